@@ -1,0 +1,139 @@
+"""Every error that rosbot_patrol raises on purpose.
+
+    PatrolError
+    |- ParamError         a parameter or a key of a configuration file
+    |- MapError           a map file or a grid that cannot be used
+    |- WorldError         a world, robot or actor description of the simulator
+    |- TransformError     a pose that cannot be had
+    |- PlanningError      no global plan
+    |  |- StartOccupied
+    |  |- GoalOccupied
+    |  |- OutOfBounds
+    |  `- NoPath
+    |- ControlError       no velocity command
+    |- ProtocolError      bytes of a peer that make no sense
+    |- DetectorError      a network, its weights or a picture
+    `- AlertError         a notice that could not be delivered
+
+A constructor takes facts and writes the sentence, so that a reader is told what and where.
+"""
+
+from __future__ import annotations
+
+
+class PatrolError(Exception):
+    """Base of all errors of this package."""
+
+
+class ParamError(PatrolError):
+    """A parameter or configuration key that cannot be used.
+
+    Args:
+        name: full name of the parameter, or "FILE: key".
+        problem: what is wrong and what was expected.
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        super().__init__(f"{name}: {problem}")
+        self.name = name
+        self.problem = problem
+
+
+class _FileError(PatrolError):
+    def __init__(self, path: object, problem: str) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = str(path)
+        self.problem = problem
+
+
+class MapError(_FileError):
+    """A map (yaml, image or grid) that cannot be used: which file, and why."""
+
+
+class WorldError(_FileError):
+    """A world, robot or actor file of the simulator that cannot be used: which file, and why."""
+
+
+class TransformError(PatrolError):
+    """The pose of one frame in another is not known (yet)."""
+
+    def __init__(self, target: str, source: str, problem: str) -> None:
+        super().__init__(f"no transform from '{source}' to '{target}': {problem}")
+        self.target = target
+        self.source = source
+
+
+class PlanningError(PatrolError):
+    """No global plan."""
+
+
+class _AtPoint(PlanningError):
+    _sentence = "({x:.2f}, {y:.2f})"
+
+    def __init__(self, x: float, y: float) -> None:
+        super().__init__(self._sentence.format(x=x, y=y))
+        self.x = x
+        self.y = y
+
+
+class StartOccupied(_AtPoint):
+    """The robot stands where the costmap says that it cannot."""
+
+    _sentence = "the start ({x:.2f}, {y:.2f}) is occupied"
+
+
+class GoalOccupied(_AtPoint):
+    """The goal lies in an obstacle."""
+
+    _sentence = "the goal ({x:.2f}, {y:.2f}) is occupied"
+
+
+class OutOfBounds(PlanningError):
+    """A point lies off the costmap.
+
+    Args:
+        what: "start" or "goal".
+    """
+
+    def __init__(self, what: str, x: float, y: float) -> None:
+        super().__init__(f"the {what} ({x:.2f}, {y:.2f}) is off the global costmap")
+        self.what = what
+        self.x = x
+        self.y = y
+
+
+class NoPath(PlanningError):
+    """Start and goal are free, but nothing connects them."""
+
+    def __init__(self, start: tuple[float, float], goal: tuple[float, float]) -> None:
+        super().__init__(
+            f"no way from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})"
+        )
+        self.start = start
+        self.goal = goal
+
+
+class ControlError(PatrolError):
+    """No velocity command that is safe could be found."""
+
+
+class ProtocolError(PatrolError):
+    """A peer sent bytes that the protocol does not allow.
+
+    Args:
+        peer: who sent them ("" where the caller adds it).
+        problem: what is wrong with them.
+    """
+
+    def __init__(self, peer: str, problem: str) -> None:
+        super().__init__(f"{peer}: {problem}" if peer else problem)
+        self.peer = peer
+        self.problem = problem
+
+
+class DetectorError(PatrolError):
+    """A network file or a picture that the detector cannot use."""
+
+
+class AlertError(PatrolError):
+    """A notice that its transport did not take."""

@@ -1,0 +1,110 @@
+"""Poses and twists in the plane (REP 103: metres, radians, x forward, y left, counter-clockwise positive).
+
+`a_from_b` is the pose of frame b in frame a, so `map_from_base = compose(map_from_odom, odom_from_base)`.
+Functions named `*_poses` take arrays of shape (N, 3): x, y, yaw.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Pose2D(NamedTuple):
+    """Position [m] and heading [rad] in the plane."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+
+    def __matmul__(self, other: Pose2D) -> Pose2D:  # type: ignore[override]
+        return compose(self, other)
+
+
+class Twist2D(NamedTuple):
+    """Velocity of a base: forward [m/s], sideways [m/s], turning [rad/s]."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    wz: float = 0.0
+
+
+STOP = Twist2D()
+
+
+def wrap_angle(angle: float) -> float:
+    """The same angle in (-pi, pi]."""
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+def wrap_angles(angles: Array) -> Array:
+    """`wrap_angle` for an array, in [-pi, pi)."""
+    return (angles + math.pi) % math.tau - math.pi
+
+
+def angle_difference(to: float, start: float) -> float:
+    """The shortest turn from `start` to `to`, in (-pi, pi]."""
+    return wrap_angle(to - start)
+
+
+def compose(a_from_b: Pose2D, b_from_c: Pose2D) -> Pose2D:
+    """a_from_c."""
+    c, s = math.cos(a_from_b.yaw), math.sin(a_from_b.yaw)
+    return Pose2D(
+        a_from_b.x + c * b_from_c.x - s * b_from_c.y,
+        a_from_b.y + s * b_from_c.x + c * b_from_c.y,
+        wrap_angle(a_from_b.yaw + b_from_c.yaw),
+    )
+
+
+def invert(a_from_b: Pose2D) -> Pose2D:
+    """b_from_a."""
+    c, s = math.cos(a_from_b.yaw), math.sin(a_from_b.yaw)
+    return Pose2D(
+        -c * a_from_b.x - s * a_from_b.y,
+        s * a_from_b.x - c * a_from_b.y,
+        wrap_angle(-a_from_b.yaw),
+    )
+
+
+def transform_points(a_from_b: Pose2D, points_b: Array) -> Array:
+    """Points of frame b, shape (N, 2), in frame a."""
+    c, s = math.cos(a_from_b.yaw), math.sin(a_from_b.yaw)
+    rotation = np.array([[c, s], [-s, c]])
+    return points_b @ rotation + np.array([a_from_b.x, a_from_b.y])
+
+
+def compose_poses(a_from_b: Pose2D, poses_b: Array) -> Array:
+    """Poses of frame b, shape (N, 3), in frame a."""
+    out = np.empty_like(poses_b)
+    out[:, :2] = transform_points(a_from_b, poses_b[:, :2])
+    out[:, 2] = wrap_angles(poses_b[:, 2] + a_from_b.yaw)
+    return out
+
+
+def distance(a: Pose2D, b: Pose2D) -> float:
+    """Distance between two positions [m]."""
+    return math.hypot(a.x - b.x, a.y - b.y)
+
+
+def quaternion_from_yaw(yaw: float) -> tuple[float, float, float, float]:
+    """(x, y, z, w) of a turn about z."""
+    return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+
+
+def yaw_from_quaternion(x: float, y: float, z: float, w: float) -> float:
+    """Heading of an orientation (roll and pitch are dropped); any length but zero.
+
+    Raises:
+        ValueError: the quaternion has no length or is not finite.
+    """
+    norm = x * x + y * y + z * z + w * w
+    if not math.isfinite(norm) or norm < 1e-12:
+        raise ValueError(f"({x}, {y}, {z}, {w}) is no orientation")
+    return math.atan2(2.0 * (w * z + x * y) / norm, 1.0 - 2.0 * (y * y + z * z) / norm)

@@ -1,0 +1,84 @@
+"""The one decorator of all numba kernels, and the folder their machine code is cached in.
+
+numba's `cache=True` does not notice that a callee in another module changed, and cannot write beside a read-only
+install. So the cache folder is named by a hash of all kernel sources, below `ROSBOT_PATROL_CACHE` (by default
+`$XDG_CACHE_HOME/rosbot_patrol`, `~/.cache/rosbot_patrol`). `python -m rosbot_patrol.kernels` compiles everything
+(set-up does it), after which a node's start only loads.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_SOURCE = Path(__file__).resolve().parent
+
+
+def kernel_sources() -> list[Path]:
+    """Files that hold kernels, sorted: every `*_kernels.py` below this package."""
+    return sorted(_SOURCE.rglob("*_kernels.py"))
+
+
+@functools.lru_cache(maxsize=1)
+def cache_dir() -> Path:
+    """Folder of the compiled kernels for exactly these sources and this numba."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in kernel_sources():
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    shipped = os.environ.get("ROSBOT_PATROL_CACHE", "")
+    base = Path(shipped) if shipped else _user_cache()
+    return base / f"numba-{digest.hexdigest()[:16]}"
+
+
+def _user_cache() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "rosbot_patrol"
+
+
+def kernel(*signatures: str, **options: Any) -> Callable[[F], F]:
+    """Compile a function with the given explicit numba signatures: cached, without the GIL, in no object mode.
+
+    With signatures the code is compiled (or loaded from the cache) when its module is imported, so nothing compiles
+    in mid-drive. Arguments that fit no signature raise TypeError at the call: pass contiguous arrays of the declared
+    types. `NUMBA_DISABLE_JIT=1` leaves the plain Python function.
+
+    Args:
+        signatures: numba type strings such as "float64[::1](float64[:, ::1], int64)".
+        options: further options of `numba.njit` (fastmath, inline, parallel is not allowed here).
+    """
+    numba.config.CACHE_DIR = str(cache_dir())
+
+    def decorate(function: F) -> F:
+        compiled: F = numba.njit(list(signatures) or None, cache=True, nogil=True, **options)(function)
+        return compiled
+
+    return decorate
+
+
+def warm(say: Callable[[str], None] = print) -> float:
+    """Import every kernel module, so that all is compiled and cached; returns the seconds taken."""
+    start = time.perf_counter()
+    sources = kernel_sources()
+    for i, path in enumerate(sources, 1):
+        dotted = ".".join(("rosbot_patrol", *path.relative_to(_SOURCE).with_suffix("").parts))
+        before = time.perf_counter()
+        importlib.import_module(dotted)
+        say(f"  [{i}/{len(sources)}] {dotted}: {time.perf_counter() - before:.1f} s")
+    return time.perf_counter() - start
+
+
+if __name__ == "__main__":
+    seconds = warm()
+    sys.stdout.write(f"kernels ready in {seconds:.1f} s, cached in {cache_dir()}\n")

@@ -1,0 +1,219 @@
+"""Declare parameters as dataclass fields, check them once at the edge.
+
+One frozen, keyword-only dataclass per node or plug-in declares names (upstream's), defaults, units and bounds:
+
+    @dataclass(frozen=True, kw_only=True)
+    class DriveParams:
+        max_vel_x: float = param(0.5, unit="m/s", lo=0.0, doc="top forward speed")
+
+    params = load(DriveParams, rospy.get_param("~", {}), name="~")
+
+Differs from dynamic parameter look-ups: every name, type and bound is checked before a node does anything, and a
+name that no declaration knows is warned of, with the nearest known one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import logging
+import math
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
+
+from rosbot_patrol.errors import ParamError
+
+log = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+_META = "rosbot_patrol.param"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ParamInfo:
+    """What a declaration says beyond type and default."""
+
+    unit: str = ""
+    lo: float | None = None
+    hi: float | None = None
+    choices: tuple[Any, ...] = ()
+    doc: str = ""
+    name: str = ""
+    check: Callable[[Any], str | None] | None = None
+
+
+def param(
+    default: Any = dataclasses.MISSING,
+    *,
+    unit: str = "",
+    lo: float | None = None,
+    hi: float | None = None,
+    choices: Iterable[Any] = (),
+    doc: str = "",
+    name: str = "",
+    check: Callable[[Any], str | None] | None = None,
+) -> Any:
+    """Declare one parameter as a dataclass field.
+
+    Args:
+        default: its value where none is given; without it the parameter must be given. Lists and dicts are copied.
+        unit: SI unit, for the table and the message.
+        lo: smallest value allowed, hi: largest; for a sequence they hold for each element.
+        choices: values allowed.
+        doc: one line for the README's table.
+        name: upstream's name where it is no Python name or differs from the field's.
+        check: returns what is wrong with a value, or None.
+    """
+    info = ParamInfo(unit=unit, lo=lo, hi=hi, choices=tuple(choices), doc=doc, name=name, check=check)
+    metadata = {_META: info}
+    if isinstance(default, (list, dict)):
+        frozen = default
+        return dataclasses.field(default_factory=lambda: type(frozen)(frozen), metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def load(cls: type[T], tree: Mapping[str, Any], *, name: str = "~", ignore: Iterable[str] = ()) -> T:
+    """Build `cls` from a tree of plain values, checking each.
+
+    Args:
+        cls: a dataclass whose fields are declared by `param`, or are such dataclasses themselves.
+        tree: nested dicts, as of `rospy.get_param("~", {})` or a yaml file.
+        name: prefix of the names in messages: "~", "/move_base/", "FILE: ".
+        ignore: names that belong to somebody else and are not warned of.
+
+    Raises:
+        ParamError: a value is missing, of the wrong type or out of bounds; names the parameter and what was expected.
+    """
+    if not isinstance(tree, Mapping):
+        raise ParamError(name, f"expected a group of parameters, got {tree!r}")
+    hints = typing.get_type_hints(cls)
+    values: dict[str, Any] = {}
+    known: set[str] = set(ignore)
+    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        info: ParamInfo = field.metadata.get(_META, ParamInfo())
+        key = info.name or field.name
+        known.add(key)
+        if key in tree:
+            values[field.name] = _convert(hints[field.name], tree[key], info, name + key)
+        elif _is_required(field):
+            raise ParamError(name + key, f"is missing, expected {_describe(hints[field.name], info)}")
+        elif dataclasses.is_dataclass(hints[field.name]) and field.default_factory is hints[field.name]:
+            values[field.name] = load(hints[field.name], {}, name=name + key + "/")
+    for key in tree:
+        if key not in known:
+            near = difflib.get_close_matches(str(key), [str(k) for k in known], n=1)
+            hint = f", did you mean '{near[0]}'?" if near else ""
+            log.warning("%s%s is not a parameter known here%s", name, key, hint)
+    return cls(**values)
+
+
+def declared(cls: type) -> list[tuple[str, str, Any, ParamInfo]]:
+    """The parameters of `cls` as (name, type, default, info), for tables; required ones have default MISSING."""
+    hints = typing.get_type_hints(cls)
+    rows = []
+    for field in dataclasses.fields(cls):
+        info: ParamInfo = field.metadata.get(_META, ParamInfo())
+        default = field.default
+        if default is dataclasses.MISSING and field.default_factory is not dataclasses.MISSING:
+            default = field.default_factory()
+        rows.append((info.name or field.name, _type_name(hints[field.name]), default, info))
+    return rows
+
+
+def table(cls: type) -> str:
+    """A Markdown table of the parameters of `cls`."""
+    lines = ["| parameter | default | unit | meaning |", "|---|---|---|---|"]
+    for key, _, default, info in declared(cls):
+        if dataclasses.is_dataclass(default):
+            continue
+        shown = "(required)" if default is dataclasses.MISSING else f"`{default}`"
+        lines.append(f"| `{key}` | {shown} | {info.unit} | {info.doc} |")
+    return "\n".join(lines)
+
+
+def _is_required(field: dataclasses.Field[Any]) -> bool:
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+
+
+def _convert(hint: Any, value: Any, info: ParamInfo, name: str) -> Any:
+    if dataclasses.is_dataclass(hint):
+        return load(hint, value, name=name + "/")  # type: ignore[arg-type]
+    value = _typed(hint, value, name, info)
+    _check_bounds(value, info, name)
+    return value
+
+
+def _typed(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
+    origin = typing.get_origin(hint)
+    if origin in (typing.Union, types.UnionType):
+        if value is None and type(None) in typing.get_args(hint):
+            return None
+        inner = [a for a in typing.get_args(hint) if a is not type(None)]
+        return _typed(inner[0], value, name, info)
+    if origin in (list, tuple):
+        return _sequence(hint, value, name, info)
+    if origin is dict:
+        if isinstance(value, Mapping):
+            return dict(value)
+    elif hint is Any:
+        return value
+    elif hint is float:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value):
+            return float(value)
+    elif hint is int:
+        if isinstance(value, int) and not isinstance(value, bool):
+            return value
+        if isinstance(value, float) and value.is_integer():
+            return int(value)
+    elif isinstance(value, hint):
+        return value
+    raise ParamError(name, f"expected {_describe(hint, info)}, got {value!r}")
+
+
+def _sequence(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
+    if not isinstance(value, (list, tuple)):
+        raise ParamError(name, f"expected {_describe(hint, info)}, got {value!r}")
+    args = typing.get_args(hint)
+    kind = typing.get_origin(hint)
+    if kind is list or (len(args) == 2 and args[1] is Ellipsis):
+        inner = [args[0]] * len(value)
+    else:
+        inner = list(args)
+        if len(inner) != len(value):
+            raise ParamError(name, f"expected {len(inner)} values, got {len(value)}: {value!r}")
+    items = [
+        load(h, v, name=f"{name}[{i}]/") if dataclasses.is_dataclass(h) else _typed(h, v, f"{name}[{i}]", info)
+        for i, (h, v) in enumerate(zip(inner, value, strict=True))
+    ]
+    return kind(items)
+
+
+def _check_bounds(value: Any, info: ParamInfo, name: str) -> None:
+    for item in value if isinstance(value, (list, tuple)) else [value]:
+        if isinstance(item, (int, float)) and not isinstance(item, bool):
+            if info.lo is not None and item < info.lo:
+                raise ParamError(name, f"is {item}, expected at least {info.lo} {info.unit}".rstrip())
+            if info.hi is not None and item > info.hi:
+                raise ParamError(name, f"is {item}, expected at most {info.hi} {info.unit}".rstrip())
+        if info.choices and item not in info.choices:
+            raise ParamError(name, f"is {item!r}, expected one of {', '.join(map(str, info.choices))}")
+    if info.check is not None:
+        problem = info.check(value)
+        if problem:
+            raise ParamError(name, problem)
+
+
+def _type_name(hint: Any) -> str:
+    return getattr(hint, "__name__", str(hint)) if typing.get_origin(hint) is None else str(hint)
+
+
+def _describe(hint: Any, info: ParamInfo) -> str:
+    text = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}.get(
+        _type_name(hint), _type_name(hint)
+    )
+    if info.choices:
+        text += f" of {', '.join(map(str, info.choices))}"
+    return f"{text} [{info.unit}]" if info.unit else text

@@ -1,0 +1,47 @@
+"""What a callback stores and a step reads."""
+
+from __future__ import annotations
+
+import threading
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class Latest(Generic[T]):
+    """The newest value of an input, with the time it was stored; safe between threads."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._value: T | None = None
+        self._stamp = float("-inf")
+        self._count = 0
+
+    def set(self, value: T, stamp: float) -> None:
+        """Store a value seen at `stamp` [s]."""
+        with self._lock:
+            self._value, self._stamp, self._count = value, stamp, self._count + 1
+
+    def get(self) -> T | None:
+        """The newest value, None before the first."""
+        return self._value
+
+    def take(self) -> T | None:
+        """The newest value, which is then gone."""
+        with self._lock:
+            value, self._value = self._value, None
+            return value
+
+    @property
+    def stamp(self) -> float:
+        """When the newest value was stored [s], -inf before the first."""
+        return self._stamp
+
+    @property
+    def count(self) -> int:
+        """How many values have come in all."""
+        return self._count
+
+    def fresh(self, now: float, timeout: float) -> bool:
+        """Whether the newest value is at most `timeout` [s] old. A clock that went back counts as stale."""
+        return self._value is not None and 0.0 <= now - self._stamp <= timeout

@@ -1,0 +1,94 @@
+"""What all nodes share: starting, failing at start in one sentence, and a loop on wall or ROS time."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import rospy
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import PatrolError
+from rosbot_patrol.ros import logs
+
+T = TypeVar("T")
+
+log = logging.getLogger(__name__)
+
+
+def run_node(name: str, body: Callable[[], None], **init_options: Any) -> None:
+    """Start a node and run `body`; a PatrolError or a bad file is logged in one sentence and the program exits 1.
+
+    Args:
+        name: name of the node where the launch file gives none.
+        body: builds and runs it; returns on shutdown.
+        init_options: further arguments of `rospy.init_node`.
+    """
+    rospy.init_node(name, **init_options)
+    logs.install()
+    try:
+        body()
+    except (PatrolError, OSError) as err:
+        rospy.logfatal("%s: %s", rospy.get_name(), err)
+        time.sleep(0.3)  # /rosout is sent by another thread
+        rospy.signal_shutdown(str(err))
+        sys.stdout.flush()
+        os._exit(1)
+    except rospy.ROSInterruptException:
+        return
+
+
+def load_params(cls: type[T], *, ignore: Iterable[str] = (), tree: dict[str, Any] | None = None) -> T:
+    """The node's private parameters through their declaration (one round trip to the master)."""
+    if tree is None:
+        tree = rospy.get_param("~", {}) or {}
+    return params.load(cls, tree, name=rospy.get_name() + "/", ignore=ignore)
+
+
+def now() -> float:
+    """ROS time [s]."""
+    return float(rospy.get_time())
+
+
+class Loop(threading.Thread):
+    """Calls `step(now)` at a rate of ROS time on its own thread, without hanging when simulated time stops.
+
+    A step that takes too long is followed by the next at once; the loop does not catch up. A PatrolError or any other
+    exception of the step ends the node loudly: the launch file's respawn brings it back.
+    """
+
+    def __init__(self, rate: float, step: Callable[[float], None], *, name: str = "loop") -> None:
+        super().__init__(name=name, daemon=True)
+        self._period = 1.0 / rate
+        self._step = step
+
+    def run(self) -> None:
+        """Run until shutdown."""
+        due = now()
+        while not rospy.is_shutdown():
+            current = now()
+            if current + 1.0 < due:  # time went back
+                due = current
+            if current < due:
+                self._wait(due - current)
+                continue
+            due = max(due + self._period, current)
+            try:
+                self._step(current)
+            except rospy.ROSException:
+                if rospy.is_shutdown():
+                    return
+                raise
+            except Exception:
+                log.critical("%s: step failed, the node ends", rospy.get_name(), exc_info=True)
+                time.sleep(0.3)
+                os._exit(1)
+
+    def _wait(self, seconds: float) -> None:
+        # Under simulated time the clock may run faster or slower than the wall: look often, never block for good.
+        time.sleep(min(max(seconds / 3.0, 0.001), 0.01))

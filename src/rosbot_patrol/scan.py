@@ -1,0 +1,49 @@
+"""A planar laser scan as a plain record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaserScan:
+    """One sweep (sensor_msgs/LaserScan without its header's frame handling).
+
+    Attributes:
+        stamp: time of the first ray [s].
+        frame_id: frame of the sensor; angle 0 is its x axis, counter-clockwise positive.
+        angle_min: angle of the first beam [rad]; angle_increment: from beam to beam [rad].
+        range_min, range_max: beams outside are no measurement [m].
+        ranges: beam lengths [m], shape (N,), inf where nothing was hit.
+    """
+
+    stamp: float
+    frame_id: str
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    ranges: Array
+
+    @property
+    def angles(self) -> Array:
+        """Angle of each beam [rad], shape (N,)."""
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges))
+
+    @property
+    def is_hit(self) -> NDArray[np.bool_]:
+        """Which beams measured something, shape (N,)."""
+        with np.errstate(invalid="ignore"):
+            return np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
+
+
+def scan_points(scan: LaserScan) -> Array:
+    """End points of the beams that hit, in the sensor's frame [m], shape (N, 2)."""
+    hit = scan.is_hit
+    lengths, angles = scan.ranges[hit], scan.angles[hit]
+    return np.column_stack((lengths * np.cos(angles), lengths * np.sin(angles)))

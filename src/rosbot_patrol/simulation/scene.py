@@ -1,0 +1,120 @@
+"""What a simulated world is made of, for physics and for the camera alike: bodies with shapes, poses and looks.
+
+Poses are homogeneous matrices of shape (4, 4), `world_from_body`, `body_from_visual` (metres, x forward, z up).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Matrix = NDArray[np.float64]
+ShapeKind = Literal["box", "cylinder", "sphere", "capsule", "plane", "mesh"]
+BodyKind = Literal["floor", "wall", "furniture", "person", "fire_hydrant", "robot", "pet", "door", "object"]
+
+
+def identity() -> Matrix:
+    """The pose that changes nothing, shape (4, 4)."""
+    return np.eye(4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """A geometric primitive about its own origin.
+
+    Attributes:
+        kind: box (size = x, y, z), cylinder (radius, length along z), sphere (radius,), capsule (radius, length of
+            the cylindric part along z), plane (x, y; normal +z), mesh (scale x, y, z).
+        mesh: file of a mesh (stl, obj, dae), or None.
+        vertices, faces: a mesh in memory instead of a file, shapes (V, 3) and (F, 3), or None.
+    """
+
+    kind: ShapeKind
+    size: tuple[float, ...] = ()
+    mesh: Path | None = None
+    vertices: NDArray[np.float64] | None = None
+    faces: NDArray[np.int64] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """Colour (linear 0 to 1, RGBA), and optionally the name of one of the renderer's procedural textures."""
+
+    rgba: tuple[float, float, float, float] = (0.7, 0.7, 0.7, 1.0)
+    texture: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Visual:
+    """A shape that the camera sees."""
+
+    shape: Shape
+    pose: Matrix = field(default_factory=identity)
+    material: Material = Material()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collision:
+    """A shape that the lidar and the robot's wheels feel."""
+
+    shape: Shape
+    pose: Matrix = field(default_factory=identity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A named thing. `pose` is world_from_body at the start; `static` things never move."""
+
+    name: str
+    kind: BodyKind = "object"
+    pose: Matrix = field(default_factory=identity)
+    static: bool = True
+    visuals: tuple[Visual, ...] = ()
+    collisions: tuple[Collision, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Intrinsics:
+    """A pinhole camera without distortion: size [px], focal lengths and principal point [px], clip distances [m]."""
+
+    width: int = 640
+    height: int = 480
+    fx: float = 554.3827
+    fy: float = 554.3827
+    cx: float = 320.0
+    cy: float = 240.0
+    near: float = 0.1
+    far: float = 100.0
+
+
+class SceneRenderer(Protocol):
+    """Draws a scene of bodies; one per process and thread."""
+
+    def add(self, body: Body) -> None:
+        """Put a body into the scene; its name must be new."""
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the scene."""
+
+    def move(self, name: str, world_from_body: Matrix) -> None:
+        """Put a body elsewhere."""
+
+    def pose_visuals(self, name: str, body_from_visuals: Matrix) -> None:
+        """Move the visuals of a body against it (limbs, wheels), shape (number of visuals, 4, 4)."""
+
+    def render(
+        self, world_from_optical: Matrix, intrinsics: Intrinsics
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """The picture of a camera whose optical frame (x right, y down, z forward) has that pose.
+
+        Returns:
+            Colour, RGB, shape (height, width, 3), and depth along the optical axis [m], shape (height, width),
+            inf where nothing is nearer than the far clip.
+        """
+
+    def close(self) -> None:
+        """Give the renderer's resources back."""
