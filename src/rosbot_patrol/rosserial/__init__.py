@@ -1,0 +1,1 @@
+"""rosserial: framing and negotiation as pure state machines, and a small server and device over real links."""

@@ -1,0 +1,134 @@
+"""Framing of rosserial (protocol version 0xfe, since hydro).
+
+    ff fe | length, int16 LE | 255 - sum(length bytes) % 256 | topic id, uint16 LE | data | 255 - sum(id, data) % 256
+
+The parser takes bytes in pieces of any size and gives whole frames. Whatever is no frame is counted and skipped: it
+looks for the next sync bytes right behind the ones that failed, so a frame that was cut off costs itself only.
+
+Differs: rosserial_python reads the length that a damaged header claims and loses the good frames behind it.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+from rosbot_patrol.errors import ProtocolError
+
+SYNC = b"\xff\xfe"
+HEADER = 7  # up to and with the topic id
+OVERHEAD = HEADER + 1
+MAX_PAYLOAD = 0x7FFF
+
+
+class Packet(NamedTuple):
+    """One frame: which topic, and its serialised message."""
+
+    topic_id: int
+    data: bytes
+
+
+def checksum(data: bytes | bytearray | memoryview) -> int:
+    """The byte that makes the sum of `data` and itself 255 modulo 256."""
+    return 255 - sum(data) % 256
+
+
+def encode(topic_id: int, data: bytes = b"") -> bytes:
+    """One frame.
+
+    Raises:
+        ProtocolError: the data are longer than the format can say.
+    """
+    if len(data) > MAX_PAYLOAD:
+        raise ProtocolError("", f"{len(data)} bytes for topic id {topic_id}, a frame holds {MAX_PAYLOAD}")
+    length = struct.pack("<H", len(data))
+    body = struct.pack("<H", topic_id) + data
+    return b"".join((SYNC, length, bytes((checksum(length),)), body, bytes((checksum(body),))))
+
+
+class Parser:
+    """Turns a stream of bytes into frames; never raises, and holds at most one frame of `max_payload` bytes.
+
+    Attributes:
+        frames: good frames so far.
+        garbage: bytes skipped so far because they belonged to none.
+        bad_checksums: frames whose data did not add up.
+        oversized: headers that announced more than `max_payload` bytes.
+        garbage_run: bytes skipped since the last good frame.
+    """
+
+    def __init__(self, max_payload: int = MAX_PAYLOAD) -> None:
+        self.max_payload = min(max_payload, MAX_PAYLOAD)
+        self.frames = 0
+        self.garbage = 0
+        self.bad_checksums = 0
+        self.oversized = 0
+        self.garbage_run = 0
+        self._buffer = bytearray()
+
+    @property
+    def pending(self) -> int:
+        """Bytes of a frame that has begun and not ended."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes) -> list[Packet]:
+        """Take bytes as they came; return the frames that they complete."""
+        self._buffer += data
+        packets = []
+        start = 0
+        while True:
+            start, packet = self._next(start)
+            if packet is None:
+                break
+            packets.append(packet)
+        del self._buffer[:start]
+        return packets
+
+    def give_up(self) -> list[Packet]:
+        """Stop waiting for the rest of the frame that has begun; return whole frames found behind its first byte."""
+        if not self._buffer:
+            return []
+        self._skip(1)
+        del self._buffer[:1]
+        return self.feed(b"")
+
+    def _next(self, start: int) -> tuple[int, Packet | None]:
+        """Where the next undecided byte is, and the frame that ended before it."""
+        buffer = self._buffer
+        while True:
+            found = buffer.find(SYNC, start)
+            if found < 0:
+                end = len(buffer) - (1 if buffer.endswith(b"\xff") and len(buffer) > start else 0)
+                self._skip(end - start)
+                return end, None
+            self._skip(found - start)
+            start = found
+            if len(buffer) - start < 5:
+                return start, None
+            size = buffer[start + 2] | buffer[start + 3] << 8
+            if (buffer[start + 2] + buffer[start + 3] + buffer[start + 4]) % 256 != 255:
+                start = self._resync(start)
+                continue
+            if size > self.max_payload:
+                self.oversized += 1
+                start = self._resync(start)
+                continue
+            end = start + OVERHEAD + size
+            if len(buffer) < end:
+                return start, None
+            if sum(buffer[start + 5 : end]) % 256 != 255:
+                self.bad_checksums += 1
+                start = self._resync(start)
+                continue
+            self.frames += 1
+            self.garbage_run = 0
+            topic_id = buffer[start + 5] | buffer[start + 6] << 8
+            return end, Packet(topic_id, bytes(buffer[start + HEADER : end - 1]))
+
+    def _resync(self, start: int) -> int:
+        self._skip(1)
+        return start + 1
+
+    def _skip(self, count: int) -> None:
+        self.garbage += count
+        self.garbage_run += count
