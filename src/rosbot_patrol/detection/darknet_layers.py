@@ -1,0 +1,155 @@
+"""The layers of a darknet network, as plain records with their shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+Shape = tuple[int, int, int]
+"""Channels, height, width."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layer:
+    """What all layers have: their place in the network (from 0, without [net]), line in the file, and shapes."""
+
+    index: int
+    line: int
+    in_shape: Shape
+    out_shape: Shape
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convolutional(Layer):
+    """A convolution; `padding` cells of zeros on each side."""
+
+    filters: int
+    size: int
+    stride: int
+    padding: int
+    groups: int
+    batch_normalize: bool
+    activation: str
+
+    @property
+    def weights_shape(self) -> tuple[int, int, int, int]:
+        """Filters, input channels of a group, rows, columns."""
+        return (self.filters, self.in_shape[0] // self.groups, self.size, self.size)
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers it has in a weights file."""
+        n, c, h, w = self.weights_shape
+        return n * c * h * w + n * (4 if self.batch_normalize else 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Maxpool(Layer):
+    """Greatest of `size` x `size`; `padding` cells in all per axis, half of them (rounded down) before the picture."""
+
+    size: int
+    stride: int
+    padding: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Route(Layer):
+    """Earlier layers side by side, of each the channels of group `group_id` of `groups`."""
+
+    layers: tuple[int, ...]
+    groups: int
+    group_id: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shortcut(Layer):
+    """The layer before plus earlier layers."""
+
+    layers: tuple[int, ...]
+    activation: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Upsample(Layer):
+    """Each cell `stride` times in both directions, multiplied by `scale`."""
+
+    stride: int
+    scale: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reorg(Layer):
+    """Darknet's own way of folding `stride` x `stride` cells into channels."""
+
+    stride: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dropout(Layer):
+    """Nothing at run time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Head(Layer):
+    """A layer whose values are boxes.
+
+    Args:
+        anchors: width and height of this head's boxes, shape (boxes of a cell, 2) as tuples; of [region] in cells, of
+            [yolo] in pixels of the network's input.
+        classes: how many classes it tells apart.
+    """
+
+    anchors: tuple[tuple[float, float], ...]
+    classes: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region(Head):
+    """YOLOv2's head."""
+
+    softmax: bool
+    background: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Yolo(Head):
+    """The head of YOLOv3 and v4; `new_coords` is scaled-YOLOv4's way of writing boxes."""
+
+    scale_x_y: float
+    new_coords: bool
+
+
+@dataclass(frozen=True)
+class NetworkSpec:
+    """A whole network.
+
+    Args:
+        source: the file it came from, for messages.
+        channels: of the input, height and width of it [px].
+        layers: in order.
+    """
+
+    source: str
+    channels: int
+    height: int
+    width: int
+    layers: tuple[Layer, ...]
+
+    @property
+    def convolutions(self) -> list[Convolutional]:
+        """The layers that have weights, in the order of the weights file."""
+        return [layer for layer in self.layers if isinstance(layer, Convolutional)]
+
+    @property
+    def heads(self) -> list[Head]:
+        """The layers that give boxes."""
+        return [layer for layer in self.layers if isinstance(layer, Head)]
+
+    @property
+    def classes(self) -> int:
+        """How many classes it tells apart."""
+        return self.heads[0].classes if self.heads else 0
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers its weights file holds."""
+        return sum(layer.parameters for layer in self.convolutions)
