@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import pytest
+
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import load, param, table
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inner:
+    depth: int = param(3, lo=1, hi=9, doc="how deep")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outer:
+    speed: float = param(0.5, unit="m/s", lo=0.0, doc="top speed")
+    mode: str = param("a", choices=("a", "b"), doc="mode")
+    flag: bool = param(False, doc="flag")
+    names: list[str] = param(["x"], doc="names")
+    corner: tuple[float, float] = param((0.0, 0.0), doc="corner")
+    inner: Inner = param(Inner(), doc="nested")
+    maybe: float | None = param(None, doc="may be absent")
+    odd: float = param(1.0, name="acc_lim_Y", doc="another name outside")
+
+
+def test_defaults() -> None:
+    assert load(Outer, {}) == Outer()
+
+
+def test_int_becomes_float_but_a_bool_is_no_int() -> None:
+    assert load(Outer, {"speed": 1}).speed == 1.0
+    with pytest.raises(ParamError, match=r"~speed: expected a number \[m/s\], got True"):
+        load(Outer, {"speed": True})
+    with pytest.raises(ParamError, match="~inner/depth: expected a whole number"):
+        load(Outer, {"inner": {"depth": True}})
+
+
+@pytest.mark.parametrize(
+    ("tree", "said"),
+    [
+        ({"speed": -1.0}, "at least 0.0 m/s"),
+        ({"speed": float("nan")}, "expected a number"),
+        ({"mode": "c"}, "expected one of a, b"),
+        ({"flag": 1}, "expected true or false"),
+        ({"names": "x"}, "got 'x'"),
+        ({"names": [1]}, r"names\[0\]"),
+        ({"corner": [1.0]}, "expected 2 values, got 1"),
+        ({"inner": 3}, "expected a group"),
+        ({"inner": {"depth": 10}}, "at most 9"),
+    ],
+)
+def test_bad_values_name_the_parameter(tree: dict[str, object], said: str) -> None:
+    with pytest.raises(ParamError, match=said):
+        load(Outer, tree)
+
+
+def test_missing_required() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Needy:
+        path: str = param(doc="a file")
+
+    with pytest.raises(ParamError, match="/node/path: is missing, expected a text"):
+        load(Needy, {}, name="/node/")
+
+
+def test_unknown_name_is_warned_of_with_the_nearest(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        load(Outer, {"sped": 1.0})
+    assert "did you mean 'speed'?" in caplog.text
+
+
+def test_other_name_and_table() -> None:
+    assert load(Outer, {"acc_lim_Y": 2}).odd == 2.0
+    assert "| `acc_lim_Y` | `1.0` |" in table(Outer)
+    assert "| `speed` | `0.5` | m/s | top speed |" in table(Outer)
