@@ -1,0 +1,1 @@
+"""Missions: rooms, driving there, looking around, when a detection is an intruder."""

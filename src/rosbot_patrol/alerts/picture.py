@@ -1,0 +1,93 @@
+"""A camera's picture as JPEG, with boxes drawn on it (Pillow: OpenCV would cost 98 MB)."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from PIL import Image, ImageDraw
+
+from rosbot_patrol.errors import AlertError
+
+_RED = (230, 30, 30)
+# encoding -> Pillow's raw mode, mode, bytes a pixel
+_ENCODINGS = {
+    "rgb8": ("RGB", "RGB", 3),
+    "bgr8": ("BGR", "RGB", 3),
+    "8UC3": ("BGR", "RGB", 3),
+    "rgba8": ("RGBA", "RGBA", 4),
+    "bgra8": ("BGRA", "RGBA", 4),
+    "8UC4": ("BGRA", "RGBA", 4),
+    "mono8": ("L", "L", 1),
+    "8UC1": ("L", "L", 1),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RawPicture:
+    """Pixels as a camera sends them (sensor_msgs/Image).
+
+    Attributes:
+        stamp: when it was taken [s].
+        encoding: rgb8, bgr8, rgba8, bgra8 or mono8.
+        step: bytes a row.
+    """
+
+    stamp: float
+    width: int
+    height: int
+    encoding: str
+    step: int
+    data: bytes
+
+
+@dataclass(frozen=True, kw_only=True)
+class LabelledBox:
+    """A box to draw: label and corners [px]."""
+
+    text: str
+    xmin: int
+    ymin: int
+    xmax: int
+    ymax: int
+
+
+def to_jpeg(picture: RawPicture, boxes: Sequence[LabelledBox] = (), *, quality: int = 88) -> bytes:
+    """The picture with its boxes.
+
+    Raises:
+        AlertError: an encoding that is not known, or too few bytes.
+    """
+    image = _decode(picture)
+    draw = ImageDraw.Draw(image)
+    for box in boxes:
+        _draw_box(draw, box)
+    out = io.BytesIO()
+    image.save(out, "JPEG", quality=quality)
+    return out.getvalue()
+
+
+def _decode(picture: RawPicture) -> Image.Image:
+    known = _ENCODINGS.get(picture.encoding)
+    if known is None:
+        raise AlertError(f"a picture in the encoding '{picture.encoding}' cannot be attached")
+    raw_mode, mode, pixel = known
+    rows = picture.height * picture.step
+    if min(picture.width, picture.height) < 1 or picture.step < picture.width * pixel or len(picture.data) < rows:
+        raise AlertError(
+            f"a picture of {picture.width} x {picture.height} {picture.encoding} came with {len(picture.data)} bytes"
+        )
+    size = (picture.width, picture.height)
+    image = Image.frombytes(mode, size, picture.data, "raw", raw_mode, picture.step)
+    return image.convert("RGB")
+
+
+def _draw_box(draw: ImageDraw.ImageDraw, box: LabelledBox) -> None:
+    left, right = sorted((box.xmin, box.xmax))
+    top, bottom = sorted((box.ymin, box.ymax))
+    draw.rectangle((left, top, right, bottom), outline=_RED, width=3)
+    text = box.text.encode("latin-1", "replace").decode("latin-1")  # all that the built-in font has
+    text_box = draw.textbbox((left + 3, max(top - 13, 1)), text)
+    draw.rectangle((text_box[0] - 2, text_box[1] - 1, text_box[2] + 2, text_box[3] + 1), fill=_RED)
+    draw.text((left + 3, max(top - 13, 1)), text, fill=(255, 255, 255))

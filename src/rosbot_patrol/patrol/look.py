@@ -1,0 +1,120 @@
+"""The look around in a room: one full turn before a live detector, and whether it may be relied on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.inputs import Inputs
+from rosbot_patrol.patrol.spin import Spin, SpinParams
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookParams:
+    """What a look around needs to count."""
+
+    detector_timeout: float = param(3.0, unit="s", lo=0.1, doc="a detector silent for longer has not watched")
+    camera_timeout: float = param(3.0, unit="s", lo=0.1, doc="a camera silent for longer has not watched")
+    detector_wait: float = param(10.0, unit="s", lo=0.0, doc="wait this long for detector and camera before turning")
+    linger: float = param(1.0, unit="s", lo=0.0, hi=30.0, doc="wait after the turn for the detector's last pictures")
+    hold: float = param(2.0, unit="s", lo=0.0, hi=30.0, doc="stand still this long while something may be an intruder")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookStep:
+    """What to do now.
+
+    Attributes:
+        speed: turning speed [rad/s].
+        done: the look is over.
+        problem: why it does not count as a look at the whole room, "" where it does.
+        why: what it does, for people.
+    """
+
+    speed: float = 0.0
+    done: bool = False
+    problem: str = ""
+    why: str = ""
+
+
+class Look:
+    """One look around.
+
+    Args:
+        needs_camera: whether pictures come to this program, too, so that a silent camera can be told.
+    """
+
+    def __init__(self, params: LookParams, spin: SpinParams, *, needs_camera: bool = True) -> None:
+        self.params = params
+        self.spin = Spin(math.tau, clockwise=False, params=spin)
+        self._needs_camera = needs_camera
+        self._began: float | None = None
+        self._turning = False
+        self._turned_at: float | None = None
+        self._problem = ""
+        self._held_since: float | None = None
+        self._held_out_until = -math.inf
+
+    def step(self, now: float, inputs: Inputs, *, candidate: bool) -> LookStep:
+        """Wait for the eyes, turn, linger.
+
+        Args:
+            now: time [s].
+            inputs: of this step.
+            candidate: something is in view that may become an intruder.
+        """
+        if self._began is None or now < self._began - 1.0:
+            self._began = now
+        if self._turned_at is not None:
+            return self._linger(now, inputs)
+        if not self._turning:
+            blind = self._blind(now, inputs)
+            if blind and now - self._began < self.params.detector_wait:
+                return LookStep(why=f"waiting before the turn: {blind}")
+            self._turning = True
+        self._note_blindness(now, inputs)
+        step = self.spin.step(now, inputs.yaw, inputs.clearance, hold=self._hold(now, candidate))
+        if step.done:
+            self._problem = step.problem or self._problem
+            self._turned_at = now
+        return LookStep(speed=step.speed, why=f"turning to look around, {self._progress()}")
+
+    def _progress(self) -> str:
+        return f"{max(self.spin.turned_deg, 0.0) // 30 * 30:.0f} of 360 degrees"
+
+    def _linger(self, now: float, inputs: Inputs) -> LookStep:
+        assert self._turned_at is not None
+        self._note_blindness(now, inputs)
+        waited = now - self._turned_at
+        done = waited >= self.params.linger or waited < 0.0
+        return LookStep(done=done, problem=self._problem, why="waiting for the detector's last pictures")
+
+    def _note_blindness(self, now: float, inputs: Inputs) -> None:
+        if not self._problem:
+            self._problem = self._blind(now, inputs)
+
+    def _blind(self, now: float, inputs: Inputs) -> str:
+        silent = _silent(now, inputs.detector_at, self.params.detector_timeout)
+        if silent:
+            return f"the detector {silent}"
+        silent = _silent(now, inputs.camera_at, self.params.camera_timeout) if self._needs_camera else ""
+        return f"the camera {silent}" if silent else ""
+
+    def _hold(self, now: float, candidate: bool) -> bool:
+        if not candidate or now < self._held_out_until:
+            self._held_since = None
+            return False
+        if self._held_since is None:
+            self._held_since = now
+        if now - self._held_since > self.params.hold:
+            self._held_out_until = now + 1.5  # it had its chance: turn on past it
+            self._held_since = None
+            return False
+        return True
+
+
+def _silent(now: float, last: float, timeout: float) -> str:
+    if last == -math.inf:
+        return "has not been heard"
+    return f"was silent for more than {timeout:g} s" if now - last > timeout else ""

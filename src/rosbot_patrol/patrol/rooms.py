@@ -1,0 +1,183 @@
+"""The points file: where each room is looked at from.
+
+Matches the tutorial's room_points.yaml (`rooms_num`, `rooms: room0: {name, x, y, angle}`).
+
+Differs:
+- `angle_unit: deg|rad` names the unit of `angle`; without it the file is read in radians as the original reads it,
+  with a warning for each angle beyond a full turn.
+- `rooms_num` has to agree with the rooms listed; each fault is one sentence that names file and key.
+- A key that stands twice is a fault, where yaml itself keeps the last.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.geometry import Pose2D, wrap_angle
+
+log = logging.getLogger(__name__)
+
+MAX_ROOMS = 256  # EspTrigger.id is a byte
+
+
+@dataclass(frozen=True, kw_only=True)
+class Room:
+    """A point to look from; room 0 is the base.
+
+    Attributes:
+        id: what a motion sensor sends.
+        name: for people.
+        pose: place and heading in the frame `map`.
+    """
+
+    id: int
+    name: str
+    pose: Pose2D
+
+    @property
+    def title(self) -> str:
+        """Number and name, as in "room 3 (kitchen)"."""
+        return f"room {self.id} ({self.name})"
+
+
+class Rooms:
+    """The rooms of one points file."""
+
+    def __init__(self, rooms: tuple[Room, ...], source: str = "the points file") -> None:
+        if not rooms:
+            raise ParamError(source, "lists no room, expected at least room0, the base")
+        self._rooms = {room.id: room for room in rooms}
+        self.source = source
+
+    @property
+    def base(self) -> Room:
+        """Room 0, where the robot waits."""
+        return self._rooms[0]
+
+    def find(self, room_id: int) -> Room | None:
+        """The room of a sensor's id, None where the file has none."""
+        return self._rooms.get(room_id)
+
+    def refusal(self, room_id: int) -> str:
+        """Why an id is not taken, in one sentence."""
+        return f"there is no room {room_id}: {self.source} has the rooms 0 to {max(self._rooms)}"
+
+    def __iter__(self) -> Iterator[Room]:
+        return iter(self._rooms.values())
+
+    def __len__(self) -> int:
+        return len(self._rooms)
+
+
+def _not_finite(value: float) -> str | None:
+    return None if math.isfinite(value) else f"is {value}, expected a finite number"
+
+
+def _bad_name(value: str) -> str | None:
+    if not value.strip():
+        return "is empty, expected a name"
+    if not value.isprintable():
+        return f"is {value!r}, expected one line without control characters"
+    return None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Entry:
+    name: str = params.param(doc="for people", check=_bad_name)
+    x: float = params.param(unit="m", check=_not_finite)
+    y: float = params.param(unit="m", check=_not_finite)
+    angle: float = params.param(doc="heading, in the file's angle_unit", check=_not_finite)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _File:
+    rooms_num: int = params.param(lo=1, hi=MAX_ROOMS, doc="how many rooms are listed, room0 with them")
+    rooms: dict[str, Any] = params.param(doc="room0, room1, ...")
+    angle_unit: str = params.param("", choices=("", "deg", "rad"), doc="unit of every angle")
+
+
+def load_rooms(path: str | Path) -> Rooms:
+    """Read a points file.
+
+    Raises:
+        ParamError: it cannot be read or is wrong; names the file and the key.
+    """
+    path = Path(path)
+    prefix = f"{path}: "
+    file = params.load(_File, _read(path), name=prefix)
+    expected = [f"room{i}" for i in range(file.rooms_num)]
+    _check_listed(file, expected, prefix)
+    return Rooms(tuple(_room(file, i, key, prefix) for i, key in enumerate(expected)), str(path))
+
+
+def _check_listed(file: _File, expected: list[str], prefix: str) -> None:
+    missing = [key for key in expected if key not in file.rooms]
+    extra = [str(key) for key in file.rooms if key not in expected]
+    if missing or extra:
+        parts = [f"{', '.join(missing)} not listed"] * bool(missing)
+        parts += [f"{', '.join(extra)} beyond it"] * bool(extra)
+        first, last = expected[0], expected[-1]
+        raise ParamError(
+            prefix + "rooms_num",
+            f"is {file.rooms_num}, expected exactly {first} to {last} under rooms: {' and '.join(parts)}",
+        )
+
+
+def _room(file: _File, index: int, key: str, prefix: str) -> Room:
+    entry = params.load(_Entry, file.rooms[key], name=f"{prefix}rooms/{key}/")
+    angle = math.radians(entry.angle) if file.angle_unit == "deg" else entry.angle
+    if not file.angle_unit and abs(entry.angle) > math.tau:
+        log.warning(
+            "%srooms/%s/angle is %g and is read in radians (%.1f degrees), as the file has no angle_unit;"
+            " is it in degrees? Then add 'angle_unit: deg'",
+            prefix,
+            key,
+            entry.angle,
+            math.degrees(wrap_angle(entry.angle)),
+        )
+    return Room(id=index, name=entry.name.strip(), pose=Pose2D(entry.x, entry.y, wrap_angle(angle)))
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """A loader for which a key that stands twice is an error."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        seen: set[object] = set()
+        for key_node, _ in node.value:
+            if isinstance(key_node, yaml.ScalarNode) and key_node.tag != "tag:yaml.org,2002:merge":
+                if key_node.value in seen:
+                    raise yaml.constructor.ConstructorError(
+                        None, None, f"the key '{key_node.value}' stands twice", key_node.start_mark
+                    )
+                seen.add(key_node.value)
+        return super().construct_mapping(node, deep)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as err:
+        raise ParamError(str(path), f"is no text in UTF-8 ({err.reason} at byte {err.start})") from err
+    except OSError as err:
+        raise ParamError(str(path), f"cannot be read: {err.strerror}") from err
+    try:
+        tree = yaml.load(text, _StrictLoader)
+    except yaml.MarkedYAMLError as err:
+        where = (
+            f" at line {err.problem_mark.line + 1}, column {err.problem_mark.column + 1}" if err.problem_mark else ""
+        )
+        raise ParamError(str(path), f"is no valid yaml{where}: {err.problem}") from err
+    except yaml.YAMLError as err:
+        raise ParamError(str(path), f"is no valid yaml: {' '.join(str(err).split())}") from err
+    if not isinstance(tree, dict):
+        raise ParamError(str(path), f"expected the keys rooms_num and rooms, got {str(tree)[:40]!r}")
+    return tree

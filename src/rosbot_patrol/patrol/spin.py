@@ -1,0 +1,139 @@
+"""Turn on the spot by an angle that is measured, not timed.
+
+Differs from the original's makeSpin (CONTRACTS A0, quirks 3 to 5):
+- the turned angle is the sum of wrapped yaw increments of odom -> base_link, so a full turn can be asked for and a
+  wobble the wrong way counts as what it is;
+- it slows down towards the end and ends with a zero twist; it ends at a time-out, too, and says why;
+- it waits while something is too near to turn, and gives up when that stays.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.geometry import angle_difference
+from rosbot_patrol.params import param
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpinParams:
+    """How to turn on the spot."""
+
+    spin_speed: float = param(0.75, unit="rad/s", lo=0.05, hi=6.0, doc="top speed of the look-around")
+    spin_min_speed: float = param(0.2, unit="rad/s", lo=0.01, hi=6.0, doc="slowest speed that still turns the robot")
+    spin_deceleration: float = param(0.6, unit="rad/s^2", lo=0.01, doc="how it slows down towards the end")
+    spin_latency: float = param(0.1, unit="s", lo=0.0, hi=2.0, doc="from a command to its effect in the pose")
+    spin_settle: float = param(0.4, unit="s", lo=0.0, hi=5.0, doc="time at rest before the angle is read")
+    spin_timeout: float = param(0.0, unit="s", lo=0.0, doc="longest turn, pauses apart; 0: three times what it takes")
+    spin_clearance: float = param(0.22, unit="m", lo=0.0, hi=2.0, doc="do not turn with something nearer than this")
+    spin_wait: float = param(10.0, unit="s", lo=0.0, doc="wait this long for an obstacle to go or the pose to come")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpinStep:
+    """What to do now.
+
+    Attributes:
+        speed: turning speed to command [rad/s].
+        done: the turn is over, well or not.
+        problem: why it ended early, "" where it did not.
+    """
+
+    speed: float
+    done: bool = False
+    problem: str = ""
+
+
+def wrap_turn(radians: float) -> float:
+    """The angle to turn as the original wraps it: into [0, 2 pi]."""
+    if not math.isfinite(radians):
+        raise ValueError(f"{radians} is no angle to turn")
+    if 0.0 <= radians <= math.tau:
+        return radians
+    wrapped = math.fmod(radians, math.tau)
+    if wrapped < 0.0:
+        wrapped += math.tau
+    # whole turns beyond the first leave one turn, as subtracting 2 pi while above 2 pi does
+    return math.tau if wrapped == 0.0 and radians > 0.0 else wrapped
+
+
+class Spin:
+    """One turn, by default clockwise as the original's; feed it `step` at 20 Hz or more."""
+
+    def __init__(self, radians: float, clockwise: bool = True, *, params: SpinParams | None = None) -> None:
+        self.params = params or SpinParams()
+        self.target = wrap_turn(radians)
+        self._sign = -1.0 if clockwise else 1.0
+        self.turned = 0.0
+        self._yaw: float | None = None
+        self._last: float | None = None
+        self._active = 0.0
+        self._idle = 0.0
+        self._settling: float | None = None
+        speed = max(self.params.spin_speed, self.params.spin_min_speed)
+        self._limit = self.params.spin_timeout or 3.0 * self.target / speed + 5.0
+
+    def step(self, now: float, yaw: float | None, clearance: float | None = None, *, hold: bool = False) -> SpinStep:
+        """Measure, and say how fast to turn.
+
+        Args:
+            now: time [s].
+            yaw: heading in odom [rad], None where it is not known.
+            clearance: nearest obstacle [m], None where nothing tells.
+            hold: stand still for now, without counting the time.
+        """
+        passed = 0.0 if self._last is None else max(now - self._last, 0.0)
+        self._last = now
+        self._measure(yaw)
+        if self._settling is not None:
+            return SpinStep(speed=0.0, done=now - self._settling >= self.params.spin_settle or now < self._settling)
+        if hold:
+            return SpinStep(speed=0.0)
+        obstacle = self._obstacle(yaw, clearance)
+        if obstacle:
+            self._idle += passed
+            if self._idle > self.params.spin_wait:
+                return self._fail(obstacle)
+            return SpinStep(speed=0.0)
+        self._idle = 0.0
+        self._active += passed
+        if self._active > self._limit:
+            return self._fail(f"the robot did not turn far enough in {self._limit:.0f} s")
+        return self._turn(now)
+
+    @property
+    def turned_deg(self) -> float:
+        """How far it has turned in the direction asked for [deg]."""
+        return math.degrees(self.turned)
+
+    def _measure(self, yaw: float | None) -> None:
+        if yaw is None:
+            return
+        if self._yaw is not None:
+            self.turned += self._sign * angle_difference(yaw, self._yaw)
+        self._yaw = yaw
+
+    def _obstacle(self, yaw: float | None, clearance: float | None) -> str:
+        if yaw is None:
+            return "the heading in odom is not known"
+        if clearance is not None and clearance < self.params.spin_clearance:
+            return f"something is {clearance:.2f} m from the robot's centre, too near to turn"
+        return ""
+
+    def _turn(self, now: float) -> SpinStep:
+        p = self.params
+        remaining = self.target - self.turned
+        speed = min(p.spin_speed, math.sqrt(max(2.0 * p.spin_deceleration * remaining, 0.0)))
+        speed = max(speed, min(p.spin_min_speed, p.spin_speed))
+        if remaining <= speed * p.spin_latency:
+            self._settling = now
+            return SpinStep(speed=0.0)
+        return SpinStep(speed=self._sign * speed)
+
+    def _fail(self, why: str) -> SpinStep:
+        return SpinStep(
+            speed=0.0,
+            done=True,
+            problem=f"the turn ended after {self.turned_deg:.0f} of {math.degrees(self.target):.0f} degrees: {why}",
+        )
