@@ -11,7 +11,7 @@ from rosbot_patrol.ros.node import run_node
 
 def main() -> None:
     """Log one sentence (arguments: package, what it is, what will be missing) and end."""
-    package, what, loss = (rospy.myargv(sys.argv)[1:] + ["?", "?", "?"])[:3]
+    package, what, loss = ([*rospy.myargv(sys.argv)[1:], "?", "?", "?"])[:3]
 
     def say() -> None:
         rospy.logerr(

@@ -1,0 +1,290 @@
+"""The whole house as a child process, driven and watched from outside: for system tests, benchmarks and campaigns.
+
+It only uses what a user has: `roslaunch`, topics and services. One process may run several houses one after another
+on one master.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import rosgraph
+import rosnode
+import rospy
+from geometry_msgs.msg import Pose2D as Pose2DMsg
+from nav_msgs.msg import Odometry
+
+from rosbot_patrol.errors import PatrolError
+from rosbot_patrol.geometry import Pose2D, wrap_angle
+from rosbot_patrol.msg import Alert, Contacts, EspTrigger, PatrolState
+from rosbot_patrol.ros.convert import pose2d_from_pose
+from rosbot_patrol.srv import MoveActor, RemoveActor, SpawnActor
+
+
+class HouseError(PatrolError):
+    """The house did not come up or did not do what was waited for."""
+
+
+def free_port() -> int:
+    """A TCP port that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Master:
+    """A roscore of one's own, and this process as a node of it on wall time."""
+
+    def __init__(self, log: Path) -> None:
+        self.port = free_port()
+        os.environ["ROS_MASTER_URI"] = f"http://localhost:{self.port}"
+        os.environ["ROS_HOSTNAME"] = "localhost"
+        with log.open("wb") as out:
+            self._core = subprocess.Popen(
+                ["roscore", "-p", str(self.port)], stdout=out, stderr=subprocess.STDOUT, start_new_session=True
+            )
+        deadline = time.monotonic() + 20.0
+        while not rosgraph.is_master_online():
+            if time.monotonic() > deadline or self._core.poll() is not None:
+                raise HouseError(f"roscore does not answer on port {self.port}, see {log}")
+            time.sleep(0.1)
+        rospy.set_param("/use_sim_time", False)
+        rospy.init_node("house_watch", anonymous=True, disable_signals=True)
+
+    def stop(self) -> None:
+        """End the roscore."""
+        rospy.signal_shutdown("done")
+        end_group(self._core)
+
+
+def end_group(process: subprocess.Popen[bytes], grace_s: float = 20.0) -> None:
+    """End a process that leads its own group: interrupt, then kill what is left of the group."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGINT)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(grace_s)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+@dataclass
+class Mission:
+    """What was seen of one mission, by ground truth."""
+
+    room: int
+    states: list[str] = field(default_factory=list)
+    verdict: str = ""
+    why: list[str] = field(default_factory=list)
+    arrival: Pose2D | None = None
+    turned: float = 0.0
+    end: Pose2D | None = None
+    alerts: list[Alert] = field(default_factory=list)
+    contacts: list[tuple[str, str]] = field(default_factory=list)
+    sim_seconds: float = 0.0
+    wall_seconds: float = 0.0
+
+
+class House:
+    """One launch of the guarded house.
+
+    Args:
+        folder: where logs, mails and state go.
+        launch: package, file and arguments of roslaunch.
+    """
+
+    def __init__(self, folder: Path, *launch: str, **arguments: Any) -> None:
+        self.folder = folder
+        self.maildir = folder / "mail"
+        self.log = folder / "roslaunch.log"
+        command = list(launch) or ["rosbot_patrol", "rosbot_patrol.launch"]
+        given: dict[str, Any] = {
+            "simulation": "true",
+            "gui": "false",
+            "transport": "maildir",
+            "maildir": str(self.maildir),
+            "state_dir": str(folder / "state"),
+        }
+        given.update(arguments)
+        self._command = ["roslaunch", "--skip-log-check", *command, *(f"{k}:={v}" for k, v in given.items())]
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+        self._subscribers: list[rospy.Subscriber] = []
+        self.state: PatrolState | None = None
+        self.alerts: list[Alert] = []
+        self.pose: Pose2D | None = None
+        self.pose_stamp = 0.0
+        self.contacts: list[tuple[str, str]] = []
+        self._mission: Mission | None = None
+        self._trigger = rospy.Publisher("/motion_trigger", EspTrigger, queue_size=5)
+
+    def __enter__(self) -> House:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def start(self, environment: Mapping[str, str] | None = None) -> None:
+        """Launch it; does not wait."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with self.log.open("wb") as out:
+            self._process = subprocess.Popen(
+                self._command,
+                stdout=out,
+                stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+                env={**os.environ, **(environment or {})},
+            )
+        self.started = time.monotonic()
+        self._subscribers = [
+            rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=50),
+            rospy.Subscriber("/patrol/alerts", Alert, self._on_alert, queue_size=50),
+            rospy.Subscriber("/ground_truth/odom", Odometry, self._on_truth, queue_size=50),
+            rospy.Subscriber("/ground_truth/contacts", Contacts, self._on_contacts, queue_size=50),
+        ]
+
+    def stop(self) -> None:
+        """End every process of it."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        self._subscribers = []
+        if self._process is not None:
+            end_group(self._process)
+            self._process = None
+        with contextlib.suppress(rosnode.ROSNodeIOException, OSError):
+            rosnode.cleanup_master_blacklist(
+                rosgraph.Master("/house"),
+                [n for n in rosnode.get_node_names() if "house_watch" not in n and n != "/rosout"],
+            )
+
+    def wait_ready(self, timeout: float = 60.0) -> float:
+        """Wait until it is on guard; returns the seconds since the launch."""
+        self.wait(lambda: self.state is not None and self.state.state == PatrolState.IDLE, timeout, "on guard")
+        return time.monotonic() - self.started
+
+    def wait(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for something on wall time.
+
+        Raises:
+            HouseError: it did not come, or the launch ended.
+        """
+        deadline = time.monotonic() + timeout
+        while not condition():
+            if self._process is None or self._process.poll() is not None:
+                raise HouseError(f"roslaunch ended while waiting for: {what}\n{self.log_end()}")
+            if time.monotonic() > deadline:
+                state = "none" if self.state is None else f"{self.state.state} ({self.state.why})"
+                raise HouseError(f"after {timeout:.0f} s still no: {what}; state: {state}\n{self.log_end()}")
+            time.sleep(0.02)
+
+    def log_end(self, lines: int = 40) -> str:
+        """The last lines of the launch's output."""
+        text = self.log.read_text(encoding="utf-8", errors="replace") if self.log.exists() else ""
+        return "\n".join(text.splitlines()[-lines:])
+
+    def trigger(self, room: int, move: bool = True) -> None:
+        """Publish a motion trigger as `rostopic pub` does."""
+        self.wait(lambda: self._trigger.get_num_connections() > 0, 10.0, "a subscriber of /motion_trigger")
+        self._trigger.publish(EspTrigger(id=room, move=move))
+
+    def spawn(self, name: str, x: float, y: float, *, yaw: float = 0.0, model: str = "person", look: str = "") -> None:
+        """Place an actor."""
+        rospy.wait_for_service("/simulator/spawn_actor", 10.0)
+        answer = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)(name, model, look, Pose2DMsg(x, y, yaw))
+        if not answer.success:
+            raise HouseError(answer.message)
+
+    def walk(self, name: str, points: list[tuple[float, float]], speed: float = 0.8, loop: bool = False) -> None:
+        """Let an actor walk."""
+        path = [Pose2DMsg(x, y, 0.0) for x, y in points]
+        answer = rospy.ServiceProxy("/simulator/move_actor", MoveActor)(name, path, speed, loop)
+        if not answer.success:
+            raise HouseError(answer.message)
+
+    def remove(self, name: str) -> None:
+        """Take an actor away."""
+        answer = rospy.ServiceProxy("/simulator/remove_actor", RemoveActor)(name)
+        if not answer.success:
+            raise HouseError(answer.message)
+
+    def mission(self, room: int, timeout: float = 300.0, start: Callable[[], None] | None = None) -> Mission:
+        """Trigger a room (or call `start`) and watch the mission until the robot is on guard again."""
+        mission = Mission(room)
+        begin, begin_sim = time.monotonic(), self.pose_stamp
+        with self._lock:
+            self._mission = mission
+        (start or (lambda: self.trigger(room)))()
+        self.wait(lambda: PatrolState.DRIVING in mission.states, 30.0, f"the robot driving to room {room}")
+        self.wait(lambda: mission.states[-1] == PatrolState.IDLE, timeout, f"the end of the mission to room {room}")
+        with self._lock:
+            self._mission = None
+        mission.end = self.pose
+        mission.wall_seconds = time.monotonic() - begin
+        mission.sim_seconds = self.pose_stamp - begin_sim
+        return mission
+
+    def pids(self) -> dict[str, int]:
+        """Process id of every node of this master."""
+        found = {}
+        for name in rosnode.get_node_names():
+            uri = rosnode.get_api_uri(rosgraph.Master("/house"), name)
+            if uri is None:
+                continue
+            with contextlib.suppress(OSError):
+                code, _, pid = rospy.core.xmlrpcapi(uri).getPid("/house")
+                if code == 1:
+                    found[name] = int(pid)
+        return found
+
+    def mails(self) -> list[Path]:
+        """Files in the Maildir, oldest first."""
+        new = self.maildir / "new"
+        return sorted(new.iterdir(), key=lambda p: p.stat().st_mtime) if new.is_dir() else []
+
+    def _on_state(self, state: PatrolState) -> None:
+        with self._lock:
+            self.state = state
+            mission = self._mission
+            if mission is None:
+                return
+            if state.state == PatrolState.LOOKING and PatrolState.LOOKING not in mission.states:
+                mission.arrival = self.pose
+            if not mission.states and state.state == PatrolState.IDLE:
+                return  # still the rest before it
+            mission.states.append(state.state)
+            mission.why.append(state.why)
+            if state.state == PatrolState.IDLE:
+                mission.verdict = state.last_verdict
+
+    def _on_alert(self, alert: Alert) -> None:
+        with self._lock:
+            self.alerts.append(alert)
+            if self._mission is not None:
+                self._mission.alerts.append(alert)
+
+    def _on_truth(self, odometry: Odometry) -> None:
+        pose = pose2d_from_pose(odometry.pose.pose)
+        with self._lock:
+            mission = self._mission
+            if mission is not None and mission.states and mission.states[-1] == PatrolState.LOOKING and self.pose:
+                mission.turned += wrap_angle(pose.yaw - self.pose.yaw)
+            self.pose, self.pose_stamp = pose, odometry.header.stamp.to_sec()
+
+    def _on_contacts(self, contacts: Contacts) -> None:
+        touched = [(c.kind, c.other) for c in contacts.contacts]
+        with self._lock:
+            self.contacts += touched
+            if self._mission is not None:
+                self._mission.contacts += touched
