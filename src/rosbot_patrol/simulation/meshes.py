@@ -1,0 +1,171 @@
+"""Triangles of the shapes of a scene, for the camera: positions, normals and texture coordinates in metres.
+
+The texture coordinate of a vertex is its place on its face in metres, from the shape's own middle, so that a texture
+keeps its size on a box of any size; `span` says how many metres a face is wide and high, for pictures that are to
+fill it once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.mesh_files import load_mesh
+from rosbot_patrol.simulation.scene import Shape
+
+_SIDES = 20
+_RINGS = 12
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles in the frame of their shape.
+
+    Attributes:
+        positions, normals: shape (V, 3).
+        uv: place on the face [m], shape (V, 2).
+        span: size of that face [m], shape (V, 2).
+        faces: corners of each triangle, shape (F, 3).
+    """
+
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    uv: NDArray[np.float64]
+    span: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+def mesh_of(shape: Shape) -> Mesh:
+    """The triangles of any shape.
+
+    Raises:
+        WorldError: a mesh that has neither file nor triangles, or a size with too few numbers.
+    """
+    needed = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "plane": 2, "mesh": 0}[shape.kind]
+    if len(shape.size) < needed:
+        raise WorldError(shape.kind, f"needs {needed} sizes, has {shape.size}")
+    size = shape.size
+    if shape.kind == "box":
+        return box(size[0], size[1], size[2])
+    if shape.kind == "plane":
+        return plane(size[0], size[1])
+    if shape.kind == "cylinder":
+        return cylinder(size[0], size[1])
+    if shape.kind == "sphere":
+        return sphere(size[0], 0.0)
+    if shape.kind == "capsule":
+        return sphere(size[0], size[1])
+    return _free_mesh(shape)
+
+
+def box(x: float, y: float, z: float) -> Mesh:
+    """A box about its middle."""
+    half = np.array([x, y, z]) / 2
+    positions, normals, uv, span = [], [], [], []
+    for axis in range(3):
+        u, v = [(1, 2), (0, 2), (0, 1)][axis]
+        for sign in (-1.0, 1.0):
+            corners = np.zeros((4, 3))
+            corners[:, axis] = sign * half[axis]
+            corners[:, u] = half[u] * np.array([-1, 1, 1, -1]) * (sign if axis != 1 else -sign)
+            corners[:, v] = half[v] * np.array([-1, -1, 1, 1])
+            normal = np.zeros(3)
+            normal[axis] = sign
+            positions.append(corners)
+            normals.append(np.tile(normal, (4, 1)))
+            uv.append(corners[:, (u, v)] * [(sign if axis != 1 else -sign), 1.0])
+            span.append(np.tile(2 * half[[u, v]], (4, 1)))
+    quads = np.arange(24).reshape(6, 4)
+    return Mesh(np.vstack(positions), np.vstack(normals), np.vstack(uv), np.vstack(span), _split(quads))
+
+
+def plane(x: float, y: float) -> Mesh:
+    """A rectangle in z = 0 that faces up."""
+    corners = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]]) / 2
+    normals = np.tile([0.0, 0.0, 1.0], (4, 1))
+    return Mesh(corners, normals, corners[:, :2].copy(), np.tile([x, y], (4, 1)), _split(np.arange(4).reshape(1, 4)))
+
+
+def cylinder(radius: float, length: float, *, sides: int = _SIDES) -> Mesh:
+    """A cylinder about its middle, along z, with its two lids."""
+    angle = np.linspace(0, 2 * np.pi, sides + 1)
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1)
+    low, high = ring * radius - [0, 0, length / 2], ring * radius + [0, 0, length / 2]
+    around = 2 * np.pi * radius
+    side_uv = np.stack([angle * radius - around / 2, np.zeros(sides + 1)], axis=1)
+    uv = np.vstack([side_uv - [0, length / 2], side_uv - [0, -length / 2], low[:, :2], high[:, :2]])
+    span = np.vstack([np.tile([around, length], (2 * sides + 2, 1)), np.tile([2 * radius] * 2, (2 * sides + 2, 1))])
+    down, up = np.tile([0.0, 0, -1], (sides + 1, 1)), np.tile([0.0, 0, 1], (sides + 1, 1))
+    n = sides + 1
+    i = np.arange(sides)
+    walls = _split(np.stack([i, i + 1, n + i + 1, n + i], axis=1))
+    fan = np.arange(1, sides - 1)
+    bottom = np.stack([np.zeros_like(fan), fan + 1, fan], axis=1) + 2 * n
+    top = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1) + 3 * n
+    return Mesh(
+        np.vstack([low, high, low, high]), np.vstack([ring, ring, down, up]), uv, span, np.vstack([walls, bottom, top])
+    )
+
+
+def sphere(radius: float, length: float, *, sides: int = _SIDES, rings: int = _RINGS) -> Mesh:
+    """A sphere, or, with a length, a capsule along z whose cylindric part has that length."""
+    polar = np.linspace(0, np.pi, rings + 1)
+    polar = np.insert(polar, rings // 2, np.pi / 2)
+    offset = np.where(np.arange(len(polar)) <= rings // 2, length / 2, -length / 2)
+    angle = np.linspace(0, 2 * np.pi, sides + 1)
+    a, p = np.meshgrid(angle, polar)
+    normals = np.stack([np.cos(a) * np.sin(p), np.sin(a) * np.sin(p), np.cos(p)], axis=-1)
+    positions = normals * radius
+    positions[..., 2] += offset[:, None]
+    uv = np.stack([(a - np.pi) * radius, positions[..., 2]], axis=-1)
+    span = np.tile([2 * np.pi * radius, 2 * radius + length], (normals.shape[0] * normals.shape[1], 1))
+    return Mesh(positions.reshape(-1, 3), normals.reshape(-1, 3), uv.reshape(-1, 2), span, grid_faces(*a.shape))
+
+
+def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
+    """Triangles between neighbours of a (rows, columns) grid of vertices, rows downwards, columns to the left."""
+    i = np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]
+    quads = np.stack([i, i + columns, i + columns + 1, i + 1], axis=-1)
+    return _split(quads.reshape(-1, 4))
+
+
+def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Normals of the vertices: the mean of their triangles' by area, vertices at one place taken together."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    weighted = np.cross(b - a, c - a)
+    _, place = np.unique(np.round(vertices, 5), axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    sums = np.zeros((place.max() + 1, 3))
+    for k in range(3):
+        np.add.at(sums, place[faces[:, k]], weighted)
+    sums /= np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-12)
+    normals: NDArray[np.float64] = sums[place]
+    return normals
+
+
+def _free_mesh(shape: Shape) -> Mesh:
+    if shape.vertices is not None and shape.faces is not None:
+        vertices, faces = np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int64)
+    elif shape.mesh is not None:
+        vertices, faces = load_mesh(shape.mesh)
+    else:
+        raise WorldError("mesh", "has neither a file nor triangles")
+    if len(shape.size) >= 3:
+        vertices = vertices * np.array(shape.size[:3])
+    normals = smooth_normals(vertices, faces)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle, extent = (low + high) / 2, np.maximum(high - low, 1e-6)
+    return Mesh(
+        vertices,
+        normals,
+        (vertices - middle)[:, 1:],
+        np.tile(extent[1:], (len(vertices), 1)),
+        faces,
+    )
+
+
+def _split(quads: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

@@ -1,0 +1,371 @@
+"""The camera's picture in colour and depth, drawn by OpenGL without a display: EGL, on Mesa's software driver or a GPU.
+
+Everything that stands still is one array of triangles; a body that has moved has its own, with a matrix for each of
+its visuals. Colours are taken as the display's own (as Gazebo classic takes them): a white face in full light is 255.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.meshes import mesh_of
+from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, SceneRenderer
+from rosbot_patrol.simulation.shaders import DEPTH_SHADER, FRAGMENT_SHADER, VERTEX_SHADER
+from rosbot_patrol.simulation.textures import SIDE, Texture, standard_textures
+
+log = logging.getLogger(__name__)
+
+Vec3 = tuple[float, float, float]
+MAX_PARTS = 48
+
+_VERTEX = np.dtype(
+    [
+        ("position", "<f4", 3),
+        ("normal", "<f4", 3),
+        ("uv", "<f4", 2),
+        ("colour", "<f4", 3),
+        ("part_layer_label", "<f4", 3),
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light:
+    """What lights a scene; each colour is added in, so that about 1 in all is full light.
+
+    Attributes:
+        sun_direction: towards the sun, of any length.
+        above, below: light on faces that look up and down, the rest in between.
+        lamp_place: a lamp [m]; its light falls to a half at `lamp_reach` [m].
+        sky: colour where nothing stands.
+    """
+
+    sun_direction: Vec3 = (-0.55, -0.35, 0.75)
+    sun: Vec3 = (0.36, 0.35, 0.33)
+    above: Vec3 = (0.68, 0.69, 0.72)
+    below: Vec3 = (0.44, 0.43, 0.41)
+    lamp_place: Vec3 = (0.0, 0.0, 2.4)
+    lamp: Vec3 = (0.0, 0.0, 0.0)
+    lamp_reach: float = 4.0
+    sky: Vec3 = (0.72, 0.80, 0.90)
+
+
+_Arrays = tuple[NDArray[np.void], NDArray[np.int64]]
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What OpenGL holds of some triangles: arrays for the depth and the shading pass, and their buffers."""
+
+    things: tuple[Any, ...] = ()
+
+    def release(self) -> None:
+        for thing in self.things:
+            thing.release()
+
+
+@dataclass
+class _Item:
+    body: Body
+    pose: Matrix
+    visuals: Matrix
+    label: int
+    moving: bool
+    arrays: list[_Arrays]
+    drawn: list[_Drawn]
+
+
+class EglRenderer(SceneRenderer):
+    """Draws bodies by OpenGL; one per process and thread, used by the thread that made it.
+
+    Args:
+        light: what lights the scene; may be changed between pictures (`light` is an attribute).
+        textures: by the names that materials use; by default those of `textures.py`.
+
+    Raises:
+        WorldError: there is no EGL, or no driver that offers OpenGL 3.3.
+    """
+
+    def __init__(self, light: Light | None = None, textures: dict[str, Texture] | None = None) -> None:
+        self.light = light or Light()
+        self._context = _open_context()
+        self._items: dict[str, _Item] = {}
+        self._still: _Drawn | None = None
+        self._target: tuple[tuple[int, int], Any, Any, Any] | None = None
+        context = self._context
+        self._program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
+        self._depth_program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=DEPTH_SHADER)
+        self._layers: dict[str, tuple[int, float]] = {}
+        self._texture = self._upload(textures if textures is not None else standard_textures())
+        self._parts = np.tile(np.eye(4, dtype="<f4"), (MAX_PARTS, 1, 1))
+
+    @property
+    def driver(self) -> str:
+        """The name of what draws, as OpenGL says it."""
+        return str(self._context.info["GL_RENDERER"])
+
+    def add(self, body: Body, *, label: int = 0) -> None:
+        """Put a body into the scene; its name must be new.
+
+        Args:
+            body: what to draw.
+            label: 1 to 255, found again in `labels()` where the body is seen; 0 for none.
+
+        Raises:
+            WorldError: the name is taken, or a shape cannot be drawn.
+        """
+        if body.name in self._items:
+            raise WorldError(body.name, "is in the scene already")
+        poses = np.array([v.pose for v in body.visuals], float).reshape(-1, 4, 4)
+        arrays = [self._vertices(body, i, label) for i in range(len(body.visuals))]
+        self._items[body.name] = _Item(body, body.pose, poses, label, not body.static, arrays, [])
+        if body.static:
+            self._forget_still()
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the scene."""
+        item = self._item(name)
+        self._release(item)
+        if not item.moving:
+            self._forget_still()
+        del self._items[name]
+
+    def clear(self) -> None:
+        """Take everything out of the scene."""
+        for name in list(self._items):
+            self.remove(name)
+
+    def move(self, name: str, world_from_body: Matrix) -> None:
+        """Put a body elsewhere."""
+        self._moving(name).pose = world_from_body
+
+    def pose_visuals(self, name: str, body_from_visuals: Matrix) -> None:
+        """Move the visuals of a body against it, shape (number of visuals, 4, 4)."""
+        item = self._moving(name)
+        if body_from_visuals.shape != item.visuals.shape:
+            raise WorldError(name, f"has visuals {item.visuals.shape}, was given poses {body_from_visuals.shape}")
+        item.visuals = body_from_visuals
+
+    def render(
+        self, world_from_optical: Matrix, intrinsics: Intrinsics
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """The picture in colour (height, width, 3) and depth [m] (height, width), inf where nothing was hit."""
+        size = (intrinsics.width, intrinsics.height)
+        buffer = self._draw(world_from_optical, intrinsics, size)
+        colour = np.frombuffer(buffer.read(components=3, alignment=1), np.uint8).reshape(size[1], size[0], 3)
+        raw = np.frombuffer(buffer.read(attachment=-1, components=1, dtype="f4"), np.float32)
+        return colour, _metres(raw.reshape(size[1], size[0]), intrinsics)
+
+    def labels(self) -> NDArray[np.uint8]:
+        """The label of what the last picture shows in each pixel, shape (height, width)."""
+        assert self._target is not None, "labels() comes after render()"
+        (width, height), buffer = self._target[0], self._target[1]
+        pixels = np.frombuffer(buffer.read(components=4), np.uint8)
+        return pixels.reshape(height, width, 4)[:, :, 3]
+
+    def close(self) -> None:
+        """Give the context and all its memory back."""
+        self._items.clear()
+        self._context.gc_mode = "context_gc"
+        self._context.gc()
+        self._context.release()
+
+    def _draw(self, world_from_optical: Matrix, intrinsics: Intrinsics, size: tuple[int, int]) -> Any:
+        buffer = self._buffer(size)
+        buffer.use()
+        context, program = self._context, self._program
+        context.enable_only(context.DEPTH_TEST)
+        buffer.clear(*self.light.sky, 0.0, depth=1.0)
+        self._texture.use(0)
+        _set(program, "view", np.linalg.inv(world_from_optical).T)
+        _set(program, "projection", _projection(intrinsics).T)
+        _set(program, "eye", world_from_optical[:3, 3])
+        self._set_light()
+        # Depth first, then only what is seen is shaded: a house is many walls behind each other.
+        _set(self._depth_program, "view", np.linalg.inv(world_from_optical).T)
+        _set(self._depth_program, "projection", _projection(intrinsics).T)
+        buffer.color_mask = False, False, False, False
+        self._draw_all(depth_only=True)
+        buffer.color_mask = True, True, True, True
+        buffer.depth_mask = False
+        context.depth_func = "<="
+        self._draw_all(depth_only=False)
+        buffer.depth_mask = True
+        context.depth_func = "<"
+        return buffer
+
+    def _draw_all(self, *, depth_only: bool) -> None:
+        for item in self._items.values():
+            if item.moving:
+                self._draw_item(item, depth_only)
+        if self._still is None:
+            arrays = [placed for item in self._items.values() if not item.moving for placed in _placed(item)]
+            self._still = self._array(arrays) if arrays else _Drawn()
+        self._parts[0] = np.eye(4)
+        self._draw_array(self._still, depth_only)
+
+    def _draw_item(self, item: _Item, depth_only: bool) -> None:
+        if not item.drawn:
+            item.drawn = [self._array(item.arrays[i : i + MAX_PARTS]) for i in range(0, len(item.arrays), MAX_PARTS)]
+        world = item.pose @ item.visuals
+        for i, drawn in enumerate(item.drawn):
+            some = world[i * MAX_PARTS : (i + 1) * MAX_PARTS]
+            self._parts[: len(some)] = some.transpose(0, 2, 1)
+            self._draw_array(drawn, depth_only)
+
+    def _draw_array(self, drawn: _Drawn, depth_only: bool) -> None:
+        if not drawn.things:
+            return
+        program = self._depth_program if depth_only else self._program
+        program["parts"].write(self._parts)
+        drawn.things[0 if depth_only else 1].render()
+
+    def _set_light(self) -> None:
+        light, program = self.light, self._program
+        towards = np.array(light.sun_direction, float)
+        _set(program, "sun_direction", towards / max(float(np.linalg.norm(towards)), 1e-9))
+        for name in ("sun", "above", "below", "lamp_place", "lamp"):
+            _set(program, name, np.array(getattr(light, name)))
+        _set(program, "lamp_reach", np.array(1.0 / light.lamp_reach**2))
+
+    def _vertices(self, body: Body, index: int, label: int) -> _Arrays:
+        visual = body.visuals[index]
+        mesh = mesh_of(visual.shape)
+        layer, metres = self._layer(visual.material.texture)
+        vertices = np.zeros(len(mesh.positions), _VERTEX)
+        vertices["position"], vertices["normal"] = mesh.positions, mesh.normals
+        vertices["uv"] = mesh.uv / metres if metres > 0 else mesh.uv / mesh.span + 0.5
+        vertices["colour"] = visual.material.rgba[:3]
+        vertices["part_layer_label"] = (index % MAX_PARTS, layer, label / 255.0)
+        return vertices, mesh.faces
+
+    def _array(self, parts: list[_Arrays]) -> _Drawn:
+        starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+        vertices = np.concatenate([vertices for vertices, _ in parts])
+        faces = np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=False)])
+        corners = self._context.buffer(vertices.tobytes())
+        order = self._context.buffer(np.ascontiguousarray(faces, "<i4").tobytes())
+        shaded = [(corners, "3f 3f 2f 3f 3f", *(_VERTEX.names or ()))]
+        outline = [(corners, "3f 32x 3f", "position", "part_layer_label")]
+        return _Drawn(
+            (
+                self._context.vertex_array(self._depth_program, outline, order),
+                self._context.vertex_array(self._program, shaded, order),
+                corners,
+                order,
+            )
+        )
+
+    def _layer(self, name: str) -> tuple[int, float]:
+        if name not in self._layers:
+            log.warning("there is no texture '%s', drawn plain (known: %s)", name, ", ".join(self._layers))
+            self._layers[name] = (0, 1.0)
+        return self._layers[name]
+
+    def _upload(self, textures: dict[str, Texture]) -> Any:
+        white = Texture(np.full((SIDE, SIDE, 3), 255, np.uint8))
+        every = {"": white, **textures}
+        self._layers = {name: (i, texture.metres) for i, (name, texture) in enumerate(every.items())}
+        pixels = np.stack([texture.pixels for texture in every.values()])
+        made = self._context.texture_array((SIDE, SIDE, len(every)), 3, pixels.tobytes(), alignment=1)
+        made.build_mipmaps()
+        made.filter = (self._context.LINEAR_MIPMAP_NEAREST, self._context.LINEAR)
+        return made
+
+    def _buffer(self, size: tuple[int, int]) -> Any:
+        if self._target is None or self._target[0] != size:
+            if self._target is not None:
+                for thing in self._target[1:]:
+                    thing.release()
+            colour, depth = self._context.texture(size, 4), self._context.depth_texture(size)
+            self._target = (size, self._context.framebuffer([colour], depth), colour, depth)
+        return self._target[1]
+
+    def _item(self, name: str) -> _Item:
+        if name not in self._items:
+            raise WorldError(name, "is not in the scene")
+        return self._items[name]
+
+    def _moving(self, name: str) -> _Item:
+        item = self._item(name)
+        if not item.moving:
+            item.moving = True
+            self._forget_still()
+        return item
+
+    def _forget_still(self) -> None:
+        if self._still is not None:
+            self._still.release()
+        self._still = None
+
+    def _release(self, item: _Item) -> None:
+        for drawn in item.drawn:
+            drawn.release()
+        item.drawn = []
+
+
+def make_renderer(prefer: str = "egl") -> SceneRenderer:
+    """The fastest renderer that this machine has: OpenGL on EGL, else PyBullet's own, with a warning that says why."""
+    if prefer == "egl":
+        try:
+            renderer = EglRenderer()
+        except WorldError as err:
+            log.warning("the camera is drawn by PyBullet's TinyRenderer, some 20 times slower: %s", err)
+        else:
+            log.info("the camera is drawn by OpenGL on EGL: %s", renderer.driver)
+            return renderer
+    from rosbot_patrol.simulation.tiny_renderer import TinyRenderer
+
+    return TinyRenderer()
+
+
+def _open_context() -> Any:
+    try:
+        import moderngl
+
+        return moderngl.create_context(standalone=True, backend="egl", require=330)  # type: ignore[arg-type]
+    except Exception as err:  # moderngl raises plain Exception, its loader OSError and ImportError
+        raise WorldError("EGL", f"OpenGL 3.3 without a display cannot be had: {err}") from err
+
+
+def _placed(item: _Item) -> list[_Arrays]:
+    placed = []
+    for (vertices, faces), visual in zip(item.arrays, item.visuals, strict=True):
+        matrix = item.pose @ visual
+        moved = vertices.copy()
+        moved["position"] = vertices["position"] @ matrix[:3, :3].T + matrix[:3, 3]
+        moved["normal"] = vertices["normal"] @ matrix[:3, :3].T
+        moved["part_layer_label"][:, 0] = 0
+        placed.append((moved, faces))
+    return placed
+
+
+def _projection(camera: Intrinsics) -> NDArray[np.float64]:
+    """Clip space from the optical frame; the picture's first row comes first in memory (OpenGL's last)."""
+    near, far, width, height = camera.near, camera.far, camera.width, camera.height
+    return np.array(
+        [
+            [2 * camera.fx / width, 0, 2 * camera.cx / width - 1, 0],
+            [0, 2 * camera.fy / height, 2 * camera.cy / height - 1, 0],
+            [0, 0, (far + near) / (far - near), -2 * far * near / (far - near)],
+            [0, 0, 1, 0],
+        ]
+    )
+
+
+def _metres(raw: NDArray[np.float32], camera: Intrinsics) -> NDArray[np.float32]:
+    near, far = np.float32(camera.near), np.float32(camera.far)
+    depth = np.subtract(far, raw * (far - near))
+    np.divide(near * far, depth, out=depth)
+    depth[raw >= 1.0] = np.inf
+    return depth
+
+
+def _set(program: Any, name: str, value: NDArray[np.float64]) -> None:
+    program[name].write(np.ascontiguousarray(value, "<f4").tobytes())
