@@ -1,0 +1,1 @@
+"""Maps: files, pictures, occupancy."""
