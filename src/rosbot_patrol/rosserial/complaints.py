@@ -1,0 +1,42 @@
+"""Say a thing once to each, not in a flood."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Hashable
+
+
+class Complaints:
+    """Remembers what has been said; a thing is said again after `period` [s], and memory is bounded.
+
+    Args:
+        period: how long a complaint is not repeated [s].
+        capacity: how many are remembered; the oldest is forgotten first.
+    """
+
+    def __init__(self, period: float = 600.0, capacity: int = 1000) -> None:
+        self._period = period
+        self._capacity = capacity
+        self._said: OrderedDict[Hashable, float] = OrderedDict()
+        self._minutes: OrderedDict[Hashable, tuple[float, int]] = OrderedDict()
+
+    def is_new(self, key: Hashable, now: float) -> bool:
+        """Whether this should be said now; if so it counts as said."""
+        said = self._said.get(key)
+        if said is not None and 0.0 <= now - said < self._period:
+            return False
+        self._said[key] = now
+        self._said.move_to_end(key)
+        if len(self._said) > self._capacity:
+            self._said.popitem(last=False)
+        return True
+
+    def may_speak(self, group: Hashable, now: float, limit: int = 60) -> bool:
+        """Count a line about `group`; whether it is among the first `limit` of its minute."""
+        began, count = self._minutes.get(group, (now, 0))
+        if not 0.0 <= now - began < 60.0:
+            began, count = now, 0
+        self._minutes[group] = (began, count + 1)
+        if len(self._minutes) > self._capacity:
+            self._minutes.popitem(last=False)
+        return count < limit

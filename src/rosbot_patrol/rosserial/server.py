@@ -1,0 +1,358 @@
+"""The rosserial server: many devices on TCP ports, or one on a serial device, in one thread. Knows no ROS.
+
+Differs from rosserial_python's RosSerialServer: any number of clients a port, IPv4 and IPv6, topics are asked for at
+once, half-open links are noticed (keepalive, silence), and nothing that one client sends or fails to read delays
+another.
+"""
+
+from __future__ import annotations
+
+import logging
+import selectors
+import socket
+import time
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from rosbot_patrol.errors import ProtocolError
+from rosbot_patrol.rosserial.client import Client, Link, listen, peer_names, tune
+from rosbot_patrol.rosserial.complaints import Complaints
+from rosbot_patrol.rosserial.policy import Policy
+from rosbot_patrol.rosserial.serial_port import SerialPort
+from rosbot_patrol.rosserial.session import (
+    Announced,
+    Event,
+    Garbled,
+    HangUp,
+    LogLine,
+    ParamAsked,
+    Received,
+    Refused,
+    Session,
+    SyncLost,
+    TimeAsked,
+)
+from rosbot_patrol.rosserial.topics import TX_STOP, TopicId, TopicInfo, param_values
+
+log = logging.getLogger(__name__)
+
+READ_SIZE = 4096
+TICK = 0.25
+REOPEN_PERIOD = 3.0
+REPLACE_AFTER = 1.5  # silence after which an old connection gives way to a new one of the same sensor [s]
+
+
+class Handler(Protocol):
+    """Where messages go to and come from; called on the server's thread, must not wait."""
+
+    def open(self, client: Client, kind: TopicId, info: TopicInfo) -> None:
+        """A topic or service is announced; raises ProtocolError where it cannot be had."""
+
+    def receive(self, client: Client, kind: TopicId, info: TopicInfo, data: bytes) -> None:
+        """A message came; raises ProtocolError where it makes no sense."""
+
+    def closed(self, client: Client) -> None:
+        """The client has gone, and all its topics with it."""
+
+    def time(self) -> tuple[int, int]:
+        """The time told to devices: seconds, nanoseconds."""
+
+    def device_log(self, client: Client, level: int, text: str) -> None:
+        """The device logs something, level 0 (debug) to 4 (fatal)."""
+
+    def parameter(self, name: str) -> object:
+        """The value of a parameter; raises ProtocolError where it is not set."""
+
+
+class SerialServer:
+    """Serves devices until closed: call `run`, or `poll` in a loop.
+
+    Args:
+        handler: the other side.
+        policy: what devices may do.
+        silence_timeout: hang up on a TCP client not heard of for that long [s].
+        max_clients: on all ports together; beyond that the oldest without an accepted topic makes room.
+        clock: monotonic time [s].
+    """
+
+    def __init__(
+        self,
+        handler: Handler,
+        policy: Policy,
+        *,
+        silence_timeout: float = 15.0,
+        max_clients: int = 600,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.clients: dict[Link, Client] = {}
+        self._handler = handler
+        self._policy = policy
+        self._silence_timeout = silence_timeout
+        self._max_clients = max_clients
+        self._clock = clock
+        self._complaints = Complaints()
+        self._listeners: list[socket.socket] = []
+        self._serial: tuple[str, int] | None = None
+        self._serial_due = 0.0
+        self._tick_due = 0.0
+        self._accept_from = 0.0
+        self._stopping = False
+        self._selector = selectors.DefaultSelector()
+        self._wake_read, self._wake_write = socket.socketpair()
+        self._wake_read.setblocking(False)
+        self._wake_write.setblocking(False)
+        self._selector.register(self._wake_read, selectors.EVENT_READ)
+
+    def listen(self, ports: Sequence[int], host: str = "") -> list[int]:
+        """Open TCP ports (0 for any free one); return them. Raises ProtocolError where one cannot be had."""
+        for port in ports:
+            listener = listen(port, host)
+            self._listeners.append(listener)
+            self._selector.register(listener, selectors.EVENT_READ)
+        return [listener.getsockname()[1] for listener in self._listeners]
+
+    def attach(self, path: str, baud: int) -> None:
+        """Serve a serial device; where it is not there (yet), it is tried again every 3 s."""
+        self._serial = (path, baud)
+
+    def run(self) -> None:
+        """Serve until `stop`."""
+        while not self._stopping:
+            self.poll(TICK)
+
+    def stop(self) -> None:
+        """Make `run` return; from any thread."""
+        self._stopping = True
+        self._wake()
+
+    def send(self, client: Client, topic_id: int, data: bytes) -> None:
+        """Queue a message for a device, from any thread; raises ProtocolError where it is too long."""
+        client.put(topic_id, data)
+        self._wake()
+
+    def close(self) -> None:
+        """Tell all devices to stop, and close everything."""
+        for client in list(self.clients.values()):
+            try:
+                client.link.send(TX_STOP)
+            except OSError as err:
+                log.debug("%s: %s", client.peer, err)
+            self._drop(client)
+        for listener in self._listeners:
+            listener.close()
+        self._listeners.clear()
+        self._selector.close()
+        self._wake_read.close()
+        self._wake_write.close()
+
+    def poll(self, timeout: float) -> None:
+        """Wait for at most `timeout` [s], and do what is to do."""
+        for key, mask in self._selector.select(timeout):
+            if key.fileobj is self._wake_read:
+                self._woken()
+            elif isinstance(key.data, Client):
+                if not key.data.closed and mask & selectors.EVENT_READ:
+                    self._read(key.data)
+                self._flush(key.data)
+            else:
+                self._accept(key.fileobj)  # type: ignore[arg-type]
+        now = self._clock()
+        if now >= self._tick_due:
+            self._tick_due = now + TICK
+            self._tick(now)
+
+    def _tick(self, now: float) -> None:
+        if self._serial is not None and not self.clients and now >= self._serial_due:
+            self._open_serial(*self._serial, now)
+        if self._accept_from and now >= self._accept_from:
+            self._accept_from = 0.0
+            for listener in self._listeners:
+                self._selector.register(listener, selectors.EVENT_READ)
+        for client in list(self.clients.values()):
+            self._handle(client, client.session.tick(now), now)
+            if client.older:
+                self._replace_older(client, now)
+            self._flush(client)
+
+    def _wake(self) -> None:
+        try:
+            self._wake_write.send(b"\0")
+        except (BlockingIOError, OSError):
+            return  # a wake-up is under way, or the server is closed
+
+    def _woken(self) -> None:
+        try:
+            self._wake_read.recv(4096)
+        except BlockingIOError:
+            return
+        for client in list(self.clients.values()):
+            if client.wants_write:
+                self._flush(client)
+
+    def _open_serial(self, path: str, baud: int, now: float) -> None:
+        self._serial_due = now + REOPEN_PERIOD
+        try:
+            port = SerialPort(path, baud)
+        except OSError as err:
+            if self._complaints.is_new("serial", now):
+                log.error("%s; trying again every %.0f s", err, REOPEN_PERIOD)
+            return
+        log.info("connected to %s at %d baud", path, baud)
+        session = Session(self._policy, now, silence_timeout=None)
+        self._add(Client(port, session, path, path))
+
+    def _accept(self, listener: socket.socket) -> None:
+        now = self._clock()
+        try:
+            link, address = listener.accept()
+        except (BlockingIOError, ConnectionError):
+            return
+        except OSError as err:  # no file descriptors left: the listener would report itself again and again
+            if self._complaints.is_new("accept", now):
+                log.error("no further sensor can connect for now: %s", err)
+            self._accept_from = now + 1.0
+            for each in self._listeners:
+                self._selector.unregister(each)
+            return
+        peer, host = peer_names(address)
+        reason = self._turn_away(host)
+        if reason is not None:
+            link.close()
+            if self._complaints.is_new(("peer", host), now):
+                log.warning("%s: refused, %s", peer, reason)
+            return
+        tune(link)
+        client = Client(link, Session(self._policy, now, silence_timeout=self._silence_timeout), peer, host)
+        self._say(client, logging.INFO, "connected")
+        self._add(client)
+
+    def _turn_away(self, host: str) -> str | None:
+        """Why a new connection is not taken; makes room for it where there is none."""
+        if not self._policy.may_connect(host):
+            return "its address is not on the list"
+        if len(self.clients) < self._max_clients:
+            return None
+        idle = next((c for c in self.clients.values() if not c.session.configured), None)
+        if idle is None:
+            return f"{self._max_clients} clients are connected"
+        self._drop(idle)
+        return None
+
+    def _add(self, client: Client) -> None:
+        self.clients[client.link] = client
+        self._selector.register(client.link, selectors.EVENT_READ, client)
+        self._flush(client)
+
+    def _read(self, client: Client) -> None:
+        now = self._clock()
+        try:
+            data = client.link.recv(READ_SIZE)
+        except BlockingIOError:
+            return
+        except OSError as err:
+            self._lose(client, str(err))
+            return
+        if not data:
+            self._lose(client, "it closed the connection")
+            return
+        self._handle(client, client.session.receive(data, now), now)
+        client.read_from = now + client.session.pause(now)
+
+    def _flush(self, client: Client) -> None:
+        """Send what can be sent, and tell the selector what to wait for."""
+        if client.closed:
+            return
+        try:
+            client.flush()
+        except OSError as err:
+            self._lose(client, str(err))
+            return
+        wanted = selectors.EVENT_WRITE if client.wants_write else 0
+        if client.read_from <= self._clock():
+            wanted |= selectors.EVENT_READ
+        self._watch(client, wanted)
+
+    def _watch(self, client: Client, wanted: int) -> None:
+        key = self._selector.get_map().get(client.link)
+        if key is not None and key.events == wanted:
+            return
+        if key is not None and wanted:
+            self._selector.modify(client.link, wanted, client)
+        elif key is not None:
+            self._selector.unregister(client.link)
+        elif wanted:
+            self._selector.register(client.link, wanted, client)
+
+    def _lose(self, client: Client, reason: str) -> None:
+        if client.closed:
+            return
+        if not self._stopping:
+            self._say(client, logging.INFO, "disconnected, %s", reason)
+        self._drop(client)
+
+    def _drop(self, client: Client) -> None:
+        client.closed = True
+        self._watch(client, 0)
+        self.clients.pop(client.link, None)
+        client.link.close()
+        self._handler.closed(client)
+
+    def _handle(self, client: Client, events: list[Event], now: float) -> None:
+        for event in events:
+            if client.closed:
+                return
+            try:
+                self._event(client, event, now)
+            except ProtocolError as err:
+                client.session.dropped += 1
+                self._complain(client, f"a message: {err}", now)
+
+    def _event(self, client: Client, event: Event, now: float) -> None:
+        if isinstance(event, Received):
+            if client.note_message(event.info.md5, event.data):
+                self._find_older(client)
+            self._handler.receive(client, event.kind, event.info, event.data)
+        elif isinstance(event, Announced):
+            self._announce(client, event, now)
+        elif isinstance(event, TimeAsked):
+            client.session.answer_time(*self._handler.time())
+        elif isinstance(event, LogLine):
+            self._handler.device_log(client, event.level, event.text)
+        elif isinstance(event, ParamAsked):
+            client.session.answer_param(param_values(self._handler.parameter(event.name)))
+        elif isinstance(event, Refused):
+            self._complain(client, f"{event.what}: {event.reason}", now)
+        elif isinstance(event, Garbled):
+            if self._complaints.is_new((client.address, "garbled"), now):
+                self._say(client, logging.WARNING, "bytes that are no frame, skipped: %s", event.sample.hex(" "))
+        elif isinstance(event, SyncLost):
+            self._say(client, logging.WARNING, "silent for %.0f s, asking for its topics again", event.seconds)
+        elif isinstance(event, HangUp):
+            self._lose(client, f"hung up on: {event.reason}")
+
+    def _announce(self, client: Client, event: Announced, now: float) -> None:
+        try:
+            self._handler.open(client, event.kind, event.info)
+        except ProtocolError as err:
+            client.session.reject(event.kind, event.info)
+            self._complain(client, str(err), now)
+
+    def _complain(self, client: Client, what: str, now: float) -> None:
+        if self._complaints.is_new((client.address, what), now):
+            self._say(client, logging.WARNING, "refused %s", what)
+
+    def _find_older(self, client: Client) -> None:
+        sensor = client.sensor
+        client.older = [c for c in self.clients.values() if c is not client and c.sensor == sensor]
+
+    def _replace_older(self, client: Client, now: float) -> None:
+        """Close what the same sensor has left behind, as it does when it loses power or its network."""
+        for older in client.older:
+            if not older.closed and now - older.session.last_frame > REPLACE_AFTER:
+                self._lose(older, f"its sensor {older.sensor_id} came back as {client.peer}")
+        client.older = [older for older in client.older if not older.closed]
+
+    def _say(self, client: Client, level: int, text: str, *details: object) -> None:
+        """Log about a client, but not in a flood."""
+        if self._complaints.may_speak(client.address, self._clock()):
+            log.log(level, "%s: " + text, client.peer, *details)
