@@ -1,0 +1,221 @@
+"""Topics and services of ROS on behalf of one rosserial device."""
+
+from __future__ import annotations
+
+import io
+import logging
+import queue
+import struct
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import genpy
+import roslib.message
+import rospy
+
+from rosbot_patrol.errors import ProtocolError
+from rosbot_patrol.msg import EspTrigger
+from rosbot_patrol.rosserial.topics import ESP_TRIGGER_TYPES, TopicInfo
+
+log = logging.getLogger(__name__)
+
+QUEUE_SIZE = 100
+SERVICE_TIMEOUT = 5.0
+
+Send = Callable[[int, bytes], None]
+
+
+def message_class(message_type: str) -> Any:
+    """The class of "package/Type"; raises ProtocolError where it is not built here."""
+    if message_type in ESP_TRIGGER_TYPES:
+        return EspTrigger  # both names mean the same message, and the other package may be absent
+    try:
+        found = roslib.message.get_message_class(message_type)
+    except (ImportError, ValueError) as err:
+        raise ProtocolError("", f"message type {message_type} cannot be loaded: {err}") from err
+    if found is None:
+        raise ProtocolError("", f"message type {message_type} is not built in this workspace")
+    return found
+
+
+def service_class(service_type: str) -> Any:
+    """The class of a service "package/Type"; raises ProtocolError where it is not built here."""
+    try:
+        found = roslib.message.get_service_class(service_type)
+    except (ImportError, ValueError) as err:
+        raise ProtocolError("", f"service type {service_type} cannot be loaded: {err}") from err
+    if found is None:
+        raise ProtocolError("", f"service type {service_type} is not built in this workspace")
+    return found
+
+
+def check_md5(info: TopicInfo, here: Any) -> None:
+    """Compare the definitions of device and workspace; raises ProtocolError that shows both."""
+    if info.md5 == here._md5sum:
+        return
+    definition = " ".join(getattr(here, "_full_text", "").split("=" * 20)[0].split("\n"))[:200].strip()
+    raise ProtocolError(
+        "",
+        f"{info.name}: checksum of {info.message_type} does not match: here {here._md5sum} ({definition}), the device "
+        f"has {info.md5}; build its ros_lib from this workspace's messages",
+    )
+
+
+def serialize(message: Any) -> bytes:
+    """A message as bytes."""
+    buffer = io.BytesIO()
+    message.serialize(buffer)
+    return buffer.getvalue()
+
+
+def deserialize(cls: Any, data: bytes, name: str) -> Any:
+    """Bytes as a message; raises ProtocolError."""
+    try:
+        return cls().deserialize(data)
+    except (genpy.DeserializationError, struct.error, UnicodeDecodeError, ValueError) as err:
+        raise ProtocolError("", f"{name}: {len(data)} bytes that are no {cls._type}: {err}") from err
+
+
+class Publishers:
+    """ROS publishers that the devices share; they stay advertised when a device goes, as upstream's do."""
+
+    def __init__(self) -> None:
+        self._by_name: dict[str, tuple[rospy.Publisher, Any]] = {}
+
+    def open(self, info: TopicInfo) -> None:
+        """Advertise a topic; raises ProtocolError."""
+        name = rospy.resolve_name(info.name)
+        cls = message_class(info.message_type)
+        check_md5(info, cls)
+        known = self._by_name.get(name)
+        if known is None:
+            try:
+                self._by_name[name] = (rospy.Publisher(name, cls, queue_size=QUEUE_SIZE), cls)
+            except (rospy.ROSException, ValueError) as err:
+                raise ProtocolError("", f"{name} cannot be published: {err}") from err
+        elif known[1]._md5sum != cls._md5sum:
+            raise ProtocolError("", f"{name} is published as {known[1]._type} already, not as {cls._type}")
+
+    def publish(self, info: TopicInfo, data: bytes) -> None:
+        """Publish the bytes of a device; raises ProtocolError."""
+        publisher, cls = self._by_name[rospy.resolve_name(info.name)]
+        publisher.publish(deserialize(cls, data, info.name))
+
+
+class Subscription:
+    """What ROS publishes on a topic goes to the device."""
+
+    def __init__(self, info: TopicInfo, send: Send) -> None:
+        cls = message_class(info.message_type)
+        check_md5(info, cls)
+        self._info = info
+        self._send = send
+        self._told = False
+        self._subscriber = rospy.Subscriber(info.name, cls, self._callback, queue_size=QUEUE_SIZE)
+
+    def close(self) -> None:
+        """Stop."""
+        self._subscriber.unregister()
+
+    def _callback(self, message: Any) -> None:
+        try:
+            self._send(self._info.topic_id, serialize(message))
+        except ProtocolError as err:
+            if not self._told:
+                self._told = True
+                log.warning("%s; such messages are dropped", err)
+
+
+class DeviceService:
+    """A service that the device offers to ROS: requests go out under one topic id, answers come under another."""
+
+    def __init__(self, info: TopicInfo, send: Send) -> None:
+        self._cls = service_class(info.message_type)
+        self._name = info.name
+        self._send = send
+        self._request_id: int | None = None
+        self._answers: queue.Queue[Any] = queue.Queue(maxsize=1)
+        self._one_at_a_time = threading.Lock()
+        self._service: rospy.Service | None = None
+
+    def set_answer_topic(self, info: TopicInfo) -> None:
+        """Where the device's answers come from; raises ProtocolError."""
+        check_md5(info, self._cls._response_class)
+
+    def set_request_topic(self, info: TopicInfo) -> None:
+        """Where requests go; from now on ROS can call. Raises ProtocolError."""
+        check_md5(info, self._cls._request_class)
+        self._request_id = info.topic_id
+        if self._service is None:
+            self._service = rospy.Service(self._name, self._cls, self._call)
+
+    def receive(self, data: bytes) -> None:
+        """An answer came; raises ProtocolError."""
+        answer = deserialize(self._cls._response_class, data, self._name)
+        if self._answers.empty():
+            self._answers.put_nowait(answer)
+
+    def close(self) -> None:
+        """Withdraw the service."""
+        if self._service is not None:
+            self._service.shutdown("the device has gone")
+
+    def _call(self, request: Any) -> Any:
+        with self._one_at_a_time:
+            while not self._answers.empty():  # one that came too late for the call before
+                self._answers.get_nowait()
+            if self._request_id is None:
+                raise rospy.ServiceException(f"{self._name}: the device has not announced it fully")
+            self._send(self._request_id, serialize(request))
+            try:
+                return self._answers.get(timeout=SERVICE_TIMEOUT)
+            except queue.Empty as err:
+                raise rospy.ServiceException(f"{self._name}: no answer within {SERVICE_TIMEOUT:.0f} s") from err
+
+
+class ServiceCaller:
+    """A ROS service that the device calls; calls wait on a thread of their own, so the device is read on."""
+
+    def __init__(self, info: TopicInfo, send: Send) -> None:
+        self._cls = service_class(info.message_type)
+        self._name = info.name
+        self._send = send
+        self._answer_id: int | None = None
+        self._requests: queue.Queue[bytes | None] = queue.Queue(maxsize=16)
+        self._proxy = rospy.ServiceProxy(info.name, self._cls)
+        threading.Thread(target=self._run, name=f"calls {info.name}", daemon=True).start()
+
+    def set_request_topic(self, info: TopicInfo) -> None:
+        """Where the device's requests come from; raises ProtocolError."""
+        check_md5(info, self._cls._request_class)
+
+    def set_answer_topic(self, info: TopicInfo) -> None:
+        """Where answers go; raises ProtocolError."""
+        check_md5(info, self._cls._response_class)
+        self._answer_id = info.topic_id
+
+    def receive(self, data: bytes) -> None:
+        """A request came; raises ProtocolError where too many wait."""
+        try:
+            self._requests.put_nowait(data)
+        except queue.Full as err:
+            raise ProtocolError("", f"{self._name}: more than 16 calls wait for an answer") from err
+
+    def close(self) -> None:
+        """End the thread."""
+        try:
+            self._requests.put_nowait(None)
+        except queue.Full:
+            self._requests.get_nowait()
+            self._requests.put_nowait(None)
+
+    def _run(self) -> None:
+        while (data := self._requests.get()) is not None:
+            try:
+                request = deserialize(self._cls._request_class, data, self._name)
+                answer = self._proxy(request)
+                if self._answer_id is not None:
+                    self._send(self._answer_id, serialize(answer))
+            except (ProtocolError, rospy.ServiceException, rospy.ROSException) as err:
+                log.warning("service %s called by a device: %s", self._name, err)

@@ -1,0 +1,231 @@
+"""serial_node: the bridge between rosserial devices and ROS.
+
+Matches rosserial_python 0.9.2 (`serial_node.py`): `~port` ("tcp" or a device), `~baud`, `~tcp_port` (else
+`/rosserial_embeddedlinux/tcp_port`), arguments `[port [tcp_port]]`, negotiation, topics, services, time, log and
+parameter requests, `/diagnostics`.
+
+Differs:
+- One process serves any number of clients a port, on IPv4 and IPv6; `~fork_server` is accepted and not needed.
+- On TCP only `/motion_trigger` of type EspTrigger may be published, and nothing subscribed, until the `~allow_*`
+  lists say more (`~restrict: never` lifts them); a serial device is not restricted.
+- Topics are asked for at once, not after 2 s; a message before negotiation makes it ask again instead of failing.
+- A client that is silent for 15 s is hung up on; a connection that a sensor left behind is closed when it is back.
+- A service that the device does not answer fails after 5 s; upstream waits for ever.
+- A taken port ends the program with one sentence.
+"""
+
+from __future__ import annotations
+
+import logging
+import resource
+import threading
+import time
+from typing import Any
+
+import rospy
+
+from rosbot_patrol.errors import ParamError, ProtocolError
+from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.serial_channels import DeviceService, Publishers, ServiceCaller, Subscription
+from rosbot_patrol.rosserial.client import Client
+from rosbot_patrol.rosserial.server import SerialServer
+from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT, SerialNodeParams
+from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, unpack_esp_trigger
+from rosbot_patrol.sensors.registry import Change, MotionSensors
+
+log = logging.getLogger(__name__)
+
+GLOBAL_TCP_PORT = "/rosserial_embeddedlinux/tcp_port"
+HEALTH_PERIOD = 1.0
+_LOGGERS = (rospy.logdebug, rospy.loginfo, rospy.logwarn, rospy.logerr, rospy.logfatal)
+
+
+class RosSide:
+    """Gives the devices' messages to ROS and the other way round (`rosserial.server.Handler`)."""
+
+    def __init__(self, sensor_timeout: float) -> None:
+        self.server: SerialServer | None = None
+        self.sensors = MotionSensors(sensor_timeout)
+        self.sensors_lock = threading.Lock()
+        self._publishers = Publishers()
+        self._channels: dict[Client, dict[tuple[str, str], Any]] = {}
+
+    def open(self, client: Client, kind: TopicId, info: TopicInfo) -> None:
+        """Advertise or subscribe; raises ProtocolError."""
+        if kind == TopicId.PUBLISHER:
+            self._publishers.open(info)
+            log.info("%s publishes %s [%s]", client.peer, rospy.resolve_name(info.name), info.message_type)
+            return
+        channels = self._channels.setdefault(client, {})
+        if kind == TopicId.SUBSCRIBER:
+            key = ("topic", info.name)
+            if key in channels:
+                channels.pop(key).close()
+            channels[key] = Subscription(info, self._sender(client))
+            log.info("%s subscribes to %s [%s]", client.peer, rospy.resolve_name(info.name), info.message_type)
+        elif kind in (TopicId.SERVICE_SERVER_PUBLISHER, TopicId.SERVICE_SERVER_SUBSCRIBER):
+            service = self._channel(channels, ("offered", info.name), DeviceService, client, info)
+            answers = kind == TopicId.SERVICE_SERVER_PUBLISHER
+            (service.set_answer_topic if answers else service.set_request_topic)(info)
+        else:
+            caller = self._channel(channels, ("called", info.name), ServiceCaller, client, info)
+            requests = kind == TopicId.SERVICE_CLIENT_PUBLISHER
+            (caller.set_request_topic if requests else caller.set_answer_topic)(info)
+
+    def receive(self, client: Client, kind: TopicId, info: TopicInfo, data: bytes) -> None:
+        """Publish, answer or call; raises ProtocolError."""
+        if kind == TopicId.PUBLISHER:
+            if info.md5 == ESP_TRIGGER_MD5:
+                self._note_sensor(client, data)
+            self._publishers.publish(info, data)
+        elif kind == TopicId.SERVICE_SERVER_PUBLISHER:
+            self._channels[client]["offered", info.name].receive(data)
+        else:
+            self._channels[client]["called", info.name].receive(data)
+
+    def closed(self, client: Client) -> None:
+        """Withdraw the device's subscriptions and services."""
+        for channel in self._channels.pop(client, {}).values():
+            channel.close()
+
+    def time(self) -> tuple[int, int]:
+        """ROS time."""
+        stamp = rospy.Time.now()
+        return stamp.secs, stamp.nsecs
+
+    def device_log(self, client: Client, level: int, text: str) -> None:
+        """To the console and /rosout, at the device's level."""
+        _LOGGERS[min(level, len(_LOGGERS) - 1)]("%s: %s", client.peer, text)
+
+    def parameter(self, name: str) -> object:
+        """A ROS parameter; raises ProtocolError where it is not set."""
+        try:
+            return rospy.get_param(name)
+        except KeyError as err:
+            raise ProtocolError("", f"parameter {name} is not set") from err
+
+    def _note_sensor(self, client: Client, data: bytes) -> None:
+        sensor_id, move = unpack_esp_trigger(data)
+        with self.sensors_lock:
+            events = self.sensors.heard(sensor_id, client.address, time.monotonic(), move=move)
+        for event in events:
+            log.info("%s", event)
+        if move:
+            log.info("motion sensor %d: something moves", sensor_id)
+
+    def _sender(self, client: Client) -> Any:
+        def send(topic_id: int, data: bytes) -> None:
+            if self.server is not None:
+                self.server.send(client, topic_id, data)
+
+        return send
+
+    def _channel(
+        self, channels: dict[tuple[str, str], Any], key: tuple[str, str], cls: Any, client: Client, info: TopicInfo
+    ) -> Any:
+        if key not in channels:
+            channels[key] = cls(info, self._sender(client))
+        return channels[key]
+
+
+class Report:
+    """Tells /diagnostics of the clients and sensors, and the log of sensors that fall silent; once a second."""
+
+    def __init__(self, ros_side: RosSide, server: SerialServer, what: str) -> None:
+        self._ros_side = ros_side
+        self._server = server
+        self._what = what
+        self._health = Health("rosserial")
+        self._parts: set[str] = set()
+
+    def run(self) -> None:
+        """Report until shutdown."""
+        while not rospy.is_shutdown():
+            self._step(time.monotonic())
+            time.sleep(HEALTH_PERIOD)
+
+    def _step(self, now: float) -> None:
+        with self._ros_side.sensors_lock:
+            events = self._ros_side.sensors.tick(now)
+            statuses = self._ros_side.sensors.statuses(now)
+        for event in events:
+            log.log(logging.WARNING if event.change is Change.SILENT else logging.INFO, "%s", event)
+        clients = list(self._server.clients.values())
+        parts = {self._client(client, now) for client in clients}
+        for part in self._parts - parts:
+            self._health.drop(part)
+        self._parts = parts
+        silent = [str(status.sensor_id) for status in statuses if status.silent]
+        for status in statuses:
+            level, text = (ERROR, "silent") if status.silent else (OK, "heard of")
+            values = {"peer": status.peer, "seconds ago": f"{status.seconds:.1f}", "triggers": status.triggers}
+            self._health.set(f"sensor {status.sensor_id}", level, f"{text} {status.seconds:.0f} s ago", values)
+        text = f"{self._what}: {len(clients)} connected"
+        self._health.set("", WARN if silent else OK, text + (f", silent: {', '.join(silent)}" if silent else ""))
+
+    def _client(self, client: Client, now: float) -> str:
+        session, part = client.session, f"client {client.peer}"
+        quiet = now - session.last_frame
+        level, text = (OK, "in sync") if quiet < 5.0 else (ERROR, "no sync with device")
+        if not session.configured:
+            level, text = max(level, WARN), "no topic accepted"
+        values = {
+            "messages": session.messages,
+            "dropped": session.dropped,
+            "bytes of garbage": session.parser.garbage,
+            "bad checksums": session.parser.bad_checksums,
+            "last heard": f"{quiet:.1f}",
+            "last sync lost": session.sync_losses,
+            "not delivered": client.discarded,
+        }
+        self._health.set(part, level, text, values)
+        return part
+
+
+def _parameters() -> SerialNodeParams:
+    """Private parameters, upstream's global ones and the arguments, in rising order of weight."""
+    tree = dict(rospy.get_param("~", {}) or {})
+    if "tcp_port" not in tree:
+        tree["tcp_port"] = rospy.get_param(GLOBAL_TCP_PORT, DEFAULT_TCP_PORT)
+    arguments = rospy.myargv()[1:]
+    if arguments:
+        tree["port"] = arguments[0]
+    if len(arguments) > 1:
+        if not arguments[1].isdigit():
+            raise ParamError("argument 2", f"expected a TCP port, got {arguments[1]!r}")
+        tree["tcp_port"] = int(arguments[1])
+    return load_params(SerialNodeParams, tree=tree)
+
+
+def _allow_many_files(clients: int) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = clients + 256
+    if soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted if hard < 0 else min(wanted, hard), hard))
+
+
+def body() -> None:
+    """Build the server and serve until shutdown."""
+    params = _parameters()
+    policy = params.policy(rospy.get_name() + "/")
+    _allow_many_files(params.max_clients)
+    ros_side = RosSide(params.sensor_timeout)
+    server = SerialServer(ros_side, policy, silence_timeout=params.silence_timeout, max_clients=params.max_clients)
+    ros_side.server = server
+    if params.is_tcp:
+        ports = server.listen(params.all_tcp_ports, params.host)
+        what = "TCP port " + ", ".join(map(str, ports))
+        log.info("waiting for sensors on %s", what)
+    else:
+        server.attach(params.port, params.baud)
+        what = params.port
+    rospy.on_shutdown(server.stop)
+    threading.Thread(target=Report(ros_side, server, what).run, name="report", daemon=True).start()
+    server.run()
+    server.close()
+
+
+def main() -> None:
+    """Run the node."""
+    run_node("serial_node", body)

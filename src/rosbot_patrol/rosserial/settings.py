@@ -1,0 +1,64 @@
+"""Parameters of `serial_node`: upstream's names and defaults, and those of the limits that upstream lacks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from rosbot_patrol.params import param
+from rosbot_patrol.rosserial.policy import MOTION_TRIGGER_RULES, TRUSTED, Policy, parse_networks, parse_rules
+
+DEFAULT_TCP_PORT = 11411
+DEFAULT_PORT = "/dev/ttyUSB0"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SerialNodeParams:
+    """Parameters of serial_node."""
+
+    port: str = param(DEFAULT_PORT, doc="serial device, or 'tcp' for a TCP server")
+    baud: int = param(57600, lo=50, hi=4_000_000, unit="baud", doc="speed of the serial device")
+    tcp_port: int = param(
+        DEFAULT_TCP_PORT, lo=0, hi=65535, doc="TCP port; without it /rosserial_embeddedlinux/tcp_port"
+    )
+    fork_server: bool = param(False, doc="accepted and not needed: one process serves all clients")
+    fix_pyserial_for_test: bool = param(False, doc="accepted and not needed: pseudo-terminals work as they are")
+    tcp_ports: tuple[int, ...] = param((), lo=0, hi=65535, doc="further TCP ports of the same process")
+    host: str = param("", doc="address to listen on; empty: every address, IPv4 and IPv6")
+    restrict: str = param("tcp", choices=("tcp", "always", "never"), doc="where the allow_ lists hold")
+    allow_publish: tuple[str, ...] = param(MOTION_TRIGGER_RULES, doc="'TOPIC TYPE' that devices may publish")
+    allow_subscribe: tuple[str, ...] = param((), doc="'TOPIC TYPE' that devices may subscribe to")
+    allow_services: tuple[str, ...] = param((), doc="'SERVICE TYPE' that devices may offer or call")
+    allow_parameters: tuple[str, ...] = param((), doc="parameters that devices are told")
+    allow_peers: tuple[str, ...] = param((), doc="addresses and networks that may connect; empty: all")
+    max_clients: int = param(600, lo=1, hi=20000, doc="TCP clients at a time, all ports together")
+    max_rate: float = param(200.0, lo=0.0, unit="1/s", doc="frames a second and client, beyond it reads slowly; 0: any")
+    max_payload: int = param(1024, lo=64, hi=32767, unit="bytes", doc="longest message of a restricted client")
+    silence_timeout: float = param(15.0, lo=1.0, unit="s", doc="hang up on a TCP client not heard of for that long")
+    sensor_timeout: float = param(
+        10.0, lo=1.0, unit="s", doc="a motion sensor without a heartbeat for that long is silent"
+    )
+
+    @property
+    def is_tcp(self) -> bool:
+        """Whether to serve TCP."""
+        return self.port == "tcp"
+
+    @property
+    def all_tcp_ports(self) -> tuple[int, ...]:
+        """Every TCP port to open."""
+        return (self.tcp_port, *(port for port in self.tcp_ports if port != self.tcp_port))
+
+    def policy(self, prefix: str) -> Policy:
+        """What devices may do; `prefix` names the parameters in messages. Raises ParamError."""
+        restricted = self.restrict == "always" or (self.restrict == "tcp" and self.is_tcp)
+        base = Policy() if restricted else TRUSTED
+        return replace(
+            base,
+            publish=parse_rules(self.allow_publish, prefix + "allow_publish"),
+            subscribe=parse_rules(self.allow_subscribe, prefix + "allow_subscribe"),
+            services=parse_rules(self.allow_services, prefix + "allow_services"),
+            parameters=self.allow_parameters,
+            peers=parse_networks(self.allow_peers, prefix + "allow_peers"),
+            max_payload=self.max_payload if restricted else base.max_payload,
+            max_rate=self.max_rate if restricted else base.max_rate,
+        )
