@@ -78,6 +78,19 @@ def end_group(process: subprocess.Popen[bytes], grace_s: float = 20.0) -> None:
     process.wait()
 
 
+def child_pids(pid: int) -> list[int]:
+    """Direct children of a process."""
+    try:
+        return [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()] + [
+            int(p)
+            for task in Path(f"/proc/{pid}/task").iterdir()
+            if int(task.name) != pid
+            for p in (task / "children").read_text().split()
+        ]
+    except OSError:
+        return []
+
+
 @dataclass
 class Mission:
     """What was seen of one mission, by ground truth."""
@@ -100,21 +113,27 @@ class House:
 
     Args:
         folder: where logs, mails and state go.
-        launch: package, file and arguments of roslaunch.
+        launch: package and file for roslaunch.
+        plain: give the launch file no argument but those named here.
+        arguments: arguments of the launch file.
     """
 
-    def __init__(self, folder: Path, *launch: str, **arguments: Any) -> None:
+    def __init__(self, folder: Path, *launch: str, plain: bool = False, **arguments: Any) -> None:
         self.folder = folder
         self.maildir = folder / "mail"
         self.log = folder / "roslaunch.log"
         command = list(launch) or ["rosbot_patrol", "rosbot_patrol.launch"]
-        given: dict[str, Any] = {
-            "simulation": "true",
-            "gui": "false",
-            "transport": "maildir",
-            "maildir": str(self.maildir),
-            "state_dir": str(folder / "state"),
-        }
+        given: dict[str, Any] = (
+            {}
+            if plain
+            else {
+                "simulation": "true",
+                "gui": "false",
+                "transport": "maildir",
+                "maildir": str(self.maildir),
+                "state_dir": str(folder / "state"),
+            }
+        )
         given.update(arguments)
         self._command = ["roslaunch", "--skip-log-check", *command, *(f"{k}:={v}" for k, v in given.items())]
         self._process: subprocess.Popen[bytes] | None = None
@@ -168,6 +187,17 @@ class House:
                 rosgraph.Master("/house"),
                 [n for n in rosnode.get_node_names() if "house_watch" not in n and n != "/rosout"],
             )
+
+    def kill(self) -> None:
+        """End every process of it at once, as `kill -9` does."""
+        if self._process is not None:
+            # roslaunch first: it would end its nodes politely. They lead groups of their own.
+            nodes = list(child_pids(self._process.pid))
+            for pid in [self._process.pid, *nodes]:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            self._process.wait()
+            self._process = None
 
     def wait_ready(self, timeout: float = 60.0) -> float:
         """Wait until it is on guard; returns the seconds since the launch."""

@@ -1,0 +1,113 @@
+"""Every launch file parses, and each of its programs exists exactly once."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("roslaunch", reason="ROS is not on the path: `. scripts/env` first")
+import roslaunch.config  # noqa: E402
+import roslaunch.xmlloader  # noqa: E402
+import roslib.packages  # noqa: E402
+
+ROOT = Path(__file__).parents[2]
+OURS = sorted((ROOT / "launch").glob("*.launch"))
+FORWARDED = sorted((ROOT / "drop_in").glob("*/launch/*.launch"))
+TUTORIAL = [
+    "gmapping_only",
+    "move_base_only",
+    "amcl_only",
+    "simulation_gmapping",
+    "simulation_world",
+    "darknet_yolo_only",
+    "darknet_yolo_simulation_only",
+    "rosbot_all_hardware",
+    "rosbot_all_algorithms",
+    "rosbot_gmapping",
+    "esp_connector",
+    "rosbot_patrol",
+    "rosbot_patrol_pc",
+]
+
+
+def parse(path: Path, *arguments: str, robot: bool = False) -> roslaunch.config.ROSLaunchConfig:
+    before = os.environ.pop("ROSBOT_VER", None)
+    if robot:
+        os.environ["ROSBOT_VER"] = "ROSBOT_2.0"
+    try:
+        config = roslaunch.config.ROSLaunchConfig()
+        loader = roslaunch.xmlloader.XmlLoader(resolve_anon=True)
+        loader.load(str(path), config, argv=list(arguments), verbose=False)
+        return config
+    finally:
+        os.environ.pop("ROSBOT_VER", None)
+        if before is not None:
+            os.environ["ROSBOT_VER"] = before
+
+
+def names(config: roslaunch.config.ROSLaunchConfig) -> dict[str, tuple[str, str]]:
+    return {node.namespace.strip("/") + node.name: (node.package, node.type) for node in config.nodes}
+
+
+def check_programs(config: roslaunch.config.ROSLaunchConfig) -> None:
+    for node in config.nodes:
+        if node.package == "tutorial_pkg":
+            continue  # the old firmware's own programs
+        found = roslib.packages.find_node(node.package, node.type)
+        ours = node.package == "rosbot_patrol" or (ROOT / "drop_in" / node.package).is_dir()
+        assert len(found) == 1 if ours else found, f"{node.package}/{node.type}: {found}"
+
+
+@pytest.mark.parametrize("path", OURS + FORWARDED, ids=lambda p: f"{p.parts[-3]}/{p.name}")
+def test_parses(path: Path) -> None:
+    arguments = ["world_name:=x"] if path.name == "empty_world.launch" else []
+    config = parse(path, *arguments)
+    if "gmapping" not in path.name:
+        check_programs(config)
+
+
+def test_the_tutorials_files_are_all_there() -> None:
+    assert {p.stem for p in OURS} >= set(TUTORIAL)
+
+
+def test_simulation_by_default_and_the_robot_where_its_version_is_set() -> None:
+    simulated = names(parse(ROOT / "launch" / "rosbot_patrol.launch"))
+    assert "simulator" in simulated
+    assert {"patrolling_node", "move_base", "amcl", "map_server", "darknet_ros", "rgb_compress"} <= set(simulated)
+    assert {"esp_client1", "esp_client2", "esp_client3", "teleop_twist_keyboard", "laser_broadcaster"} <= set(simulated)
+    robot = names(parse(ROOT / "launch" / "rosbot_patrol.launch", robot=True))
+    assert "simulator" not in robot
+    assert {"laser_publisher", "imu_publisher", "camera_publisher", "patrolling_node"} <= set(robot)
+
+
+def test_detector_on_the_pc() -> None:
+    robot = names(parse(ROOT / "launch" / "rosbot_patrol.launch", "detector:=pc"))
+    assert "darknet_ros" not in robot
+    assert "esp_client1" not in robot
+    computer = names(parse(ROOT / "launch" / "rosbot_patrol_pc.launch"))
+    assert set(computer) == {"rgb_decompress", "darknet_ros", "esp_client1", "esp_client2", "esp_client3"}
+
+
+@pytest.mark.parametrize("profile", ["tuned", "tutorial"])
+@pytest.mark.parametrize("simulation", ["true", "false"])
+def test_profiles(profile: str, simulation: str) -> None:
+    config = parse(ROOT / "launch" / "move_base_only.launch", f"profile:={profile}", f"simulation:={simulation}")
+    given = {name: value.value for name, value in config.params.items()}
+    rate = given["/move_base/controller_frequency"]
+    if profile == "tutorial":
+        assert rate == (25.0 if simulation == "true" else 10.0)
+        assert given["/move_base/global_costmap/width"] == (35 if simulation == "true" else 15)
+        assert given["/move_base/TrajectoryPlannerROS/max_vel_x"] == 0.1
+
+
+def test_an_unknown_profile_names_the_two() -> None:
+    with pytest.raises(Exception, match="tutorial-or-tuned-not-fast"):
+        parse(ROOT / "launch" / "move_base_only.launch", "profile:=fast")
+
+
+def test_respawn_has_a_delay() -> None:
+    for node in parse(ROOT / "launch" / "rosbot_patrol.launch").nodes:
+        if node.respawn:
+            assert node.respawn_delay >= 1.0, node.name
