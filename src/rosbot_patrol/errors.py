@@ -13,6 +13,7 @@
     |- ControlError       no velocity command
     |- ProtocolError      bytes of a peer that make no sense
     |- DetectorError      a network, its weights or a picture
+    |- ImageError         the bytes of a picture that make no sense
     `- AlertError         a notice that could not be delivered
 
 A constructor takes facts and writes the sentence, so that a reader is told what and where.
@@ -133,6 +134,10 @@ class ProtocolError(PatrolError):
 
 class DetectorError(PatrolError):
     """A network file or a picture that the detector cannot use."""
+
+
+class ImageError(PatrolError):
+    """The bytes of a picture, raw or compressed, that cannot be read."""
 
 
 class AlertError(PatrolError):

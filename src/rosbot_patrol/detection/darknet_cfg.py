@@ -141,7 +141,7 @@ def parse_cfg(text: str, source: str = "cfg") -> NetworkSpec:
         layers.append(builder(section, layers, layers[-1].out_shape if layers else shape))
     if not layers:
         raise net.fail("has no layers after it")
-    spec = NetworkSpec(source, *shape, tuple(layers))
+    spec = NetworkSpec(source, *shape, tuple(layers), text)
     if not spec.heads:
         raise DetectorError(f"{source}: has neither [region] nor [yolo], so it finds no boxes")
     if len({head.classes for head in spec.heads}) > 1:

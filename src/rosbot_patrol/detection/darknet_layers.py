@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 Shape = tuple[int, int, int]
 """Channels, height, width."""
@@ -126,6 +126,7 @@ class NetworkSpec:
         source: the file it came from, for messages.
         channels: of the input, height and width of it [px].
         layers: in order.
+        text: the file as it was.
     """
 
     source: str
@@ -133,6 +134,7 @@ class NetworkSpec:
     height: int
     width: int
     layers: tuple[Layer, ...]
+    text: str = field(default="", repr=False)
 
     @property
     def convolutions(self) -> list[Convolutional]:

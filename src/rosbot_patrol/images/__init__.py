@@ -1,0 +1,1 @@
+"""Pictures as they travel: ROS encodings and compressed bytes <-> numpy arrays."""
