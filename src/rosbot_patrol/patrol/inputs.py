@@ -70,11 +70,11 @@ class Frame:
     """What the detector saw in one picture.
 
     Attributes:
-        stamp: when the picture was taken [s].
+        stamp: when the picture was taken [s], None where that is not known (darknet_ros tells it only with boxes).
         boxes: nothing seen if empty.
     """
 
-    stamp: float
+    stamp: float | None = None
     boxes: tuple[Box, ...] = ()
 
 

@@ -132,6 +132,7 @@ class PatrolManager:
         self._drive: Drive | None = None
         self._look: Look | None = None
         self._ready = False
+        self._woke: float | None = None
         self._at_rest = "on guard"
         self._report: Report | None = None
         self._last = -math.inf
@@ -179,10 +180,10 @@ class PatrolManager:
             self._watch.start(now)
         self._last = now
         self._accept(inputs, out)
-        if self.mission is None and self._is_ready(inputs) and self.queue:
+        if self.mission is None and self._is_ready(now, inputs) and self.queue:
             self._begin(now, inputs, out)
         if self.mission is None:
-            self._say(out, Phase.IDLE if self._ready else Phase.STARTING, self._at_rest)
+            self._say(out, Phase.IDLE if self._ready else Phase.STARTING, self._rest_text(now, inputs))
             return out
         if self._drive is None and self._look is None:
             self._enter(now, self.mission.phase)
@@ -224,20 +225,25 @@ class PatrolManager:
             return True
         return pose is not None and distance(pose, mission.room.pose) < self.params.own_motion_radius
 
-    def _is_ready(self, inputs: Inputs) -> bool:
-        lacks = []
-        if not inputs.link.is_up:
-            lacks.append("move_base")
-        if inputs.pose is None:
-            lacks.append("the robot's pose in the map")
-        if inputs.yaw is None:
-            lacks.append("its heading in odom")
-        if lacks and not self._ready:
-            self._at_rest = "waiting for " + " and ".join(lacks)
-        elif not self._ready:
-            self._ready, self._at_rest = True, "on guard"
-        # once on guard a trigger is taken at once: its drive waits for what is missing, within bounds
+    def _is_ready(self, now: float, inputs: Inputs) -> bool:
+        # Once on guard a trigger is taken at once: its drive waits for what is missing, within bounds.
+        look = self.params.look
+        silent = now - inputs.detector_at > look.detector_timeout
+        if not self._ready:
+            if self._woke is None or now < self._woke:
+                self._woke = now
+            lacks = ["move_base"] * (not inputs.link.is_up)
+            lacks += ["the robot's pose in the map"] * (inputs.pose is None)
+            lacks += ["its heading in odom"] * (inputs.yaw is None)
+            lacks += ["the detector"] * (silent and now - self._woke < look.detector_wait)
+            self._ready = not lacks
+            self._at_rest = "waiting for " + " and ".join(lacks) if lacks else "on guard"
         return self._ready
+
+    def _rest_text(self, now: float, inputs: Inputs) -> str:
+        if self._ready and now - inputs.detector_at > self.params.look.detector_timeout:
+            return f"{self._at_rest}; the detector is silent"
+        return self._at_rest
 
     def _begin(self, now: float, inputs: Inputs, out: Commands) -> None:
         room_id, triggers = self.queue.pop()

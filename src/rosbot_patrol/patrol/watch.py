@@ -58,28 +58,30 @@ class Watch:
     def __init__(self, alarm_classes: tuple[str, ...], params: WatchParams | None = None) -> None:
         self.params = params or WatchParams()
         self._classes = frozenset(alarm_classes)
-        self._frames: deque[Frame] = deque(maxlen=self.params.window)
+        self._views: deque[_View] = deque(maxlen=self.params.window)
         self._newest = -math.inf
 
     def start(self, now: float) -> None:
         """Forget everything; pictures taken before `now` do not count from here on."""
-        self._frames.clear()
+        self._views.clear()
         self._newest = now
 
     def add(self, now: float, frame: Frame) -> Confirmation | None:
         """Take one picture's boxes; a confirmation where they make an intruder."""
-        if frame.stamp <= self._newest or now - frame.stamp > self.params.max_age:
-            return None
-        self._newest = frame.stamp
-        boxes = tuple(box for box in frame.boxes if self._is_plausible(box))
-        self._frames.append(Frame(stamp=frame.stamp, boxes=boxes))
-        while self._frames and frame.stamp - self._frames[0].stamp > self.params.max_age:
-            self._frames.popleft()
-        return self._confirm({box.label for box in boxes})
+        stamp = now if frame.stamp is None else frame.stamp
+        if frame.stamp is not None:
+            if stamp <= self._newest or now - stamp > self.params.max_age:
+                return None
+            self._newest = stamp
+        view = _View(arrived=now, stamp=stamp, boxes=tuple(box for box in frame.boxes if self._is_plausible(box)))
+        self._views.append(view)
+        while now - self._views[0].arrived > self.params.max_age:
+            self._views.popleft()
+        return self._confirm({box.label for box in view.boxes})
 
     def candidate(self, now: float, recent: float = 0.6) -> bool:
-        """Whether one of the last pictures shows something that may become an intruder."""
-        return any(frame.boxes and 0.0 <= now - frame.stamp <= recent for frame in self._frames)
+        """Whether a picture that came lately shows something that may become an intruder."""
+        return any(view.boxes and 0.0 <= now - view.arrived <= recent for view in self._views)
 
     def _is_plausible(self, box: Box) -> bool:
         if box.label not in self._classes or not 0.0 < box.probability <= 1.0:
@@ -90,23 +92,27 @@ class Watch:
 
     def _confirm(self, labels: set[str]) -> Confirmation | None:
         for label in sorted(labels, key=self._best_score, reverse=True):
-            best = [
-                (max(self._of(frame, label), key=_score), frame) for frame in self._frames if self._of(frame, label)
-            ]
-            mean = sum(box.probability for box, _ in best) / len(best)
-            span = best[-1][1].stamp - best[0][1].stamp
-            if len(best) >= self.params.frames and span >= self.params.span - 1e-6 and mean >= self.params.min_score:
-                frame = max(best, key=lambda pair: (pair[0].probability, pair[0].height))[1]
-                boxes = tuple(sorted(frame.boxes, key=lambda b: (b.label != label, -b.probability)))
-                return Confirmation(label=label, probability=mean, stamp=frame.stamp, boxes=boxes, pictures=len(best))
+            shown = [(max(view.of(label), key=_score), view) for view in self._views if view.of(label)]
+            mean = sum(box.probability for box, _ in shown) / len(shown)
+            span = shown[-1][1].stamp - shown[0][1].stamp
+            if len(shown) >= self.params.frames and span >= self.params.span - 1e-6 and mean >= self.params.min_score:
+                view = max(shown, key=lambda pair: (pair[0].probability, pair[0].height))[1]
+                boxes = tuple(sorted(view.boxes, key=lambda b: (b.label != label, -b.probability)))
+                return Confirmation(label=label, probability=mean, stamp=view.stamp, boxes=boxes, pictures=len(shown))
         return None
 
     def _best_score(self, label: str) -> float:
-        return max(box.probability for frame in self._frames for box in self._of(frame, label))
+        return max(box.probability for view in self._views for box in view.of(label))
 
-    @staticmethod
-    def _of(frame: Frame, label: str) -> list[Box]:
-        return [box for box in frame.boxes if box.label == label]
+
+@dataclass(frozen=True, kw_only=True)
+class _View:
+    arrived: float
+    stamp: float
+    boxes: tuple[Box, ...]
+
+    def of(self, label: str) -> list[Box]:
+        return [box for box in self.boxes if box.label == label]
 
 
 def _score(box: Box) -> float:

@@ -1,0 +1,208 @@
+"""The alert desk: a thread that writes incidents and mails to disk, then delivers, and never stops the patrol."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from pathlib import Path
+
+import rospy
+
+from rosbot_patrol.alerts.incident import Incident, load_incident, save_incident
+from rosbot_patrol.alerts.mail import Envelope, build_mail, one_line
+from rosbot_patrol.alerts.outbox import Entry, Outbox
+from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
+from rosbot_patrol.alerts.transports import DeliveryError, Transport
+from rosbot_patrol.errors import AlertError
+from rosbot_patrol.msg import Alert
+from rosbot_patrol.patrol.manager import Notice
+from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.patrol_images import PictureRing
+
+log = logging.getLogger(__name__)
+
+DISK_RETRY = 5.0  # [s] between attempts to write where the disk does not take it
+
+
+class AlertDesk:
+    """Takes notices, keeps them, delivers them.
+
+    Args:
+        outbox: mails on disk.
+        transport: how they leave.
+        envelope: whom they go to.
+        pictures: the camera's last pictures.
+        incidents: folder of the records.
+        health: where to say how it goes.
+    """
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        transport: Transport,
+        envelope: Envelope,
+        pictures: PictureRing,
+        incidents: Path,
+        health: Health,
+    ) -> None:
+        self._outbox, self._transport, self._envelope = outbox, transport, envelope
+        self._pictures, self._incidents, self._health = pictures, incidents, health
+        self._jobs: deque[tuple[Incident, Notice]] = deque()
+        self._finals: deque[tuple[str, str, str, int]] = deque()
+        self._wake = threading.Event()
+        self._publisher = rospy.Publisher("/patrol/alerts", Alert, queue_size=10)
+        self._thread = threading.Thread(target=self._run, name="alerts", daemon=True)
+
+    def start(self) -> None:
+        """Begin to work."""
+        waiting = f", {len(self._outbox)} wait from before" if len(self._outbox) else ""
+        log.info("alert mails go to %s (transport %s)%s", self._transport.describe(), self._transport.name, waiting)
+        self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
+        self._thread.start()
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether every notice taken is on disk."""
+        return not self._jobs
+
+    def take(self, notice: Notice, ros_time: float) -> None:
+        """Take an intruder's notice; returns at once."""
+        mission, seen, pose = notice.mission, notice.seen, notice.pose
+        incident = Incident(
+            id=mission.id,
+            wall=time.time(),
+            ros_time=ros_time,
+            room_id=mission.room.id,
+            room_name=mission.room.name,
+            phase=notice.phase.value,
+            object_class=seen.label,
+            probability=seen.probability,
+            pictures=seen.pictures,
+            verdict=mission.verdict.value if mission.verdict else "",
+            reason=mission.reason,
+            pose=(pose.x, pose.y, pose.yaw) if pose else None,
+        )
+        self._jobs.append((incident, notice))
+        self._wake.set()
+
+    def close_incident(self, mission_id: str, verdict: str, reason: str, sightings: int) -> None:
+        """Complete the record of a mission that is over; returns at once."""
+        self._finals.append((mission_id, verdict, reason, sightings))
+        self._wake.set()
+
+    # -- the thread
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            try:
+                pause = self._work()
+            except Exception:  # the desk must outlive whatever one mail does to it
+                log.error("the alert desk stumbled", exc_info=True)
+                pause = DISK_RETRY
+            if pause > 0.0:
+                self._wake.wait(min(pause, 60.0))
+                self._wake.clear()
+
+    def _work(self) -> float:
+        """Do one thing; returns how long to wait for the next [s]."""
+        if self._jobs:
+            return 0.0 if self._record(*self._jobs[0]) else DISK_RETRY
+        if self._finals:
+            self._complete(*self._finals.popleft())
+            return 0.0
+        entry = self._outbox.due(time.monotonic())
+        if entry is not None:
+            self._deliver(entry)
+            return 0.0
+        wait = self._outbox.wait(time.monotonic())
+        return 60.0 if wait is None else wait + 0.01
+
+    def _record(self, incident: Incident, notice: Notice) -> bool:
+        picture, note = self._picture(notice)
+        try:
+            self._outbox.put(incident.id, build_mail(incident, self._envelope, picture, picture_note=note))
+        except OSError as err:
+            log.error(
+                "the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, self._outbox.folder, err
+            )
+            self._health.set("mail", WARN, f"the outbox cannot be written: {err}")
+            return False
+        log.warning("ALERT: %s; the notice is on disk", incident.sentence)
+        self._jobs.popleft()
+        self._publish(incident, delivered=False, location=str(self._outbox.folder), text=incident.sentence)
+        self._save(incident, picture)
+        return True
+
+    def _picture(self, notice: Notice) -> tuple[bytes | None, str]:
+        if not self._pictures.is_wanted:
+            return None, "none, no camera topic is set"
+        raw = self._pictures.wait_for(notice.seen.stamp, 0.5)
+        boxes = [
+            LabelledBox(
+                text=f"{one_line(b.label)} {b.probability:.2f}", xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax
+            )
+            for b in notice.seen.boxes
+        ]
+        note = "attached, the one that the boxes were found in"
+        if raw is None:
+            raw, boxes = self._pictures.find(notice.seen.stamp, tolerance=2.0), []
+            if raw is None:
+                return None, "none came from the camera"
+            note = f"attached, taken {abs(raw.stamp - notice.seen.stamp):.1f} s from the detection"
+        try:
+            return to_jpeg(raw, boxes), note
+        except AlertError as err:
+            log.error("%s", err)
+            return None, f"none: {err}"
+
+    def _save(self, incident: Incident, picture: bytes | None) -> None:
+        try:
+            save_incident(self._incidents, incident, picture)
+        except OSError as err:
+            log.error("the record of incident %s cannot be written: %s", incident.id, err)
+
+    def _complete(self, mission_id: str, verdict: str, reason: str, sightings: int) -> None:
+        incident = load_incident(self._incidents, mission_id)
+        if incident is not None:
+            fields = {**incident.__dict__, "verdict": verdict, "reason": reason, "sightings": sightings, "final": True}
+            self._save(Incident(**fields), None)
+
+    def _deliver(self, entry: Entry) -> None:
+        try:
+            mail = entry.mail()
+        except FileNotFoundError:
+            log.error("%s is gone from the outbox", entry.path)
+            self._outbox.delivered(entry, time.monotonic())
+            return
+        except (OSError, ValueError) as err:
+            log.error("%s cannot be sent (%s), set aside as %s", entry.path, err, self._outbox.set_aside(entry))
+            return
+        try:
+            location = self._transport.send(entry.id, mail)
+        except DeliveryError as err:
+            self._put_off(entry, err)
+            return
+        self._outbox.delivered(entry, time.monotonic())
+        incident = load_incident(self._incidents, entry.id)
+        text = f"mail about incident {entry.id} delivered by {self._transport.name}: {location}"
+        log.info("%s", text)
+        self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
+        self._publish(incident, delivered=True, location=location, text=text, incident_id=entry.id)
+
+    def _put_off(self, entry: Entry, err: DeliveryError) -> None:
+        delay = self._outbox.failed(entry, time.monotonic(), permanent=err.permanent)
+        log.error("%s; the mail stays in %s, next try in %.0f s", err, entry.path, delay)
+        self._health.set("mail", WARN, f"{len(self._outbox)} mails wait: {err}")
+
+    def _publish(
+        self, incident: Incident | None, *, delivered: bool, location: str, text: str, incident_id: str = ""
+    ) -> None:
+        message = Alert(id=incident_id, delivered=delivered, location=location, text=text)
+        message.header.stamp = rospy.Time.now()
+        message.transport = self._transport.name
+        if incident is not None:
+            message.id, message.room_id, message.room_name = incident.id, incident.room_id, incident.room_name
+            message.object_class, message.probability = incident.object_class, incident.probability
+        self._publisher.publish(message)

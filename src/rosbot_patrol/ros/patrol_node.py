@@ -1,0 +1,343 @@
+"""patrol_robot: drives to the room whose motion sensor calls, looks around, mails what it finds, comes home.
+
+Matches `patrol_robot` and `patrol_robot_simulation` of the tutorial: topics /motion_trigger,
+/darknet_ros/bounding_boxes, /cmd_vel, action move_base, parameters ~path_to_params, ~email_to, ~email_from.
+
+Differs: see rosbot_patrol.patrol.manager, .patrol.rooms, .patrol.spin and .alerts.mail; beyond the original it
+publishes /patrol/state and /patrol/alerts, keeps its outbox, queue and incidents in ~state_dir, and stops the robot
+and gives up its goal when it is ended. Only one action client, one tf listener and one publisher are made.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import socket
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import rospy
+from darknet_ros_msgs.msg import BoundingBoxes, ObjectCount
+from geometry_msgs.msg import Twist
+from sensor_msgs.msg import LaserScan as LaserScanMsg
+
+from rosbot_patrol.alerts.mail import make_envelope
+from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.transports import MailParams, make_transport
+from rosbot_patrol.errors import TransformError
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, transform_points
+from rosbot_patrol.msg import EspTrigger, PatrolState
+from rosbot_patrol.params import declared, param
+from rosbot_patrol.patrol.drive import DriveParams
+from rosbot_patrol.patrol.inputs import Box, Frame, Inputs
+from rosbot_patrol.patrol.look import LookParams
+from rosbot_patrol.patrol.manager import Commands, ManagerParams, PatrolManager, Report
+from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.store import PatrolStore
+from rosbot_patrol.patrol.watch import WatchParams
+from rosbot_patrol.ros import convert
+from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.inputs import Latest
+from rosbot_patrol.ros.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.patrol_alerts import AlertDesk
+from rosbot_patrol.ros.patrol_goal import MoveBase
+from rosbot_patrol.ros.patrol_images import PictureRing
+from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.scan import scan_points
+
+log = logging.getLogger(__name__)
+
+P = TypeVar("P")
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeParams:
+    """The node's own parameters; those of mail, drive, look, turn and watch come beside them."""
+
+    path_to_params: str = param(doc="points file (the tutorial's name)")
+    state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
+    image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
+    alarm_classes: list[str] = param(["person", "fire hydrant"], doc="classes of objects that alarm")
+    own_motion_radius: float = param(
+        2.0, unit="m", lo=0.0, doc="on the way back, so near to its room's point, the robot is what its sensor sees"
+    )
+    base_frame: str = param("base_link", doc="the robot")
+    odom_frame: str = param("odom", doc="frame in which a turn is measured")
+    map_frame: str = param("map", doc="frame of the points file")
+    pose_timeout: float = param(0.5, unit="s", lo=0.05, doc="an older odom -> base_link is not known")
+    scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="an older scan says nothing of obstacles")
+    rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
+    latched_window: float = param(
+        10.0, unit="s", lo=0.0, doc="so long after its start a latched trigger that it had before is not taken again"
+    )
+    watch: WatchParams = WatchParams()
+
+
+FLAT = (NodeParams, MailParams, DriveParams, LookParams, SpinParams)
+
+
+def load_flat(cls: type[P], tree: dict[str, Any]) -> P:
+    """One of the groups that share the node's flat namespace; only NodeParams' warns of unknown names."""
+    others = {name for other in FLAT if other is not cls for name, *_ in declared(other)}
+    return load_params(cls, tree=tree, ignore=others | (set(tree) if cls is not NodeParams else set()))
+
+
+def ros_home() -> Path:
+    """Where ROS keeps a user's files."""
+    return Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
+
+
+class PatrolNode:
+    """Inputs, one thread that steps the manager, outputs."""
+
+    def __init__(self) -> None:
+        tree = rospy.get_param("~", {}) or {}
+        self.params = load_flat(NodeParams, tree)
+        mail = load_flat(MailParams, tree)
+        prefix = rospy.get_name() + "/"
+        rooms = load_rooms(Path(self.params.path_to_params).expanduser())
+        envelope = make_envelope(mail.email_to, mail.email_from, prefix=prefix, host=socket.getfqdn())
+        transport = make_transport(mail, envelope, home=ros_home(), environ=os.environ, prefix=prefix)
+        folder = Path(self.params.state_dir).expanduser() if self.params.state_dir else ros_home() / "rosbot_patrol"
+        outbox = Outbox(folder / "outbox", interval=mail.mail_interval, first_delay=mail.mail_retry)
+        self.health = Health()
+        self.pictures = PictureRing(self.params.image_topic)
+        self.desk = AlertDesk(outbox, transport, envelope, self.pictures, folder / "incidents", self.health)
+        self.store = PatrolStore(folder / "patrol.json", str(rospy.get_param("/run_id", "")))
+        self.manager = PatrolManager(
+            rooms,
+            ManagerParams(
+                alarm_classes=tuple(self.params.alarm_classes),
+                own_motion_radius=self.params.own_motion_radius,
+                drive=load_flat(DriveParams, tree),
+                look=load_flat(LookParams, tree),
+                spin=load_flat(SpinParams, tree),
+                watch=self.params.watch,
+            ),
+            memory=self.store.memory,
+            needs_camera=self.pictures.is_wanted,
+        )
+        log.info("%d rooms in %s", len(rooms), rooms.source)
+        self._make_ends()
+
+    def _make_ends(self) -> None:
+        self._triggers: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._frames: queue.Queue[Frame] = queue.Queue(maxsize=200)
+        self._detector: Latest[int] = Latest()
+        self._scan: Latest[LaserScanMsg] = Latest()
+        self._stepping = threading.Lock()
+        self._end = ""
+        self._unsaved = False
+        self._save_at = 0.0
+        self._turning = False
+        self._started = time.monotonic()
+        self._first_heard: set[str] = set()
+        self._report: Report | None = None
+        self.transforms = Transforms()
+        self.move_base = MoveBase(self.params.map_frame)
+        self._cmd_vel = rospy.Publisher("/cmd_vel", Twist, queue_size=1)
+        self._state = rospy.Publisher("/patrol/state", PatrolState, queue_size=10, latch=True)
+        rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100)
+        rospy.Subscriber("/darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes, queue_size=10)
+        rospy.Subscriber("/darknet_ros/found_object", ObjectCount, self._on_count, queue_size=10)
+        rospy.Subscriber("/scan", LaserScanMsg, self._on_scan, queue_size=1, buff_size=1 << 18)
+
+    def run(self) -> None:
+        """Patrol until shutdown."""
+        rospy.core.add_preshutdown_hook(self._note_end)
+        rospy.on_shutdown(self._stop)
+        self.desk.start()
+        Loop(self.params.rate, self._step, name="patrol").start()
+        rospy.spin()
+
+    # -- callbacks store
+
+    def _on_trigger(self, message: EspTrigger) -> None:
+        if not message.move:
+            return  # a heartbeat
+        header = getattr(message, "_connection_header", None) or {}
+        sender = str(header.get("callerid", ""))
+        is_latched = header.get("latching") == "1"
+        is_first = sender not in self._first_heard
+        self._first_heard.add(sender)
+        is_early = time.monotonic() - self._started < self.params.latched_window
+        if is_latched and is_first and is_early and self.store.is_handled(sender, message.id):
+            log.info("the latched trigger for room %d from %s was taken before the restart", message.id, sender)
+            return
+        if is_latched:
+            self.store.note_latched(sender, message.id)
+            self._unsaved = True
+        self._triggers.put(message.id)
+
+    def _on_boxes(self, message: BoundingBoxes) -> None:
+        time_now = now()
+        self._detector.set(1, time_now)
+        if not message.bounding_boxes:
+            return  # the count, which always comes, has said so
+        stamp = message.image_header.stamp.to_sec() or message.header.stamp.to_sec() or time_now
+        boxes = tuple(
+            Box(label=b.Class, probability=b.probability, xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax)
+            for b in message.bounding_boxes
+        )
+        self._put_frame(Frame(stamp=stamp, boxes=boxes))
+
+    def _on_count(self, message: ObjectCount) -> None:
+        self._detector.set(1, now())
+        if message.count == 0:  # other counts come with their boxes
+            self._put_frame(Frame())
+
+    def _put_frame(self, frame: Frame) -> None:
+        try:
+            self._frames.put_nowait(frame)
+        except queue.Full:
+            self._frames.get_nowait()
+            self._frames.put_nowait(frame)
+
+    def _on_scan(self, message: LaserScanMsg) -> None:
+        self._scan.set(message, now())
+
+    # -- step
+
+    def _step(self, time_now: float) -> None:
+        with self._stepping:
+            if not rospy.is_shutdown():
+                self._publish(time_now, self.manager.step(time_now, self._inputs(time_now)))
+
+    def _inputs(self, time_now: float) -> Inputs:
+        looking = self.manager.mission is not None and self.manager.mission.phase is Phase.LOOKING
+        return Inputs(
+            wall=time.time(),
+            triggers=tuple(_drain(self._triggers)),
+            frames=tuple(_drain(self._frames)),
+            yaw=self._yaw(time_now),
+            pose=self._pose(),
+            clearance=self._clearance(time_now) if looking else None,
+            link=self.move_base.link(),
+            detector_at=self._detector.stamp,
+            camera_at=self.pictures.seen_at,
+        )
+
+    def _yaw(self, time_now: float) -> float | None:
+        try:
+            pose, stamp = self.transforms.lookup_stamped(self.params.odom_frame, self.params.base_frame)
+        except TransformError:
+            return None
+        return pose.yaw if abs(time_now - stamp) <= self.params.pose_timeout else None
+
+    def _pose(self) -> Pose2D | None:
+        try:
+            return self.transforms.lookup(self.params.map_frame, self.params.base_frame)
+        except TransformError:
+            return None
+
+    def _clearance(self, time_now: float) -> float | None:
+        message = self._scan.get()
+        if message is None or not self._scan.fresh(time_now, self.params.scan_timeout):
+            return None
+        scan = convert.scan_from_msg(message)
+        try:
+            base_from_laser = self.transforms.lookup(self.params.base_frame, scan.frame_id)
+        except TransformError:
+            return None
+        points = transform_points(base_from_laser, scan_points(scan))
+        return float(np.hypot(points[:, 0], points[:, 1]).min()) if len(points) else None
+
+    # -- publish
+
+    def _publish(self, time_now: float, commands: Commands) -> None:
+        if commands.cancel:
+            self.move_base.cancel()
+        if commands.goal is not None:
+            self.move_base.send(commands.goal)
+        self._turn(commands.speed)
+        if commands.report is not None:
+            self._publish_state(time_now, commands.report)
+        if commands.notice is not None:
+            self.desk.take(commands.notice, time_now)
+        if commands.ended is not None:
+            ended = commands.ended
+            verdict = ended.verdict.value if ended.verdict else ""
+            self.desk.close_incident(ended.id, verdict, ended.reason, ended.sightings)
+        if self.manager.mission is not None:
+            self.pictures.start()
+        elif self.desk.is_recorded:
+            self.pictures.stop()
+        self._save(commands.changed)
+
+    def _turn(self, speed: float | None) -> None:
+        if speed is None:
+            if self._turning:
+                self._cmd_vel.publish(convert.twist_to_msg(STOP))
+            self._turning = False
+            return
+        self._turning = True
+        self._cmd_vel.publish(convert.twist_to_msg(Twist2D(wz=speed)))
+
+    def _publish_state(self, time_now: float, report: Report) -> None:
+        if self._report is None or (report.phase, report.why) != (self._report.phase, self._report.why):
+            log.info("%s: %s", report.phase.value, report.why)
+        self._report = report
+        message = PatrolState(
+            state=report.phase.value,
+            mission=report.mission,
+            room_id=report.room_id,
+            room_name=report.room_name,
+            why=report.why,
+            queue=bytes(report.queue),
+            last_verdict=report.last_verdict,
+        )
+        message.header.stamp = convert.time_to_msg(time_now)
+        self._state.publish(message)
+        self.health.set("", OK if report.phase is not Phase.STARTING else WARN, f"{report.phase.value}: {report.why}")
+
+    def _save(self, changed: bool) -> None:
+        self._unsaved = self._unsaved or changed
+        # A mission's notice is on disk before the mission is remembered as one that gave it.
+        if not self._unsaved or not self.desk.is_recorded or time.monotonic() < self._save_at:
+            return
+        self._unsaved = False
+        try:
+            self.store.save(self.manager.snapshot())
+        except OSError as err:
+            self._unsaved, self._save_at = True, time.monotonic() + 5.0
+            log.error("the patrol's state cannot be kept: %s", err)
+
+    def _note_end(self, reason: str) -> None:
+        self._end = str(reason)
+
+    def _stop(self) -> None:
+        """Leave the robot at rest: goal given up, wheels still.
+
+        A signal (Ctrl-C, the end of the launch) gives up missions, too; after anything else (`rosnode kill`) the
+        respawned node goes on with them.
+        """
+        with self._stepping:
+            if self._end.startswith("signal"):
+                self.manager.abandon("the node is ended")
+            self.move_base.cancel()
+            if self._turning:
+                self._cmd_vel.publish(convert.twist_to_msg(STOP))
+            self._unsaved, self._save_at = True, 0.0
+            self._save(changed=True)
+        time.sleep(0.1)  # let the two messages leave
+
+
+def _drain(source: Any) -> list[Any]:
+    items = []
+    while True:
+        try:
+            items.append(source.get_nowait())
+        except queue.Empty:
+            return items
+
+
+def main() -> None:
+    """Run the node."""
+    run_node("patrol_robot", lambda: PatrolNode().run())

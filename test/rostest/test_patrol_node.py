@@ -1,0 +1,344 @@
+"""patrol_robot as a process, before a real master, a real action server and real topics; needs the built workspace.
+
+The camera and the detector are this test: it publishes pictures with stamps, and boxes that name them.
+"""
+
+import json
+import mailbox
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+rospy = pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("localhost", 0))
+        return s.getsockname()[1]
+
+
+def stop(process, sig=signal.SIGINT):
+    if process.poll() is None:
+        process.send_signal(sig)
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def wait_until(condition, seconds=20.0, what="the condition"):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        if condition():
+            return
+        time.sleep(0.02)
+    raise AssertionError(f"{what} did not come within {seconds} s")
+
+
+@pytest.fixture(scope="module")
+def master():
+    port = int(os.environ.get("ROSBOT_TEST_PORT", 0)) or free_port()
+    os.environ.update(ROS_MASTER_URI=f"http://localhost:{port}", ROS_HOSTNAME="localhost")
+    core = subprocess.Popen(["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    import rosgraph
+
+    wait_until(rosgraph.is_master_online, 30, "roscore")
+    rospy.init_node("patrol_test", disable_signals=True)
+    yield port
+    rospy.signal_shutdown("done")
+    stop(core)
+
+
+class House:
+    """Processes and topics around the node under test."""
+
+    def __init__(self, folder):
+        from darknet_ros_msgs.msg import BoundingBoxes, ObjectCount
+        from geometry_msgs.msg import Twist
+        from sensor_msgs.msg import Image
+
+        from rosbot_patrol.msg import Alert, EspTrigger, PatrolState
+
+        self.folder = folder
+        self.processes = []
+        self.states, self.alerts, self.twists = [], [], []
+        self.person, self.detecting, self.running = False, True, True
+        self.boxes = rospy.Publisher("/darknet_ros/bounding_boxes", BoundingBoxes, queue_size=1)
+        self.count = rospy.Publisher("/darknet_ros/found_object", ObjectCount, queue_size=1)
+        self.image = rospy.Publisher("/camera/rgb/image_raw", Image, queue_size=1)
+        self.trigger = rospy.Publisher("/motion_trigger", EspTrigger, queue_size=10)
+        self.ends = [
+            rospy.Subscriber("/patrol/state", PatrolState, self.states.append),
+            rospy.Subscriber("/patrol/alerts", Alert, self.alerts.append),
+            rospy.Subscriber("/cmd_vel", Twist, lambda m: self.twists.append(m.angular.z)),
+        ]
+        self.thread = threading.Thread(target=self._camera, daemon=True)
+        self.thread.start()
+
+    def _camera(self):
+        from darknet_ros_msgs.msg import BoundingBox, BoundingBoxes, ObjectCount
+        from sensor_msgs.msg import Image
+
+        while self.running:
+            image = Image(width=64, height=48, encoding="rgb8", step=192, data=bytes(64 * 48 * 3))
+            image.header.stamp = rospy.Time.now()
+            self.image.publish(image)
+            if self.detecting:
+                self.count.publish(ObjectCount(count=1 if self.person else 0))
+                if self.person:
+                    box = BoundingBox(probability=0.9, xmin=10, ymin=5, xmax=30, ymax=45, Class="person")
+                    self.boxes.publish(BoundingBoxes(image_header=image.header, bounding_boxes=[box]))
+            time.sleep(0.1)
+
+    def start_move_base(self, **params):
+        self.move_base = self._start([sys.executable, str(HERE / "move_base_like.py")], params)
+
+    def start_patrol(self, wait=True, **params):
+        values = {
+            "path_to_params": str(ROOT / "params" / "room_points.yaml"),
+            "state_dir": str(self.folder / "state"),
+            "maildir": str(self.folder / "mail"),
+            "transport": "maildir",
+            "mail_interval": 0,
+            "spin_speed": 2.5,
+            "spin_deceleration": 3.0,
+            "detector_wait": 1.5,
+            "detector_timeout": 1.0,
+            "linger": 0.3,
+            "retry_delay": 0.2,
+            **params,
+        }
+        self.states.clear()
+        command = ["rosrun", "rosbot_patrol", "patrol_robot", "__name:=patrolling_node"]
+        self.patrol = self._start(command, values)
+        if wait:
+            wait_until(lambda: self.states and self.states[-1].state == "idle", 25, "on guard")
+
+    def _start(self, command, params):
+        log = (self.folder / f"log{len(self.processes)}").open("wb")
+        arguments = [f"_{key}:={json.dumps(value)}" for key, value in params.items()]
+        process = subprocess.Popen([*command, *arguments], stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+        self.processes.append(process)
+        return process
+
+    def log(self, process):
+        return (self.folder / f"log{self.processes.index(process)}").read_text(errors="replace")
+
+    def send(self, room, move=True):
+        from rosbot_patrol.msg import EspTrigger
+
+        wait_until(lambda: self.trigger.get_num_connections() > 0, 10, "the node's subscription")
+        self.trigger.publish(EspTrigger(id=room, move=move))
+
+    def wait_for_mission(self, count=1, seconds=60):
+        def ended():
+            names = [s.state for s in self.states]
+            return (
+                sum(a != "idle" and b == "idle" and a != "starting" for a, b in zip(names, names[1:], strict=False))
+                >= count
+            )
+
+        wait_until(ended, seconds, f"the end of mission {count}")
+        return self.states[-1]
+
+    def phases(self):
+        names = [s.state for s in self.states]
+        return [n for i, n in enumerate(names) if i == 0 or names[i - 1] != n]
+
+    def mails(self):
+        folder = self.folder / "mail"
+        return list(mailbox.Maildir(folder, create=False)) if folder.exists() else []
+
+    def close(self):
+        for process in reversed(self.processes):
+            stop(process)
+        self.running = False
+        self.thread.join()
+        for end in [*self.ends, self.boxes, self.count, self.image, self.trigger]:
+            end.unregister()
+        subprocess.run(["rosparam", "delete", "/patrolling_node"], capture_output=True, check=False)
+        subprocess.run(["rosparam", "delete", "/move_base"], capture_output=True, check=False)
+
+
+@pytest.fixture
+def house(master, tmp_path):
+    house = House(tmp_path)
+    yield house
+    house.close()
+
+
+def test_person_makes_one_mail_with_picture(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.send(2, move=False)  # a heartbeat
+    house.person = True
+    house.send(2)
+    last = house.wait_for_mission()
+    assert last.last_verdict == "confirmed"
+    assert house.phases() == ["idle", "driving", "looking", "returning", "idle"] or house.phases()[0] == "starting"
+    wait_until(lambda: any(a.delivered for a in house.alerts), 10, "the delivery")
+    assert [a.delivered for a in house.alerts] == [False, True]
+    (mail,) = house.mails()
+    assert mail["Subject"] == "rosbot patrol node"
+    parts = list(mail.walk())
+    text = parts[1].get_payload(decode=True).decode()
+    assert text.startswith("I have found something strange it could be invader")
+    assert "2 (square room behind the door)" in text
+    picture = parts[-1]
+    assert picture.get_content_type() == "image/jpeg"
+    assert picture.get_payload(decode=True)[:2] == b"\xff\xd8"
+    assert Path(house.alerts[-1].location).exists()
+    assert house.alerts[0].room_id == 2
+    assert house.alerts[0].object_class == "person"
+
+
+def test_empty_room_makes_none_and_the_turn_ends_with_zero(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.send(1)
+    last = house.wait_for_mission()
+    assert last.last_verdict == "clear", last.why
+    assert house.mails() == []
+    assert max(house.twists) > 0.5
+    assert house.twists[-1] == 0.0
+    turned = float(last.why.split("turned ")[1].split()[0])
+    assert abs(turned - 360) <= 6
+
+
+def test_dead_detector_is_never_clear(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.detecting = False
+    house.send(1)
+    last = house.wait_for_mission()
+    assert last.last_verdict == "unverified"
+    assert "detector" in last.why
+    assert house.mails() == []
+
+
+def test_unreachable_room_is_reported_and_not_turned_in(house):
+    house.start_move_base(refuse=["15,11"])
+    house.start_patrol()
+    house.twists.clear()
+    house.send(7)
+    last = house.wait_for_mission()
+    assert last.last_verdict == "unreachable"
+    assert "Failed to find a valid plan" in last.why
+    assert "looking" not in house.phases()
+    assert not any(house.twists)
+
+
+def test_unknown_room_is_refused_and_the_node_lives(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.send(99)
+    house.send(1)
+    assert house.wait_for_mission().last_verdict == "clear"
+    assert "there is no room 99" in house.log(house.patrol)
+
+
+def test_triggers_of_a_mission_wait_in_order(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.send(1)
+    wait_until(lambda: house.states[-1].state == "driving", 10, "the drive")
+    for room in (3, 2, 3):
+        house.send(room)
+    wait_until(lambda: list(house.states[-1].queue) == [3, 2], 5, "the queue")
+    house.wait_for_mission(3)
+    rooms = [s.room_id for s in house.states if s.state == "driving"]
+    assert [r for i, r in enumerate(rooms) if i == 0 or rooms[i - 1] != r] == [1, 3, 2]
+
+
+def test_killed_in_mission_goes_on_after_respawn_with_one_mail(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.person = True
+    house.send(2)
+    wait_until(lambda: house.states[-1].state == "looking", 20, "the look")
+    wait_until(lambda: any(a.delivered for a in house.alerts), 10, "the delivery")
+    os.killpg(house.patrol.pid, signal.SIGKILL)
+    house.patrol.wait()
+    house.start_patrol(wait=False)
+    last = house.wait_for_mission()
+    assert last.last_verdict == "confirmed"
+    assert len(house.mails()) == 1
+
+
+def test_latched_trigger_makes_no_second_mission_after_respawn(house):
+    house.start_move_base()
+    house.start_patrol()
+    command = ["rostopic", "pub", "/motion_trigger", "rosbot_patrol/EspTrigger", "{id: 1, move: true}"]
+    sender = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    try:
+        house.wait_for_mission()
+        os.killpg(house.patrol.pid, signal.SIGKILL)
+        house.patrol.wait()
+        house.start_patrol()
+        time.sleep(2.0)
+        assert {s.state for s in house.states} <= {"starting", "idle"}
+        assert "was taken before the restart" in house.log(house.patrol)
+    finally:
+        stop(sender)
+
+
+def test_move_base_that_is_down_is_said_and_bounded(house):
+    house.start_move_base()
+    house.start_patrol(server_wait=8)
+    stop(house.move_base, signal.SIGKILL)
+    house.send(1)
+    wait_until(lambda: "move_base" in house.states[-1].why, 15, "the word about move_base")
+    house.start_move_base()
+    assert house.wait_for_mission(seconds=40).last_verdict == "clear"
+
+
+def test_unreachable_mail_server_loses_and_hangs_nothing(house):
+    house.start_move_base()
+    port = free_port()
+    house.start_patrol(
+        transport="smtp", email_to="owner@example.org", smtp_host="localhost", smtp_port=port, mail_retry=0.5
+    )
+    house.person = True
+    house.send(2)
+    assert house.wait_for_mission().last_verdict == "confirmed"
+    assert f"the mail server localhost:{port} cannot be used" in house.log(house.patrol)
+    assert len(list((house.folder / "state" / "outbox").glob("*.eml"))) == 1
+
+
+def test_sigint_cancels_the_goal_and_stops_the_wheels(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.send(1)
+    wait_until(lambda: any(house.twists), 20, "the turn")
+    began = time.monotonic()
+    os.killpg(house.patrol.pid, signal.SIGINT)
+    house.patrol.wait(10)
+    assert time.monotonic() - began < 5
+    wait_until(lambda: house.twists[-1] == 0.0, 2, "the zero twist")
+
+
+@pytest.mark.parametrize(
+    ("params", "said"),
+    [
+        ({"path_to_params": "/nowhere/rooms.yaml"}, "/nowhere/rooms.yaml: cannot be read: No such file"),
+        ({"email_to": "a@b.org\nBcc: x@y.org"}, "email_to: has a line break"),
+        ({"transport": "smtp"}, "email_to: expected a real address for smtp"),
+        ({"spin_speed": "fast"}, "spin_speed: expected a number"),
+    ],
+)
+def test_bad_parameter_is_one_sentence_and_exit_1(house, params, said):
+    house.start_patrol(wait=False, **params)
+    assert house.patrol.wait(20) == 1
+    assert said in house.log(house.patrol)
+    assert "Traceback" not in house.log(house.patrol)
