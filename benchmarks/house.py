@@ -77,7 +77,7 @@ def mission_run(folder: Path, room: int) -> tuple[float, list[tuple[str, float, 
         house.wait(lambda: any(a.delivered for a in house.alerts) or mission.verdict != "confirmed", 10.0, "the mail")
     factor = mission.sim_seconds / mission.wall_seconds
     said = (
-        f"room {room}: {mission.verdict}, {mission.sim_seconds:.0f} s of simulated time in {mission.wall_seconds:.0f} s, "
+        f"room {room}: {mission.verdict}, {mission.sim_seconds:.0f} simulated seconds in {mission.wall_seconds:.0f}, "
         f"{len(mission.contacts)} contacts, {len(house.mails())} mail(s)"
     )
     return factor, sorted(rows, key=lambda row: -row[1]), said
@@ -117,7 +117,7 @@ def main() -> int:
             master.stop()
 
     print(f"\n{os.cpu_count()} cores; {said}\n")
-    print(f"| node | % of a core (wall) | % of a core (simulated) | MB |\n|---|---|---|---|")
+    print("| node | % of a core (wall) | % of a core (simulated) | MB |\n|---|---|---|---|")
     for node, wall, simulated, memory in rows:
         print(f"| {node} | {wall:.1f} | {simulated:.1f} | {memory:.0f} |")
     print(f"| all | {sum(r[1] for r in rows):.0f} | {sum(r[2] for r in rows):.0f} | {sum(r[3] for r in rows):.0f} |\n")

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("roslaunch", reason="ROS is not on the path: `. scripts/env` first")
-import roslaunch.config  # noqa: E402
-import roslaunch.xmlloader  # noqa: E402
-import roslib.packages  # noqa: E402
+import roslaunch.config
+import roslaunch.xmlloader
+import roslib.packages
 
 ROOT = Path(__file__).parents[2]
 OURS = sorted((ROOT / "launch").glob("*.launch"))
