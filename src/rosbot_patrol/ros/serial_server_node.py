@@ -11,6 +11,7 @@ Differs:
 - Topics are asked for at once, not after 2 s; a message before negotiation makes it ask again instead of failing.
 - A client that is silent for 15 s is hung up on; a connection that a sensor left behind is closed when it is back.
 - A service that the device does not answer fails after 5 s; upstream waits for ever.
+- The allowed topics are advertised from the start, so that a sensor's first trigger finds its listeners.
 - A taken port ends the program with one sentence.
 """
 
@@ -27,8 +28,9 @@ import rospy
 from rosbot_patrol.errors import ParamError, ProtocolError
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.node import load_params, run_node
-from rosbot_patrol.ros.serial_channels import DeviceService, Publishers, ServiceCaller, Subscription
+from rosbot_patrol.ros.serial_channels import DeviceService, Publishers, ServiceCaller, Subscription, message_class
 from rosbot_patrol.rosserial.client import Client
+from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.server import SerialServer
 from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT, SerialNodeParams
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, unpack_esp_trigger
@@ -50,6 +52,12 @@ class RosSide:
         self.sensors_lock = threading.Lock()
         self._publishers = Publishers()
         self._channels: dict[Client, dict[tuple[str, str], Any]] = {}
+
+    def advertise(self, policy: Policy) -> None:
+        """Advertise what the lists allow before the first device comes, so that its first message finds listeners."""
+        for rule in policy.publish:
+            if "*" not in (rule.name, rule.message_type):
+                self._publishers.advertise(rule.name, message_class(rule.message_type))
 
     def open(self, client: Client, kind: TopicId, info: TopicInfo) -> None:
         """Advertise or subscribe; raises ProtocolError."""
@@ -213,6 +221,8 @@ def body() -> None:
     ros_side = RosSide(params.sensor_timeout)
     server = SerialServer(ros_side, policy, silence_timeout=params.silence_timeout, max_clients=params.max_clients)
     ros_side.server = server
+    if policy.restricted:
+        ros_side.advertise(policy)
     if params.is_tcp:
         ports = server.listen(params.all_tcp_ports, params.host)
         what = "TCP port " + ", ".join(map(str, ports))

@@ -309,6 +309,8 @@ class SerialServer:
 
     def _event(self, client: Client, event: Event, now: float) -> None:
         if isinstance(event, Received):
+            if not client.session.accepts(event):  # refused since, in the same piece of data
+                return
             if client.note_message(event.info.md5, event.data):
                 self._find_older(client)
             self._handler.receive(client, event.kind, event.info, event.data)

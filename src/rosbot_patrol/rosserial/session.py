@@ -178,6 +178,10 @@ class Session:
         (self.incoming if kind in INCOMING else self.outgoing).pop(info.topic_id, None)
         self._note_refused(info.topic_id)
 
+    def accepts(self, message: Received) -> bool:
+        """Whether the topic of a message has not been rejected since it came."""
+        return self.incoming.get(message.info.topic_id) == (message.kind, message.info)
+
     def answer_time(self, seconds: int, nanoseconds: int) -> None:
         """Tell the time."""
         self._output.append(encode(TopicId.TIME, pack_time(seconds, nanoseconds)))

@@ -1,0 +1,264 @@
+"""The server and virtual sensors over real TCP on the loopback."""
+
+import contextlib
+import os
+import pty
+import socket
+import threading
+import time
+
+import pytest
+
+from rosbot_patrol.errors import ProtocolError
+from rosbot_patrol.rosserial.packet import Parser, encode
+from rosbot_patrol.rosserial.policy import TRUSTED, Policy
+from rosbot_patrol.rosserial.server import SerialServer
+from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.topics import (
+    ESP_TRIGGER_MD5,
+    REQUEST_TOPICS,
+    TX_STOP,
+    TopicId,
+    TopicInfo,
+    pack_topic_info,
+)
+
+ESP = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=ESP_TRIGGER_MD5)
+ANNOUNCE = encode(TopicId.PUBLISHER, pack_topic_info(ESP))
+
+
+class Recorder:
+    def __init__(self):
+        self.opened, self.messages, self.closed_peers, self.clients = [], [], [], []
+
+    def open(self, client, kind, info):
+        if info.md5 == "bad":
+            raise ProtocolError("", "checksum does not match")
+        self.opened.append((kind, info))
+        self.clients.append(client)
+
+    def receive(self, client, kind, info, data):
+        self.messages.append(data)
+
+    def closed(self, client):
+        self.closed_peers.append(client.peer)
+
+    def time(self):
+        return 5, 6
+
+    def device_log(self, client, level, text):
+        self.messages.append(text)
+
+    def parameter(self, name):
+        raise ProtocolError("", f"parameter {name} is not set")
+
+
+@contextlib.contextmanager
+def serving(policy=None, **options):
+    recorder = Recorder()
+    server = SerialServer(recorder, policy or Policy(), **options)
+    (port,) = server.listen([0])
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        yield recorder, server, port
+    finally:
+        server.stop()
+        thread.join(3.0)
+        server.close()
+
+
+def wait_for(condition, timeout=4.0):
+    until = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < until, "did not happen"
+        time.sleep(0.01)
+
+
+def connect(port, host="127.0.0.1"):
+    link = socket.create_connection((host, port), timeout=3.0)
+    assert link.recv(8) == REQUEST_TOPICS
+    return link
+
+
+def test_virtual_sensor_triggers_at_once_and_reconnects_after_a_reboot():
+    with serving() as (recorder, _, port):
+        sensor = EspClient("localhost", port, 3).start()
+        assert sensor.wait_connected(3.0)
+        wait_for(lambda: b"\x03\x00" in recorder.messages)
+        sensor.set_motion(True)
+        wait_for(lambda: b"\x03\x01" in recorder.messages, 0.4)
+        sensor.set_motion(True)  # no edge
+        sensor.reboot()
+        wait_for(lambda: len(recorder.opened) == 2)
+        sensor.set_motion(True)
+        wait_for(lambda: recorder.messages.count(b"\x03\x01") == 2)
+        sensor.stop()
+        assert not sensor.connected
+
+
+def test_trigger_raised_before_the_bridge_is_there_arrives():
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    sensor = EspClient("127.0.0.1", port, 4).start()
+    sensor.set_motion(True)
+    recorder = Recorder()
+    server = SerialServer(recorder, Policy())
+    server.listen([port])
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    wait_for(lambda: b"\x04\x01" in recorder.messages, 6.0)
+    sensor.stop()
+    server.stop()
+    thread.join(3.0)
+    server.close()
+
+
+def test_many_sensors_on_one_port_with_a_stranger_and_a_stalled_reader_among_them():
+    with serving() as (recorder, server, port):
+        stranger, stalled = connect(port), connect(port)
+        stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        stalled.sendall(encode(10, bytes(8)) * 500)  # asks for the time and never reads
+        stranger.sendall(os.urandom(3000))
+        sensors = [EspClient("127.0.0.1", port, i).start() for i in range(1, 21)]
+        assert all(sensor.wait_connected(4.0) for sensor in sensors)
+        for sensor in sensors:
+            sensor.set_motion(True)
+        wait_for(lambda: {m[0] for m in recorder.messages if m[1]} == set(range(1, 21)))
+        assert len(server.clients) == 22
+        for sensor in sensors:
+            sensor.stop()
+        stranger.close()
+        stalled.close()
+
+
+def test_ipv4_and_ipv6_on_one_port():
+    with serving() as (recorder, _, port):
+        links = [connect(port, host) for host in ("127.0.0.1", "::1")]
+        for number, link in enumerate(links):
+            link.sendall(ANNOUNCE + encode(125, bytes((number, 1))))
+        wait_for(lambda: sorted(recorder.messages) == [b"\x00\x01", b"\x01\x01"])
+        for link in links:
+            link.close()
+        wait_for(lambda: len(recorder.closed_peers) == 2)
+        assert {peer.rsplit(":", 1)[0] for peer in recorder.closed_peers} == {"127.0.0.1", "[::1]"}
+
+
+def test_message_before_negotiation_makes_the_server_ask():
+    with serving() as (_, _, port):
+        link = connect(port)
+        time.sleep(1.05)
+        link.sendall(encode(125, b"\x01\x00"))
+        assert link.recv(8) == REQUEST_TOPICS
+        link.close()
+
+
+def test_taken_port_is_one_sentence():
+    with serving() as (_, _, port), pytest.raises(ProtocolError, match=f"TCP port {port} is already taken"):
+        SerialServer(Recorder(), Policy()).listen([port])
+
+
+def test_refused_definition_is_said_once(caplog):
+    caplog.set_level("WARNING")
+    with serving() as (recorder, _, port):
+        link = connect(port)
+        wrong = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5="bad")
+        link.sendall(encode(TopicId.PUBLISHER, pack_topic_info(wrong)) * 3 + encode(125, b"\x01\x01"))
+        time.sleep(0.3)
+        link.close()
+        wait_for(lambda: recorder.closed_peers)
+    assert [r.message.split(": ", 1)[1] for r in caplog.records] == ["refused checksum does not match"]
+    assert recorder.messages == []
+
+
+def test_silent_client_is_hung_up_on():
+    with serving(silence_timeout=0.5) as (recorder, server, port):
+        link = connect(port)
+        wait_for(lambda: recorder.closed_peers, 2.0)
+        assert link.recv(100) == b""
+        assert not server.clients
+        link.close()
+
+
+def test_new_connection_replaces_the_silent_one_of_the_same_sensor_only():
+    with serving() as (recorder, server, port):
+        old, other, new = connect(port), connect(port), connect(port)
+        old.sendall(ANNOUNCE + encode(125, b"\x02\x00"))
+        other.sendall(ANNOUNCE + encode(125, b"\x05\x00"))
+        time.sleep(1.0)
+        new.sendall(ANNOUNCE + encode(125, b"\x02\x00"))
+        wait_for(lambda: recorder.closed_peers, 3.0)
+        assert recorder.closed_peers == ["{}:{}".format(*old.getsockname())]
+        assert len(server.clients) == 2
+        for link in (old, other, new):
+            link.close()
+
+
+def test_full_server_drops_a_stranger_for_a_newcomer_but_no_sensor(caplog):
+    with serving(max_clients=2) as (recorder, server, port):
+        sensor, stranger = connect(port), connect(port)
+        sensor.sendall(ANNOUNCE)
+        wait_for(lambda: recorder.opened)
+        second = connect(port)
+        assert stranger.recv(100) == b""
+        second.sendall(ANNOUNCE)
+        wait_for(lambda: len(recorder.opened) == 2)
+        late = socket.create_connection(("127.0.0.1", port))
+        assert late.recv(100) == b""
+        assert len(server.clients) == 2
+        for link in (sensor, stranger, second, late):
+            link.close()
+    assert "refused, 2 clients are connected" in caplog.text
+
+
+def test_stop_tells_the_devices():
+    with serving() as (_, _, port):
+        link = connect(port)
+    assert link.recv(8) == TX_STOP
+    link.close()
+
+
+def test_messages_to_the_device_and_their_limit():
+    with serving(TRUSTED) as (recorder, server, port):
+        link = connect(port)
+        led = TopicInfo(topic_id=100, name="led", message_type="std_msgs/Bool", md5="x", buffer_size=4)
+        link.sendall(encode(TopicId.SUBSCRIBER, pack_topic_info(led)))
+        wait_for(lambda: recorder.clients)
+        server.send(recorder.clients[0], 100, b"\x01")
+        assert link.recv(100) == encode(100, b"\x01")
+        with pytest.raises(ProtocolError, match="5 bytes on led exceeds its buffer of 4"):
+            server.send(recorder.clients[0], 100, bytes(5))
+        link.close()
+
+
+def test_serial_device_over_a_pseudo_terminal():
+    main, other = pty.openpty()
+    recorder = Recorder()
+    server = SerialServer(recorder, TRUSTED)
+    server.attach(os.ttyname(other), 525000)
+    server.poll(0.05)
+    assert os.read(main, 100) == REQUEST_TOPICS
+    anything = TopicInfo(topic_id=125, name="battery", message_type="sensor_msgs/BatteryState", md5="x")
+    os.write(main, b"boot\r\n" + encode(TopicId.PUBLISHER, pack_topic_info(anything)) + encode(125, b"\x11\x13\r\n"))
+    os.write(main, encode(10, bytes(8)))
+    for _ in range(5):
+        server.poll(0.05)
+    assert recorder.messages == [b"\x11\x13\r\n"]
+    assert Parser().feed(os.read(main, 100))[0].data == b"\x05\0\0\0\x06\0\0\0"
+    os.close(other)
+    os.close(main)
+    for _ in range(3):
+        server.poll(0.05)
+    assert recorder.closed_peers
+    server.close()
+
+
+def test_missing_serial_device_is_said_and_tried_again(caplog):
+    now = [0.0]
+    server = SerialServer(Recorder(), TRUSTED, clock=lambda: now[0])
+    server.attach("/dev/no-such-device", 57600)
+    for now[0] in (0.0, 1.0, 4.0, 8.0):
+        server.poll(0.0)
+    assert len(caplog.records) == 1
+    assert "/dev/no-such-device" in caplog.text
+    server.close()
