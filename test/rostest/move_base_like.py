@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A small real move_base for tests: an actionlib server that glides the robot to its goal, with tf, and turns it by /cmd_vel.
+"""A small real move_base for tests: an actionlib server that glides the robot to its goal, and turns it by /cmd_vel.
 
 Parameters: ~speed [m/s], ~refuse [list of rounded "x,y" goals that it aborts].
 """

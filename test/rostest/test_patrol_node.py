@@ -3,6 +3,7 @@
 The camera and the detector are this test: it publishes pictures with stamps, and boxes that name them.
 """
 
+import itertools
 import json
 import mailbox
 import os
@@ -66,9 +67,8 @@ class House:
     def __init__(self, folder):
         from darknet_ros_msgs.msg import BoundingBoxes, ObjectCount
         from geometry_msgs.msg import Twist
-        from sensor_msgs.msg import Image
-
         from rosbot_patrol.msg import Alert, EspTrigger, PatrolState
+        from sensor_msgs.msg import Image
 
         self.folder = folder
         self.processes = []
@@ -144,10 +144,7 @@ class House:
     def wait_for_mission(self, count=1, seconds=60):
         def ended():
             names = [s.state for s in self.states]
-            return (
-                sum(a != "idle" and b == "idle" and a != "starting" for a, b in zip(names, names[1:], strict=False))
-                >= count
-            )
+            return sum(a != "idle" and b == "idle" and a != "starting" for a, b in itertools.pairwise(names)) >= count
 
         wait_until(ended, seconds, f"the end of mission {count}")
         return self.states[-1]
@@ -326,6 +323,21 @@ def test_sigint_cancels_the_goal_and_stops_the_wheels(house):
     house.patrol.wait(10)
     assert time.monotonic() - began < 5
     wait_until(lambda: house.twists[-1] == 0.0, 2, "the zero twist")
+    assert "Traceback" not in house.log(house.patrol)
+    kept = json.loads((house.folder / "state" / "patrol.json").read_text())
+    assert kept["memory"]["mission"] is None
+
+
+def test_rosnode_kill_and_respawn_goes_on(house):
+    house.start_move_base()
+    house.start_patrol()
+    house.send(1)
+    wait_until(lambda: any(house.twists), 20, "the turn")
+    subprocess.run(["rosnode", "kill", "/patrolling_node"], capture_output=True, check=True)
+    house.patrol.wait(10)
+    assert house.twists[-1] == 0.0
+    house.start_patrol(wait=False)
+    assert house.wait_for_mission().last_verdict == "clear"
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from __future__ import annotations
 import logging
 import os
 import queue
+import signal
 import socket
 import threading
 import time
@@ -133,7 +134,8 @@ class PatrolNode:
         self._detector: Latest[int] = Latest()
         self._scan: Latest[LaserScanMsg] = Latest()
         self._stepping = threading.Lock()
-        self._end = ""
+        self._is_over = False
+        self._is_signalled = False
         self._unsaved = False
         self._save_at = 0.0
         self._turning = False
@@ -151,7 +153,8 @@ class PatrolNode:
 
     def run(self) -> None:
         """Patrol until shutdown."""
-        rospy.core.add_preshutdown_hook(self._note_end)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._note_signal(number)
         rospy.on_shutdown(self._stop)
         self.desk.start()
         Loop(self.params.rate, self._step, name="patrol").start()
@@ -207,7 +210,7 @@ class PatrolNode:
 
     def _step(self, time_now: float) -> None:
         with self._stepping:
-            if not rospy.is_shutdown():
+            if not self._is_over:
                 self._publish(time_now, self.manager.step(time_now, self._inputs(time_now)))
 
     def _inputs(self, time_now: float) -> Inputs:
@@ -309,8 +312,15 @@ class PatrolNode:
             self._unsaved, self._save_at = True, time.monotonic() + 5.0
             log.error("the patrol's state cannot be kept: %s", err)
 
-    def _note_end(self, reason: str) -> None:
-        self._end = str(reason)
+    def _note_signal(self, number: int) -> None:
+        rospys = signal.getsignal(number)
+
+        def note(received: int, frame: Any) -> None:
+            self._is_signalled = True
+            if callable(rospys):
+                rospys(received, frame)
+
+        signal.signal(number, note)
 
     def _stop(self) -> None:
         """Leave the robot at rest: goal given up, wheels still.
@@ -319,7 +329,8 @@ class PatrolNode:
         respawned node goes on with them.
         """
         with self._stepping:
-            if self._end.startswith("signal"):
+            self._is_over = True
+            if self._is_signalled:
                 self.manager.abandon("the node is ended")
             self.move_base.cancel()
             if self._turning:
