@@ -1,4 +1,4 @@
-"""A launch file written the tutorial's way comes up on our drop-ins and patrols; the tutorial's commands run as typed."""
+"""A launch file written the tutorial's way comes up on our drop-ins and patrols; its commands run as typed."""
 
 from __future__ import annotations
 
