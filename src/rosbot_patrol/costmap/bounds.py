@@ -1,0 +1,60 @@
+"""A rectangle of cells."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Bounds(NamedTuple):
+    """Cells x0 <= ix < x1, y0 <= iy < y1."""
+
+    x0: int
+    y0: int
+    x1: int
+    y1: int
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no cell is inside."""
+        return self.x1 <= self.x0 or self.y1 <= self.y0
+
+    def union(self, other: Bounds) -> Bounds:
+        """The smallest rectangle around both."""
+        if self.is_empty:
+            return other
+        if other.is_empty:
+            return self
+        return Bounds(min(self.x0, other.x0), min(self.y0, other.y0), max(self.x1, other.x1), max(self.y1, other.y1))
+
+    def grown(self, cells: int) -> Bounds:
+        """Larger by so many cells on each side."""
+        if self.is_empty:
+            return self
+        return Bounds(self.x0 - cells, self.y0 - cells, self.x1 + cells, self.y1 + cells)
+
+    def clipped(self, width: int, height: int) -> Bounds:
+        """The part inside a grid."""
+        return Bounds(max(self.x0, 0), max(self.y0, 0), min(self.x1, width), min(self.y1, height))
+
+    def overlaps(self, other: Bounds) -> bool:
+        """Whether the two share a cell."""
+        return self.x0 < other.x1 and other.x0 < self.x1 and self.y0 < other.y1 and other.y0 < self.y1
+
+
+NOTHING = Bounds(0, 0, 0, 0)
+
+
+def merged(areas: list[Bounds]) -> list[Bounds]:
+    """The same cells (and perhaps more) as rectangles that do not overlap."""
+    todo = [a for a in areas if not a.is_empty]
+    done: list[Bounds] = []
+    while todo:
+        area = todo.pop()
+        for other in done:
+            if area.overlaps(other):
+                done.remove(other)
+                todo.append(area.union(other))
+                break
+        else:
+            done.append(area)
+    return done

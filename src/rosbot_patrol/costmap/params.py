@@ -1,0 +1,211 @@
+"""Parameters of costmaps and layers: upstream's names and defaults, and the pre-hydro form (no `plugins`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import load, param
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostmapParams:
+    """Parameters of a costmap_2d costmap."""
+
+    global_frame: str = param("map", doc="frame the costmap lies in")
+    robot_base_frame: str = param("base_link", doc="the robot's frame")
+    transform_tolerance: float = param(0.3, unit="s", lo=0.0, doc="how old the robot's pose may be")
+    update_frequency: float = param(5.0, unit="Hz", lo=0.0, hi=100.0, doc="how often costs are updated")
+    publish_frequency: float = param(0.0, unit="Hz", lo=0.0, hi=100.0, doc="how often it is shown; 0 is never")
+    width: float = param(10.0, unit="m", lo=0.0, doc="extent in x where no map gives it")
+    height: float = param(10.0, unit="m", lo=0.0, doc="extent in y where no map gives it")
+    resolution: float = param(0.1, unit="m", lo=0.001, hi=50.0, doc="edge of a cell")
+    origin_x: float = param(0.0, unit="m", doc="left edge; a rolling window follows the robot instead")
+    origin_y: float = param(0.0, unit="m", doc="lower edge")
+    rolling_window: bool = param(False, doc="keep the robot in the middle")
+    track_unknown_space: bool = param(False, doc="tell unknown cells from free ones")
+    always_send_full_costmap: bool = param(False, doc="publish whole grids, no updates")
+    footprint: Any = param("[]", doc="corners of the robot [[x, y], ...]")
+    robot_radius: float = param(0.46, unit="m", lo=0.0, doc="used where there is no footprint")
+    footprint_padding: float = param(0.01, unit="m", doc="added to each corner")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StaticParams:
+    """Parameters of costmap_2d::StaticLayer."""
+
+    enabled: bool = param(True)
+    map_topic: str = param("map", doc="nav_msgs/OccupancyGrid to use")
+    first_map_only: bool = param(False, doc="ignore later maps")
+    subscribe_to_updates: bool = param(False, doc="listen to <map_topic>_updates")
+    track_unknown_space: bool = param(True)
+    use_maximum: bool = param(False, doc="combine by maximum instead of overwriting")
+    lethal_cost_threshold: int = param(100, lo=0, hi=255)
+    unknown_cost_value: int = param(-1, lo=-128, hi=255)
+    trinary_costmap: bool = param(True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceParams:
+    """One observation source of an obstacle layer."""
+
+    topic: str = param("", doc="topic, the source's name where empty")
+    sensor_frame: str = param("", doc="frame of the sensor, the message's where empty")
+    data_type: str = param("PointCloud", choices=("LaserScan", "PointCloud", "PointCloud2"))
+    observation_persistence: float = param(0.0, unit="s", lo=0.0, doc="how long a scan is used again")
+    expected_update_rate: float = param(0.0, unit="s", lo=0.0, doc="older input stops the robot; 0 is never")
+    min_obstacle_height: float = param(0.0, unit="m")
+    max_obstacle_height: float = param(2.0, unit="m")
+    obstacle_range: float = param(2.5, unit="m", lo=0.0, doc="hits farther away are not marked")
+    raytrace_range: float = param(3.0, unit="m", lo=0.0, doc="cells are cleared up to here")
+    inf_is_valid: bool = param(False, doc="a beam without a hit clears")
+    clearing: bool = param(False)
+    marking: bool = param(True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObstacleParams:
+    """Parameters of costmap_2d::ObstacleLayer (VoxelLayer's further ones are accepted and have no effect)."""
+
+    enabled: bool = param(True)
+    track_unknown_space: bool = param(False, doc="the costmap's own where not given")
+    footprint_clearing_enabled: bool = param(True, doc="cells under the robot are free")
+    combination_method: int = param(1, choices=(0, 1, 99), doc="0 overwrites, 1 maximum, 99 nothing")
+    max_obstacle_height: float = param(2.0, unit="m")
+    transform_tolerance: float = param(0.2, unit="s", lo=0.0)
+    observation_sources: str = param("", doc="names of sources, separated by spaces")
+
+
+@dataclass(frozen=True, kw_only=True)
+class InflationParams:
+    """Parameters of costmap_2d::InflationLayer."""
+
+    enabled: bool = param(True)
+    inflation_radius: float = param(0.55, unit="m", lo=0.0, hi=50.0)
+    cost_scaling_factor: float = param(10.0, unit="1/m", lo=0.0, hi=100.0)
+    inflate_unknown: bool = param(False)
+
+
+@dataclass(frozen=True)
+class LayerConfig:
+    """One configured layer: name, upstream's type without its package, parameters, and sources of observations."""
+
+    name: str
+    type: str
+    params: StaticParams | ObstacleParams | InflationParams
+    sources: dict[str, SourceParams]
+
+
+@dataclass(frozen=True)
+class CostmapConfig:
+    """A costmap's parameters and its layers in order."""
+
+    params: CostmapParams
+    layers: list[LayerConfig]
+    name: str = "costmap"
+
+
+LAYER_TYPES: dict[str, type] = {
+    "StaticLayer": StaticParams,
+    "ObstacleLayer": ObstacleParams,
+    "VoxelLayer": ObstacleParams,
+    "InflationLayer": InflationParams,
+}
+
+_INHERITED = ("obstacle_range", "raytrace_range", "max_obstacle_height", "min_obstacle_height")
+_VOXEL = ("origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold", "publish_voxel_map")
+_LEGACY = {
+    "static_layer": ("map_topic", "unknown_cost_value", "lethal_cost_threshold", "subscribe_to_updates", "first_map_only"),
+    "obstacle_layer": ("observation_sources", *_INHERITED),
+    "inflation_layer": ("cost_scaling_factor", "inflation_radius"),
+}
+
+
+def read_costmap(tree: Mapping[str, Any], *, name: str = "~costmap/") -> CostmapConfig:
+    """A costmap's namespace as one checked configuration.
+
+    Without `plugins` the pre-hydro names are translated, as upstream's resetOldParameters does.
+
+    Raises:
+        ParamError: a value is wrong, or a plug-in's type is not known.
+    """
+    if not isinstance(tree, Mapping):
+        raise ParamError(name, f"expected a group of parameters, got {tree!r}")
+    legacy = "plugins" not in tree
+    if legacy:
+        tree = translate_legacy(tree)
+    plugins = _plugins(tree["plugins"], name + "plugins")
+    sources = [s for p in plugins for s in str(_sub(tree, p[0], name).get("observation_sources", "")).split()]
+    ignore = ["plugins", "static_map", "map_type", *[p[0] for p in plugins], *sources, *_INHERITED]
+    if legacy:
+        ignore += [key for keys in _LEGACY.values() for key in keys] + list(_VOXEL)
+    params = load(CostmapParams, tree, name=name, ignore=ignore)
+    layers = [_read_layer(tree, plugin, params, name) for plugin in plugins]
+    return CostmapConfig(params, layers, name.strip("~/"))
+
+
+def translate_legacy(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Pre-hydro parameters as plug-ins: static_layer if `static_map`, then obstacle_layer, then inflation_layer."""
+    out = dict(tree)
+    plugins = [{"name": "obstacle_layer", "type": "costmap_2d::ObstacleLayer"}]
+    if tree.get("map_type") == "voxel":
+        plugins[0]["type"] = "costmap_2d::VoxelLayer"
+    if tree.get("static_map", False):
+        plugins.insert(0, {"name": "static_layer", "type": "costmap_2d::StaticLayer"})
+    plugins.append({"name": "inflation_layer", "type": "costmap_2d::InflationLayer"})
+    for layer, keys in _LEGACY.items():
+        moved = {key: tree[key] for key in keys if key in tree}
+        if layer == "obstacle_layer":
+            moved.update({s: tree[s] for s in str(tree.get("observation_sources", "")).split() if s in tree})
+            if "track_unknown_space" in tree:
+                moved["track_unknown_space"] = tree["track_unknown_space"]
+        given = tree.get(layer, {})
+        out[layer] = {**moved, **(given if isinstance(given, Mapping) else {})}
+    out["plugins"] = plugins
+    return out
+
+
+def _plugins(value: Any, name: str) -> list[tuple[str, str]]:
+    if not isinstance(value, (list, tuple)):
+        raise ParamError(name, f"expected a list of {{name, type}}, got {value!r}")
+    found = []
+    for item in value:
+        if not isinstance(item, Mapping) or not {"name", "type"} <= set(item):
+            raise ParamError(name, f"expected {{name, type}}, got {item!r}")
+        kind = str(item["type"]).split("::")[-1]
+        if kind not in LAYER_TYPES:
+            raise ParamError(name, f"knows no layer '{item['type']}', expected one of {', '.join(LAYER_TYPES)}")
+        found.append((str(item["name"]), kind))
+    return found
+
+
+def _sub(tree: Mapping[str, Any], key: str, name: str) -> Mapping[str, Any]:
+    sub = tree.get(key, {})
+    if not isinstance(sub, Mapping):
+        raise ParamError(name + key, f"expected a group of parameters, got {sub!r}")
+    return sub
+
+
+def _read_layer(tree: Mapping[str, Any], plugin: tuple[str, str], params: CostmapParams, name: str) -> LayerConfig:
+    layer, kind = plugin
+    own = dict(_sub(tree, layer, name))
+    prefix = f"{name}{layer}/"
+    sources: dict[str, SourceParams] = {}
+    if kind in ("ObstacleLayer", "VoxelLayer"):
+        own.setdefault("track_unknown_space", params.track_unknown_space)
+        for source in str(own.get("observation_sources", "")).split():
+            sources[source] = _read_source(tree, own, source, prefix)
+    ignore = [*sources, *_INHERITED, *_VOXEL]
+    return LayerConfig(layer, kind, load(LAYER_TYPES[kind], own, name=prefix, ignore=ignore), sources)
+
+
+def _read_source(tree: Mapping[str, Any], layer: Mapping[str, Any], source: str, prefix: str) -> SourceParams:
+    """Ranges and heights are looked for in the source, then in the layer, then in the costmap (searchParam)."""
+    inherited: dict[str, Any] = {}
+    for scope in (tree, layer):
+        inherited.update({key: scope[key] for key in ("obstacle_range", "raytrace_range") if key in scope})
+    own = _sub(layer, source, prefix)
+    values = {**inherited, "topic": source, **own}
+    return load(SourceParams, values, name=f"{prefix}{source}/")

@@ -1,0 +1,337 @@
+"""move_base's state machine (matches move_base 1.17), without clocks, threads or ROS.
+
+PLANNING waits for a plan, CONTROLLING drives along it, CLEARING works through the recovery behaviours; a goal ends in
+one of upstream's result texts. Planning itself happens behind `PlanSource`, so it may take its time elsewhere.
+
+Differs:
+    - A recovery behaviour is cancelled like everything else, at the next step.
+    - A robot whose pose is not known stands still and waits; only `step` with a pose counts against patience.
+    - A plan that came before a goal was cancelled or replaced is dropped.
+"""
+
+from __future__ import annotations
+
+import enum
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.errors import ControlError, PlanningError
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
+from rosbot_patrol.navigation.params import MoveBaseParams
+from rosbot_patrol.planning.interfaces import LocalPlanner, LocalView, Recovery, RecoveryView
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+
+class State(enum.Enum):
+    """What the navigator is doing."""
+
+    IDLE = "idle"
+    PLANNING = "planning"
+    CONTROLLING = "controlling"
+    CLEARING = "clearing"
+
+
+class Trigger(enum.Enum):
+    """Why it recovers, with upstream's result text for when that is no use."""
+
+    PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
+    CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
+    OSCILLATION = "Robot is oscillating. Even after executing recovery behaviors."
+
+
+REACHED = "Goal reached."
+BAD_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
+PLAN_REFUSED = "Failed to pass global plan to the controller."
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """A plan, shape (N, 3), or why there is none."""
+
+    poses: Array | None = None
+    error: PlanningError | None = None
+
+
+class PlanSource(Protocol):
+    """Plans on request; at most one request is open."""
+
+    def request(self, goal: Pose2D) -> None:
+        """Begin to plan from where the robot is."""
+
+    def poll(self) -> PlanResult | None:
+        """The result of the last request, once; None while it is worked on or when there is none."""
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a request is open."""
+
+    def drop(self) -> None:
+        """Forget the open request and its result."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NavigatorView:
+    """What the navigator sees in a step: the two planners' views, and whether the sensors can be trusted."""
+
+    local: LocalView
+    recovery: RecoveryView
+    is_current: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """How a goal ended."""
+
+    succeeded: bool
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What a step wants done.
+
+    Attributes:
+        twist: velocity to send, None to send nothing.
+        outcome: set when the goal has ended.
+        plan: a new plan to show.
+        recovery: index, count and name of a behaviour that has just begun.
+        reason: why it does what it does, in one string.
+    """
+
+    twist: Twist2D | None = None
+    outcome: Outcome | None = None
+    plan: Array | None = None
+    recovery: tuple[int, int, str] | None = None
+    reason: str = ""
+
+
+@dataclass
+class _Progress:
+    """Times and counts of the goal that is worked on."""
+
+    last_plan: float
+    last_control: float
+    last_motion: float
+    last_request: float = -math.inf
+    motion_from: Pose2D | None = None
+    retries: int = 0
+    recovery_index: int = 0
+    trigger: Trigger = Trigger.PLANNING
+    running: Recovery | None = None
+    control_failed: bool = False
+
+
+@dataclass
+class _Context:
+    goal: Pose2D
+    progress: _Progress
+    failures: list[str] = field(default_factory=list)
+
+
+class Navigator:
+    """Brings the robot to one goal at a time.
+
+    Args:
+        params: move_base's.
+        plans: where plans come from.
+        controller: turns plans into velocities.
+        recoveries: tried in turn.
+    """
+
+    def __init__(
+        self,
+        params: MoveBaseParams,
+        *,
+        plans: PlanSource,
+        controller: LocalPlanner,
+        recoveries: Sequence[Recovery],
+    ) -> None:
+        self.params = params
+        self.state = State.IDLE
+        self._plans = plans
+        self._controller = controller
+        self._recoveries = list(recoveries)
+        self._context: _Context | None = None
+        self.reason = "no goal"
+
+    @property
+    def goal(self) -> Pose2D | None:
+        """The goal that is worked on, in the global costmap's frame."""
+        return self._context.goal if self._context else None
+
+    def set_goal(self, goal: Pose2D, now: float) -> None:
+        """Start for a goal; a goal before is given up without stopping."""
+        self._plans.drop()
+        self._controller.reset()
+        self._context = _Context(goal, _Progress(last_plan=now, last_control=now, last_motion=now))
+        self._begin_planning(now)
+
+    def cancel(self) -> Command:
+        """Give the goal up; the robot stands."""
+        self._end()
+        return Command(twist=STOP, reason="cancelled")
+
+    def _end(self) -> None:
+        self._plans.drop()
+        self._context = None
+        self.state, self.reason = State.IDLE, "no goal"
+
+    def _begin_planning(self, now: float) -> None:
+        assert self._context is not None
+        self.state = State.PLANNING
+        self._request(now)
+
+    def _request(self, now: float) -> None:
+        assert self._context is not None
+        if not self._plans.is_busy:
+            self._context.progress.last_request = now
+            self._plans.request(self._context.goal)
+
+    def step(self, now: float, view: NavigatorView | None) -> Command:
+        """One control cycle; `view` is None where the robot's pose is not known."""
+        context = self._context
+        if context is None:
+            return Command(reason=self.reason)
+        if view is None:
+            self.reason = "the robot's pose is not known"
+            return Command(twist=STOP, reason=self.reason)
+        self._watch_motion(now, view.local.pose, context)
+        result = self._plans.poll()
+        shown: Array | None = None
+        if result is not None:
+            shown = self._take_plan(now, result, context)
+            if isinstance(shown, Command):
+                return shown
+        step = {
+            State.PLANNING: self._planning,
+            State.CONTROLLING: self._controlling,
+            State.CLEARING: self._clearing,
+        }[self.state]
+        command = step(now, view, context)
+        self.reason = command.reason
+        if shown is not None and command.plan is None:
+            return Command(
+                twist=command.twist,
+                outcome=command.outcome,
+                plan=shown,
+                recovery=command.recovery,
+                reason=command.reason,
+            )
+        return command
+
+    def _watch_motion(self, now: float, pose: Pose2D, context: _Context) -> None:
+        progress = context.progress
+        start = progress.motion_from
+        if start is None or math.hypot(pose.x - start.x, pose.y - start.y) >= self.params.oscillation_distance:
+            progress.motion_from, progress.last_motion = pose, now
+            if progress.trigger is Trigger.OSCILLATION:
+                progress.recovery_index = 0
+
+    def _take_plan(self, now: float, result: PlanResult, context: _Context) -> Array | Command | None:
+        progress = context.progress
+        if result.poses is None:
+            progress.retries += 1
+            self.reason = str(result.error)
+            if self.state is State.PLANNING and (not context.failures or context.failures[-1] != self.reason):
+                log.warning("no plan: %s", self.reason)
+                context.failures.append(self.reason)
+            return None
+        progress.last_plan, progress.retries = now, 0
+        context.failures.clear()
+        try:
+            self._controller.set_plan(result.poses)
+        except ControlError as err:
+            log.error("%s %s", PLAN_REFUSED, err)
+            return self._finish(PLAN_REFUSED, succeeded=False)
+        if self.state is State.PLANNING:
+            self.state = State.CONTROLLING
+            if not progress.control_failed:
+                progress.last_control = now
+        if progress.trigger is Trigger.PLANNING:
+            progress.recovery_index = 0
+        return result.poses
+
+    # ---- states
+
+    def _planning(self, now: float, view: NavigatorView, context: _Context) -> Command:
+        progress, p = context.progress, self.params
+        too_often = 0 <= p.max_planning_retries < progress.retries
+        if now > progress.last_plan + p.planner_patience or too_often:
+            if not self._plans.is_busy:
+                return self._recover(Trigger.PLANNING, context)
+            if now <= progress.last_plan + 4.0 * p.planner_patience + 10.0:
+                return Command(twist=STOP, reason="planning takes long")
+            return self._recover(Trigger.PLANNING, context)
+        if now - progress.last_request >= (1.0 / p.planner_frequency if p.planner_frequency > 0.0 else 0.2):
+            self._request(now)
+        return Command(twist=STOP, reason=context.failures[-1] if context.failures else "planning")
+
+    def _controlling(self, now: float, view: NavigatorView, context: _Context) -> Command:
+        progress, p = context.progress, self.params
+        if self._controller.is_goal_reached(view.local):
+            return self._finish(REACHED, succeeded=True)
+        if p.oscillation_timeout > 0.0 and now > progress.last_motion + p.oscillation_timeout:
+            return self._recover(Trigger.OSCILLATION, context)
+        if not view.is_current:
+            progress.last_control = now
+            return Command(twist=STOP, reason="sensor data is out of date")
+        if p.planner_frequency > 0.0 and now - progress.last_request >= 1.0 / p.planner_frequency:
+            self._request(now)
+        try:
+            twist = self._controller.compute(view.local)
+        except ControlError as err:
+            if now > progress.last_control + p.controller_patience:
+                return self._recover(Trigger.CONTROLLING, context)
+            progress.control_failed = True
+            progress.last_plan, progress.retries = now, 0
+            self._begin_planning(now)
+            return Command(twist=STOP, reason=str(err))
+        progress.last_control, progress.control_failed = now, False
+        if progress.trigger is Trigger.CONTROLLING:
+            progress.recovery_index = 0
+        return Command(twist=twist, reason="driving")
+
+    def _recover(self, trigger: Trigger, context: _Context) -> Command:
+        context.progress.trigger = trigger
+        context.progress.running = None
+        self.state = State.CLEARING
+        return Command(twist=STOP, reason=f"recovering ({trigger.name.lower()})")
+
+    def _clearing(self, now: float, view: NavigatorView, context: _Context) -> Command:
+        progress = context.progress
+        count = len(self._recoveries) if self.params.recovery_behavior_enabled else 0
+        if progress.running is None:
+            if progress.recovery_index >= count:
+                log.error("%s %s", progress.trigger.value, "; ".join(context.failures[-1:]))
+                return self._finish(progress.trigger.value, succeeded=False)
+            progress.running = self._recoveries[progress.recovery_index]
+            log.warning("recovery %d of %d: %s", progress.recovery_index + 1, count, progress.running.name)
+            progress.running.start(view.recovery)
+            return Command(
+                twist=STOP,
+                recovery=(progress.recovery_index, count, progress.running.name),
+                reason=f"recovery {progress.running.name}",
+            )
+        twist = progress.running.step(view.recovery)
+        if twist is not None:
+            return Command(twist=twist, reason=f"recovery {progress.running.name}")
+        log.info("recovery %s: %s", progress.running.name, progress.running.last_words)
+        progress.running = None
+        progress.recovery_index += 1
+        progress.last_plan = progress.last_motion = progress.last_control = now
+        progress.retries = 0
+        self._begin_planning(now)
+        return Command(twist=STOP, reason="planning after a recovery")
+
+    def _finish(self, text: str, *, succeeded: bool) -> Command:
+        self._end()
+        return Command(twist=STOP, outcome=Outcome(succeeded=succeeded, text=text), reason=text)

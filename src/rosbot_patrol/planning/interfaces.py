@@ -1,0 +1,112 @@
+"""What a global planner, a local planner and a recovery behaviour are, without ROS."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.costmap.layered import LayeredCostmap
+from rosbot_patrol.geometry import Pose2D, Twist2D
+from rosbot_patrol.grid import Grid
+
+Array = NDArray[np.float64]
+
+
+class GlobalPlanner(ABC):
+    """Finds a way over a costmap."""
+
+    @abstractmethod
+    def plan(self, costmap: Grid, start: Pose2D, goal: Pose2D) -> Array:
+        """Poses from start to goal, shape (N, 3), in the costmap's frame. `costmap` may be written to.
+
+        Raises:
+            PlanningError: StartOccupied, GoalOccupied, OutOfBounds or NoPath.
+        """
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalView:
+    """What a local planner sees in one control cycle, all in the local costmap's frame.
+
+    Attributes:
+        now: time [s].
+        pose, velocity: the robot's.
+        costmap: costs around it (a copy, may be written to).
+        local_from_plan: pose of the plan's frame in the local costmap's.
+    """
+
+    now: float
+    pose: Pose2D
+    velocity: Twist2D
+    costmap: Grid
+    local_from_plan: Pose2D = Pose2D()
+
+
+class LocalPlanner(ABC):
+    """Turns a plan into velocities."""
+
+    @abstractmethod
+    def set_plan(self, poses: Array) -> None:
+        """Follow a plan of shape (N, 3), in the plan's frame; raises ControlError where it cannot."""
+
+    @abstractmethod
+    def compute(self, view: LocalView) -> Twist2D:
+        """The velocity for this cycle; raises ControlError where none is safe."""
+
+    @abstractmethod
+    def is_goal_reached(self, view: LocalView) -> bool:
+        """Whether the robot stands at the plan's end."""
+
+    def reset(self) -> None:
+        """Forget the goal that was worked on."""
+
+    @property
+    def local_plan(self) -> Array:
+        """What the last velocity would drive, shape (N, 3), in the local costmap's frame."""
+        return np.empty((0, 3))
+
+    @property
+    def visible_plan(self) -> Array:
+        """The part of the plan that is followed now, shape (N, 3), in the local costmap's frame."""
+        return np.empty((0, 3))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecoveryView:
+    """What a recovery behaviour sees in one cycle.
+
+    Attributes:
+        now: time [s].
+        pose_global, pose_local: the robot's, in each costmap's frame.
+        global_costmap, local_costmap: may be cleared.
+    """
+
+    now: float
+    pose_global: Pose2D
+    pose_local: Pose2D
+    global_costmap: LayeredCostmap
+    local_costmap: LayeredCostmap
+
+
+class Recovery(ABC):
+    """Something to try when the robot is stuck; worked on step by step, so that it can be cancelled."""
+
+    name: str = ""
+
+    @abstractmethod
+    def start(self, view: RecoveryView) -> None:
+        """Begin."""
+
+    @abstractmethod
+    def step(self, view: RecoveryView) -> Twist2D | None:
+        """The velocity for this cycle, None when done."""
+
+    @property
+    def last_words(self) -> str:
+        """How it ended, for the log; empty where there is nothing to say."""
+        return ""
+
+
