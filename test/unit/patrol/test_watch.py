@@ -1,0 +1,117 @@
+import pytest
+
+from rosbot_patrol.patrol.inputs import Box, Frame
+from rosbot_patrol.patrol.watch import Watch, WatchParams
+
+
+def box(label="person", probability=0.9, xmin=100, ymin=100, xmax=200, ymax=400):
+    return Box(label=label, probability=probability, xmin=xmin, ymin=ymin, xmax=xmax, ymax=ymax)
+
+
+def feed(watch, frames, now=None):
+    found = []
+    for frame in frames:
+        seen = watch.add(frame.stamp if now is None else now, frame)
+        if seen:
+            found.append(seen)
+    return found
+
+
+def frames(*boxes, start=1.0, period=0.1):
+    return [Frame(stamp=start + i * period, boxes=tuple(b)) for i, b in enumerate(boxes)]
+
+
+@pytest.fixture
+def watch():
+    watch = Watch(("person", "fire hydrant"))
+    watch.start(0.0)
+    return watch
+
+
+def test_three_pictures_over_two_tenths_make_an_intruder(watch):
+    found = feed(watch, frames([box(probability=0.6)], [box(probability=0.9)], [box(probability=0.6)]))
+    assert len(found) == 1
+    assert found[0].label == "person"
+    assert found[0].probability == pytest.approx(0.7)
+    assert found[0].stamp == pytest.approx(1.1)  # the surest picture is the one for the mail
+
+
+def test_two_pictures_do_not(watch):
+    assert feed(watch, frames([box()], [box()])) == []
+
+
+def test_three_of_five_with_gaps(watch):
+    assert len(feed(watch, frames([box()], [], [box()], [], [box()]))) == 1
+
+
+def test_two_of_five_do_not(watch):
+    assert feed(watch, frames([box()], [], [], [box()], [], [], [box()])) == []
+
+
+def test_pictures_without_a_stamp_count_as_empty(watch):
+    watch.add(1.0, Frame(stamp=1.0, boxes=(box(),)))
+    for i in range(5):
+        watch.add(1.1 + i / 10, Frame())
+    assert feed(watch, frames([box()], [box()], start=2.0)) == []
+
+
+def test_an_empty_picture_never_hides_a_later_stamp(watch):
+    # darknet_ros says "nothing" with the time of now, and boxes with the earlier time of their picture
+    watch.add(1.30, Frame())
+    found = [watch.add(1.3 + i / 10, Frame(stamp=1.15 + i / 10, boxes=(box(),))) for i in range(3)]
+    assert found[-1] is not None
+
+
+def test_the_same_picture_again_and_again_proves_nothing(watch):
+    assert feed(watch, [Frame(stamp=1.0, boxes=(box(),))] * 50, now=1.0) == []
+
+
+def test_pictures_from_before_the_mission_do_not_count():
+    # the original mails when it is home again, from messages that waited (CONTRACTS A0, quirk 1)
+    watch = Watch(("person",))
+    watch.start(5.0)
+    assert feed(watch, frames([box()], [box()], [box()], start=4.0), now=5.5) == []
+
+
+def test_old_pictures_do_not_count(watch):
+    assert feed(watch, frames([box()], [box()], [box()], start=1.0), now=30.0) == []
+
+
+def test_unsure_pictures_do_not(watch):
+    assert feed(watch, frames(*[[box(probability=0.35)]] * 6)) == []
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"label": "chair"},
+        {"ymin": 395},  # too low
+        {"xmax": 100},  # no width
+        {"xmin": 0, "xmax": 640, "ymin": 300, "ymax": 320},  # a stripe
+        {"probability": 0.0},
+        {"probability": 7.0},
+    ],
+)
+def test_implausible_boxes_do_not(watch, bad):
+    assert feed(watch, frames(*[[box(**bad)]] * 6)) == []
+
+
+def test_fire_hydrants_alarm_by_default_and_classes_do_not_add_up(watch):
+    assert feed(watch, frames([box()], [box(label="fire hydrant")], [box()], [box(label="fire hydrant")])) == []
+    assert feed(watch, frames(*[[box(label="fire hydrant")]] * 3, start=3.0))[0].label == "fire hydrant"
+
+
+def test_a_slow_detector_confirms_too(watch):
+    assert len(feed(watch, frames([box()], [box()], [box()], period=1.5))) == 1
+
+
+def test_a_candidate_is_something_seen_lately(watch):
+    assert not watch.candidate(1.0)
+    watch.add(1.0, Frame(stamp=0.9, boxes=(box(),)))
+    assert watch.candidate(1.3)
+    assert not watch.candidate(2.0)
+
+
+def test_one_picture_is_enough_where_asked_for():
+    watch = Watch(("person",), WatchParams(frames=1, window=1, span=0.0))
+    assert len(feed(watch, frames([box()], start=1.0))) == 1
