@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,14 +54,14 @@ def _read_netpbm(path: Path, data: bytes) -> NDArray[np.uint8]:
     return values.astype(np.uint8).reshape(shape)
 
 
-def _binary_values(path: Path, body: bytes, count: int, largest: int) -> NDArray[np.integer]:
+def _binary_values(path: Path, body: bytes, count: int, largest: int) -> NDArray[Any]:
     kind = np.dtype(np.uint8) if largest < 256 else np.dtype(">u2")
     if len(body) < count * kind.itemsize:
         raise MapError(path, f"the picture is cut short: {len(body)} bytes of pixels, expected {count * kind.itemsize}")
     return np.frombuffer(body, dtype=kind, count=count).copy()
 
 
-def _text_values(path: Path, body: bytes, count: int) -> NDArray[np.integer]:
+def _text_values(path: Path, body: bytes, count: int) -> NDArray[Any]:
     words = re.sub(rb"#[^\n]*", b"", body).split()
     if len(words) < count:
         raise MapError(path, f"the picture is cut short: {len(words)} pixel values, expected {count}")

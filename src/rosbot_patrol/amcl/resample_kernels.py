@@ -1,0 +1,140 @@
+"""Resampling with as many particles as their spread asks for (Fox 2003, KLD sampling), and clusters of particles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rosbot_patrol.kernels import kernel
+
+EMPTY = np.int64(-1)
+BIN_M = 0.5
+BIN_RAD = math.pi / 18.0
+TURNS = 36  # bins in a full turn
+
+
+@kernel("int64(int64, float64, float64, int64, int64)")
+def kld_size(bins, error, z, least, most):
+    """How many particles keep the error against the true distribution below a bound (Fox 2003, equation 7).
+
+    Args:
+        bins: bins that hold particles.
+        error: largest Kullback-Leibler distance; z: upper quantile of the standard normal distribution.
+        least, most: bounds of the answer.
+    """
+    if bins <= 1:
+        return least
+    k = bins - 1.0
+    b = 2.0 / (9.0 * k)
+    root = 1.0 - b + math.sqrt(b) * z
+    return min(max(int(math.ceil(k / (2.0 * error) * root * root * root)), least), most)
+
+
+@kernel("int64(float64, float64, float64)")
+def bin_key(x, y, yaw):
+    """The bin of a pose as one number: 0.5 m x 0.5 m x 10 degrees, the turn closed."""
+    turn = int(math.floor(yaw / BIN_RAD)) % TURNS
+    return ((int(math.floor(x / BIN_M)) + (1 << 24)) * (1 << 25) + int(math.floor(y / BIN_M)) + (1 << 24)) * 64 + turn
+
+
+@kernel("int64(int64[::1], int64)")
+def find_slot(slots, key):
+    """Where a key is in an open hash table of 2^n slots, or the empty slot where it would go."""
+    mask = slots.shape[0] - 1
+    mixed = key * 0x1E3779B97F4A7C15
+    at = np.int64((mixed >> 32) ^ mixed) & mask
+    while slots[at] != EMPTY and slots[at] != key:
+        at = (at + 1) & mask
+    return at
+
+
+@kernel(
+    "int64(float64[:, ::1], float64[::1], float64, float64[:, ::1], float64, float64, int64, int64, float64[:, ::1])"
+)
+def draw(poses, cumulative, offset, strangers, error, z, least, most, out):
+    """Draw particles by weight until their spread asks for no more; returns how many.
+
+    The draws follow the golden ratio's additive sequence, which covers the weights evenly however many are drawn.
+
+    Args:
+        poses: x, y, yaw, shape (N, 3); cumulative: running sum of the weights up to 1, shape (N,).
+        offset: start of the sequence, 0 to 1.
+        strangers: x, y, yaw of random poses that stand in for the draws, NaN where none does, shape (most or 0, 3).
+        error, z, least, most: as for `kld_size`.
+        out: the drawn poses, shape (most, 3).
+    """
+    size = 16
+    while size < 4 * most:
+        size *= 2
+    slots = np.full(size, EMPTY, dtype=np.int64)
+    bins, wanted = 0, least
+    at = offset
+    for m in range(most):
+        at += 0.6180339887498949
+        if at >= 1.0:
+            at -= 1.0
+        if m < strangers.shape[0] and not math.isnan(strangers[m, 0]):
+            out[m, 0], out[m, 1], out[m, 2] = strangers[m, 0], strangers[m, 1], strangers[m, 2]
+        else:
+            i = min(np.searchsorted(cumulative, at, side="right"), poses.shape[0] - 1)
+            out[m, 0], out[m, 1], out[m, 2] = poses[i, 0], poses[i, 1], poses[i, 2]
+        key = bin_key(out[m, 0], out[m, 1], out[m, 2])
+        slot = find_slot(slots, key)
+        if slots[slot] == EMPTY:
+            slots[slot] = key
+            bins += 1
+            wanted = kld_size(bins, error, z, least, most)
+        if m + 1 >= wanted:
+            return m + 1
+    return most
+
+
+@kernel("int64(int64[::1], int64)")
+def root_of(parents, i):
+    """The representative of a set, with its path halved (disjoint sets)."""
+    while parents[i] != i:
+        parents[i] = parents[parents[i]]
+        i = parents[i]
+    return i
+
+
+@kernel("int64(float64[:, ::1], int64[::1])")
+def label_clusters(poses, labels):
+    """Number the clusters of particles whose bins touch; returns how many numbers are in use.
+
+    Args:
+        poses: x, y, yaw, shape (N, 3).
+        labels: the cluster of each, shape (N,); numbers need not be consecutive.
+    """
+    n = poses.shape[0]
+    size = 16
+    while size < 4 * n:
+        size *= 2
+    slots = np.full(size, EMPTY, dtype=np.int64)
+    index = np.zeros(size, dtype=np.int64)
+    keys = np.empty(n, dtype=np.int64)
+    bins = 0
+    for i in range(n):
+        key = bin_key(poses[i, 0], poses[i, 1], poses[i, 2])
+        slot = find_slot(slots, key)
+        if slots[slot] == EMPTY:
+            slots[slot] = key
+            index[slot] = bins
+            keys[bins] = key
+            bins += 1
+        labels[i] = index[slot]
+    parents = np.arange(bins)
+    for b in range(bins):
+        turn = keys[b] % 64
+        place = keys[b] // 64
+        for dx in range(-1, 2):
+            for dy in range(-1, 2):
+                for dt in range(-1, 2):
+                    near = (place + dx * (1 << 25) + dy) * 64 + (turn + dt) % TURNS
+                    slot = find_slot(slots, near)
+                    if slots[slot] == near:
+                        parents[root_of(parents, b)] = root_of(parents, index[slot])
+    for i in range(n):
+        labels[i] = root_of(parents, labels[i])
+    return bins

@@ -1,0 +1,115 @@
+"""Scans that wait until tf knows where the robot was when they were taken (tf's MessageFilter, without its locks)."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from dataclasses import dataclass
+
+import rospy
+import tf2_ros
+
+from rosbot_patrol.amcl.sensor_model import Mount
+from rosbot_patrol.errors import TransformError
+from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
+from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.scan import LaserScan
+
+POLL_S, SLOW_POLL_S, SLOW_AFTER_S = 0.005, 0.05, 0.1
+GIVE_UP_S = 1.0  # a scan that is this much older than the newest, or has waited so long, is dropped
+
+
+@dataclass(frozen=True)
+class PlacedScan:
+    """A scan, the robot in the odometry's frame at its time, and how the laser sits on the robot."""
+
+    scan: LaserScan
+    odom_from_base: Pose2D
+    mount: Mount
+
+
+def mount_of(transforms: Transforms, base: str, laser: str) -> Mount:
+    """How the laser sits on the robot.
+
+    Raises:
+        TransformError: tf does not know it, or the laser does not look along the floor.
+    """
+    try:
+        found = transforms.buffer.lookup_transform(base, laser, rospy.Time(0)).transform
+    except tf2_ros.TransformException as err:
+        raise TransformError(base, laser, str(err)) from err
+    t, q = found.translation, found.rotation
+    upright = 1.0 - 2.0 * (q.x * q.x + q.y * q.y)  # z component of the sensor's z axis
+    if abs(upright) < 0.9:
+        raise TransformError(base, laser, "the laser is not mounted level, its scan is no plan of the room")
+    return Mount(Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w)), upright < 0.0)
+
+
+class ScanQueue:
+    """Hands out scans in their order, each once its odometry is known.
+
+    Args:
+        transforms: the node's tf.
+        odom, base: frames of odometry and robot.
+        size: most scans that wait; the oldest goes first.
+    """
+
+    def __init__(self, transforms: Transforms, odom: str, base: str, size: int = 100) -> None:
+        self._transforms = transforms
+        self._odom, self._base = odom, base
+        self._waiting: deque[LaserScan] = deque(maxlen=size)
+        self._arrived = threading.Event()
+        self._mounts: dict[str, Mount] = {}
+        self._waited = 0.0
+        self._newest = -math.inf
+        self.problem = ""  # why the last scan that was dropped could not be placed
+        self.dropped = 0
+
+    def put(self, scan: LaserScan) -> None:
+        """Add a scan; called by the subscriber."""
+        if scan.stamp < self._newest - GIVE_UP_S:  # the clock was set back: what waits is of another time
+            self._waiting.clear()
+        self._newest = scan.stamp
+        self._waiting.append(scan)
+        self._arrived.set()
+
+    def take(self) -> PlacedScan | None:
+        """The oldest scan, once it can be placed; None where none can be now. Waits a few milliseconds at most."""
+        if not self._waiting:
+            self._arrived.wait(SLOW_POLL_S)
+            self._arrived.clear()
+        try:
+            scan = self._waiting[0]
+        except IndexError:
+            return None
+        try:
+            placed = PlacedScan(
+                scan, self._transforms.lookup(self._odom, self._base, scan.stamp), self._mount(scan.frame_id)
+            )
+        except (TransformError, ValueError) as err:
+            self._wait_or_drop(scan, str(err))
+            return None
+        self._done(scan)
+        self.problem = ""
+        return placed
+
+    def _mount(self, frame: str) -> Mount:
+        if frame not in self._mounts:
+            self._mounts[frame] = mount_of(self._transforms, self._base, frame)
+        return self._mounts[frame]
+
+    def _wait_or_drop(self, scan: LaserScan, why: str) -> None:
+        if self._newest - scan.stamp > GIVE_UP_S or self._waited > GIVE_UP_S:
+            self.problem = why
+            self.dropped += 1
+            self._done(scan)
+            return
+        pause = POLL_S if self._waited < SLOW_AFTER_S else SLOW_POLL_S
+        self._waited += pause
+        threading.Event().wait(pause)
+
+    def _done(self, scan: LaserScan) -> None:
+        self._waited = 0.0
+        if self._waiting and self._waiting[0] is scan:
+            self._waiting.popleft()
