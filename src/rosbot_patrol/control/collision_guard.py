@@ -1,0 +1,213 @@
+"""The last word before the base: slows and stops for what the lidar sees on the way, whoever commands.
+
+The commanded arc is followed ahead, and the command is scaled down (its shape is kept) until the robot can stop before
+its footprint, with a gap in the direction of motion, meets something seen. What lies in the footprint's margin already
+blocks only a motion that goes deeper, so the robot can always leave. The lidar is blind closer than its minimum range:
+what was last seen there is remembered for a while.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert, transform_points
+from rosbot_patrol.params import param
+from rosbot_patrol.scan import LaserScan, scan_points
+
+Array = NDArray[np.float64]
+
+_STEP = 0.01  # along the arc [m]
+_TURN_STEP = 0.03  # [rad]
+_DEEPER = 0.002  # a point must sink that much in one glance to count as coming closer [m]
+_GLANCE = 0.1  # [s]
+_SELF = 0.06  # so deep inside the footprint a point is no obstacle but the robot itself [m]
+_CREEP = 0.05  # a scale below this is a stop
+
+
+@dataclass(frozen=True, kw_only=True)
+class GuardParams:
+    """Parameters of the collision guard."""
+
+    half_length: float = param(0.12, lo=0.01, unit="m", doc="footprint ahead of and behind base_link")
+    half_width: float = param(0.14, lo=0.01, unit="m", doc="footprint to either side")
+    gap: float = param(0.05, lo=0.0, unit="m", doc="kept free ahead in the direction of motion")
+    slack: float = param(0.01, lo=0.0, unit="m", doc="taken off the sides it does not move to (noise of the lidar)")
+    deceleration: float = param(1.0, lo=0.05, unit="m/s^2", doc="what the base surely brakes with")
+    turn_deceleration: float = param(3.0, lo=0.05, unit="rad/s^2", doc="the same for turning")
+    latency: float = param(0.2, lo=0.0, unit="s", doc="from the light on the obstacle to the brake")
+    min_points: int = param(2, lo=1, doc="beams that must agree on an obstacle")
+    stale_after: float = param(0.6, lo=0.05, unit="s", doc="older scans are not trusted")
+    stale_speed: float = param(0.1, lo=0.0, unit="m/s", doc="speed without a fresh scan")
+    stale_turn: float = param(0.4, lo=0.0, unit="rad/s", doc="turning without a fresh scan")
+    memory: float = param(20.0, lo=0.0, unit="s", doc="how long a thing in the lidar's blind ring is remembered")
+
+
+class Verdict(NamedTuple):
+    """What the base may do: the command, how much of the wish it is (0 to 1), and why not all ("" if all)."""
+
+    twist: Twist2D
+    scale: float
+    reason: str
+
+
+class CollisionGuard:
+    """Holds what was seen, and limits commands. Times [s] are of one clock; poses are odom_from_base, None if unknown.
+
+    Args:
+        params: sizes, decelerations, limits.
+    """
+
+    def __init__(self, params: GuardParams) -> None:
+        self._params = params
+        self._stamp = -math.inf
+        self._seen: Array = np.empty((0, 2))  # in the base's frame at the scan
+        self._pose: Pose2D | None = None
+        self._blind: Array = np.empty((0, 2))  # in odom
+        self._blind_since: Array = np.empty(0)
+
+    def see(self, scan: LaserScan, base_from_laser: Pose2D, now: float, odom_from_base: Pose2D | None = None) -> None:
+        """Take a scan."""
+        if odom_from_base is not None:
+            self._remember(scan.range_min, compose(odom_from_base, base_from_laser), now)
+        self._seen = transform_points(base_from_laser, scan_points(scan))
+        self._pose, self._stamp = odom_from_base, now
+
+    def limit(self, wish: Twist2D, now: float, odom_from_base: Pose2D | None = None) -> Verdict:
+        """The part of a commanded velocity that is safe."""
+        if wish == STOP:
+            return Verdict(STOP, 1.0, "")
+        if not 0.0 <= now - self._stamp <= self._params.stale_after:
+            return self._without_sight(wish, now)
+        points = self._points(odom_from_base)
+        scale = self._free_part(wish, points)
+        if scale >= _CREEP or wish.wz == 0.0:
+            return self._verdict(wish, scale)
+        turn = Twist2D(0.0, 0.0, wish.wz)  # cannot go on along the arc, but perhaps turn out of it
+        return self._verdict(turn, self._free_part(turn, points), wish)
+
+    def _verdict(self, wish: Twist2D, scale: float, whole: Twist2D | None = None) -> Verdict:
+        if scale < _CREEP:
+            return Verdict(STOP, 0.0, "something is in the way")
+        twist = Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale)
+        if whole is not None and whole != wish:
+            return Verdict(twist, 0.0, "something is in the way, turning only")
+        return Verdict(twist, scale, "" if scale >= 0.999 else "something is near on the way")
+
+    def _without_sight(self, wish: Twist2D, now: float) -> Verdict:
+        p = self._params
+        speed = math.hypot(wish.vx, wish.vy)
+        parts = [1.0]
+        if speed > 0.0:
+            parts.append(p.stale_speed / speed)
+        if wish.wz != 0.0:
+            parts.append(p.stale_turn / abs(wish.wz))
+        scale = min(parts)
+        age = now - self._stamp
+        reason = "no scan yet" if math.isinf(age) else f"the last scan is {abs(age):.1f} s old"
+        return Verdict(Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale), scale, reason)
+
+    def _points(self, odom_from_base: Pose2D | None) -> Array:
+        """What was seen and what is remembered, in the base's frame now."""
+        if odom_from_base is None or self._pose is None:
+            return self._seen
+        base_from_odom = invert(odom_from_base)
+        seen = transform_points(compose(base_from_odom, self._pose), self._seen)
+        if not len(self._blind):
+            return seen
+        return np.vstack((seen, transform_points(base_from_odom, self._blind)))
+
+    def _remember(self, range_min: float, odom_from_laser: Pose2D, now: float) -> None:
+        """Keep what now lies closer to the lidar than it can see."""
+        known, since = self._blind, self._blind_since
+        if self._pose is not None and len(self._seen):
+            seen = transform_points(self._pose, self._seen)
+            known = np.vstack((known, seen))
+            since = np.concatenate((since, np.full(len(seen), now)))
+        offset = known - np.array([odom_from_laser.x, odom_from_laser.y])
+        keep = (np.hypot(offset[:, 0], offset[:, 1]) < range_min) & (now - since < self._params.memory) & (since <= now)
+        self._blind, self._blind_since = known[keep], since[keep]
+
+    def _free_part(self, wish: Twist2D, points: Array) -> float:
+        """The factor (0 to 1) at which the robot can still stop before it touches a point."""
+        p = self._params
+        speed = math.hypot(wish.vx, wish.vy)
+        stopping = max(speed / p.deceleration, abs(wish.wz) / p.turn_deceleration)
+        horizon = p.latency + stopping / 2.0 + _GLANCE
+        reach = math.hypot(p.half_length, p.half_width) + p.gap + speed * horizon
+        near = points[np.abs(points).max(axis=1) < reach] if len(points) else points
+        if len(near) < p.min_points:
+            return 1.0
+        contact = self._contact_time(wish, near, horizon)
+        if math.isinf(contact):
+            return 1.0
+        return _scale_to_stop(contact, p.latency, stopping)
+
+    def _contact_time(self, wish: Twist2D, points: Array, horizon: float) -> float:
+        """When the footprint meets `min_points` of the points at the commanded speed [s], inf for not within sight."""
+        speed = math.hypot(wish.vx, wish.vy)
+        steps = math.ceil(max(speed * horizon / _STEP, abs(wish.wz) * horizon / _TURN_STEP, 1.0))
+        times = np.linspace(0.0, horizon, min(steps, 60) + 1)
+        box = self._box(wish)
+        depth = _distance_to_box(points[:, 0], points[:, 1], box)
+        soon = _seen_from(points, wish, np.array([_GLANCE]))
+        deeper = _distance_to_box(soon[:, 0, 0], soon[:, 1, 0], box) < depth - _DEEPER
+        counts = ((depth >= 0.0) | deeper) & ~self._is_self(points)
+        if counts.sum() < self._params.min_points:
+            return math.inf
+        moved = _seen_from(points[counts], wish, times)
+        hit = _distance_to_box(moved[:, 0], moved[:, 1], box) < 0.0
+        last_free = np.maximum(hit.argmax(axis=1) - 1, 0)
+        first = np.where(hit.any(axis=1), times[last_free], math.inf)
+        return float(np.partition(first, self._params.min_points - 1)[self._params.min_points - 1])
+
+    def _is_self(self, points: Array) -> NDArray[np.bool_]:
+        p = self._params
+        deep = (-p.half_length + _SELF, p.half_length - _SELF, -p.half_width + _SELF, p.half_width - _SELF)
+        return _distance_to_box(points[:, 0], points[:, 1], deep) < 0.0
+
+    def _box(self, wish: Twist2D) -> tuple[float, float, float, float]:
+        """The footprint with its gap in the direction of motion: x from, x to, y from, y to."""
+        p = self._params
+        length, width = p.half_length - p.slack, p.half_width - p.slack
+        return (
+            -p.half_length - p.gap if wish.vx < 0.0 else -length,
+            p.half_length + p.gap if wish.vx > 0.0 else length,
+            -p.half_width - p.gap if wish.vy < 0.0 else -width,
+            p.half_width + p.gap if wish.vy > 0.0 else width,
+        )
+
+
+def _seen_from(points: Array, twist: Twist2D, times: Array) -> Array:
+    """Points in the robot's frame after moving at `twist` for each time, shape (N, 2, T)."""
+    angle = twist.wz * times
+    if abs(twist.wz) < 1e-6:
+        x, y = twist.vx * times, twist.vy * times
+    else:
+        s, c = np.sin(angle) / twist.wz, (1.0 - np.cos(angle)) / twist.wz
+        x, y = twist.vx * s - twist.vy * c, twist.vx * c + twist.vy * s
+    dx, dy = points[:, 0:1] - x, points[:, 1:2] - y
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack((cos * dx + sin * dy, cos * dy - sin * dx), axis=1)
+
+
+def _distance_to_box(x: Array, y: Array, box: tuple[float, float, float, float]) -> Array:
+    """How far outside a box points are [m]; negative inside."""
+    x_from, x_to, y_from, y_to = box
+    dx = np.maximum(x_from - x, x - x_to)
+    dy = np.maximum(y_from - y, y - y_to)
+    outside = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0))
+    return np.where(outside > 0.0, outside, np.maximum(dx, dy))
+
+
+def _scale_to_stop(contact: float, latency: float, stopping: float) -> float:
+    """The largest k <= 1 with k * latency + k^2 * stopping / 2 <= contact (times at the commanded speed [s])."""
+    if contact >= latency + stopping / 2.0:
+        return 1.0
+    if stopping < 1e-9:
+        return contact / latency if latency > 0.0 else 1.0
+    return (math.sqrt(latency * latency + 2.0 * stopping * contact) - latency) / stopping

@@ -1,0 +1,133 @@
+"""Which of several commanders drives the base: the one of highest priority that still speaks (twist_mux's rules)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.geometry import STOP, Twist2D
+from rosbot_patrol.params import param
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceParams:
+    """One velocity topic."""
+
+    name: str = param(doc="what it is called in messages")
+    topic: str = param(doc="geometry_msgs/Twist")
+    timeout: float = param(0.5, lo=0.0, unit="s", doc="silence after which it has no say; 0: never")
+    priority: int = param(lo=0, hi=255, doc="the highest that speaks is heard")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LockParams:
+    """One lock: while it is true, sources of lower priority are not heard."""
+
+    name: str = param(doc="what it is called in messages")
+    topic: str = param(doc="std_msgs/Bool")
+    timeout: float = param(0.0, lo=0.0, unit="s", doc="silence after which it counts as true; 0: never")
+    priority: int = param(lo=0, hi=255, doc="sources below it are locked")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MuxParams:
+    """twist_mux's configuration file."""
+
+    topics: tuple[SourceParams, ...] = param(doc="velocity sources")
+    locks: tuple[LockParams, ...] = param((), doc="locks")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the base is told.
+
+    Attributes:
+        source: who is heard, None for nobody.
+        lock: which lock keeps a source that speaks from being heard, None for none.
+        fresh: whether the command has not been chosen before.
+    """
+
+    source: str | None
+    twist: Twist2D
+    lock: str | None = None
+    fresh: bool = False
+
+
+class _Input:
+    def __init__(self, timeout: float) -> None:
+        self.timeout = timeout
+        self.stamp = -math.inf
+
+    def has_expired(self, now: float) -> bool:
+        if now < self.stamp:  # the clock went back: what came before it is old
+            self.stamp = -math.inf
+        return self.timeout > 0.0 and now - self.stamp > self.timeout
+
+
+class _Source(_Input):
+    def __init__(self, params: SourceParams) -> None:
+        super().__init__(params.timeout)
+        self.params = params
+        self.twist: Twist2D | None = None
+        self.count = 0
+
+
+class _Lock(_Input):
+    def __init__(self, params: LockParams) -> None:
+        super().__init__(params.timeout)
+        self.params = params
+        self.is_set = False
+
+    def holds(self, now: float) -> bool:
+        return self.is_set or self.has_expired(now)
+
+
+class TwistMux:
+    """Chooses between commanders.
+
+    Raises:
+        ParamError: two sources or locks share a name, or two sources a priority.
+    """
+
+    def __init__(self, params: MuxParams) -> None:
+        _check_distinct("topics", "name", [s.name for s in params.topics])
+        _check_distinct("topics", "priority", [s.priority for s in params.topics])
+        _check_distinct("locks", "name", [lock.name for lock in params.locks])
+        self._sources = {s.name: _Source(s) for s in sorted(params.topics, key=lambda s: -s.priority)}
+        self._locks = {lock.name: _Lock(lock) for lock in sorted(params.locks, key=lambda lock: -lock.priority)}
+        self._taken: tuple[str, int] | None = None
+
+    def command(self, name: str, twist: Twist2D, now: float) -> None:
+        """A source commands; values that are not finite count as a stop."""
+        source = self._sources[name]
+        source.twist = twist if all(map(math.isfinite, twist)) else STOP
+        source.stamp = now
+        source.count += 1
+
+    def lock(self, name: str, value: bool, now: float) -> None:
+        """A lock is set or released."""
+        self._locks[name].is_set = value
+        self._locks[name].stamp = now
+
+    def choose(self, now: float) -> Choice:
+        """Who is heard now, and what it says."""
+        barrier = next((lock for lock in self._locks.values() if lock.holds(now)), None)
+        held_by = None
+        for source in self._sources.values():
+            if source.twist is None or source.has_expired(now):
+                continue
+            if barrier is not None and barrier.params.priority > source.params.priority:
+                held_by = barrier.params.name
+                continue
+            this = (source.params.name, source.count)
+            fresh, self._taken = this != self._taken, this
+            return Choice(source.params.name, source.twist, None, fresh)
+        self._taken = None
+        return Choice(None, STOP, held_by)
+
+
+def _check_distinct(group: str, key: str, values: list[object] | list[str] | list[int]) -> None:
+    for value in values:
+        if values.count(value) > 1:  # type: ignore[arg-type]
+            raise ParamError(f"{group}/{key}", f"{value!r} is given twice")
