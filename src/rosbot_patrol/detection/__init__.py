@@ -1,0 +1,1 @@
+"""See things in pictures: darknet networks, their files and their decoding."""

@@ -65,7 +65,8 @@ def decode(
     """The boxes of a picture: all heads, mapped back through the letterbox, suppressed as darknet_ros does.
 
     Args:
-        heads: the network's heads, with the values before each in `values`, shape (channels, rows, columns).
+        heads: the network's heads.
+        values: what the layer before each gave, shape (channels, rows, columns).
         place: where the picture lay in the input.
         threshold: on objectness and on probability.
         iou_threshold: of two boxes that overlap more, the one of lower objectness goes.

@@ -1,8 +1,8 @@
 """What a detector is, and the one that runs a darknet network.
 
 Matches what darknet_ros makes of a picture: letterbox, thresholds, class-agnostic suppression at IoU 0.4, boxes cut to
-the picture, those under 1 % of its width or height dropped, one detection for each class above the threshold, ordered by
-class and then by objectness.
+the picture, those under 1 % of its width or height dropped, one detection for each class above the threshold, ordered
+by class and then by objectness.
 
 Differs: of more than 100 boxes the 100 most probable count, where darknet_ros sends none.
 """
@@ -108,7 +108,8 @@ def load_detector(
     """Read a network's files and make it ready to run.
 
     Args:
-        cfg_path: darknet's network file, with its weights in `weights_path`.
+        cfg_path: darknet's network file.
+        weights_path: its weights file.
         names: of its classes; where empty, read from the file beside the cfg that ends in .names.
         threshold: on objectness and probability, 0 to 1.
         threads: how many cores it may use.

@@ -1,4 +1,4 @@
-"""Where a picture lies in the network's input: as large as fits, in the middle, grey around it; darknet's arithmetic."""
+"""Where a picture lies in the network's input: as large as fits, in the middle, grey around it, as darknet does."""
 
 from __future__ import annotations
 
@@ -30,6 +30,20 @@ class Letterbox:
         left, top = (self.net_width - width) // 2, (self.net_height - height) // 2
         return left, top, self.net_width - width - left, self.net_height - height - top
 
+    @property
+    def row_gains(self) -> np.ndarray:
+        """What each row of the fitted picture is multiplied by, float32, shape (rows,): 1, but for the last.
+
+        Darknet leaves one of the last row's two summands out, on the ground that the other has all the weight. Where
+        single precision puts that row just above the picture's last one, it is black instead; a network sees that.
+        """
+        rows = self.fitted[1]
+        gains = np.ones(rows, dtype=np.float32)
+        if rows > 1:
+            at = np.float32(rows - 1) * (np.float32(self.height - 1) / np.float32(rows - 1))
+            gains[-1] = 1.0 - (at - np.floor(at))
+        return gains
+
     def to_picture(self, boxes: np.ndarray) -> np.ndarray:
         """Boxes (x, y, width, height as shares of the input, shape (N, 4)) as shares of the picture."""
         width, height = self.fitted
@@ -49,7 +63,7 @@ class Letterbox:
         width, height = self.fitted
         left, top, _, _ = self.margins
         rows = _along(picture.astype(np.float32) / np.float32(255.0), height, axis=0)
-        fitted = _along(rows, width, axis=1)
+        fitted = _along(rows, width, axis=1) * self.row_gains[:, None, None]
         out = np.full((picture.shape[2], self.net_height, self.net_width), 0.5, dtype=np.float32)
         out[:, top : top + height, left : left + width] = fitted.transpose(2, 0, 1)
         return out

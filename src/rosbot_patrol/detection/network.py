@@ -61,6 +61,7 @@ class OnnxNetwork:
             "picture": picture.pixels,
             "size": np.array([1, picture.pixels.shape[2], height, width], dtype=np.int64),
             "pads": np.array([0, 0, top, left, 0, 0, bottom, right], dtype=np.int64),
+            "gains": place.row_gains.reshape(1, 1, height, 1) / np.float32(255.0),
             "order": np.array(picture.order[:1] if self._grey else picture.order, dtype=np.int64),
         }
         return [values[0] for values in self._session.run(None, inputs)]

@@ -5,8 +5,8 @@ letterbox does (its bilinear rule keeps the corner pixels' centres, which ONNX c
 and gives the values before each head. What a head makes of them is computed in `decode`.
 
 Inputs besides the picture: `size` (1, channels, rows, columns of the fitted picture), `pads` (as of ONNX Pad: the cells
-around it) and `order` (which of the picture's channels is red, green, blue), so that one graph serves pictures of every
-size and encoding.
+around it), `gains` (the factor of each fitted row, 1 / 255 as a rule) and `order` (which of the picture's channels is
+red, green, blue), so that one graph serves pictures of every size and encoding.
 """
 
 from __future__ import annotations
@@ -72,6 +72,7 @@ class _Graph:
             helper.make_tensor_value_info("picture", TensorProto.UINT8, ["rows", "columns", "channels"]),
             helper.make_tensor_value_info("size", TensorProto.INT64, [4]),
             helper.make_tensor_value_info("pads", TensorProto.INT64, [8]),
+            helper.make_tensor_value_info("gains", TensorProto.FLOAT, [1, 1, "fitted_rows", 1]),
             helper.make_tensor_value_info("order", TensorProto.INT64, [self._spec.channels]),
         ]
         outputs = [
@@ -115,7 +116,7 @@ class _Graph:
         options = {"mode": "linear", "coordinate_transformation_mode": "align_corners"}
         fitted = self.node("Resize", [batch, "", "", "size"], **options)
         ordered = self.node("Gather", [fitted, "order"], axis=1)
-        scaled = self.node("Mul", [ordered, self.constant(1.0 / 255.0, np.float32)])
+        scaled = self.node("Mul", [ordered, "gains"])
         padded = self.node("Pad", [scaled, "pads", self.constant(GREY, np.float32)])
         shape = self.constant([1, spec.channels, spec.height, spec.width], np.int64)
         return self.node("Reshape", [padded, shape])  # states the size, so that the rest of the graph is fixed

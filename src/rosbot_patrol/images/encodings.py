@@ -108,7 +108,8 @@ def unpack(data: bytes, encoding: str, *, width: int, height: int, step: int = 0
     Args:
         data: rows of `step` bytes.
         encoding: the message's encoding.
-        width: columns, height: rows [px].
+        width: columns [px].
+        height: rows [px].
         step: length of a row [bytes]; 0 means no gap between rows.
         big_endian: how values of more than one byte are written.
 
@@ -125,8 +126,8 @@ def unpack(data: bytes, encoding: str, *, width: int, height: int, step: int = 0
     step = step or row
     if step < row or len(data) < step * height:
         raise ImageError(
-            f"a picture of {width}x{height} {encoding} with rows of {step} bytes needs {max(step, row) * height} bytes, "
-            f"it has {len(data)}"
+            f"a picture of {width}x{height} {encoding} with rows of {step} bytes needs {max(step, row) * height} "
+            f"bytes, it has {len(data)}"
         )
     rows = np.frombuffer(data, dtype=np.uint8, count=step * height).reshape(height, step)[:, :row]
     pixels = np.ascontiguousarray(rows).view(dtype).reshape(height, width, known.channels)

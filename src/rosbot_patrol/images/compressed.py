@@ -1,0 +1,113 @@
+"""Pictures as jpeg and png, and the text that says what they were before.
+
+Matches compressed_image_transport (noetic-devel): the format "rgb8; jpeg compressed bgr8" and its like, colours stored
+as blue, green, red, the source's encoding restored on the way back.
+
+Differs: 16-bit pictures become jpegs with their values scaled to 8 bits, where upstream cuts them off at 255; `mode`
+gray gives mono8 for jpeg too; a depth picture as jpeg is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from rosbot_patrol.errors import ImageError
+from rosbot_patrol.images.encodings import ENCODINGS, Picture
+from rosbot_patrol.params import param
+
+COLOURS = ("rgb8", "bgr8", "rgba8", "bgra8", "8UC3", "8UC4")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompressedParams:
+    """Parameters of a compressed publisher; names and defaults as compressed_image_transport's."""
+
+    format: str = param("jpeg", choices=("jpeg", "png"), doc="how pictures are compressed")
+    jpeg_quality: int = param(80, lo=1, hi=100, doc="quality of a jpeg")
+    jpeg_progressive: bool = param(False)
+    jpeg_optimize: bool = param(False)
+    jpeg_restart_interval: int = param(0, lo=0, hi=65535)
+    png_level: int = param(9, lo=1, hi=9, doc="effort of a png")
+
+    def options(self) -> list[int]:
+        """The same for `cv2.imencode`."""
+        if self.format == "png":
+            return [cv2.IMWRITE_PNG_COMPRESSION, self.png_level]
+        return [
+            *(cv2.IMWRITE_JPEG_QUALITY, self.jpeg_quality),
+            *(cv2.IMWRITE_JPEG_PROGRESSIVE, int(self.jpeg_progressive)),
+            *(cv2.IMWRITE_JPEG_OPTIMIZE, int(self.jpeg_optimize)),
+            *(cv2.IMWRITE_JPEG_RST_INTERVAL, self.jpeg_restart_interval),
+        ]
+
+
+def compress(picture: Picture, params: CompressedParams) -> tuple[str, bytes]:
+    """Format text and bytes of a picture.
+
+    Raises:
+        ImageError: this encoding cannot be compressed that way.
+    """
+    colour = picture.encoding in COLOURS
+    pixels = _blue_first(picture) if colour else picture.pixels
+    if pixels.dtype != np.uint8 and params.format == "jpeg":
+        pixels = picture.eight_bits().pixels
+    elif pixels.dtype == np.float32:
+        raise ImageError(f"a picture of encoding {picture.encoding} cannot be a {params.format}")
+    done, data = cv2.imencode("." + params.format, pixels, params.options())
+    if not done:
+        raise ImageError(f"a picture of {picture.width}x{picture.height} {picture.encoding} gives no {params.format}")
+    text = f"{picture.encoding}; {params.format} compressed {'bgr8' if colour else ''}"
+    return text, data.tobytes()
+
+
+def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
+    """The picture in compressed bytes.
+
+    Args:
+        text: the message's format.
+        data: jpeg or png.
+        mode: unchanged, color or gray.
+
+    Raises:
+        ImageError: the bytes are no picture, or the format names an unknown encoding.
+    """
+    encoding = text.partition(";")[0].strip() if ";" in text else ""
+    if encoding and encoding not in ENCODINGS:
+        raise ImageError(f"the encoding '{encoding}' (of the format '{text}') is not known here")
+    flag = {"gray": cv2.IMREAD_GRAYSCALE, "color": cv2.IMREAD_COLOR}.get(mode, cv2.IMREAD_UNCHANGED)
+    pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flag) if data else None
+    if pixels is None:
+        raise ImageError(f"{len(data)} bytes of the format '{text}' are no picture that can be read")
+    return _restore(pixels.reshape(*pixels.shape[:2], -1), encoding, mode)
+
+
+def _blue_first(picture: Picture) -> np.ndarray:
+    codes = {"rgb8": cv2.COLOR_RGB2BGR, "rgba8": cv2.COLOR_RGBA2BGR, "bgra8": cv2.COLOR_BGRA2BGR}
+    code = codes.get(picture.encoding, cv2.COLOR_BGRA2BGR if picture.pixels.shape[2] == 4 else None)
+    return picture.pixels if code is None else cv2.cvtColor(picture.pixels, code)
+
+
+def _restore(pixels: np.ndarray, encoding: str, mode: str) -> Picture:
+    channels = pixels.shape[2]
+    if channels == 1:
+        if pixels.dtype == np.uint8 and encoding == "mono16":  # a jpeg of it
+            return Picture(pixels.astype(np.uint16) * 257, encoding)
+        deep = encoding if encoding in ("mono16", "16UC1") else "mono16"
+        return Picture(pixels, "mono8" if pixels.dtype == np.uint8 else deep)
+    if pixels.dtype != np.uint8:
+        raise ImageError(f"a colour picture of {pixels.dtype.itemsize * 8} bits a value is not supported")
+    codes = {
+        (3, "rgb8"): cv2.COLOR_BGR2RGB,
+        (3, "rgba8"): cv2.COLOR_BGR2RGBA,
+        (3, "bgra8"): cv2.COLOR_BGR2BGRA,
+        (4, "rgb8"): cv2.COLOR_BGRA2RGB,
+        (4, "bgr8"): cv2.COLOR_BGRA2BGR,
+        (4, "rgba8"): cv2.COLOR_BGRA2RGBA,
+    }
+    code = codes.get((channels, encoding))
+    if code is not None:
+        return Picture(cv2.cvtColor(pixels, code), encoding)
+    return Picture(pixels, "bgr8" if channels == 3 else "bgra8")
