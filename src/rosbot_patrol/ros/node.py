@@ -72,7 +72,7 @@ class Loop(threading.Thread):
         due = now()
         while not rospy.is_shutdown():
             current = now()
-            if current + 1.0 < due:  # time went back
+            if current + self._period + 1.0 < due:  # time went back
                 due = current
             if current < due:
                 self._wait(due - current)
