@@ -117,7 +117,13 @@ LAYER_TYPES: dict[str, type] = {
 _INHERITED = ("obstacle_range", "raytrace_range", "max_obstacle_height", "min_obstacle_height")
 _VOXEL = ("origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold", "publish_voxel_map")
 _LEGACY = {
-    "static_layer": ("map_topic", "unknown_cost_value", "lethal_cost_threshold", "subscribe_to_updates", "first_map_only"),
+    "static_layer": (
+        "map_topic",
+        "unknown_cost_value",
+        "lethal_cost_threshold",
+        "subscribe_to_updates",
+        "first_map_only",
+    ),
     "obstacle_layer": ("observation_sources", *_INHERITED),
     "inflation_layer": ("cost_scaling_factor", "inflation_radius"),
 }

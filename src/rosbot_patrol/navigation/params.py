@@ -21,7 +21,9 @@ class MoveBaseParams:
     oscillation_timeout: float = param(0.0, unit="s", lo=0.0, doc="how long to move on the spot, 0 is for ever")
     oscillation_distance: float = param(0.5, unit="m", lo=0.0, doc="motion that counts as progress")
     conservative_reset_dist: float = param(3.0, unit="m", lo=0.0, doc="square kept by the first clearing")
-    clearing_radius: float = param(-1.0, unit="m", doc="the second clearing keeps four times this; circumscribed_radius where not given")
+    clearing_radius: float = param(
+        -1.0, unit="m", doc="the second clearing keeps four times this; circumscribed_radius where not given"
+    )
     circumscribed_radius: float = param(0.46, unit="m", lo=0.0)
     inscribed_radius: float = param(0.325, unit="m", lo=0.0, doc="accepted, has no effect")
     clearing_rotation_allowed: bool = param(True, doc="turn on the spot to recover")

@@ -19,8 +19,13 @@ class GlobalPlanner(ABC):
     """Finds a way over a costmap."""
 
     @abstractmethod
-    def plan(self, costmap: Grid, start: Pose2D, goal: Pose2D) -> Array:
-        """Poses from start to goal, shape (N, 3), in the costmap's frame. `costmap` may be written to.
+    def plan(self, costmap: Grid, start: Pose2D, goal: Pose2D, *, tolerance: float | None = None) -> Array:
+        """Poses from start to goal, shape (N, 3), in the costmap's frame.
+
+        Args:
+            costmap: costs; may be written to.
+            start, goal: in the costmap's frame.
+            tolerance: how far from the goal the plan may end [m]; the planner's own parameter where None.
 
         Raises:
             PlanningError: StartOccupied, GoalOccupied, OutOfBounds or NoPath.
@@ -108,5 +113,3 @@ class Recovery(ABC):
     def last_words(self) -> str:
         """How it ended, for the log; empty where there is nothing to say."""
         return ""
-
-

@@ -88,7 +88,7 @@ class NavfnPlanner(GlobalPlanner):
     def _open_start(self, cells: CostCells, start: tuple[int, int], info: GridInfo) -> None:
         """Free the robot's cell; where it stands too near to an obstacle, let it out at the highest cost."""
         ix, iy = start
-        if INSCRIBED == cells[iy, ix]:
+        if cells[iy, ix] == INSCRIBED:
             r = math.ceil(self.params.escape_radius / info.resolution)
             y0, x0 = max(iy - r, 0), max(ix - r, 0)
             area = cells[y0 : iy + r + 1, x0 : ix + r + 1]

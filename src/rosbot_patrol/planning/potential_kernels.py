@@ -208,9 +208,7 @@ def descend(times, from_x, from_y, to_x, to_y, step):
             jx, jy = int(round(nx)), int(round(ny))
             if 0 <= jx < width and 0 <= jy < height:
                 same = jx == ix and jy == iy
-                corner_free = jx == ix or jy == iy or (
-                    math.isfinite(times[iy, jx]) and math.isfinite(times[jy, ix])
-                )
+                corner_free = jx == ix or jy == iy or (math.isfinite(times[iy, jx]) and math.isfinite(times[jy, ix]))
                 if same or (times[jy, jx] < lowest and corner_free):
                     stay = stay + 1 if same else 0
                     x, y = nx, ny

@@ -105,5 +105,3 @@ def _is_free(costmap: LayeredCostmap, pose: Pose2D, angle: float, step: float) -
     outline = costmap.footprint.outline(costmap.info.resolution * 0.7)
     place = (costmap.info.resolution, costmap.info.origin_x, costmap.info.origin_y)
     return bool(kernels.worst_footprint_costs(trajectory, costmap.cells, *place, outline, 0)[0] >= 0.0)
-
-

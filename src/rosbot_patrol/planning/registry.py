@@ -84,7 +84,9 @@ def make_recovery(plugin: str, label: str, values: Tree, *, name: str = "~", def
     return Rotate(load(RotateParams, merged, name=f"{name}{label}/", ignore=("sim_time",)), name=label)
 
 
-def make_recoveries(tree: Tree, *, conservative: float, clearing_radius: float, clearing_rotation: bool, name: str = "~") -> list[Recovery]:
+def make_recoveries(
+    tree: Tree, *, conservative: float, clearing_radius: float, clearing_rotation: bool, name: str = "~"
+) -> list[Recovery]:
     """The behaviours that `recovery_behaviors` names, or upstream's four."""
     local = _group(tree, "TrajectoryPlannerROS", name)
     turn = {

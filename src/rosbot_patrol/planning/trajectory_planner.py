@@ -80,7 +80,9 @@ class TrajectoryPlannerParams:
     publish_cost_grid_pc: bool = param(False, doc="accepted, has no effect")
     global_frame_id: str = param("odom", doc="accepted, has no effect")
     sim_period: float = param(0.1, doc="accepted, has no effect")
-    controller_frequency: float = param(20.0, unit="Hz", lo=0.1, doc="cycles a second, for accelerations; move_base's own where not given")
+    controller_frequency: float = param(
+        20.0, unit="Hz", lo=0.1, doc="cycles a second, for accelerations; move_base's own where not given"
+    )
 
 
 @dataclass

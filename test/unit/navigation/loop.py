@@ -14,6 +14,7 @@ from house import cast, scan_of
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.obstacle import observe
 from rosbot_patrol.costmap.params import read_costmap
+from rosbot_patrol.errors import PlanningError
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.navigation.navigator import Navigator, NavigatorView, Outcome, PlanResult
@@ -21,7 +22,6 @@ from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
 from rosbot_patrol.planning.interfaces import LocalView, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
-from rosbot_patrol.errors import PlanningError
 
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "tuned"
 
@@ -180,5 +180,3 @@ class Loop:
             if outcome is not None:
                 return outcome
         return None
-
-

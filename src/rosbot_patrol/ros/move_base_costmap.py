@@ -1,0 +1,247 @@
+"""One costmap of move_base on ROS: its map, scans, robot pose, update loop and topics."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from functools import partial
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point32, PolygonStamped
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid
+from rospy.numpy_msg import numpy_msg
+from sensor_msgs.msg import LaserScan as LaserScanMsg
+
+from rosbot_patrol.costmap.bounds import NOTHING, Bounds
+from rosbot_patrol.costmap.costs import occupancy_of
+from rosbot_patrol.costmap.layered import LayeredCostmap
+from rosbot_patrol.costmap.obstacle import ObservationBuffer, observe
+from rosbot_patrol.costmap.params import CostmapConfig
+from rosbot_patrol.costmap.static import StaticLayer
+from rosbot_patrol.errors import MapError, TransformError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.ros.convert import grid_from_msg, grid_to_msg, scan_from_msg, time_to_msg
+from rosbot_patrol.ros.node import Loop
+from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.scan import LaserScan
+
+log = logging.getLogger(__name__)
+
+_SCANS_KEPT = 5
+
+
+class _Source:
+    """Scans of one observation source that wait for their transform."""
+
+    def __init__(self, buffer: ObservationBuffer) -> None:
+        self.buffer = buffer
+        self.waiting: deque[LaserScan] = deque(maxlen=_SCANS_KEPT)
+
+    def receive(self, msg: LaserScanMsg) -> None:
+        self.waiting.append(scan_from_msg(msg))
+
+
+class CostmapNode:
+    """A LayeredCostmap kept up to date by its own loop, and shown under `~<name>/`.
+
+    Args:
+        config: parameters and layers.
+        transforms: the node's tf listener.
+        name: "global_costmap" or "local_costmap".
+    """
+
+    def __init__(self, config: CostmapConfig, transforms: Transforms, name: str) -> None:
+        self.name = name
+        self.params = config.params
+        self.frame = config.params.global_frame.lstrip("/")
+        self.base_frame = config.params.robot_base_frame.lstrip("/")
+        self.lock = threading.RLock()
+        self.costmap = LayeredCostmap(config)
+        self.problem = "has not been updated yet"
+        self.updates = 0
+        self._transforms = transforms
+        self._said: str = ""
+        self._sources: list[_Source] = []
+        self._map_frames: dict[int, str] = {}
+        self._pending = NOTHING
+        self._published_info: GridInfo | None = None
+        self._last_published = float("-inf")
+        self._listeners = 0
+        self._advertise()
+        self._subscribe()
+
+    # ---- topics
+
+    def _advertise(self) -> None:
+        base = f"~{self.name}"
+        self._pub_grid = rospy.Publisher(f"{base}/costmap", numpy_msg(OccupancyGrid), queue_size=1, latch=False)
+        self._pub_update = rospy.Publisher(f"{base}/costmap_updates", numpy_msg(OccupancyGridUpdate), queue_size=5)
+        self._pub_footprint = rospy.Publisher(f"{base}/footprint", PolygonStamped, queue_size=1)
+
+    def _subscribe(self) -> None:
+        for layer in self.costmap.static_layers:
+            topic = layer.params.map_topic
+            rospy.Subscriber(
+                topic, numpy_msg(OccupancyGrid), partial(self._on_map, layer), queue_size=1, buff_size=2**24
+            )
+            if layer.params.subscribe_to_updates:
+                callback = partial(self._on_map_update, layer)
+                rospy.Subscriber(f"{topic}_updates", numpy_msg(OccupancyGridUpdate), callback, queue_size=10)
+        for layer in self.costmap.obstacle_layers:
+            for key, buffer in layer.buffers.items():
+                if buffer.params.data_type != "LaserScan":
+                    log.warning("%s: source '%s' is no LaserScan and is not used", self.name, key)
+                    continue
+                source = _Source(buffer)
+                self._sources.append(source)
+                topic = buffer.params.topic or key
+                rospy.Subscriber(topic, LaserScanMsg, source.receive, queue_size=1, buff_size=2**18, tcp_nodelay=True)
+
+    def _on_map(self, layer: StaticLayer, msg: OccupancyGrid) -> None:
+        try:
+            grid = grid_from_msg(msg)
+            with self.lock:
+                layer.set_map(grid)
+                self._map_frames[id(layer)] = msg.header.frame_id.lstrip("/")
+        except (MapError, ValueError) as err:
+            log.error("%s: a map on %s cannot be used: %s", self.name, layer.params.map_topic, err)
+            return
+        info = grid.info
+        log.info("%s: map of %d x %d cells at %.3f m", self.name, info.width, info.height, info.resolution)
+
+    def _on_map_update(self, layer: StaticLayer, msg: OccupancyGridUpdate) -> None:
+        if len(msg.data) != msg.width * msg.height:
+            log.error(
+                "%s: a map update of %d cells says that it has %d", self.name, len(msg.data), msg.width * msg.height
+            )
+            return
+        cells = np.array(msg.data, dtype=np.int8).reshape(msg.height, msg.width)
+        with self.lock:
+            layer.update_map(msg.x, msg.y, cells)
+
+    # ---- pose
+
+    def robot_pose(self, now: float) -> Pose2D:
+        """The robot in this costmap's frame.
+
+        Raises:
+            TransformError: it is not known, or older than `transform_tolerance`.
+        """
+        pose, stamp = self._transforms.lookup_stamped(self.frame, self.base_frame)
+        age = now - stamp
+        if self.params.transform_tolerance > 0.0 and age > self.params.transform_tolerance:
+            raise TransformError(self.frame, self.base_frame, f"the newest is {age:.2f} s old")
+        return pose
+
+    # ---- updates
+
+    def start(self) -> None:
+        """Begin to update."""
+        if self.params.update_frequency > 0.0:
+            Loop(self.params.update_frequency, self.update, name=self.name).start()
+
+    def update(self, now: float) -> None:
+        """One update, and what is to be shown."""
+        try:
+            pose = self.robot_pose(now)
+        except TransformError as err:
+            self._complain(str(err))
+            return
+        with self.lock:
+            self._take_scans()
+            self._place_maps()
+            areas = self.costmap.update(now, pose)
+            self.updates += 1
+            for area in areas:
+                self._pending = self._pending.union(area)
+        self._complain("")
+        self._show(now, pose)
+
+    def _complain(self, problem: str) -> None:
+        self.problem = problem
+        kind = problem.split(":")[0]
+        if problem and kind != self._said:
+            log.warning("%s: %s", self.name, problem)
+        self._said = kind
+
+    def _take_scans(self) -> None:
+        for source in self._sources:
+            later: list[LaserScan] = []
+            newest_only = source.buffer.params.observation_persistence == 0.0
+            for scan in reversed(list(source.waiting)):
+                frame = source.buffer.params.sensor_frame or scan.frame_id
+                try:
+                    pose = self._transforms.lookup(self.frame, frame, scan.stamp)
+                except TransformError:
+                    later.append(scan)
+                    continue
+                source.buffer.add(observe(scan, pose, inf_is_valid=source.buffer.params.inf_is_valid))
+                if newest_only:
+                    break
+            newest = later[0].stamp if later else 0.0
+            source.waiting = deque((s for s in reversed(later) if newest - s.stamp < 1.0), maxlen=_SCANS_KEPT)
+
+    def _place_maps(self) -> None:
+        for layer in self.costmap.static_layers:
+            frame = self._map_frames.get(id(layer), self.frame)
+            if frame and frame != self.frame:
+                try:
+                    layer.master_from_map = self._transforms.lookup(self.frame, frame)
+                except TransformError as err:
+                    self._complain(str(err))
+
+    def copy(self) -> Grid:
+        """Place and costs now."""
+        with self.lock:
+            return Grid(self.costmap.info, self.costmap.cells.copy())
+
+    def is_current(self, now: float) -> bool:
+        """Whether what drives by this costmap can trust it."""
+        return not self.problem and self.costmap.is_current(now)
+
+    # ---- showing
+
+    def _show(self, now: float, pose: Pose2D) -> None:
+        frequency = self.params.publish_frequency
+        if frequency <= 0.0 or (now - self._last_published < 0.99 / frequency and now >= self._last_published):
+            return
+        self._last_published = now
+        if self._pub_footprint.get_num_connections():
+            self._pub_footprint.publish(self._footprint(pose, now))
+        listeners = self._pub_grid.get_num_connections() + self._pub_update.get_num_connections()
+        is_new = listeners > self._listeners
+        self._listeners = listeners
+        if not listeners:
+            self._pending = NOTHING
+            return
+        self._publish_cells(now, whole=is_new)
+
+    def _publish_cells(self, now: float, *, whole: bool) -> None:
+        with self.lock:
+            info = self.costmap.info
+            whole = whole or info != self._published_info or self.params.always_send_full_costmap
+            area = Bounds(0, 0, info.width, info.height) if whole else self._pending.clipped(info.width, info.height)
+            cells = occupancy_of(self.costmap.cells[area.y0 : area.y1, area.x0 : area.x1])
+            self._pending = NOTHING
+        if area.is_empty:
+            return
+        self._published_info = info
+        if whole:
+            self._pub_grid.publish(grid_to_msg(Grid(info, cells), self.frame, now))
+            return
+        update = OccupancyGridUpdate()
+        update.header.stamp, update.header.frame_id = time_to_msg(now), self.frame
+        update.x, update.y = area.x0, area.y0
+        update.width, update.height = area.x1 - area.x0, area.y1 - area.y0
+        update.data = np.ascontiguousarray(cells).ravel()
+        self._pub_update.publish(update)
+
+    def _footprint(self, pose: Pose2D, now: float) -> PolygonStamped:
+        msg = PolygonStamped()
+        msg.header.stamp, msg.header.frame_id = time_to_msg(now), self.frame
+        msg.polygon.points = [Point32(x, y, 0.0) for x, y in self.costmap.footprint.at(pose).tolist()]
+        return msg

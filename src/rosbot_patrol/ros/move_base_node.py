@@ -1,0 +1,287 @@
+"""The node move_base (matches move_base 1.17 with costmap_2d, navfn and base_local_planner as their ROS interface).
+
+Differs:
+    - Planning runs on a copy of the global costmap: neither the control cycle nor the costmap waits for it.
+    - Cancelling works inside recovery behaviours.
+    - Odometry that is older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
+    - A goal in a frame that tf does not know is aborted at once with the planner's text, instead of after recoveries.
+    - Topics that nobody listens to are not built. No dynamic_reconfigure.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Twist
+from move_base_msgs.msg import RecoveryStatus
+from nav_msgs.msg import Odometry, Path
+from nav_msgs.srv import GetPlan, GetPlanRequest, GetPlanResponse
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+
+from rosbot_patrol.costmap.params import read_costmap
+from rosbot_patrol.errors import ParamError, PlanningError, TransformError
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
+from rosbot_patrol.navigation.navigator import Command, Navigator, NavigatorView, State
+from rosbot_patrol.navigation.params import MoveBaseParams
+from rosbot_patrol.planning.interfaces import LocalView, RecoveryView
+from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries, short_name
+from rosbot_patrol.ros.convert import path_to_msg, twist_from_msg, twist_to_msg
+from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.ros.inputs import Latest
+from rosbot_patrol.ros.move_base_costmap import CostmapNode
+from rosbot_patrol.ros.move_base_goals import GoalRefused, GoalServer, read_goal
+from rosbot_patrol.ros.move_base_plans import ThreadedPlans
+from rosbot_patrol.ros.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.transforms import Transforms
+
+log = logging.getLogger(__name__)
+
+_SHOWN_POSES = 400
+_HEALTH_PERIOD = 1.0
+
+
+def _group(tree: dict[str, Any], key: str) -> dict[str, Any]:
+    group = tree.get(key, {})
+    if not isinstance(group, dict):
+        raise ParamError(f"{rospy.get_name()}/{key}", f"expected a group of parameters, got {group!r}")
+    return group
+
+
+class MoveBaseNode:
+    """Reads inputs, steps the navigator, publishes what it commands."""
+
+    def __init__(self) -> None:
+        tree: dict[str, Any] = rospy.get_param("~", {}) or {}
+        groups = [key for key, value in tree.items() if isinstance(value, dict)]
+        self.params = load_params(MoveBaseParams, tree=tree, ignore=[*groups, "recovery_behaviors"])
+        name = rospy.get_name() + "/"
+        self._transforms = Transforms()
+        self._global = self._make_costmap(tree, "global_costmap", name)
+        self._local = self._make_costmap(tree, "local_costmap", name)
+        p = self.params
+        self._plans = ThreadedPlans(make_global_planner(p.base_global_planner, tree, name=name), self._global)
+        self._controller = make_local_planner(
+            p.base_local_planner,
+            tree,
+            self._local.costmap,
+            controller_frequency=p.controller_frequency,
+            name=name,
+        )
+        recoveries = make_recoveries(
+            tree,
+            conservative=p.conservative_reset_dist,
+            clearing_radius=p.aggressive_radius,
+            clearing_rotation=p.clearing_rotation_allowed,
+            name=name,
+        )
+        self._navigator = Navigator(p, plans=self._plans, controller=self._controller, recoveries=recoveries)
+        self._velocity: Latest[Twist2D] = Latest()
+        self._slow_cycles = 0
+        self._said = ""
+        self._health_due = float("-inf")
+        self._advertise()
+
+    def _make_costmap(self, tree: dict[str, Any], key: str, name: str) -> CostmapNode:
+        return CostmapNode(read_costmap(_group(tree, key), name=f"{name}{key}/"), self._transforms, key)
+
+    def _advertise(self) -> None:
+        p = self.params
+        global_name, local_name = short_name(p.base_global_planner), short_name(p.base_local_planner)
+        self._pub_cmd = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        self._pub_plan = rospy.Publisher(f"~{global_name}/plan", Path, queue_size=1)
+        self._pub_global_plan = rospy.Publisher(f"~{local_name}/global_plan", Path, queue_size=1)
+        self._pub_local_plan = rospy.Publisher(f"~{local_name}/local_plan", Path, queue_size=1)
+        self._pub_recovery = rospy.Publisher("move_base/recovery_status", RecoveryStatus, queue_size=1)
+        self._health = Health()
+        self._goals = GoalServer(self._global.frame, self._transforms)
+        rospy.Subscriber(p.odom_topic, Odometry, self._on_odom, queue_size=1, tcp_nodelay=True)
+        rospy.Service("~make_plan", GetPlan, self._on_make_plan)
+        rospy.Service(f"~{global_name}/make_plan", GetPlan, self._on_planner_make_plan)
+        rospy.Service("~clear_costmaps", Empty, self._on_clear)
+        rospy.on_shutdown(self._stop)
+
+    def run(self) -> None:
+        """Until shutdown."""
+        self._global.start()
+        self._local.start()
+        self._goals.start()
+        Loop(self.params.controller_frequency, self.step, name="control").start()
+        log.info("move_base takes goals in frame '%s'", self._global.frame)
+        rospy.spin()
+
+    def _stop(self) -> None:
+        if self._navigator.state is not State.IDLE:
+            self._pub_cmd.publish(Twist())
+
+    # ---- inputs
+
+    def _on_odom(self, msg: Odometry) -> None:
+        self._velocity.set(twist_from_msg(msg.twist.twist), now())
+
+    def _on_clear(self, request: EmptyRequest) -> EmptyResponse:
+        for costmap in (self._global, self._local):
+            with costmap.lock:
+                costmap.costmap.reset()
+        return EmptyResponse()
+
+    def _on_make_plan(self, request: GetPlanRequest) -> GetPlanResponse | None:
+        if self._goals.is_active:
+            log.error("move_base must be in an inactive state to make a plan for an external user")
+            return None
+        return self._on_planner_make_plan(request)
+
+    def _on_planner_make_plan(self, request: GetPlanRequest) -> GetPlanResponse | None:
+        try:
+            if request.start.header.frame_id:
+                start = read_goal(request.start, self._global.frame, self._transforms)
+            else:
+                start = self._global.robot_pose(now())
+            goal = read_goal(request.goal, self._global.frame, self._transforms)
+        except (GoalRefused, TransformError) as err:
+            log.error("make_plan: %s", err)
+            return None
+        response = GetPlanResponse()
+        response.plan.header.frame_id = self._global.frame
+        try:
+            poses = self._plans.plan(start, goal, tolerance=request.tolerance)
+        except PlanningError as err:
+            log.error("make_plan: %s", err)
+            return response
+        response.plan = path_to_msg(poses, self._global.frame, now())
+        return response
+
+    # ---- the control cycle
+
+    def step(self, time: float) -> None:
+        """One control cycle."""
+        goal = self._goals.take(time)
+        if goal is not None:
+            if self._navigator.state is State.IDLE:
+                self._send(STOP)
+            self._navigator.set_goal(goal, time)
+        if self._navigator.state is State.IDLE:
+            self._tell(time)
+            return
+        if not self._goals.is_active:  # refused or replaced by one that was refused
+            self._publish(self._navigator.cancel(), time)
+            return
+        if self._goals.is_cancelled:
+            self._publish(self._navigator.cancel(), time)
+            self._goals.preempt()
+            return
+        self._work(time)
+
+    def _work(self, time: float) -> None:
+        view, problem = self._view(time)
+        if self._navigator.state is State.CLEARING:
+            with self._global.lock, self._local.lock:
+                command = self._navigator.step(time, view)
+        else:
+            command = self._navigator.step(time, view)
+        self._publish(command, time)
+        reason = problem or command.reason
+        if reason != self._said and reason not in ("driving", "planning", ""):
+            (log.info if command.outcome and command.outcome.succeeded else log.warning)("%s", reason)
+        self._said = reason
+        if view is not None:
+            self._goals.feedback(view.recovery.pose_global, time)
+        if command.outcome is not None:
+            self._goals.finish(command.outcome)
+        self._watch_rate(time)
+        self._tell(time)
+
+    def _view(self, time: float) -> tuple[NavigatorView | None, str]:
+        """What the navigator sees, None and why where the robot's pose is not known."""
+        try:
+            pose_global = self._global.robot_pose(time)
+            pose_local = self._local.robot_pose(time)
+            frames = self._local.frame, self._global.frame
+            local_from_plan = Pose2D() if frames[0] == frames[1] else self._transforms.lookup(*frames)
+        except TransformError as err:
+            return None, str(err)
+        timeout = self.params.odom_timeout
+        moving_known = timeout == 0.0 or self._velocity.fresh(time, timeout)
+        local = LocalView(
+            now=time,
+            pose=pose_local,
+            velocity=self._velocity.get() or STOP,
+            costmap=self._local.copy(),
+            local_from_plan=local_from_plan,
+        )
+        recovery = RecoveryView(
+            now=time,
+            pose_global=pose_global,
+            pose_local=pose_local,
+            global_costmap=self._global.costmap,
+            local_costmap=self._local.costmap,
+        )
+        problem = "" if moving_known else f"no odometry on {self.params.odom_topic} for {timeout} s"
+        if not self._local.is_current(time):
+            problem = "Sensor data is out of date, we're not going to allow commanding of the base for safety"
+        return NavigatorView(local=local, recovery=recovery, is_current=not problem), problem
+
+    # ---- outputs
+
+    def _send(self, twist: Twist2D) -> None:
+        self._pub_cmd.publish(twist_to_msg(twist))
+
+    def _publish(self, command: Command, time: float) -> None:
+        if command.twist is not None:
+            self._send(command.twist)
+        if command.recovery is not None:
+            self._publish_recovery(command.recovery, time)
+        if command.plan is not None:
+            self._show(self._pub_plan, command.plan, self._global.frame, time)
+        if command.reason == "driving":
+            self._show(self._pub_global_plan, self._controller.visible_plan, self._local.frame, time)
+            self._show(self._pub_local_plan, self._controller.local_plan, self._local.frame, time)
+
+    def _show(self, publisher: rospy.Publisher, poses: np.ndarray, frame: str, time: float) -> None:
+        if publisher.get_num_connections() == 0:
+            return
+        if len(poses) > _SHOWN_POSES:
+            keep = np.linspace(0, len(poses) - 1, _SHOWN_POSES).astype(int)
+            poses = poses[keep]
+        publisher.publish(path_to_msg(poses, frame, time))
+
+    def _publish_recovery(self, recovery: tuple[int, int, str], time: float) -> None:
+        msg = RecoveryStatus()
+        msg.current_recovery_number, msg.total_number_of_recoveries, msg.recovery_behavior_name = recovery
+        msg.pose_stamped.header.stamp = rospy.Time.from_sec(time)
+        self._pub_recovery.publish(msg)
+
+    def _watch_rate(self, time: float) -> None:
+        took = now() - time
+        if took > 1.0 / self.params.controller_frequency:
+            self._slow_cycles += 1
+            log.warning(
+                "Control loop missed its desired rate of %.4fHz... the loop actually took %.4f seconds",
+                self.params.controller_frequency,
+                took,
+            )
+
+    def _tell(self, time: float) -> None:
+        if self._health_due - _HEALTH_PERIOD <= time < self._health_due:
+            return
+        self._health_due = time + _HEALTH_PERIOD
+        values = {
+            "state": self._navigator.state.value,
+            "reason": self._navigator.reason,
+            "slow cycles": self._slow_cycles,
+        }
+        problems = [f"{c.name}: {c.problem}" for c in (self._global, self._local) if c.problem]
+        if problems:
+            level = WARN if self._navigator.state is State.IDLE else ERROR
+            self._health.set("", level, "; ".join(problems), values)
+        elif self._navigator.state is not State.IDLE and not self._local.is_current(time):
+            self._health.set("", ERROR, "sensor data is out of date", values)
+        else:
+            self._health.set("", OK, self._navigator.state.value, values)
+
+
+def main() -> None:
+    """Start the node."""
+    run_node("move_base", lambda: MoveBaseNode().run())
