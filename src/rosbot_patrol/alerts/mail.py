@@ -21,6 +21,7 @@ from rosbot_patrol.errors import ParamError
 SUBJECT = "rosbot patrol node"
 FIRST_SENTENCE = "I have found something strange it could be invader"
 
+_USER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]*")  # a user of this machine
 _HOST = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*")
 
 
@@ -51,10 +52,12 @@ def parse_addresses(name: str, text: str) -> tuple[Address, ...]:
         raise ParamError(name, f"has a line break or control character: {text!r}")
     if not text.strip():
         return ()
+    parts = [part.strip() for part in text.split(",")]
     found = []
     for display, spec in getaddresses([text]):
         try:
-            address = Address(display_name=display, addr_spec=spec)
+            is_local = spec in parts and _USER.fullmatch(spec)
+            address = Address(display, spec) if is_local else Address(display, addr_spec=spec)
         except (HeaderParseError, ValueError, IndexError) as err:
             raise ParamError(name, f"expected a mail address, got {text!r}") from err
         if not address.username or address.username.startswith("-") or not address.addr_spec.isascii():
@@ -120,20 +123,19 @@ def _is_real(address: Address) -> bool:
 def _body(incident: Incident, picture_note: str) -> str:
     when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(incident.wall))
     rows = [
-        ("Room", f"{incident.room_id} ({one_line(incident.room_name)})"),
+        ("Room", f"{incident.room_id} ({incident.room_name})"),
         ("Time", f"{when} (robot's clock {incident.ros_time:.1f} s)"),
         ("Verdict", incident.verdict),
         (
             "Seen",
-            f"{one_line(incident.object_class)}, probability {incident.probability:.2f},"
-            f" in {incident.pictures} pictures",
+            f"{incident.object_class}, probability {incident.probability:.2f}, in {incident.pictures} pictures",
         ),
-        ("Why", one_line(incident.reason)),
+        ("Why", incident.reason),
     ]
     if incident.pose is not None:
         x, y, yaw = incident.pose
         rows.append(("Robot", f"x {x:.2f} m, y {y:.2f} m, heading {yaw:.2f} rad in the map"))
-    rows.append(("Picture", one_line(picture_note) or "attached"))
+    rows.append(("Picture", picture_note or "attached"))
     rows.append(("Incident", incident.id))
-    table = "\n".join(f"{key + ':':10}{value}" for key, value in rows)
+    table = "\n".join(f"{key + ':':10}{one_line(value)}" for key, value in rows)
     return f"{FIRST_SENTENCE}.\n\n{table}\n"

@@ -336,6 +336,7 @@ def test_a_killed_patrol_goes_on_with_mission_and_queue(moment):
     assert again.ended[0].verdict.value == "confirmed"
     assert len([n for n in again.notices if n.mission.room.id == 2]) == (0 if memory["mission"]["notified"] else 1)
     assert len({m.id for m in again.ended}) == 2
+    assert again.goals[0].pose.x == (0.0 if moment is Phase.RETURNING else 20.0)
 
 
 @pytest.mark.parametrize("memory", [{"count": "x"}, {"count": 1}, {"count": 1, "queue": 5, "mission": 3}, {"a": None}])

@@ -115,3 +115,7 @@ def test_a_candidate_is_something_seen_lately(watch):
 def test_one_picture_is_enough_where_asked_for():
     watch = Watch(("person",), WatchParams(frames=1, window=1, span=0.0))
     assert len(feed(watch, frames([box()], start=1.0))) == 1
+
+
+def test_a_burst_of_pictures_within_a_tenth_of_a_second_is_too_short(watch):
+    assert feed(watch, frames(*[[box()]] * 4, period=0.02)) == []

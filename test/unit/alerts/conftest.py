@@ -1,0 +1,36 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from rosbot_patrol.alerts.incident import Incident
+from rosbot_patrol.alerts.mail import make_envelope
+
+
+@pytest.fixture
+def make_incident():
+    def make(**given):
+        values = {
+            "id": "20261121T010203Z-1",
+            "wall": 1_790_000_000.0,
+            "ros_time": 61.5,
+            "room_id": 3,
+            "room_name": "Küche – 台所",
+            "phase": "looking",
+            "object_class": "person",
+            "probability": 0.87,
+            "pictures": 3,
+            "verdict": "confirmed",
+            "reason": "person seen in room 3",
+            "pose": (1.0, 2.0, 0.5),
+        }
+        return Incident(**{**values, **given})
+
+    return make
+
+
+@pytest.fixture
+def envelope():
+    return make_envelope("owner@example.org", "robot@example.org")
