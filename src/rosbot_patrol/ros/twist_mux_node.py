@@ -1,0 +1,198 @@
+"""twist_mux: the only publisher of the base's velocity, with the collision guard behind it.
+
+Matches twist_mux 3.1 (Noetic): `~topics` and `~locks` (name, topic, timeout, priority), `cmd_vel_out`.
+
+Differs:
+- What is chosen goes through the collision guard (`~guard`, true), which slows and stops for what `scan` shows in the
+  direction of motion. A command is checked again with each scan, not only when it comes.
+- When every source has fallen silent, or a lock closes, a zero is published; upstream publishes nothing.
+- Only the planar part of a Twist is passed on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import threading
+import time
+from dataclasses import dataclass
+
+import rospy
+from geometry_msgs.msg import Twist
+from sensor_msgs.msg import LaserScan as LaserScanMsg
+from std_msgs.msg import Bool
+
+from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, Verdict
+from rosbot_patrol.control.mux import Choice, LockParams, MuxParams, SourceParams, TwistMux
+from rosbot_patrol.errors import TransformError
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
+from rosbot_patrol.params import param
+from rosbot_patrol.ros.convert import scan_from_msg, twist_from_msg, twist_to_msg
+from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.inputs import Latest
+from rosbot_patrol.ros.node import load_params, now, run_node
+from rosbot_patrol.ros.transforms import Transforms
+
+log = logging.getLogger(__name__)
+
+STEP = 0.04  # wall time between two looks where nothing comes [s]
+REPEAT_STOP = 0.2  # a lock's zero is repeated [s]
+REPEAT_LOG = 5.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwistMuxParams(MuxParams):
+    """Parameters of twist_mux."""
+
+    guard: bool = param(True, doc="slow and stop for what the lidar sees")
+    base_frame: str = param("base_link", doc="frame of the footprint")
+    odom_frame: str = param("odom", doc="frame in which motion between scans is measured")
+    collision_guard: GuardParams = dataclasses.field(default_factory=GuardParams)
+
+
+class Eyes:
+    """Feeds the guard: scans, and where the robot has moved since."""
+
+    def __init__(self, params: TwistMuxParams, wake: threading.Event) -> None:
+        self.guard = CollisionGuard(params.collision_guard)
+        self._params = params
+        self._transforms = Transforms()
+        self._scans: Latest[LaserScanMsg] = Latest()
+        self._mounts: dict[str, Pose2D] = {}
+        self._told = float("-inf")
+        self._wake = wake
+        rospy.Subscriber("scan", LaserScanMsg, self._on_scan, queue_size=1, tcp_nodelay=True)
+
+    def look(self) -> bool:
+        """Show the guard the newest scan; whether there was one."""
+        message = self._scans.take()
+        if message is None:
+            return False
+        frame = message.header.frame_id.lstrip("/")
+        try:
+            if frame not in self._mounts:
+                self._mounts[frame] = self._transforms.lookup(self._params.base_frame, frame)
+        except TransformError as err:
+            if time.monotonic() - self._told > REPEAT_LOG:
+                self._told = time.monotonic()
+                log.warning("the collision guard cannot place the scan: %s", err)
+            return False
+        pose = self.pose(message.header.stamp.to_sec())
+        self.guard.see(scan_from_msg(message), self._mounts[frame], self._scans.stamp, pose)
+        return True
+
+    def pose(self, stamp: float | None = None) -> Pose2D | None:
+        """odom_from_base at a time, else the newest, None where there is none."""
+        odom, base = self._params.odom_frame, self._params.base_frame
+        for when in (stamp, None):
+            try:
+                return self._transforms.lookup(odom, base, when)
+            except TransformError:
+                if when is None:
+                    return None
+        return None
+
+    def _on_scan(self, message: LaserScanMsg) -> None:
+        self._scans.set(message, now())
+        self._wake.set()
+
+
+class TwistMuxNode:
+    """Callbacks store and wake; one thread chooses, guards and publishes."""
+
+    def __init__(self, params: TwistMuxParams) -> None:
+        self._mux = TwistMux(params)
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._publisher = rospy.Publisher("cmd_vel_out", Twist, queue_size=1, tcp_nodelay=True)
+        self._health = Health()
+        self._eyes = Eyes(params, self._wake) if params.guard else None
+        self._last: Choice = Choice(None, STOP)
+        self._stopped_at = float("-inf")
+        self._reason = ""
+        self._told = float("-inf")
+        for source in params.topics:
+            self._listen(source)
+        for lock in params.locks:
+            self._listen_lock(lock)
+
+    def run(self) -> None:
+        """Choose and publish until shutdown, then stop the base."""
+        while not rospy.is_shutdown():
+            self._wake.wait(STEP)
+            self._wake.clear()
+            self._step(now())
+
+    def stop(self) -> None:
+        """Send a zero."""
+        self._publisher.publish(twist_to_msg(STOP))
+
+    def _listen(self, source: SourceParams) -> None:
+        def callback(message: Twist) -> None:
+            with self._lock:
+                self._mux.command(source.name, twist_from_msg(message), now())
+            self._wake.set()
+
+        rospy.Subscriber(source.topic, Twist, callback, queue_size=1, tcp_nodelay=True)
+
+    def _listen_lock(self, lock: LockParams) -> None:
+        def callback(message: Bool) -> None:
+            with self._lock:
+                self._mux.lock(lock.name, bool(message.data), now())
+            self._wake.set()
+
+        rospy.Subscriber(lock.topic, Bool, callback, queue_size=1)
+
+    def _step(self, current: float) -> None:
+        with self._lock:
+            choice = self._mux.choose(current)
+        seen = self._eyes.look() if self._eyes is not None else False
+        if choice.source is None:
+            self._stand(choice, current)
+        elif choice.fresh or seen:
+            verdict = self._guarded(choice.twist, current)
+            self._publisher.publish(twist_to_msg(verdict.twist))
+            self._tell(choice, verdict)
+        self._last = choice
+
+    def _stand(self, choice: Choice, current: float) -> None:
+        """Publish a zero where the base was driven until now, and again and again where a lock holds."""
+        due = choice.lock is not None and not 0.0 <= current - self._stopped_at < REPEAT_STOP
+        if self._last.source is not None or due:
+            self._stopped_at = current
+            self.stop()
+        text = f"{choice.lock} is locked" if choice.lock else "nobody commands"
+        self._health.set("", WARN if choice.lock else OK, text)
+        if choice.lock and self._last.lock != choice.lock:
+            log.warning("the base is stopped: %s is set", choice.lock)
+        self._reason = ""
+
+    def _guarded(self, wish: Twist2D, current: float) -> Verdict:
+        if self._eyes is None:
+            return Verdict(wish, 1.0, "")
+        return self._eyes.guard.limit(wish, current, self._eyes.pose())
+
+    def _tell(self, choice: Choice, verdict: Verdict) -> None:
+        self._health.set(
+            "",
+            WARN if verdict.scale < 0.05 else OK,
+            f"{choice.source} drives",
+            {"guard": verdict.reason or "free", "part of the wish": f"{verdict.scale:.2f}"},
+        )
+        worth = verdict.scale < 0.05 or "scan" in verdict.reason
+        if worth and verdict.reason != self._reason and time.monotonic() - self._told > REPEAT_LOG:
+            self._told = time.monotonic()
+            log.warning("%s is held back: %s", choice.source, verdict.reason)
+        self._reason = verdict.reason
+
+
+def body() -> None:
+    """Run until shutdown."""
+    node = TwistMuxNode(load_params(TwistMuxParams))
+    rospy.on_shutdown(node.stop)
+    node.run()
+
+
+def main() -> None:
+    """Run the node."""
+    run_node("twist_mux", body)
