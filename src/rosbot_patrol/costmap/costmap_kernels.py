@@ -50,7 +50,7 @@ def inflate(cells, x0, y0, x1, y1, radius, table, inflate_unknown):
                 v = site[n - 1]
                 # first column at which u is nearer than v
                 sep = (np.float64(u) * u - np.float64(v) * v + g2 - site_d2[n - 1]) / (2.0 * (u - v))
-                begin = np.int64(math.floor(sep)) + 1
+                begin = math.floor(sep) + 1
                 if begin > start[n - 1]:
                     break
                 n -= 1
@@ -114,16 +114,16 @@ def draw_ray(cells, x0, y0, x1, y1, max_cells, value):
 def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, raytrace_range):
     """Set the cells from the sensor to each end [m] free, up to `raytrace_range`; returns the bounds touched."""
     height, width = cells.shape
-    cx = int(math.floor((sensor_x - origin_x) / resolution))
-    cy = int(math.floor((sensor_y - origin_y) / resolution))
+    cx = math.floor((sensor_x - origin_x) / resolution)
+    cy = math.floor((sensor_y - origin_y) / resolution)
     bounds = np.array([width, height, 0, 0], dtype=np.int64)
     if cx < 0 or cy < 0 or cx >= width or cy >= height:
         bounds[0] = bounds[1] = 0
         return bounds
     reach = raytrace_range / resolution
     for i in range(ends.shape[0]):
-        ex = int(math.floor((ends[i, 0] - origin_x) / resolution))
-        ey = int(math.floor((ends[i, 1] - origin_y) / resolution))
+        ex = math.floor((ends[i, 0] - origin_x) / resolution)
+        ey = math.floor((ends[i, 1] - origin_y) / resolution)
         draw_ray(cells, cx, cy, ex, ey, reach, 0)
         length = math.sqrt(float((ex - cx) * (ex - cx) + (ey - cy) * (ey - cy)))
         if length > reach:
@@ -145,8 +145,8 @@ def mark_points(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, point
         dx, dy = points[i, 0] - sensor_x, points[i, 1] - sensor_y
         if dx * dx + dy * dy >= reach:
             continue
-        ix = int(math.floor((points[i, 0] - origin_x) / resolution))
-        iy = int(math.floor((points[i, 1] - origin_y) / resolution))
+        ix = math.floor((points[i, 0] - origin_x) / resolution)
+        iy = math.floor((points[i, 1] - origin_y) / resolution)
         if ix < 0 or iy < 0 or ix >= width or iy >= height:
             continue
         cells[iy, ix] = 254
@@ -181,15 +181,15 @@ def merge_over(master, layer, x0, y0, x1, y1):
 def sample_map(master, source, x0, y0, x1, y1, affine, use_maximum):
     """Write a map that lies differently into the master.
 
-    Args:
-        affine: (a, b, c, d, e, f): source ix = a * x + b * y + c, source iy = d * x + e * y + f, for master cells x, y.
+    `affine` is (a, b, c, d, e, f): source ix = a * x + b * y + c, source iy = d * x + e * y + f, for the master's
+    cells x, y.
     """
     height, width = source.shape
     a, b, c, d, e, f = affine[0], affine[1], affine[2], affine[3], affine[4], affine[5]
     for y in range(y0, y1):
         for x in range(x0, x1):
-            sx = int(math.floor(a * x + b * y + c))
-            sy = int(math.floor(d * x + e * y + f))
+            sx = math.floor(a * x + b * y + c)
+            sy = math.floor(d * x + e * y + f)
             if sx < 0 or sy < 0 or sx >= width or sy >= height:
                 continue
             new, old = source[sy, sx], master[y, x]
@@ -202,10 +202,10 @@ def fill_polygon(cells, corners, value):
     """Set the cells whose centres lie in a polygon; corners in cells (x, y), shape (N, 2)."""
     height, width = cells.shape
     n = corners.shape[0]
-    y0 = max(int(math.floor(corners[:, 1].min())), 0)
-    y1 = min(int(math.ceil(corners[:, 1].max())), height)
-    x0 = max(int(math.floor(corners[:, 0].min())), 0)
-    x1 = min(int(math.ceil(corners[:, 0].max())), width)
+    y0 = max(math.floor(corners[:, 1].min()), 0)
+    y1 = min(math.ceil(corners[:, 1].max()), height)
+    x0 = max(math.floor(corners[:, 0].min()), 0)
+    x1 = min(math.ceil(corners[:, 0].max()), width)
     for y in range(y0, y1):
         py = y + 0.5
         for x in range(x0, x1):

@@ -51,6 +51,7 @@ class InflationLayer(Layer):
         self._inscribed = 0.0
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
+        """Take the master's place and size."""
         self._info = info
         self._inscribed = footprint.inscribed_radius
         self._radius = max(0, math.ceil(self.params.inflation_radius / info.resolution - 1e-9))
@@ -62,6 +63,7 @@ class InflationLayer(Layer):
         )
 
     def move(self, info: GridInfo, dx: int, dy: int) -> None:
+        """Follow the rolling window."""
         self._info = info
 
     def cost_at(self, distance: float) -> int:
@@ -77,8 +79,10 @@ class InflationLayer(Layer):
         return self._radius if self.enabled else 0
 
     def update_bounds(self, now: float, pose: Pose2D, bounds: Bounds) -> Bounds:
+        """Grow the bounds by what changed."""
         return bounds.grown(self._radius)
 
     def update_costs(self, master: CostCells, bounds: Bounds) -> None:
+        """Write this layer's costs."""
         if self._radius > 0:
             kernels.inflate(master, *bounds, self._radius, self._table, self.params.inflate_unknown)

@@ -114,16 +114,19 @@ class ObstacleLayer(Layer):
         self._outline: Array | None = None
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
+        """Take the master's place and size."""
         self._info, self._footprint = info, footprint
         self._cells = np.full(info.shape, self._default, np.uint8)
         self._dirty = Bounds(0, 0, info.width, info.height)
 
     def move(self, info: GridInfo, dx: int, dy: int) -> None:
+        """Follow the rolling window."""
         self._info = info
         shift_cells(self._cells, dx, dy, self._default)
         self._dirty = NOTHING if self._dirty.is_empty else Bounds(0, 0, info.width, info.height)
 
     def update_bounds(self, now: float, pose: Pose2D, bounds: Bounds) -> Bounds:
+        """Grow the bounds by what changed."""
         info = self._info
         if info is None:
             return bounds
@@ -152,6 +155,7 @@ class ObstacleLayer(Layer):
         return Bounds(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
 
     def update_costs(self, master: CostCells, bounds: Bounds) -> None:
+        """Write this layer's costs."""
         if self._outline is not None:
             kernels.fill_polygon(master, self._outline, FREE)
         if self.params.combination_method == 1:
@@ -160,10 +164,12 @@ class ObstacleLayer(Layer):
             kernels.merge_over(master, self._cells, *bounds)
 
     def reset(self) -> None:
+        """Forget what was sensed."""
         if self._info is not None:
             self.clear_outside(NOTHING)
 
     def clear_outside(self, keep: Bounds) -> None:
+        """Forget what was sensed outside an area."""
         if self._info is None:
             return
         keep = keep.clipped(self._info.width, self._info.height)
@@ -175,6 +181,7 @@ class ObstacleLayer(Layer):
         self._dirty = Bounds(0, 0, self._info.width, self._info.height)
 
     def is_current(self, now: float) -> bool:
+        """Whether the inputs are fresh."""
         return all(buffer.is_current(now) for buffer in self.buffers.values())
 
 

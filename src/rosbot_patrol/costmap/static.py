@@ -70,11 +70,13 @@ class StaticLayer(Layer):
         return np.ascontiguousarray(costs)
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
+        """Take the master's place and size."""
         self._info = info
         if self.map_info is not None:
             self._changed = Bounds(0, 0, self.map_info.width, self.map_info.height)
 
     def move(self, info: GridInfo, dx: int, dy: int) -> None:
+        """Follow the rolling window."""
         self._info = info
 
     @property
@@ -82,6 +84,7 @@ class StaticLayer(Layer):
         return self._info == self.map_info and self.master_from_map == Pose2D()
 
     def update_bounds(self, now: float, pose: Pose2D, bounds: Bounds) -> Bounds:
+        """Grow the bounds by what changed."""
         if self._changed is None or self._info is None or self.map_info is None:
             if self.map_info is not None and self._sampled_from not in (None, self.master_from_map):
                 return self._whole(bounds)  # the map moved against the master
@@ -96,6 +99,7 @@ class StaticLayer(Layer):
         return bounds.union(Bounds(0, 0, self._info.width, self._info.height))
 
     def update_costs(self, master: CostCells, bounds: Bounds) -> None:
+        """Write this layer's costs."""
         if self.map_info is None or self._info is None:
             return
         if self._is_aligned:
@@ -120,4 +124,5 @@ class StaticLayer(Layer):
         return np.array([c * ratio, -s * ratio, x0, s * ratio, c * ratio, y0])
 
     def is_current(self, now: float) -> bool:
+        """Whether there is a map."""
         return self.map_info is not None or not self.enabled

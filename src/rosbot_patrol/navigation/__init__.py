@@ -1,0 +1,1 @@
+"""move_base's state machine."""

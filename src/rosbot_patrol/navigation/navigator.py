@@ -15,7 +15,7 @@ import enum
 import logging
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -206,11 +206,9 @@ class Navigator:
             return Command(twist=STOP, reason=self.reason)
         self._watch_motion(now, view.local.pose, context)
         result = self._plans.poll()
-        shown: Array | None = None
-        if result is not None:
-            shown = self._take_plan(now, result, context)
-            if isinstance(shown, Command):
-                return shown
+        taken = self._take_plan(now, result, context) if result is not None else None
+        if isinstance(taken, Command):
+            return taken
         step = {
             State.PLANNING: self._planning,
             State.CONTROLLING: self._controlling,
@@ -218,15 +216,7 @@ class Navigator:
         }[self.state]
         command = step(now, view, context)
         self.reason = command.reason
-        if shown is not None and command.plan is None:
-            return Command(
-                twist=command.twist,
-                outcome=command.outcome,
-                plan=shown,
-                recovery=command.recovery,
-                reason=command.reason,
-            )
-        return command
+        return command if taken is None else replace(command, plan=taken)
 
     def _watch_motion(self, now: float, pose: Pose2D, context: _Context) -> None:
         progress = context.progress

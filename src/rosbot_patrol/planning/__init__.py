@@ -1,0 +1,1 @@
+"""Global planners, local planners and recovery behaviours."""

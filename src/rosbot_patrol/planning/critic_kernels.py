@@ -39,12 +39,11 @@ def simulate(pose, samples, velocity, sim_time, steps, acc_x, acc_theta):
 def footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, free_below):
     """Cost of the robot standing at a pose, -1 in collision, -2 where it is unknown, -3 off the map.
 
-    Args:
-        outline: points along the footprint's edges in the robot's frame, shape (M, 2).
-        free_below: where the centre costs less, the outline need not be looked at.
+    `outline` holds points along the footprint's edges in the robot's frame, shape (M, 2); where the centre costs less
+    than `free_below`, it need not be looked at.
     """
     height, width = cells.shape
-    ix, iy = int(math.floor((x - origin_x) / resolution)), int(math.floor((y - origin_y) / resolution))
+    ix, iy = math.floor((x - origin_x) / resolution), math.floor((y - origin_y) / resolution)
     if ix < 0 or iy < 0 or ix >= width or iy >= height:
         return -3
     highest = np.int64(cells[iy, ix])
@@ -58,7 +57,7 @@ def footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, fr
     for k in range(outline.shape[0]):
         px = x + c * outline[k, 0] - s * outline[k, 1]
         py = y + s * outline[k, 0] + c * outline[k, 1]
-        jx, jy = int(math.floor((px - origin_x) / resolution)), int(math.floor((py - origin_y) / resolution))
+        jx, jy = math.floor((px - origin_x) / resolution), math.floor((py - origin_y) / resolution)
         if jx < 0 or jy < 0 or jx >= width or jy >= height:
             return -3
         cost = cells[jy, jx]
@@ -95,7 +94,7 @@ def read_field(field, resolution, origin_x, origin_y, x, y):
     height, width = field.shape
     u = (x - origin_x) / resolution - 0.5
     v = (y - origin_y) / resolution - 0.5
-    x0, y0 = int(math.floor(u)), int(math.floor(v))
+    x0, y0 = math.floor(u), math.floor(v)
     fx, fy = u - x0, v - y0
     total, weight = 0.0, 0.0
     for k in range(4):

@@ -1,5 +1,6 @@
 """What a global planner, a local planner and a recovery behaviour are, without ROS."""
 
+# ruff: noqa: B027 - a planner overrides only the hooks that it needs
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
@@ -24,7 +25,8 @@ class GlobalPlanner(ABC):
 
         Args:
             costmap: costs; may be written to.
-            start, goal: in the costmap's frame.
+            start: in the costmap's frame.
+            goal: in the costmap's frame.
             tolerance: how far from the goal the plan may end [m]; the planner's own parameter where None.
 
         Raises:

@@ -25,8 +25,10 @@ def propagate(costs, table, sources, source_times, target_x, target_y, heuristic
     Args:
         costs: cost of each cell.
         table: cost of crossing a cell by its cost, inf where it cannot be crossed; shape (256,).
-        sources: cells (ix, iy) to start from, shape (N, 2), with their times `source_times`.
-        target_x, target_y: cell to reach.
+        sources: cells (ix, iy) to start from, shape (N, 2).
+        source_times: their times, shape (N,).
+        target_x: cell to reach, column.
+        target_y: its row.
         heuristic: least cost of a cell, 0 for no guidance.
         times: to be filled, inf everywhere at call; shape of `costs`.
 
@@ -176,7 +178,7 @@ def descend(times, from_x, from_y, to_x, to_y, step):
     x, y = from_x, from_y
     stay = 0
     reached = 0
-    lowest = times[int(round(y)), int(round(x))]
+    lowest = times[round(y), round(x)]
     for _ in range(8 * width * height + 64):
         if n == out.shape[0]:
             out = np.concatenate((out, np.empty_like(out)))
@@ -185,9 +187,9 @@ def descend(times, from_x, from_y, to_x, to_y, step):
         if abs(x - to_x) < 1.0 and abs(y - to_y) < 1.0:
             reached = 1
             break
-        ix, iy = int(round(x)), int(round(y))
+        ix, iy = round(x), round(y)
         # gradient, interpolated between the four centres around, those without a way left out
-        x0, y0 = int(math.floor(x)), int(math.floor(y))
+        x0, y0 = math.floor(x), math.floor(y)
         fx, fy = x - x0, y - y0
         gx, gy, weight = 0.0, 0.0, 0.0
         for k in range(4):
@@ -205,7 +207,7 @@ def descend(times, from_x, from_y, to_x, to_y, step):
         moved = False
         if norm > 1e-3 and stay < 8:
             nx, ny = x - step * gx / norm, y - step * gy / norm
-            jx, jy = int(round(nx)), int(round(ny))
+            jx, jy = round(nx), round(ny)
             if 0 <= jx < width and 0 <= jy < height:
                 same = jx == ix and jy == iy
                 corner_free = jx == ix or jy == iy or (math.isfinite(times[iy, jx]) and math.isfinite(times[jy, ix]))

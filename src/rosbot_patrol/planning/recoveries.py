@@ -35,16 +35,19 @@ class ClearCostmap(Recovery):
         self.params = params
 
     def start(self, view: RecoveryView) -> None:
+        """Begin."""
         if self.params.affected_maps in ("global", "both"):
             view.global_costmap.clear_outside(view.pose_global, self.params.reset_distance)
         if self.params.affected_maps in ("local", "both"):
             view.local_costmap.clear_outside(view.pose_local, self.params.reset_distance)
 
     def step(self, view: RecoveryView) -> Twist2D | None:
+        """One cycle; None when done."""
         return None
 
     @property
     def last_words(self) -> str:
+        """How it ended."""
         return f"costmaps cleared beyond {self.params.reset_distance / 2.0:.2f} m"
 
 
@@ -72,10 +75,12 @@ class Rotate(Recovery):
         self._words = ""
 
     def start(self, view: RecoveryView) -> None:
+        """Begin."""
         self._turned, self._yaw, self._started = 0.0, view.pose_local.yaw, view.now
         self._words = ""
 
     def step(self, view: RecoveryView) -> Twist2D | None:
+        """One cycle; None when done."""
         p = self.params
         self._turned += angle_difference(view.pose_local.yaw, self._yaw)
         self._yaw = view.pose_local.yaw
@@ -95,6 +100,7 @@ class Rotate(Recovery):
 
     @property
     def last_words(self) -> str:
+        """How it ended."""
         return self._words
 
 

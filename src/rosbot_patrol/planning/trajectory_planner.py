@@ -121,9 +121,11 @@ class TrajectoryPlanner(LocalPlanner):
         self._visible: Array = np.empty((0, 3))
 
     def reset(self) -> None:
+        """Forget the goal that was worked on."""
         self._memory = _Memory()
 
     def set_plan(self, poses: Array) -> None:
+        """Follow a new plan."""
         if len(poses) == 0:
             raise ControlError("a plan without poses cannot be followed")
         same_goal = len(self._plan) > 0 and np.allclose(self._plan[-1], poses[-1], atol=1e-6)
@@ -134,13 +136,16 @@ class TrajectoryPlanner(LocalPlanner):
 
     @property
     def local_plan(self) -> Array:
+        """What the last velocity would drive."""
         return self._local_plan
 
     @property
     def visible_plan(self) -> Array:
+        """The part of the plan that is followed now."""
         return self._visible
 
     def is_goal_reached(self, view: LocalView) -> bool:
+        """Whether the robot stands at the goal, turned as it should."""
         if len(self._plan) == 0 or not self._is_at_goal_xy(view):
             return False
         p, goal = self.params, self._goal(view)
@@ -161,6 +166,7 @@ class TrajectoryPlanner(LocalPlanner):
         return near or self._memory.xy_reached
 
     def compute(self, view: LocalView) -> Twist2D:
+        """The velocity for this cycle; raises ControlError."""
         if len(self._plan) == 0:
             raise ControlError("there is no plan to follow")
         self._free_own_cells(view)

@@ -91,8 +91,8 @@ class CostmapNode:
             if layer.params.subscribe_to_updates:
                 callback = partial(self._on_map_update, layer)
                 rospy.Subscriber(f"{topic}_updates", numpy_msg(OccupancyGridUpdate), callback, queue_size=10)
-        for layer in self.costmap.obstacle_layers:
-            for key, buffer in layer.buffers.items():
+        for obstacles in self.costmap.obstacle_layers:
+            for key, buffer in obstacles.buffers.items():
                 if buffer.params.data_type != "LaserScan":
                     log.warning("%s: source '%s' is no LaserScan and is not used", self.name, key)
                     continue

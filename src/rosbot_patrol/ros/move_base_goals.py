@@ -19,7 +19,7 @@ from rosbot_patrol.ros.transforms import Transforms
 log = logging.getLogger(__name__)
 
 
-class GoalRefused(Exception):
+class GoalRefusedError(Exception):
     """A goal that cannot be worked on; its text is the action's result text."""
 
 
@@ -27,17 +27,17 @@ def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
     """A goal message in a frame.
 
     Raises:
-        GoalRefused: its quaternion is none (upstream's text), its position is none, or its frame is not known.
+        GoalRefusedError: its quaternion is none (upstream's text), its position is none, or its frame is not known.
     """
     q, p = msg.pose.orientation, msg.pose.position
     length = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
     if not math.isfinite(length) or length < 1e-6:
-        raise GoalRefused(BAD_QUATERNION)
+        raise GoalRefusedError(BAD_QUATERNION)
     tilt = 1.0 - 2.0 * (q.x * q.x + q.y * q.y) / length  # upstream wants the z axis up
     if abs(tilt - 1.0) > 1e-3:
-        raise GoalRefused(BAD_QUATERNION)
+        raise GoalRefusedError(BAD_QUATERNION)
     if not (math.isfinite(p.x) and math.isfinite(p.y)):
-        raise GoalRefused(f"Aborting on goal because it was sent with an invalid position ({p.x}, {p.y})")
+        raise GoalRefusedError(f"Aborting on goal because it was sent with an invalid position ({p.x}, {p.y})")
     yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y) / length, 1.0 - 2.0 * (q.y * q.y + q.z * q.z) / length)
     goal, source = Pose2D(p.x, p.y, yaw), msg.header.frame_id.lstrip("/")
     if source == frame:
@@ -47,7 +47,7 @@ def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
     except TransformError as err:
         log.error("a goal in frame '%s' cannot be used: %s", source, err)
         text = "The goal pose passed to this planner must be in the {} frame. It is instead in the {} frame."
-        raise GoalRefused(text.format(frame, source)) from err
+        raise GoalRefusedError(text.format(frame, source)) from err
 
 
 class GoalServer:
@@ -90,7 +90,7 @@ class GoalServer:
             return None
         try:
             pose = read_goal(goal.target_pose, self._frame, self._transforms)
-        except GoalRefused as err:
+        except GoalRefusedError as err:
             log.error("%s", err)
             self._server.set_aborted(MoveBaseResult(), str(err))
             return None

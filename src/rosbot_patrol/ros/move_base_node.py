@@ -32,7 +32,7 @@ from rosbot_patrol.ros.convert import path_to_msg, twist_from_msg, twist_to_msg
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
-from rosbot_patrol.ros.move_base_goals import GoalRefused, GoalServer, read_goal
+from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_goal
 from rosbot_patrol.ros.move_base_plans import ThreadedPlans
 from rosbot_patrol.ros.node import Loop, load_params, now, run_node
 from rosbot_patrol.ros.transforms import Transforms
@@ -140,7 +140,7 @@ class MoveBaseNode:
             else:
                 start = self._global.robot_pose(now())
             goal = read_goal(request.goal, self._global.frame, self._transforms)
-        except (GoalRefused, TransformError) as err:
+        except (GoalRefusedError, TransformError) as err:
             log.error("make_plan: %s", err)
             return None
         response = GetPlanResponse()

@@ -15,7 +15,7 @@ from rosbot_patrol.ros.node import now
 log = logging.getLogger(__name__)
 
 
-class PoseUnknown(PlanningError):
+class PoseUnknownError(PlanningError):
     """There is no start to plan from."""
 
 
@@ -80,7 +80,7 @@ class ThreadedPlans:
         except PlanningError as err:
             return PlanResult(error=err)
         except TransformError as err:
-            return PlanResult(error=PoseUnknown(str(err)))
+            return PlanResult(error=PoseUnknownError(str(err)))
         except (PatrolError, ValueError, IndexError) as err:
             log.error("the global planner failed", exc_info=True)
             return PlanResult(error=PlanningError(f"the global planner failed: {err}"))

@@ -1,4 +1,7 @@
-"""A program, not a test: drive from the base to each room and back, on the pure navigator. Usage: drive_house.py [ROOM...]"""
+"""A program, not a test: drive from the base to each room and back, on the pure navigator.
+
+Usage: drive_house.py WALLS.csv [ROOM...]
+"""
 
 from __future__ import annotations
 
