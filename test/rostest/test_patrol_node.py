@@ -354,3 +354,65 @@ def test_bad_parameter_is_one_sentence_and_exit_1(house, params, said):
     assert house.patrol.wait(20) == 1
     assert said in house.log(house.patrol)
     assert "Traceback" not in house.log(house.patrol)
+
+
+def test_the_mail_server_comes_back_and_gets_it_once(house):
+    sys.path.insert(0, str(ROOT / "test" / "unit" / "alerts"))
+    from smtp_server import SmtpServer
+
+    port = free_port()
+    mail = {"transport": "smtp", "email_to": "owner@example.org", "smtp_port": port, "mail_retry": 0.5}
+    house.start_move_base()
+    house.start_patrol(**mail)
+    house.person = True
+    house.send(2)
+    assert house.wait_for_mission().last_verdict == "confirmed"
+    os.killpg(house.patrol.pid, signal.SIGKILL)
+    house.patrol.wait()
+    with SmtpServer(port=port) as server:
+        house.start_patrol(**mail)
+        wait_until(lambda: server.mails, 20, "the mail")
+        wait_until(lambda: house.alerts[-1].delivered, 5, "the word about it")
+        time.sleep(1.0)
+        assert len(server.mails) == 1
+    assert not list((house.folder / "state" / "outbox").iterdir())
+    assert "1 wait from before" in house.log(house.patrol)
+
+
+def test_a_state_folder_that_cannot_be_written_is_said_at_start(house):
+    (house.folder / "file").write_text("")
+    house.start_patrol(wait=False, state_dir=str(house.folder / "file" / "state"))
+    assert house.patrol.wait(20) == 1
+    assert str(house.folder / "file") in house.log(house.patrol)
+    assert "Traceback" not in house.log(house.patrol)
+
+
+@pytest.mark.parametrize(("person", "verdict", "status"), [(True, "confirmed", 0), (False, "confirmed", 3)])
+def test_the_narrator_tells_and_ends_with_the_mission(house, person, verdict, status):
+    summary = house.folder / "summary.json"
+    house.start_move_base()
+    narrator = house._start(
+        ["rosrun", "rosbot_patrol", "narrator"],
+        {"exit_after_mission": True, "expect_verdict": verdict, "summary_file": str(summary), "time_limit": 60},
+    )
+    house.start_patrol()
+    wait_until(lambda: "On guard." in house.log(narrator), 10, "the word")
+    house.person = person
+    house.send(3)
+    assert narrator.wait(60) == status
+    told = [line.split("] ", 1)[1] for line in house.log(narrator).splitlines() if line.startswith("[ ")]
+    room = "room 3 (west alcove)"
+    ends = "confirmed" if person else "clear"
+    steps = [
+        "On guard.",
+        "Motion sensor 3 calls.",
+        f"Driving to {room}.",
+        f"Arrived in {room}.",
+        f"Turning once to look around in {room}.",
+        f"Home again. Verdict for {room}: {ends}.",
+    ]
+    assert [line for line in told if line in steps] == steps
+    assert any(line.startswith("INTRUDER: a person") for line in told) == person
+    (mission,) = json.loads(summary.read_text())["missions"]
+    assert mission["verdict"] == ends
+    assert [Path(p).exists() for p in mission["mails"]] == [True] * person

@@ -7,11 +7,11 @@ import threading
 class SmtpServer:
     """`replies` maps a verb (EHLO, MAIL, RCPT, DATA, ".", QUIT) to another reply; None closes the connection."""
 
-    def __init__(self, replies=None, silent=False):
+    def __init__(self, replies=None, silent=False, port=0):
         self.replies = replies or {}
         self.silent = silent
         self.mails, self.verbs = [], []
-        self._socket = socket.create_server(("localhost", 0))
+        self._socket = socket.create_server(("localhost", port))
         self.port = self._socket.getsockname()[1]
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
