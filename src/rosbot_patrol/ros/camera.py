@@ -1,0 +1,149 @@
+"""A camera topic: only its newest picture, and a watch over whether it is alive."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+import rosgraph
+import rospy
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Bool
+
+from rosbot_patrol.images.encodings import Picture
+from rosbot_patrol.images.stream import Stream, StreamWatch
+from rosbot_patrol.ros import diagnostics
+from rosbot_patrol.ros.convert_images import picture_from_msg
+
+log = logging.getLogger(__name__)
+
+PART = "camera"
+WATCH_PERIOD = 0.5
+FIRST_WAIT = 2.0
+WAIT_REPEAT = 10.0
+BUFFER_SIZE = 16 * 2**20
+
+
+class Camera:
+    """Subscribes, keeps the newest picture that has not been looked at, and tells of a silent or frozen camera.
+
+    Args:
+        topic: base name of the topic.
+        transport: raw or compressed.
+        timeout: silence that means it has stopped [s] of wall time.
+        frozen_timeout: sameness that means it is frozen [s] of wall time, 0 for never.
+        health: where to tell.
+        notify: called when a picture has come.
+    """
+
+    def __init__(
+        self,
+        topic: str,
+        *,
+        transport: str,
+        timeout: float,
+        frozen_timeout: float,
+        health: diagnostics.Health,
+        notify: Callable[[], None],
+    ) -> None:
+        self._kind = CompressedImage if transport == "compressed" else Image
+        self._topic = rospy.resolve_name(topic if transport == "raw" else f"{topic}/{transport}")
+        self._lock = threading.Lock()
+        self._newest: Image | CompressedImage | None = None
+        self._last_stamp = rospy.Time(0)
+        self._watch = StreamWatch(timeout, frozen_timeout)
+        self._refused = ""
+        self._health = health
+        self._notify = notify
+        self._ok = rospy.Publisher("~camera_ok", Bool, queue_size=1, latch=True)
+        self._subscriber = rospy.Subscriber(
+            self._topic, self._kind, self._on_picture, queue_size=1, buff_size=BUFFER_SIZE, tcp_nodelay=True
+        )
+        threading.Thread(target=self._run, name="camera watch", daemon=True).start()
+
+    @property
+    def pending(self) -> bool:
+        """Whether a picture waits."""
+        return self._newest is not None
+
+    def take(self) -> Image | CompressedImage | None:
+        """The newest message that has not been taken."""
+        with self._lock:
+            message, self._newest = self._newest, None
+            return message
+
+    def decode(self, message: Image | CompressedImage) -> Picture:
+        """The picture in a message; ImageError where it cannot be read."""
+        if isinstance(message, CompressedImage):
+            codec = importlib.import_module("rosbot_patrol.images.compressed")
+            picture: Picture = codec.decompress(message.format, message.data)
+        else:
+            picture = picture_from_msg(message)
+        self._refused = ""
+        return picture
+
+    def refuse(self, problem: str) -> None:
+        """State that a picture could not be looked at; said once for the same reason."""
+        if problem != self._refused:
+            log.error("%s: %s", self._topic, problem)
+        self._refused = problem
+
+    def _on_picture(self, message: Image | CompressedImage) -> None:
+        stamp = message.header.stamp
+        with self._lock:
+            # the camera's own time and some of its bytes: what a frozen driver repeats
+            self._watch.note(time.monotonic(), bytes(message.data[::997]))
+            if stamp == self._last_stamp and not stamp.is_zero():
+                return  # the same picture again
+            self._last_stamp = stamp
+            self._newest = message
+        self._notify()
+
+    def _run(self) -> None:
+        before: Stream | None = None
+        tell = time.monotonic() + FIRST_WAIT
+        while not rospy.is_shutdown():
+            now = time.monotonic()
+            with self._lock:
+                state, silent, rate = self._watch.state(now), self._watch.silent_for(now), self._watch.rate
+            if state is not before:
+                self._changed(state, before, silent)
+                before = state
+            if state is Stream.WAITING and now >= tell:
+                log.warning("waiting for pictures on %s (%s): %s", self._topic, self._kind._type, self._who_publishes())
+                tell = now + WAIT_REPEAT
+            self._tell_health(state, silent, rate)
+            time.sleep(WATCH_PERIOD)
+
+    def _changed(self, state: Stream, before: Stream | None, silent: float) -> None:
+        self._ok.publish(Bool(state is Stream.FLOWING))
+        if state is Stream.STOPPED:
+            log.error("%s: the camera has been silent for %.1f s: %s", self._topic, silent, self._who_publishes())
+        elif state is Stream.FROZEN:
+            log.error("%s: the camera is frozen, it sends the same picture again and again", self._topic)
+        elif before is not None:
+            log.info("%s: %s", self._topic, state.value)
+
+    def _tell_health(self, state: Stream, silent: float, rate: float) -> None:
+        values = {"topic": self._topic, "rate": f"{rate:.1f}", "seconds since the last picture": f"{silent:.1f}"}
+        if self._refused:
+            self._health.set(PART, diagnostics.ERROR, self._refused, values)
+            return
+        level = {Stream.WAITING: diagnostics.WARN, Stream.FLOWING: diagnostics.OK}.get(state, diagnostics.ERROR)
+        self._health.set(PART, level, state.value, values)
+
+    def _who_publishes(self) -> str:
+        """Who publishes the topic, and as what type."""
+        try:
+            master = rosgraph.Master(rospy.get_name())
+            publishers = dict(master.getSystemState()[0]).get(self._topic, [])
+            kind = dict(master.getTopicTypes()).get(self._topic, "")
+        except (OSError, rosgraph.MasterException) as err:
+            return f"the master does not say who publishes it ({err})"
+        if not publishers:
+            return "nobody publishes it"
+        text = f"published by {', '.join(publishers)}"
+        return f"{text} as {kind}, which is another type" if kind not in ("", "*", self._kind._type) else text
