@@ -375,7 +375,7 @@ def test_the_mail_server_comes_back_and_gets_it_once(house):
         wait_until(lambda: house.alerts[-1].delivered, 5, "the word about it")
         time.sleep(1.0)
         assert len(server.mails) == 1
-    assert not list((house.folder / "state" / "outbox").iterdir())
+    assert not list((house.folder / "state" / "outbox").glob("*.eml"))
     assert "1 wait from before" in house.log(house.patrol)
 
 

@@ -1,12 +1,14 @@
 """Mails that wait for their transport: on disk until it took them.
 
 Each is one whole file, written before anything is sent. Order is kept: where the transport is down, all wait for the
-oldest; a mail that the server refuses for good lets the others pass and is tried again later. After a crash between
-sending and crossing out a mail goes again, with the same Message-ID (the Maildir transport notices and keeps one).
+oldest; a mail that the server refuses for good lets the others pass and is tried again later. What was delivered moves
+to the folder `sent`, so that an incident that comes up again after a crash is known. After a crash between sending and
+moving a mail goes again, with the same Message-ID (the Maildir transport notices and keeps one).
 """
 
 from __future__ import annotations
 
+import glob
 import logging
 import re
 from dataclasses import dataclass
@@ -53,38 +55,49 @@ class Outbox:
         folder: is made where missing; what lies there already waits, too.
         interval: least time between two mails [s]: delays, never drops.
         first_delay: wait after the first failure [s]; doubles with each to at most max_delay.
+        keep: so many delivered mails stay in `sent`.
     """
 
     def __init__(
-        self, folder: Path, *, interval: float = 10.0, first_delay: float = 5.0, max_delay: float = 900.0
+        self,
+        folder: Path,
+        *,
+        interval: float = 10.0,
+        first_delay: float = 5.0,
+        max_delay: float = 900.0,
+        keep: int = 200,
     ) -> None:
         self.folder = folder
         self._interval = interval
-        self._first_delay, self._max_delay = first_delay, max_delay
+        self._first_delay, self._max_delay, self._keep = first_delay, max_delay, keep
+        self._sent = folder / "sent"
         self._failures = 0
         self._blocked_until = float("-inf")
         self._last_delivery = float("-inf")
-        folder.mkdir(parents=True, exist_ok=True)
+        self._sent.mkdir(parents=True, exist_ok=True)
         self._entries = self._scan()
-        orders = [int(match["order"]) for e in self._entries if (match := _NAME.fullmatch(e.path.name))]
+        names = [path.name for path in (*folder.glob("*.eml"), *self._sent.glob("*.eml"))]
+        orders = [int(match["order"]) for name in names if (match := _NAME.fullmatch(name))]
         self._order = max(orders, default=0)
 
     def __len__(self) -> int:
         return len(self._entries)
 
-    def put(self, incident_id: str, mail: EmailMessage) -> Entry:
-        """Keep a mail until it is delivered; the one that is there already where the id is known. Raises OSError."""
-        known = next((entry for entry in self._entries if entry.id == incident_id), None)
-        if known:
-            return known
+    def has(self, incident_id: str) -> bool:
+        """Whether a mail of this incident waits or was delivered."""
+        waits = any(entry.id == incident_id for entry in self._entries)
+        return waits or any(True for _ in self._sent.glob(f"*-{glob.escape(incident_id)}.eml"))
+
+    def put(self, incident_id: str, mail: EmailMessage) -> None:
+        """Keep a mail until it is delivered; nothing where the incident's is known already. Raises OSError."""
+        if self.has(incident_id):
+            return
         path = self.folder / f"{self._order + 1:012d}-{incident_id}.eml"
         if not _NAME.fullmatch(path.name):
             raise ValueError(f"'{incident_id}' is no id for a file")
         write_atomic(path, mail.as_bytes(policy=SMTP))
         self._order += 1
-        entry = Entry(id=incident_id, path=path)
-        self._entries.append(entry)
-        return entry
+        self._entries.append(Entry(id=incident_id, path=path))
 
     def due(self, now: float) -> Entry | None:
         """The mail to be sent now, None where none is due."""
@@ -100,12 +113,19 @@ class Outbox:
         return max(due - now, 0.0)
 
     def delivered(self, entry: Entry, now: float) -> None:
-        """Cross a mail out. Raises OSError where the disk does not take it (it is then sent again after a restart)."""
+        """Move a mail to `sent`. Raises OSError where the disk does not take it (it goes again after a restart)."""
         self._entries.remove(entry)
         self._last_delivery = now
         self._failures, self._blocked_until = 0, float("-inf")
-        entry.path.unlink(missing_ok=True)
+        entry.path.replace(self._sent / entry.path.name)
+        sync_folder(self._sent)
         sync_folder(self.folder)
+        for old in sorted(self._sent.glob("*.eml"))[: -self._keep]:
+            old.unlink(missing_ok=True)
+
+    def forget(self, entry: Entry) -> None:
+        """Take an entry whose file is gone off the list."""
+        self._entries.remove(entry)
 
     def failed(self, entry: Entry, now: float, *, permanent: bool = False) -> float:
         """Put a mail off; returns how long [s].

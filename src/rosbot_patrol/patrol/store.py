@@ -52,7 +52,7 @@ class PatrolStore:
 
     def save(self, memory: Mapping[str, Any]) -> None:
         """Write memory and latched triggers. Raises OSError."""
-        tree = {"version": VERSION, "run_id": self._run_id, "latched": self._latched, "memory": dict(memory)}
+        tree = {"version": VERSION, "run_id": self._run_id, "latched": dict(self._latched), "memory": dict(memory)}
         write_atomic(self.path, json.dumps(tree, indent=1).encode())
 
     def _read(self) -> None:

@@ -1,4 +1,4 @@
-"""The alert desk: a thread that writes incidents and mails to disk, then delivers, and never stops the patrol."""
+"""The alert desk: one thread writes notices to disk, another delivers them, and neither ever stops the patrol."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
 
 import rospy
@@ -51,21 +52,26 @@ class AlertDesk:
         self._pictures, self._incidents, self._health = pictures, incidents, health
         self._jobs: deque[tuple[Incident, Notice]] = deque()
         self._finals: deque[tuple[str, str, str, int]] = deque()
-        self._wake = threading.Event()
+        self._memory: Callable[[], None] | None = None
+        self._outbox_lock = threading.Lock()
+        self._to_record, self._to_deliver = threading.Event(), threading.Event()
         self._publisher = rospy.Publisher("/patrol/alerts", Alert, queue_size=10)
-        self._thread = threading.Thread(target=self._run, name="alerts", daemon=True)
 
     def start(self) -> None:
         """Begin to work."""
         waiting = f", {len(self._outbox)} wait from before" if len(self._outbox) else ""
         log.info("alert mails go to %s (transport %s)%s", self._transport.describe(), self._transport.name, waiting)
         self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
-        self._thread.start()
+        for name, work, wake in (
+            ("record", self._record_next, self._to_record),
+            ("deliver", self._deliver_next, self._to_deliver),
+        ):
+            threading.Thread(target=_repeat, args=(work, wake), name=name, daemon=True).start()
 
     @property
     def is_recorded(self) -> bool:
-        """Whether every notice taken is on disk."""
-        return not self._jobs
+        """Whether every notice and memory taken is on disk."""
+        return not self._jobs and self._memory is None
 
     def take(self, notice: Notice, ros_time: float) -> None:
         """Take an intruder's notice; returns at once."""
@@ -85,44 +91,65 @@ class AlertDesk:
             pose=(pose.x, pose.y, pose.yaw) if pose else None,
         )
         self._jobs.append((incident, notice))
-        self._wake.set()
+        self._to_record.set()
 
     def close_incident(self, mission_id: str, verdict: str, reason: str, sightings: int) -> None:
         """Complete the record of a mission that is over; returns at once."""
         self._finals.append((mission_id, verdict, reason, sightings))
-        self._wake.set()
+        self._to_record.set()
 
-    # -- the thread
+    def remember(self, save: Callable[[], None]) -> None:
+        """Save the patrol's memory once every notice taken so far is on disk; returns at once.
 
-    def _run(self) -> None:
-        while not rospy.is_shutdown():
-            try:
-                pause = self._work()
-            except Exception:  # the desk must outlive whatever one mail does to it
-                log.error("the alert desk stumbled", exc_info=True)
-                pause = DISK_RETRY
-            if pause > 0.0:
-                self._wake.wait(min(pause, 60.0))
-                self._wake.clear()
+        A mission is never remembered as one that gave its notice before the notice is there.
+        """
+        self._memory = save
+        self._to_record.set()
 
-    def _work(self) -> float:
-        """Do one thing; returns how long to wait for the next [s]."""
+    # -- the threads
+
+    def _record_next(self) -> float:
+        """Write one thing; returns how long to wait for the next [s]."""
         if self._jobs:
             return 0.0 if self._record(*self._jobs[0]) else DISK_RETRY
+        save = self._memory
+        if save is not None:
+            return 0.0 if self._remember(save) else DISK_RETRY
         if self._finals:
             self._complete(*self._finals.popleft())
             return 0.0
-        entry = self._outbox.due(time.monotonic())
+        return 60.0
+
+    def _remember(self, save: Callable[[], None]) -> bool:
+        try:
+            save()
+        except OSError as err:
+            log.error("the patrol's state cannot be kept: %s; trying on", err)
+            return False
+        if self._memory is save:
+            self._memory = None
+        return True
+
+    def _deliver_next(self) -> float:
+        now = time.monotonic()
+        with self._outbox_lock:
+            entry = self._outbox.due(now)
+            wait = self._outbox.wait(now)
         if entry is not None:
             self._deliver(entry)
             return 0.0
-        wait = self._outbox.wait(time.monotonic())
         return 60.0 if wait is None else wait + 0.01
 
     def _record(self, incident: Incident, notice: Notice) -> bool:
+        with self._outbox_lock:
+            if self._outbox.has(incident.id):  # the program was killed after it was written
+                self._jobs.popleft()
+                return True
         picture, note = self._picture(notice)
+        mail = build_mail(incident, self._envelope, picture, picture_note=note)
         try:
-            self._outbox.put(incident.id, build_mail(incident, self._envelope, picture, picture_note=note))
+            with self._outbox_lock:
+                self._outbox.put(incident.id, mail)
         except OSError as err:
             log.error(
                 "the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, self._outbox.folder, err
@@ -131,6 +158,7 @@ class AlertDesk:
             return False
         log.warning("ALERT: %s; the notice is on disk", incident.sentence)
         self._jobs.popleft()
+        self._to_deliver.set()
         self._publish(incident, delivered=False, location=str(self._outbox.folder), text=incident.sentence)
         self._save(incident, picture)
         return True
@@ -174,27 +202,33 @@ class AlertDesk:
             mail = entry.mail()
         except FileNotFoundError:
             log.error("%s is gone from the outbox", entry.path)
-            self._outbox.delivered(entry, time.monotonic())
+            with self._outbox_lock:
+                self._outbox.forget(entry)
             return
         except (OSError, ValueError) as err:
-            log.error("%s cannot be sent (%s), set aside as %s", entry.path, err, self._outbox.set_aside(entry))
+            with self._outbox_lock:
+                aside = self._outbox.set_aside(entry)
+            log.error("%s cannot be sent (%s), set aside as %s", entry.path, err, aside)
             return
         try:
             location = self._transport.send(entry.id, mail)
         except DeliveryError as err:
             self._put_off(entry, err)
             return
-        self._outbox.delivered(entry, time.monotonic())
-        incident = load_incident(self._incidents, entry.id)
+        with self._outbox_lock:
+            self._outbox.delivered(entry, time.monotonic())
         text = f"mail about incident {entry.id} delivered by {self._transport.name}: {location}"
         log.info("%s", text)
         self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
+        incident = load_incident(self._incidents, entry.id)
         self._publish(incident, delivered=True, location=location, text=text, incident_id=entry.id)
 
     def _put_off(self, entry: Entry, err: DeliveryError) -> None:
-        delay = self._outbox.failed(entry, time.monotonic(), permanent=err.permanent)
+        with self._outbox_lock:
+            delay = self._outbox.failed(entry, time.monotonic(), permanent=err.permanent)
+            count = len(self._outbox)
         log.error("%s; the mail stays in %s, next try in %.0f s", err, entry.path, delay)
-        self._health.set("mail", WARN, f"{len(self._outbox)} mails wait: {err}")
+        self._health.set("mail", WARN, f"{count} mails wait: {err}")
 
     def _publish(
         self, incident: Incident | None, *, delivered: bool, location: str, text: str, incident_id: str = ""
@@ -206,3 +240,15 @@ class AlertDesk:
             message.id, message.room_id, message.room_name = incident.id, incident.room_id, incident.room_name
             message.object_class, message.probability = incident.object_class, incident.probability
         self._publisher.publish(message)
+
+
+def _repeat(work: Callable[[], float], wake: threading.Event) -> None:
+    while not rospy.is_shutdown():
+        try:
+            pause = work()
+        except Exception:  # the desk has to outlive whatever one mail does to it
+            log.error("the alert desk stumbled", exc_info=True)
+            pause = DISK_RETRY
+        if pause > 0.0:
+            wake.wait(min(pause, 60.0))
+            wake.clear()

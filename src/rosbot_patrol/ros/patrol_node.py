@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import logging
 import os
-import queue
 import signal
 import socket
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -56,6 +56,7 @@ from rosbot_patrol.scan import scan_points
 log = logging.getLogger(__name__)
 
 P = TypeVar("P")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,15 +130,14 @@ class PatrolNode:
         self._make_ends()
 
     def _make_ends(self) -> None:
-        self._triggers: queue.SimpleQueue[int] = queue.SimpleQueue()
-        self._frames: queue.Queue[Frame] = queue.Queue(maxsize=200)
+        self._triggers: deque[tuple[int, str]] = deque(maxlen=1000)  # room, sender where it latches
+        self._frames: deque[Frame] = deque(maxlen=200)
         self._detector: Latest[int] = Latest()
         self._scan: Latest[LaserScanMsg] = Latest()
         self._stepping = threading.Lock()
         self._is_over = False
         self._is_signalled = False
         self._unsaved = False
-        self._save_at = 0.0
         self._turning = False
         self._started = time.monotonic()
         self._first_heard: set[str] = set()
@@ -174,10 +174,7 @@ class PatrolNode:
         if is_latched and is_first and is_early and self.store.is_handled(sender, message.id):
             log.info("the latched trigger for room %d from %s was taken before the restart", message.id, sender)
             return
-        if is_latched:
-            self.store.note_latched(sender, message.id)
-            self._unsaved = True
-        self._triggers.put(message.id)
+        self._triggers.append((message.id, sender if is_latched else ""))
 
     def _on_boxes(self, message: BoundingBoxes) -> None:
         time_now = now()
@@ -189,19 +186,12 @@ class PatrolNode:
             Box(label=b.Class, probability=b.probability, xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax)
             for b in message.bounding_boxes
         )
-        self._put_frame(Frame(stamp=stamp, boxes=boxes))
+        self._frames.append(Frame(stamp=stamp, boxes=boxes))
 
     def _on_count(self, message: ObjectCount) -> None:
         self._detector.set(1, now())
         if message.count == 0:  # other counts come with their boxes
-            self._put_frame(Frame())
-
-    def _put_frame(self, frame: Frame) -> None:
-        try:
-            self._frames.put_nowait(frame)
-        except queue.Full:
-            self._frames.get_nowait()
-            self._frames.put_nowait(frame)
+            self._frames.append(Frame())
 
     def _on_scan(self, message: LaserScanMsg) -> None:
         self._scan.set(message, now())
@@ -217,7 +207,7 @@ class PatrolNode:
         looking = self.manager.mission is not None and self.manager.mission.phase is Phase.LOOKING
         return Inputs(
             wall=time.time(),
-            triggers=tuple(_drain(self._triggers)),
+            triggers=self._take_triggers(),
             frames=tuple(_drain(self._frames)),
             yaw=self._yaw(time_now),
             pose=self._pose(),
@@ -226,6 +216,14 @@ class PatrolNode:
             detector_at=self._detector.stamp,
             camera_at=self.pictures.seen_at,
         )
+
+    def _take_triggers(self) -> tuple[int, ...]:
+        taken = _drain(self._triggers)
+        for room_id, sender in taken:
+            if sender:
+                self.store.note_latched(sender, room_id)
+                self._unsaved = True
+        return tuple(room_id for room_id, _ in taken)
 
     def _yaw(self, time_now: float) -> float | None:
         try:
@@ -301,16 +299,10 @@ class PatrolNode:
         self.health.set("", OK if report.phase is not Phase.STARTING else WARN, f"{report.phase.value}: {report.why}")
 
     def _save(self, changed: bool) -> None:
-        self._unsaved = self._unsaved or changed
-        # A mission's notice is on disk before the mission is remembered as one that gave it.
-        if not self._unsaved or not self.desk.is_recorded or time.monotonic() < self._save_at:
-            return
-        self._unsaved = False
-        try:
-            self.store.save(self.manager.snapshot())
-        except OSError as err:
-            self._unsaved, self._save_at = True, time.monotonic() + 5.0
-            log.error("the patrol's state cannot be kept: %s", err)
+        if changed or self._unsaved:
+            self._unsaved = False
+            memory = self.manager.snapshot()
+            self.desk.remember(lambda: self.store.save(memory))
 
     def _note_signal(self, number: int) -> None:
         rospys = signal.getsignal(number)
@@ -335,18 +327,18 @@ class PatrolNode:
             self.move_base.cancel()
             if self._turning:
                 self._cmd_vel.publish(convert.twist_to_msg(STOP))
-            self._unsaved, self._save_at = True, 0.0
             self._save(changed=True)
+        deadline = time.monotonic() + 2.0
+        while not self.desk.is_recorded and time.monotonic() < deadline:
+            time.sleep(0.02)
         time.sleep(0.1)  # let the two messages leave
 
 
-def _drain(source: Any) -> list[Any]:
+def _drain(source: deque[T]) -> list[T]:
     items = []
-    while True:
-        try:
-            items.append(source.get_nowait())
-        except queue.Empty:
-            return items
+    while source:
+        items.append(source.popleft())
+    return items
 
 
 def main() -> None:

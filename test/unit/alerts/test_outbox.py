@@ -29,7 +29,7 @@ def test_mails_leave_in_order_and_are_gone_then(tmp_path, put):
     outbox = Outbox(tmp_path / "out", interval=0.0)
     put(outbox, "b", "a", "c")
     assert drain(outbox) == ["b", "a", "c"]
-    assert list(tmp_path.glob("out/*")) == []
+    assert list(tmp_path.glob("out/*.eml")) == []
     assert outbox.wait(0.0) is None
 
 
@@ -45,6 +45,26 @@ def test_the_same_incident_waits_once(tmp_path, put):
     put(outbox, "a", "a")
     assert len(outbox) == 1
     assert len(Outbox(tmp_path)) == 1
+
+
+def test_what_was_delivered_does_not_wait_again(tmp_path, put):
+    outbox = Outbox(tmp_path, interval=0.0)
+    put(outbox, "a", "b")
+    assert drain(outbox) == ["a", "b"]
+    again = Outbox(tmp_path, interval=0.0)
+    put(again, "a", "c")
+    assert drain(again) == ["c"]
+    assert [path.name[-5:] for path in sorted((tmp_path / "sent").iterdir())] == ["a.eml", "b.eml", "c.eml"]
+
+
+def test_only_the_last_delivered_are_kept(tmp_path, put):
+    outbox = Outbox(tmp_path, interval=0.0, keep=2)
+    put(outbox, "a", "b", "c")
+    drain(outbox)
+    assert [path.name for path in sorted((tmp_path / "sent").iterdir())] == [
+        "000000000002-b.eml",
+        "000000000003-c.eml",
+    ]
 
 
 def test_the_interval_delays_and_never_drops(tmp_path, put):
@@ -119,7 +139,7 @@ def test_a_disk_that_does_not_take_it_leaves_no_half_file(tmp_path, put, monkeyp
         patched.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(28, "No space left on device")))
         with pytest.raises(OSError, match="No space left"):
             put(outbox, "a")
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["sent"]
     put(outbox, "a")
     assert len(outbox) == 1
 
