@@ -1,0 +1,223 @@
+"""simulator: the house, the robot and its sensors in place of Gazebo.
+
+Matches what gazebo_ros and rosbot_description publish for the ROSbot: topics, types, frames (see the tables in the
+README), `/clock` and the transform odom -> base_link.
+
+Differs: /clock at 100 Hz of simulated time, not 1 kHz; /odom at 20 Hz from wheel encoders that drift
+(`odometry: ground_truth` gives Gazebo's); the lidar turns at 10 Hz; the base stops 0.5 s after the last command; all
+sensors carry a little noise; ranges below the lidar's minimum are -inf (REP 117). In addition /range, /battery, ground
+truth on /ground_truth/odom and /ground_truth/contacts, and services for actors.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import rospy
+import yaml
+from geometry_msgs.msg import Twist
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import ParamError, WorldError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.params import param
+from rosbot_patrol.ros.convert import twist_from_msg
+from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.inputs import Latest
+from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RateParams
+from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
+from rosbot_patrol.ros.simulator_requests import Requests
+from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.simulation.battery import BatteryParams
+from rosbot_patrol.simulation.camera import CameraParams
+from rosbot_patrol.simulation.drive import DriveParams
+from rosbot_patrol.simulation.engine import Engine, EngineParams
+from rosbot_patrol.simulation.imu import ImuParams
+from rosbot_patrol.simulation.lidar import LidarParams
+from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace
+from rosbot_patrol.simulation.odometry import OdometryParams
+from rosbot_patrol.simulation.range_sensors import RangeParams
+from rosbot_patrol.simulation.renderer import make_renderer
+from rosbot_patrol.simulation.robot import RobotDescription, load_robot, parse_robot
+from rosbot_patrol.simulation.world import World, load_world
+
+log = logging.getLogger(__name__)
+
+_HEALTH_PERIOD = 1.0
+_PAUSED_PERIOD = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatorParams:
+    """Parameters of the node simulator."""
+
+    world: str = param("", doc="SDF file of the world, empty: a floor without walls")
+    model_path: tuple[str, ...] = param((), doc="folders of model://, beside those of GAZEBO_MODEL_PATH")
+    robot: bool = param(True, doc="place the robot at the start; false waits for ~spawn_robot")
+    urdf: str = param("", doc="URDF file of the robot, empty: the parameter /robot_description")
+    x: float = param(0.0, unit="m", doc="where the robot starts")
+    y: float = param(0.0, unit="m", doc="where the robot starts")
+    yaw: float = param(0.0, unit="rad", doc="where the robot starts")
+    rate: float = param(1.0, lo=0.0, doc="real-time factor, 0: as fast as it goes")
+    seed: int = param(1, lo=0, doc="of all noise")
+    paused: bool = param(False, doc="begin paused")
+    gui: bool = param(False, doc="open PyBullet's window")
+    odometry: str = param("encoder", choices=("encoder", "ground_truth"), doc="what /odom tells")
+    motion_sensors: str = param("", doc="file of the motion sensors, empty: none")
+    prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
+    bridge_host: str = param("localhost", doc="where the bridge of the motion sensors runs")
+    drive: DriveParams = field(default_factory=DriveParams)
+    encoder: OdometryParams = field(default_factory=OdometryParams)
+    lidar: LidarParams = field(default_factory=LidarParams)
+    range: RangeParams = field(default_factory=RangeParams)
+    imu: ImuParams = field(default_factory=ImuParams)
+    battery: BatteryParams = field(default_factory=BatteryParams)
+    camera: CameraParams = field(default_factory=CameraParams)
+    motion: MotionSensorParams = field(default_factory=MotionSensorParams)
+    rates: RateParams = field(default_factory=RateParams)
+    lockstep: LockstepParams = field(default_factory=LockstepParams)
+
+    @property
+    def engine(self) -> EngineParams:
+        """What the engine takes of them."""
+        return EngineParams(
+            drive=self.drive,
+            encoder=self.encoder,
+            lidar=self.lidar,
+            range=self.range,
+            imu=self.imu,
+            battery=self.battery,
+            camera=self.camera,
+            motion=dataclasses.replace(self.motion, prewarmed=self.prewarmed and self.motion.prewarmed),
+            seed=self.seed,
+        )
+
+
+def read_sensors(file: str) -> list[SensorPlace]:
+    """The motion sensors of a file, none where the name is empty.
+
+    Raises:
+        ParamError: the file cannot be read, or a key is wrong; names file and key.
+    """
+    if not file:
+        return []
+    try:
+        tree = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+    except (OSError, yaml.YAMLError, UnicodeDecodeError) as err:
+        raise ParamError(file, f"cannot be read: {err}") from err
+    listed = tree.get("sensors") if isinstance(tree, dict) else None
+    if not isinstance(listed, list):
+        raise ParamError(f"{file}: sensors", f"expected a list of sensors, got {listed!r}")
+    unit = tree.get("angle_unit", "rad")
+    if unit not in ("rad", "deg"):
+        raise ParamError(f"{file}: angle_unit", f"is {unit!r}, expected rad or deg")
+    places = [params.load(SensorPlace, item, name=f"{file}: sensors[{i}]/") for i, item in enumerate(listed)]
+    twice = [p.id for i, p in enumerate(places) if p.id in {q.id for q in places[:i]}]
+    if twice:
+        raise ParamError(f"{file}: sensors", f"the id {twice[0]} is used twice")
+    if unit == "deg":
+        places = [dataclasses.replace(p, yaw=p.yaw * 3.141592653589793 / 180.0) for p in places]
+    return places
+
+
+class Simulator:
+    """Runs the engine on one thread, in step with the wall or with the nodes that listen."""
+
+    def __init__(self, p: SimulatorParams) -> None:
+        gui = p.gui and bool(os.environ.get("DISPLAY"))
+        if p.gui and not gui:
+            log.warning("gui: there is no display, the simulation runs without a window")
+        folders = [*p.model_path, *filter(None, os.environ.get("GAZEBO_MODEL_PATH", "").split(":"))]
+        world = load_world(p.world, folders) if p.world else World()
+        places = read_sensors(p.motion_sensors)
+        self._params = p
+        self._engine = Engine(
+            world, p.engine, sensors=places, make_renderer=lambda: make_renderer(p.camera.renderer), gui=gui
+        )
+        if p.robot:
+            self._engine.spawn_robot(_description(p), Pose2D(p.x, p.y, p.yaw))
+        self._paused = p.paused
+        self._tick = 0
+        self._command: Latest[Twist] = Latest()
+        self._pace = Pace(p.rate)
+        self._outputs = Outputs(self._engine, p.rates, exact_odometry=p.odometry == "ground_truth")
+        self._requests = Requests(self._engine, self._set_paused)
+        self._lockstep = Lockstep(p.lockstep, lambda: self._engine.now) if p.rate == 0.0 else None
+        self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id).start() for s in places}
+        self._health = Health("simulation")
+        rospy.Subscriber("/cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
+        log.info("world '%s': %d bodies, %d motion sensors", world.name, len(world.bodies), len(places))
+
+    def run(self) -> None:
+        """Simulate until shutdown."""
+        if self._engine.has_robot:
+            self._engine.warm_up()
+        self._pace.restart(self._engine.now)
+        report_at, report_sim = time.monotonic(), self._engine.now
+        while not rospy.is_shutdown():
+            self._requests.serve()
+            if self._paused:
+                time.sleep(_PAUSED_PERIOD)
+                self._pace.restart(self._engine.now)
+            else:
+                self._advance()
+            wall = time.monotonic()
+            if wall - report_at >= _HEALTH_PERIOD:
+                self._report((self._engine.now - report_sim) / (wall - report_at))
+                report_at, report_sim = wall, self._engine.now
+        self.close()
+
+    def close(self) -> None:
+        """End the sensors' links and give the engine back."""
+        for client in self._clients.values():
+            client.stop(0.2)
+        self._engine.close()
+
+    def _advance(self) -> None:
+        command = self._command.take()
+        if command is not None:
+            self._engine.command(twist_from_msg(command))
+        for _ in range(STEPS_PER_TICK):
+            self._engine.step()
+        self._tick += 1
+        self._outputs.publish(self._tick)
+        for sensor, is_high in self._engine.motion_changes():
+            self._clients[sensor].set_motion(is_high)
+        if self._lockstep is not None:
+            self._lockstep.wait()
+        self._pace.wait(self._engine.now)
+
+    def _set_paused(self, paused: bool) -> None:
+        self._paused = paused
+        log.info("the simulation %s", "is paused" if paused else "goes on")
+
+    def _report(self, factor: float) -> None:
+        slow = self._params.rate > 0.0 and factor < 0.9 * self._params.rate and not self._paused
+        text = f"paused at {self._engine.now:.1f} s" if self._paused else f"{factor:.2f} x real time"
+        values = {
+            "real-time factor": f"{factor:.2f}",
+            "simulated time": f"{self._engine.now:.1f}",
+            "actors": len(self._engine.actors),
+            "motion sensors linked": sum(c.connected for c in self._clients.values()),
+        }
+        self._health.set("", WARN if slow else OK, text, values)
+
+
+def _description(p: SimulatorParams) -> RobotDescription:
+    if p.urdf:
+        return load_robot(p.urdf)
+    text = rospy.get_param("/robot_description", "")
+    if not text:
+        raise WorldError("/robot_description", "is missing: give the robot's URDF there, or a file in ~urdf")
+    return parse_robot(text, source="/robot_description")
+
+
+def main() -> None:
+    """Load parameters, world and robot; simulate."""
+    run_node("simulator", lambda: Simulator(load_params(SimulatorParams)).run())

@@ -1,0 +1,161 @@
+"""Everything that the simulator publishes, each at its rate of simulated time and only where somebody listens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import rospy
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import BatteryState, CameraInfo, Image, Imu, JointState, LaserScan, PointCloud2, Range
+from tf2_msgs.msg import TFMessage
+
+from rosbot_patrol.geometry import Pose2D, Twist2D, compose, invert
+from rosbot_patrol.msg import Contacts
+from rosbot_patrol.params import param
+from rosbot_patrol.ros import simulator_messages as messages
+from rosbot_patrol.ros.convert import scan_to_msg, time_to_msg, transform_to_msg
+from rosbot_patrol.simulation.engine import RANGE_FRAMES, STEP, Engine
+
+TICK = 0.01  # of /clock [s]
+STEPS_PER_TICK = round(TICK / STEP)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateParams:
+    """How often each thing is published, in simulated time; a whole number of hundredths of a second between two."""
+
+    odometry: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="/odom and its transform")
+    scan: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="/scan (Gazebo: 40)")
+    camera: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="the camera's five topics")
+    imu: float = param(10.0, unit="Hz", lo=0.1, hi=100.0, doc="/rosbot/imu")
+    range: float = param(5.0, unit="Hz", lo=0.1, hi=50.0, doc="/range/*")
+    joints: float = param(10.0, unit="Hz", lo=0.1, hi=100.0, doc="/joint_states (Gazebo: 50)")
+    battery: float = param(1.0, unit="Hz", lo=0.01, hi=10.0, doc="/battery")
+    ground_truth: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="/ground_truth/odom")
+
+
+class Outputs:
+    """The publishers; `publish(tick)` sends what is due. One thread calls it, that of the simulation.
+
+    Args:
+        engine: what is simulated.
+        rates: how often.
+        exact_odometry: /odom tells the truth, as Gazebo's does.
+    """
+
+    def __init__(self, engine: Engine, rates: RateParams, *, exact_odometry: bool = False) -> None:
+        self._engine = engine
+        self._exact = exact_odometry
+        self._odom_start: Pose2D | None = None
+        self._touching = False
+        self._camera_frame = "camera_depth_frame"
+        publisher = rospy.Publisher
+        self._clock = publisher("/clock", Clock, queue_size=1)
+        self._odom = publisher("/odom", Odometry, queue_size=1)
+        self._tf = publisher("/tf", TFMessage, queue_size=20)
+        self._scan = publisher("/scan", LaserScan, queue_size=1)
+        self._imu = publisher("/rosbot/imu", Imu, queue_size=1)
+        self._ranges = {f: publisher(f"/range/{f.removeprefix('range_')}", Range, queue_size=1) for f in RANGE_FRAMES}
+        self._joints = publisher("/joint_states", JointState, queue_size=1)
+        self._battery = publisher("/battery", BatteryState, queue_size=1)
+        self._truth = publisher("/ground_truth/odom", Odometry, queue_size=1)
+        self._contacts = publisher("/ground_truth/contacts", Contacts, queue_size=10)
+        self._rgb = publisher("/camera/rgb/image_raw", Image, queue_size=1)
+        self._rgb_info = publisher("/camera/rgb/camera_info", CameraInfo, queue_size=1)
+        self._depth = publisher("/camera/depth/image_raw", Image, queue_size=1)
+        self._depth_info = publisher("/camera/depth/camera_info", CameraInfo, queue_size=1)
+        self._cloud = publisher("/camera/depth/points", PointCloud2, queue_size=1)
+        self._due: list[tuple[int, int, Callable[[float], None]]] = [
+            (_ticks(rates.odometry), 0, self._send_odometry),
+            (_ticks(rates.ground_truth), 0, self._send_truth),
+            (_ticks(rates.scan), 0, self._send_scan),
+            (_ticks(rates.camera), 5, self._send_pictures),
+            (_ticks(rates.imu), 2, self._send_imu),
+            (_ticks(rates.range), 3, self._send_ranges),
+            (_ticks(rates.joints), 1, self._send_joints),
+            (_ticks(rates.battery), 7, self._send_battery),
+        ]
+
+    def publish(self, tick: int) -> None:
+        """Send the time and what is due at a tick."""
+        now = self._engine.now
+        self._clock.publish(Clock(time_to_msg(now)))
+        if not self._engine.has_robot:
+            return
+        self._send_contacts(now)
+        for every, offset, send in self._due:
+            if tick % every == offset % every:
+                send(now)
+
+    def _odometry_now(self) -> tuple[Pose2D, Twist2D]:
+        if not self._exact:
+            return self._engine.odometry
+        if self._odom_start is None:
+            self._odom_start = self._engine.start_pose
+        return compose(invert(self._odom_start), self._engine.pose), self._engine.twist
+
+    def _send_odometry(self, now: float) -> None:
+        pose, twist = self._odometry_now()
+        transform = transform_to_msg(pose, "odom", "base_link", now)
+        self._tf.publish(TFMessage([transform]))
+        if self._odom.get_num_connections():
+            self._odom.publish(messages.odometry_msg(pose, twist, now, "odom", exact=self._exact))
+
+    def _send_truth(self, now: float) -> None:
+        if self._truth.get_num_connections():
+            height = self._engine.description.axle_height
+            pose, twist = self._engine.pose, self._engine.twist
+            self._truth.publish(messages.odometry_msg(pose, twist, now, "map", z=height, exact=True))
+
+    def _send_contacts(self, now: float) -> None:
+        if not self._contacts.get_num_connections():
+            return
+        touches = self._engine.touches()
+        if touches or self._touching:
+            self._contacts.publish(messages.contacts_msg(touches, now, self._engine.description.base))
+        self._touching = bool(touches)
+
+    def _send_scan(self, now: float) -> None:
+        if self._scan.get_num_connections():
+            self._scan.publish(scan_to_msg(self._engine.scan()))
+
+    def _send_imu(self, now: float) -> None:
+        if self._imu.get_num_connections():
+            self._imu.publish(messages.imu_msg(self._engine.imu(), self._engine.params.imu, now))
+
+    def _send_ranges(self, now: float) -> None:
+        if not any(p.get_num_connections() for p in self._ranges.values()):
+            return
+        for frame, distance in self._engine.ranges().items():
+            self._ranges[frame].publish(messages.range_msg(distance, self._engine.params.range, now, frame))
+
+    def _send_joints(self, now: float) -> None:
+        if self._joints.get_num_connections():
+            angles, speeds = self._engine.wheels
+            self._joints.publish(messages.joints_msg(self._engine.description, angles, speeds, now))
+
+    def _send_battery(self, now: float) -> None:
+        if self._battery.get_num_connections():
+            self._battery.publish(messages.battery_msg(self._engine.battery, now))
+
+    def _send_pictures(self, now: float) -> None:
+        camera, frame = self._engine.params.camera.intrinsics, self._camera_frame
+        for info in (self._rgb_info, self._depth_info):
+            if info.get_num_connections():
+                info.publish(messages.camera_info_msg(camera, now, frame))
+        wanted = [p.get_num_connections() > 0 for p in (self._rgb, self._depth, self._cloud)]
+        if not any(wanted):
+            return
+        picture = self._engine.picture(colour=wanted[0] or wanted[2], depth=wanted[1] or wanted[2])
+        if wanted[0]:
+            self._rgb.publish(messages.image_msg(picture.colour, "rgb8", now, frame))
+        if wanted[1]:
+            self._depth.publish(messages.image_msg(picture.depth, "32FC1", now, frame))
+        if wanted[2]:
+            self._cloud.publish(messages.cloud_msg(picture.colour, picture.depth, camera, now, frame))
+
+
+def _ticks(rate: float) -> int:
+    return max(round(1.0 / (rate * TICK)), 1)

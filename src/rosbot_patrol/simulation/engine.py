@@ -1,0 +1,364 @@
+"""The simulation itself: a world, a robot in it, its sensors and the actors, advanced step by step.
+
+Exact: the same seed and the same calls at the same simulated times give the same data bit for bit. Noise belongs to a
+sample's number, not to who asked before. Nothing here knows of wall time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.geometry import Pose2D, Twist2D, compose
+from rosbot_patrol.params import param
+from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.simulation.battery import Battery, BatteryParams
+from rosbot_patrol.simulation.camera import Camera, CameraParams, Picture
+from rosbot_patrol.simulation.drive import Drive, DriveParams
+from rosbot_patrol.simulation.imu import Imu, ImuParams, ImuReading
+from rosbot_patrol.simulation.lidar import LidarParams, measure_scan
+from rosbot_patrol.simulation.matrices import Matrix, from_pose2d, to_pose2d
+from rosbot_patrol.simulation.motion_sensors import (
+    MotionSensor,
+    MotionSensorParams,
+    SensorPlace,
+    bearing_in_cone,
+)
+from rosbot_patrol.simulation.noise import noise_of
+from rosbot_patrol.simulation.odometry import EncoderOdometry, OdometryParams
+from rosbot_patrol.simulation.physics import Physics, Touch
+from rosbot_patrol.simulation.range_sensors import RangeParams, measure_range
+from rosbot_patrol.simulation.robot import RobotDescription
+from rosbot_patrol.simulation.scene import SceneRenderer
+from rosbot_patrol.simulation.slices import Slice, slice_bodies
+from rosbot_patrol.simulation.walkers import Walker, cuts
+from rosbot_patrol.simulation.world import World
+
+STEP = 0.005  # [s]
+EYE_LEVEL = 1.3  # height at which a motion sensor's line of sight is judged [m]
+RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")
+
+_ODOMETRY_EVERY = 10  # steps
+_MOTION_EVERY = 20
+_BATTERY_EVERY = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineParams:
+    """Everything that is simulated, part by part."""
+
+    drive: DriveParams = field(default_factory=DriveParams)
+    encoder: OdometryParams = field(default_factory=OdometryParams)
+    lidar: LidarParams = field(default_factory=LidarParams)
+    range: RangeParams = field(default_factory=RangeParams)
+    imu: ImuParams = field(default_factory=ImuParams)
+    battery: BatteryParams = field(default_factory=BatteryParams)
+    camera: CameraParams = field(default_factory=CameraParams)
+    motion: MotionSensorParams = field(default_factory=MotionSensorParams)
+    seed: int = param(0, lo=0, doc="of all noise")
+
+
+class _Robot:
+    """The robot's own parts, there once a robot has been spawned."""
+
+    def __init__(self, engine: Engine, description: RobotDescription, pose: Pose2D) -> None:
+        p = engine.params
+        self.description = description
+        self.start = pose
+        self.drive = Drive(p.drive, noise_of(p.seed, "slip"))
+        self.odometry = EncoderOdometry(p.encoder, p.drive.wheel_radius, p.drive.effective_track)
+        self.imu = Imu(p.imu)
+        self.battery = Battery(p.battery)
+        self.turned = np.zeros(2)  # wheels, left and right [rad]
+        laser = description.frame("laser")
+        self.base_from_laser = to_pose2d(laser)
+        self.lidar_height = description.axle_height + float(laser[2, 3]) + p.lidar.height_offset
+        self.base_from_ranges = {f: to_pose2d(description.frames[f]) for f in RANGE_FRAMES if f in description.frames}
+        heights = [description.frames[f][2, 3] for f in self.base_from_ranges]
+        self.range_height = description.axle_height + float(np.mean(heights)) if heights else 0.05
+        self.base_from_optical: Matrix | None = description.frames.get("camera_rgb_frame")
+        self.lidar_slice = slice_bodies(engine.world.bodies, self.lidar_height)
+        self.range_slice = slice_bodies(engine.world.bodies, self.range_height)
+        self.imu.reset(pose.yaw)
+
+
+class Engine:
+    """A running world.
+
+    Args:
+        world: what stands in it.
+        params: of every part.
+        sensors: motion sensors on the walls.
+        make_renderer: builds the camera's renderer, in the thread that takes pictures.
+        gui: opens PyBullet's window.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        params: EngineParams | None = None,
+        *,
+        sensors: Sequence[SensorPlace] = (),
+        make_renderer: Callable[[], SceneRenderer] | None = None,
+        gui: bool = False,
+    ) -> None:
+        self.world = world
+        self.params = params or EngineParams()
+        self.sensors = tuple(sensors)
+        self._physics = Physics(STEP, gui=gui)
+        for body in world.bodies:
+            self._physics.add(body)
+        self._eye_slice = slice_bodies(world.bodies, EYE_LEVEL)
+        self._walkers: dict[str, Walker] = {}
+        self._spawned = 0
+        self._robot: _Robot | None = None
+        self._steps = 0
+        self._motion = {s.id: MotionSensor(self.params.motion) for s in self.sensors}
+        self._told: dict[int, bool] = {}
+        self._camera = None
+        if make_renderer is not None:
+            self._camera = Camera(self.params.camera, make_renderer, world.bodies, self.params.seed)
+        for actor in world.actors:
+            self.spawn_actor(actor.name, actor.model, "", actor.pose)
+
+    # Time ------------------------------------------------------------------------------------------------------------
+
+    @property
+    def now(self) -> float:
+        """Simulated time [s]."""
+        return self._steps * STEP
+
+    def step(self) -> None:
+        """Advance by one step."""
+        robot = self._robot
+        where = self._physics.pose if robot is not None else None
+        for walker in self._walkers.values():
+            if walker.step(STEP, where):
+                self._physics.move(walker.name, walker.matrix)
+        if robot is None:
+            self._physics.step(Twist2D())
+        else:
+            self._physics.step(robot.drive.step(self.now, STEP))
+            robot.turned += np.array([robot.drive.left, robot.drive.right]) * STEP
+            robot.imu.step(self._physics.twist, STEP)
+        self._steps += 1
+        self._slow_parts(robot)
+
+    def _slow_parts(self, robot: _Robot | None) -> None:
+        if robot is not None and self._steps % _ODOMETRY_EVERY == 0:
+            robot.odometry.update(float(robot.turned[0]), float(robot.turned[1]), self.now)
+        if robot is not None and self._steps % _BATTERY_EVERY == 0:
+            robot.battery.step(robot.drive.load, _BATTERY_EVERY * STEP)
+        if self._steps % _MOTION_EVERY == 0:
+            for place in self.sensors:
+                self._motion[place.id].update(self.now, self._seen_by(place))
+
+    def reset(self) -> None:
+        """Robot back to its start at rest, odometry to zero; time, actors and battery stay as they are."""
+        if self._robot is not None:
+            self.set_pose(self._robot.start)
+            self._robot.odometry.reset(float(self._robot.turned[0]), float(self._robot.turned[1]), self.now)
+            self._robot.imu.reset(self._robot.start.yaw)
+
+    def close(self) -> None:
+        """Give physics and renderer back."""
+        if self._camera is not None:
+            self._camera.close()
+        self._physics.close()
+
+    # The robot -------------------------------------------------------------------------------------------------------
+
+    @property
+    def has_robot(self) -> bool:
+        """Whether a robot is there."""
+        return self._robot is not None
+
+    def spawn_robot(self, description: RobotDescription, pose: Pose2D = Pose2D()) -> None:
+        """Put the robot into the world; raises WorldError where there is one, or no room for it."""
+        if self._robot is not None:
+            raise WorldError(f"robot '{description.name}'", f"'{self._robot.description.name}' is there already")
+        robot = _Robot(self, description, pose)
+        self._physics.add_robot(description, pose, self.params.drive.traction)
+        self._robot = robot
+
+    @property
+    def description(self) -> RobotDescription:
+        """The robot's description."""
+        return self._need_robot().description
+
+    def command(self, twist: Twist2D) -> None:
+        """Drive at a velocity until the next command, or until the time-out."""
+        if self._robot is not None:
+            self._robot.drive.command(twist, self.now)
+
+    def set_pose(self, pose: Pose2D) -> None:
+        """Carry the robot elsewhere; its odometry does not notice."""
+        self._need_robot().drive.stop()
+        self._physics.set_pose(pose)
+
+    @property
+    def pose(self) -> Pose2D:
+        """True pose of the base in the world."""
+        return self._physics.pose if self._robot is not None else Pose2D()
+
+    @property
+    def start_pose(self) -> Pose2D:
+        """Where the robot was put when it was spawned."""
+        return self._need_robot().start
+
+    @property
+    def twist(self) -> Twist2D:
+        """True velocity of the base in its own frame."""
+        return self._physics.twist if self._robot is not None else Twist2D()
+
+    @property
+    def odometry(self) -> tuple[Pose2D, Twist2D]:
+        """What the wheel encoders believe, every 0.05 s anew."""
+        robot = self._need_robot()
+        return robot.odometry.pose, robot.odometry.twist
+
+    @property
+    def wheels(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Angles [rad] and speeds [rad/s] of the left and the right wheels."""
+        robot = self._need_robot()
+        return (float(robot.turned[0]), float(robot.turned[1])), (robot.drive.left, robot.drive.right)
+
+    @property
+    def battery(self) -> Battery:
+        """The robot's battery."""
+        return self._need_robot().battery
+
+    def touches(self) -> list[Touch]:
+        """What the robot touches, the floor apart."""
+        return self._physics.touches()
+
+    def _need_robot(self) -> _Robot:
+        if self._robot is None:
+            raise WorldError("simulation", "has no robot yet")
+        return self._robot
+
+    # Sensors ---------------------------------------------------------------------------------------------------------
+
+    def scan(self) -> LaserScan:
+        """One sweep of the lidar."""
+        robot = self._need_robot()
+        scene = robot.lidar_slice.with_circles(cuts(self._walkers.values(), robot.lidar_height))
+        place = compose(self.pose, robot.base_from_laser)
+        return measure_scan(self.params.lidar, scene, place, self.now, self._noise("lidar"))
+
+    def ranges(self) -> dict[str, float]:
+        """Frame and distance [m] of each range sensor."""
+        robot = self._need_robot()
+        scene = robot.range_slice.with_circles(cuts(self._walkers.values(), robot.range_height))
+        noise = self._noise("range")
+        return {
+            frame: measure_range(self.params.range, scene, compose(self.pose, place), noise)
+            for frame, place in robot.base_from_ranges.items()
+        }
+
+    def imu(self) -> ImuReading:
+        """One sample of the inertial unit."""
+        return self._need_robot().imu.read(self._noise("imu"))
+
+    def picture(self, *, colour: bool = True, depth: bool = True) -> Picture:
+        """One picture of the camera; always from the same thread.
+
+        Args:
+            colour, depth: whether the picture's noise and limits are wanted of each; what is not may be left raw.
+
+        Raises:
+            WorldError: the engine has no renderer, or the robot no camera.
+        """
+        robot = self._need_robot()
+        if self._camera is None or robot.base_from_optical is None:
+            raise WorldError("simulation", "has no camera")
+        world_from_base = from_pose2d(self.pose, robot.description.axle_height)
+        pose = world_from_base @ robot.base_from_optical
+        return self._camera.take(pose, self._walkers.values(), self._steps, colour=colour, depth=depth)
+
+    def motion(self) -> dict[int, bool]:
+        """Whether each motion sensor's output is high, by id."""
+        return {number: sensor.is_high for number, sensor in self._motion.items()}
+
+    def motion_changes(self) -> list[tuple[int, bool]]:
+        """Id and level of each motion sensor whose output has changed since this was last asked."""
+        changed = [(n, s.is_high) for n, s in self._motion.items() if s.is_high != self._told.get(n, False)]
+        self._told.update(changed)
+        return changed
+
+    def warm_up(self) -> None:
+        """Take one of each measurement, so that the first that counts does not come late."""
+        self.scan()
+        self.ranges()
+        if self._camera is not None and self._need_robot().base_from_optical is not None:
+            self.picture()
+
+    def _noise(self, sensor: str) -> np.random.Generator:
+        return noise_of(self.params.seed, sensor, self._steps)
+
+    def _seen_by(self, place: SensorPlace) -> list[tuple[str, float]]:
+        seen = []
+        for walker in self._walkers.values():
+            if not walker.is_warm:
+                continue
+            bearing = bearing_in_cone(self.params.motion, place, walker.pose)
+            if bearing is None:
+                continue
+            eye = (place.x + 0.1 * math.cos(bearing), place.y + 0.1 * math.sin(bearing))
+            if not self._eye_slice.is_blocked(eye, (walker.pose.x, walker.pose.y)):
+                seen.append((walker.name, bearing))
+        return seen
+
+    # Actors ----------------------------------------------------------------------------------------------------------
+
+    @property
+    def actors(self) -> tuple[Walker, ...]:
+        """Who is there."""
+        return tuple(self._walkers.values())
+
+    @property
+    def slices(self) -> tuple[Slice, Slice]:
+        """The cuts through what stands still, at the height of the lidar and of the range sensors."""
+        robot = self._need_robot()
+        return robot.lidar_slice, robot.range_slice
+
+    def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D) -> str:
+        """Place an actor; returns its name, made up where it is "".
+
+        Raises:
+            WorldError: the name is taken, the model or look unknown, or the pose not finite.
+        """
+        self._spawned += 1
+        name = name or f"{model}_{self._spawned}"
+        taken = {b.name for b in self.world.bodies} | set(self._walkers)
+        if name in taken:
+            raise WorldError(f"actor '{name}'", "the name is taken")
+        if not all(map(math.isfinite, pose)):
+            raise WorldError(f"actor '{name}'", f"{tuple(pose)} is no pose")
+        walker = Walker(name, model, look, pose, noise_of(self.params.seed, "look", self._spawned))
+        self._physics.add(walker.body)
+        self._physics.move(name, walker.matrix)
+        self._walkers[name] = walker
+        return name
+
+    def move_actor(self, name: str, path: Sequence[Pose2D], speed: float, loop: bool = False) -> None:
+        """Let an actor walk along points, or put it somewhere; raises WorldError."""
+        walker = self._actor(name)
+        walker.walk(path, speed, loop)
+        self._physics.move(name, walker.matrix)
+
+    def remove_actor(self, name: str) -> None:
+        """Take an actor out; raises WorldError where there is none of that name."""
+        self._actor(name)
+        self._physics.remove(name)
+        del self._walkers[name]
+
+    def _actor(self, name: str) -> Walker:
+        if name not in self._walkers:
+            there = ", ".join(self._walkers) or "none"
+            raise WorldError(f"actor '{name}'", f"is not there (there: {there})")
+        return self._walkers[name]

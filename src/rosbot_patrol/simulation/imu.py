@@ -1,0 +1,68 @@
+"""An inertial unit: turning rate and acceleration with bias and noise, and the heading that it integrates itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rosbot_patrol.geometry import Twist2D, wrap_angle
+from rosbot_patrol.params import param
+
+GRAVITY = 9.8
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuParams:
+    """Noise of the unit; zero everywhere is Gazebo's."""
+
+    gyro_noise: float = param(0.002, unit="rad/s", lo=0.0, doc="standard deviation of a turning rate")
+    gyro_bias: float = param(0.0002, unit="rad/s", doc="constant error of the turning rate about z")
+    accel_noise: float = param(0.02, unit="m/s^2", lo=0.0, doc="standard deviation of an acceleration")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImuReading:
+    """Heading [rad], turning rates [rad/s] and accelerations [m/s^2] in the unit's frame, shape (3,) each."""
+
+    yaw: float
+    rates: tuple[float, float, float]
+    accelerations: tuple[float, float, float]
+
+
+class Imu:
+    """Follows the motion step by step; `read` adds the noise."""
+
+    def __init__(self, params: ImuParams) -> None:
+        self._params = params
+        self._yaw = 0.0
+        self._before = Twist2D()
+        self._acceleration = (0.0, 0.0)
+        self._rate = 0.0
+
+    def step(self, twist: Twist2D, dt: float) -> None:
+        """Take the base's velocity in its own frame after `dt` [s]."""
+        self._rate = twist.wz + self._params.gyro_bias
+        self._yaw = wrap_angle(self._yaw + self._rate * dt)
+        self._acceleration = (
+            0.9 * self._acceleration[0] + 0.1 * ((twist.vx - self._before.vx) / dt - twist.wz * twist.vy),
+            0.9 * self._acceleration[1] + 0.1 * ((twist.vy - self._before.vy) / dt + twist.wz * twist.vx),
+        )
+        self._before = twist
+
+    def reset(self, yaw: float) -> None:
+        """Begin anew with a heading."""
+        self._yaw, self._before, self._acceleration, self._rate = yaw, Twist2D(), (0.0, 0.0), 0.0
+
+    def read(self, rng: np.random.Generator) -> ImuReading:
+        """One sample."""
+        g = rng.standard_normal(6) * ([self._params.gyro_noise] * 3 + [self._params.accel_noise] * 3)
+        return ImuReading(
+            yaw=self._yaw,
+            rates=(float(g[0]), float(g[1]), self._rate + float(g[2])),
+            accelerations=(
+                self._acceleration[0] + float(g[3]),
+                self._acceleration[1] + float(g[4]),
+                GRAVITY + float(g[5]),
+            ),
+        )

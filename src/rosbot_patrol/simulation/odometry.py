@@ -1,0 +1,53 @@
+"""Wheel-encoder odometry: counts ticks, and believes in a wheel radius and a track that are not quite true."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
+from rosbot_patrol.params import param
+
+
+@dataclass(frozen=True, kw_only=True)
+class OdometryParams:
+    """What the encoders and the calibration of the base are worth."""
+
+    ticks_per_turn: float = param(1024.0, lo=1.0, doc="encoder ticks a turn of a wheel")
+    radius_error: float = param(0.004, lo=-0.5, hi=0.5, doc="relative error of the wheel radius that odometry believes")
+    track_error: float = param(-0.004, lo=-0.5, hi=0.5, doc="relative error of the track that odometry believes")
+
+
+class EncoderOdometry:
+    """Dead reckoning from the turns of the left and right wheels."""
+
+    def __init__(self, params: OdometryParams, wheel_radius: float, track: float) -> None:
+        self._tick = math.tau / params.ticks_per_turn
+        self._radius = wheel_radius * (1.0 + params.radius_error)
+        self._track = track * (1.0 + params.track_error)
+        self._ticks = (0, 0)
+        self._time = 0.0
+        self.pose = Pose2D()
+        self.twist = Twist2D()
+
+    def update(self, left: float, right: float, now: float) -> None:
+        """Take the angles of the wheels [rad] at a time [s]."""
+        ticks = (math.floor(left / self._tick), math.floor(right / self._tick))
+        travel_left = (ticks[0] - self._ticks[0]) * self._tick * self._radius
+        travel_right = (ticks[1] - self._ticks[1]) * self._tick * self._radius
+        forward, turn = (travel_left + travel_right) / 2.0, (travel_right - travel_left) / self._track
+        middle = self.pose.yaw + turn / 2.0
+        self.pose = Pose2D(
+            self.pose.x + forward * math.cos(middle),
+            self.pose.y + forward * math.sin(middle),
+            wrap_angle(self.pose.yaw + turn),
+        )
+        dt = now - self._time
+        if dt > 0.0:
+            self.twist = Twist2D(forward / dt, 0.0, turn / dt)
+        self._ticks, self._time = ticks, now
+
+    def reset(self, left: float, right: float, now: float) -> None:
+        """Begin anew at the origin."""
+        self._ticks = (math.floor(left / self._tick), math.floor(right / self._tick))
+        self._time, self.pose, self.twist = now, Pose2D(), Twist2D()

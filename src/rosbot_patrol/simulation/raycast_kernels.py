@@ -1,0 +1,95 @@
+"""Rays in the plane against segments and circles: exact, and only for the beams that an obstacle can cover."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rosbot_patrol.kernels import kernel
+
+
+@kernel("void(float64, float64, float64, float64, float64[:, ::1], float64[:, ::1], float64[::1])")
+def cast_fan(px, py, first, step, segments, circles, ranges):
+    """Shorten each beam of a fan to the nearest obstacle.
+
+    Args:
+        px, py: where the beams start [m].
+        first, step: bearing of beam 0 and from beam to beam [rad], step > 0, at most one turn in all.
+        segments: x0, y0, x1, y1, shape (S, 4).
+        circles: x, y, radius, shape (C, 3).
+        ranges: longest length on entry, length to the nearest obstacle on return [m], shape (N,).
+    """
+    turn = 2.0 * math.pi
+    n = ranges.shape[0]
+    for s in range(segments.shape[0]):
+        ax, ay = segments[s, 0] - px, segments[s, 1] - py
+        dx, dy = segments[s, 2] - segments[s, 0], segments[s, 3] - segments[s, 1]
+        cross = ax * dy - ay * dx
+        a0 = math.atan2(ay, ax)
+        width = math.atan2(ay + dy, ax + dx) - a0
+        if width > math.pi:
+            width -= turn
+        elif width <= -math.pi:
+            width += turn
+        low = a0 if width >= 0.0 else a0 + width
+        offset = (low - first) % turn - 1e-9
+        for lap in range(2):
+            k0 = int(math.ceil((offset - lap * turn) / step))
+            k1 = int(math.floor((offset - lap * turn + abs(width) + 2e-9) / step))
+            for k in range(max(k0, 0), min(k1, n - 1) + 1):
+                bearing = first + k * step
+                below = math.cos(bearing) * dy - math.sin(bearing) * dx
+                if below != 0.0:
+                    length = cross / below
+                    if 0.0 <= length < ranges[k]:
+                        ranges[k] = length
+    for c in range(circles.shape[0]):
+        cx, cy, radius = circles[c, 0] - px, circles[c, 1] - py, circles[c, 2]
+        away = math.hypot(cx, cy)
+        centre = math.atan2(cy, cx)
+        half = math.pi if away <= radius else math.asin(radius / away)
+        offset = (centre - half - first) % turn
+        for lap in range(2):
+            k0 = int(math.ceil((offset - lap * turn) / step))
+            k1 = int(math.floor((offset - lap * turn + 2.0 * half) / step))
+            for k in range(max(k0, 0), min(k1, n - 1) + 1):
+                bearing = first + k * step
+                along = cx * math.cos(bearing) + cy * math.sin(bearing)
+                inside = radius * radius - (away * away - along * along)
+                if inside < 0.0:
+                    continue
+                root = math.sqrt(inside)
+                length = along - root if along > root else along + root
+                if 0.0 <= length < ranges[k]:
+                    ranges[k] = length
+
+
+@kernel("boolean(float64, float64, float64, float64, float64[:, ::1], float64[:, ::1])")
+def is_blocked(x0, y0, x1, y1, segments, circles):
+    """Whether a segment or a circle lies between two points."""
+    dx, dy = x1 - x0, y1 - y0
+    for s in range(segments.shape[0]):
+        ex, ey = segments[s, 2] - segments[s, 0], segments[s, 3] - segments[s, 1]
+        below = dx * ey - dy * ex
+        if below == 0.0:
+            continue
+        ax, ay = segments[s, 0] - x0, segments[s, 1] - y0
+        t = (ax * ey - ay * ex) / below
+        u = (ax * dy - ay * dx) / below
+        if 0.0 < t < 1.0 and 0.0 <= u <= 1.0:
+            return True
+    length2 = dx * dx + dy * dy
+    for c in range(circles.shape[0]):
+        t = 0.0
+        if length2 > 0.0:
+            t = ((circles[c, 0] - x0) * dx + (circles[c, 1] - y0) * dy) / length2
+            t = min(max(t, 0.0), 1.0)
+        nx, ny = circles[c, 0] - (x0 + t * dx), circles[c, 1] - (y0 + t * dy)
+        if nx * nx + ny * ny < circles[c, 2] * circles[c, 2]:
+            return True
+    return False
+
+
+NO_SEGMENTS = np.zeros((0, 4))
+NO_CIRCLES = np.zeros((0, 3))

@@ -1,0 +1,134 @@
+"""The horizontal cut through a scene at one height: what a planar lidar, a range sensor or a look at eye level meets.
+
+The cut of a convex shape is a polygon or a circle, and exact; a lying cylinder or capsule is cut as a prism of 24
+sides, a mesh triangle by triangle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.simulation import raycast_kernels as kernels
+from rosbot_patrol.simulation.matrices import Matrix, is_upright
+from rosbot_patrol.simulation.meshes import mesh_of
+from rosbot_patrol.simulation.scene import Body, Shape
+
+Array = NDArray[np.float64]
+
+_SIDES = 24
+_CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+_CUBE_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1])
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Segments (x0, y0, x1, y1), shape (S, 4), and circles (x, y, radius), shape (C, 3), in the frame of the world."""
+
+    segments: Array
+    circles: Array
+
+    def with_circles(self, circles: Array) -> Slice:
+        """The same cut with further circles."""
+        if not len(circles):
+            return self
+        return Slice(self.segments, np.ascontiguousarray(np.vstack((self.circles, circles))))
+
+    def cast(self, x: float, y: float, first: float, step: float, count: int, longest: float) -> Array:
+        """Lengths of a fan of beams from a point; `longest` where nothing is met [m], shape (count,)."""
+        ranges = np.full(count, longest)
+        kernels.cast_fan(x, y, first, step, self.segments, self.circles, ranges)
+        return ranges
+
+    def is_blocked(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+        """Whether something lies between two points."""
+        return bool(kernels.is_blocked(*start, *end, self.segments, self.circles))
+
+
+EMPTY = Slice(kernels.NO_SEGMENTS, kernels.NO_CIRCLES)
+
+
+def slice_bodies(bodies: Iterable[Body], height: float) -> Slice:
+    """The cut through the collision shapes of bodies at a height [m]."""
+    segments: list[Array] = []
+    circles: list[Array] = []
+    for body in bodies:
+        for collision in body.collisions:
+            cut = slice_shape(collision.shape, body.pose @ collision.pose, height)
+            segments.append(cut.segments)
+            circles.append(cut.circles)
+    if not segments:
+        return EMPTY
+    return Slice(np.ascontiguousarray(np.vstack(segments)), np.ascontiguousarray(np.vstack(circles)))
+
+
+def slice_shape(shape: Shape, world_from_shape: Matrix, height: float) -> Slice:
+    """The cut through one shape."""
+    if shape.kind == "plane":
+        return EMPTY
+    if shape.kind == "box":
+        corners = (_CUBE * shape.size) @ world_from_shape[:3, :3].T + world_from_shape[:3, 3]
+        return Slice(_cut_convex(corners, _CUBE_EDGES, height), kernels.NO_CIRCLES)
+    if shape.kind == "sphere" or (shape.kind in ("cylinder", "capsule") and is_upright(world_from_shape)):
+        return Slice(kernels.NO_SEGMENTS, _cut_round(shape, world_from_shape, height))
+    if shape.kind == "mesh":
+        mesh = mesh_of(shape)
+        placed = mesh.positions @ world_from_shape[:3, :3].T + world_from_shape[:3, 3]
+        return Slice(_cut_triangles(placed, mesh.faces, height), kernels.NO_CIRCLES)
+    return Slice(_cut_lying(shape, world_from_shape, height), kernels.NO_CIRCLES)
+
+
+def _cut_round(shape: Shape, pose: Matrix, height: float) -> Array:
+    rise = abs(height - float(pose[2, 3]))
+    radius = shape.size[0]
+    straight = shape.size[1] / 2.0 if shape.kind != "sphere" else 0.0
+    if rise > straight:
+        if shape.kind == "cylinder" or rise - straight >= radius:
+            return kernels.NO_CIRCLES
+        radius = math.sqrt(radius**2 - (rise - straight) ** 2)
+    return np.array([[pose[0, 3], pose[1, 3], radius]])
+
+
+def _cut_lying(shape: Shape, pose: Matrix, height: float) -> Array:
+    radius, length = shape.size[0], shape.size[1]
+    if shape.kind == "capsule":
+        length += 2.0 * radius
+    angles = np.linspace(0.0, math.tau, _SIDES, endpoint=False)
+    ring = np.column_stack((radius * np.cos(angles), radius * np.sin(angles)))
+    corners = np.vstack([np.column_stack((ring, np.full(_SIDES, z))) for z in (-length / 2.0, length / 2.0)])
+    i = np.arange(_SIDES)
+    around = np.column_stack((i, (i + 1) % _SIDES))
+    edges = np.vstack((around, around + _SIDES, np.column_stack((i, i + _SIDES))))
+    return _cut_convex(corners @ pose[:3, :3].T + pose[:3, 3], edges, height)
+
+
+def _cut_convex(corners: Array, edges: NDArray[np.int64], height: float) -> Array:
+    """Outline of the cut through a convex body given by corners and edges, shape (S, 4)."""
+    a, b = corners[edges[:, 0]], corners[edges[:, 1]]
+    crosses = (a[:, 2] - height) * (b[:, 2] - height) < 0.0
+    if not crosses.any():
+        return kernels.NO_SEGMENTS
+    a, b = a[crosses], b[crosses]
+    t = (height - a[:, 2]) / (b[:, 2] - a[:, 2])
+    points = a[:, :2] + t[:, None] * (b[:, :2] - a[:, :2])
+    centre = points.mean(axis=0)
+    points = points[np.argsort(np.arctan2(points[:, 1] - centre[1], points[:, 0] - centre[0]))]
+    return np.column_stack((points, np.roll(points, -1, axis=0)))
+
+
+def _cut_triangles(vertices: Array, faces: NDArray[np.int64], height: float) -> Array:
+    above = vertices[:, 2] > height
+    hit = faces[above[faces].any(axis=1) & ~above[faces].all(axis=1)]
+    rows = []
+    for face in hit:
+        ends = []
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            p, q = vertices[face[i]], vertices[face[j]]
+            if above[face[i]] != above[face[j]]:
+                ends.append(p[:2] + (height - p[2]) / (q[2] - p[2]) * (q[:2] - p[:2]))
+        rows.append(np.concatenate(ends))
+    return np.array(rows) if rows else kernels.NO_SEGMENTS
