@@ -5,22 +5,31 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
+
+Array = NDArray[np.float64]
+Table = NDArray[np.float32]
 
 
 @kernel(
     "void(float64[:, ::1], float64[::1], float64[::1], float32[:, ::1], float64, float64, float64, float64[::1])",
     fastmath={"reassoc", "contract"},
 )
-def sum_over_beams(poses, xs, ys, table, origin_x, origin_y, resolution, out):
+def sum_over_beams(
+    poses: Array, xs: Array, ys: Array, table: Table, origin_x: float, origin_y: float, resolution: float, out: Array
+) -> None:
     """Sum a table's values at the beams' end points, for each particle.
 
     Args:
         poses: x, y, yaw of the particles, shape (N, 3).
-        xs, ys: end points in the robot's frame [m], shapes (K,).
+        xs: end points in the robot's frame [m], shape (K,).
+        ys: likewise.
         table: value of each cell; its border cells stand for all that lies beyond, shape (H, W).
-        origin_x, origin_y: lower left corner of the table [m]; resolution: edge of a cell [m].
+        origin_x: lower left corner of the table [m].
+        origin_y: likewise.
+        resolution: edge of a cell [m].
         out: the sums, shape (N,).
     """
     height, width = table.shape
@@ -41,7 +50,17 @@ def sum_over_beams(poses, xs, ys, table, origin_x, origin_y, resolution, out):
 @kernel(
     "void(float64[:, ::1], float64[::1], float64[::1], float32[:, ::1], float64, float64, float64, float64, int64[::1])"
 )
-def count_agreement(poses, xs, ys, distances, origin_x, origin_y, resolution, near, out):
+def count_agreement(
+    poses: Array,
+    xs: Array,
+    ys: Array,
+    distances: Table,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+    near: float,
+    out: NDArray[np.int64],
+) -> None:
     """For each beam, how many particles see its end point nearer than `near` [m] to an obstacle, shape (K,)."""
     height, width = distances.shape
     out[:] = 0
@@ -59,7 +78,16 @@ def count_agreement(poses, xs, ys, distances, origin_x, origin_y, resolution, ne
 @kernel(
     "float64(float64, float64, float64, float32[:, ::1], float64, float64, float64, float64)",
 )
-def cast_ray(x, y, angle, distances, origin_x, origin_y, resolution, reach):
+def cast_ray(
+    x: float,
+    y: float,
+    angle: float,
+    distances: Table,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+    reach: float,
+) -> float:
     """Length of a ray [m] from a point to the first cell of distance 0, at most `reach` (sphere tracing).
 
     `distances` [m] is the distance of each cell to the nearest blocked one; beyond the grid nothing blocks.
@@ -83,14 +111,30 @@ def cast_ray(x, y, angle, distances, origin_x, origin_y, resolution, reach):
     "void(float64[:, ::1], float64[::1], float64[::1], float64[::1], float32[:, ::1], float64, float64, float64,"
     " float64, float64[::1], float64[::1])"
 )
-def sum_beam_model(poses, mount, angles, ranges, distances, origin_x, origin_y, resolution, reach, mixture, out):
+def sum_beam_model(
+    poses: Array,
+    mount: Array,
+    angles: Array,
+    ranges: Array,
+    distances: Table,
+    origin_x: float,
+    origin_y: float,
+    resolution: float,
+    reach: float,
+    mixture: Array,
+    out: Array,
+) -> None:
     """Sum the cubed probabilities of the beam range finder model (Probabilistic Robotics, table 6.1).
 
     Args:
         poses: x, y, yaw of the particles, shape (N, 3).
         mount: x, y, yaw of the sensor on the robot, shape (3,).
-        angles: of the beams in the sensor's frame [rad]; ranges: measured, `reach` where nothing was hit [m], (K,).
-        distances: of each cell to the nearest blocked one [m]; origin_x, origin_y, resolution: its place [m].
+        angles: of the beams in the sensor's frame [rad], shape (K,).
+        ranges: measured, `reach` where nothing was hit [m], shape (K,).
+        distances: of each cell to the nearest blocked one [m].
+        origin_x: lower left corner of the distances [m].
+        origin_y: likewise.
+        resolution: edge of a cell [m].
         reach: largest range of the sensor [m].
         mixture: z_hit, z_short, z_max, z_rand, sigma_hit [m], lambda_short [1/m], shape (6,).
         out: the sums, shape (N,).

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rosbot_patrol.kernels import kernel
+
+Array = NDArray[np.float64]
 
 
 @kernel("void(float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])")
-def move_turn_drive_turn(poses, step, sigma, noise):
+def move_turn_drive_turn(poses: Array, step: Array, sigma: Array, noise: Array) -> None:
     """Move each particle by a turn, a drive and a turn, each with its own Gaussian error.
 
     Args:
         poses: x, y, yaw of the particles, changed in place, shape (N, 3).
-        step: first turn [rad], drive [m], second turn [rad]; sigma: their standard deviations, shapes (3,).
+        step: first turn [rad], drive [m], second turn [rad], shape (3,).
+        sigma: their standard deviations, shape (3,).
         noise: standard normal numbers, shape (N, 3).
     """
     for i in range(poses.shape[0]):
@@ -28,7 +34,7 @@ def move_turn_drive_turn(poses, step, sigma, noise):
 
 
 @kernel("void(float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])")
-def move_sliding(poses, step, sigma, noise):
+def move_sliding(poses: Array, step: Array, sigma: Array, noise: Array) -> None:
     """Move each particle in a direction independent of its heading, and turn it.
 
     Args:

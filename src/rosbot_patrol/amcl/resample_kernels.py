@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
+
+Array = NDArray[np.float64]
+Wholes = NDArray[np.int64]
 
 EMPTY = np.int64(-1)
 BIN_M = 0.5
@@ -15,35 +19,37 @@ TURNS = 36  # bins in a full turn
 
 
 @kernel("int64(int64, float64, float64, int64, int64)")
-def kld_size(bins, error, z, least, most):
+def kld_size(bins: int, error: float, z: float, least: int, most: int) -> int:
     """How many particles keep the error against the true distribution below a bound (Fox 2003, equation 7).
 
     Args:
         bins: bins that hold particles.
-        error: largest Kullback-Leibler distance; z: upper quantile of the standard normal distribution.
-        least, most: bounds of the answer.
+        error: largest Kullback-Leibler distance.
+        z: upper quantile of the standard normal distribution.
+        least: smallest answer.
+        most: largest answer.
     """
     if bins <= 1:
         return least
     k = bins - 1.0
     b = 2.0 / (9.0 * k)
     root = 1.0 - b + math.sqrt(b) * z
-    return min(max(int(math.ceil(k / (2.0 * error) * root * root * root)), least), most)
+    return min(max(math.ceil(k / (2.0 * error) * root * root * root), least), most)
 
 
 @kernel("int64(float64, float64, float64)")
-def bin_key(x, y, yaw):
+def bin_key(x: float, y: float, yaw: float) -> int:
     """The bin of a pose as one number: 0.5 m x 0.5 m x 10 degrees, the turn closed."""
-    turn = int(math.floor(yaw / BIN_RAD)) % TURNS
-    return ((int(math.floor(x / BIN_M)) + (1 << 24)) * (1 << 25) + int(math.floor(y / BIN_M)) + (1 << 24)) * 64 + turn
+    turn = math.floor(yaw / BIN_RAD) % TURNS
+    return ((math.floor(x / BIN_M) + (1 << 24)) * (1 << 25) + math.floor(y / BIN_M) + (1 << 24)) * 64 + turn
 
 
 @kernel("int64(int64[::1], int64)")
-def find_slot(slots, key):
+def find_slot(slots: Wholes, key: int) -> int:
     """Where a key is in an open hash table of 2^n slots, or the empty slot where it would go."""
     mask = slots.shape[0] - 1
     mixed = key * 0x1E3779B97F4A7C15
-    at = np.int64((mixed >> 32) ^ mixed) & mask
+    at = ((mixed >> 32) ^ mixed) & mask
     while slots[at] != EMPTY and slots[at] != key:
         at = (at + 1) & mask
     return at
@@ -52,16 +58,30 @@ def find_slot(slots, key):
 @kernel(
     "int64(float64[:, ::1], float64[::1], float64, float64[:, ::1], float64, float64, int64, int64, float64[:, ::1])"
 )
-def draw(poses, cumulative, offset, strangers, error, z, least, most, out):
+def draw(
+    poses: Array,
+    cumulative: Array,
+    offset: float,
+    strangers: Array,
+    error: float,
+    z: float,
+    least: int,
+    most: int,
+    out: Array,
+) -> int:
     """Draw particles by weight until their spread asks for no more; returns how many.
 
     The draws follow the golden ratio's additive sequence, which covers the weights evenly however many are drawn.
 
     Args:
-        poses: x, y, yaw, shape (N, 3); cumulative: running sum of the weights up to 1, shape (N,).
+        poses: x, y, yaw, shape (N, 3).
+        cumulative: running sum of the weights up to 1, shape (N,).
         offset: start of the sequence, 0 to 1.
         strangers: x, y, yaw of random poses that stand in for the draws, NaN where none does, shape (most or 0, 3).
-        error, z, least, most: as for `kld_size`.
+        error: as for `kld_size`.
+        z: as for `kld_size`.
+        least: fewest particles.
+        most: most particles.
         out: the drawn poses, shape (most, 3).
     """
     size = 16
@@ -77,7 +97,7 @@ def draw(poses, cumulative, offset, strangers, error, z, least, most, out):
         if m < strangers.shape[0] and not math.isnan(strangers[m, 0]):
             out[m, 0], out[m, 1], out[m, 2] = strangers[m, 0], strangers[m, 1], strangers[m, 2]
         else:
-            i = min(np.searchsorted(cumulative, at, side="right"), poses.shape[0] - 1)
+            i = min(int(np.searchsorted(cumulative, at, side="right")), poses.shape[0] - 1)
             out[m, 0], out[m, 1], out[m, 2] = poses[i, 0], poses[i, 1], poses[i, 2]
         key = bin_key(out[m, 0], out[m, 1], out[m, 2])
         slot = find_slot(slots, key)
@@ -91,7 +111,7 @@ def draw(poses, cumulative, offset, strangers, error, z, least, most, out):
 
 
 @kernel("int64(int64[::1], int64)")
-def root_of(parents, i):
+def root_of(parents: Wholes, i: int) -> int:
     """The representative of a set, with its path halved (disjoint sets)."""
     while parents[i] != i:
         parents[i] = parents[parents[i]]
@@ -100,7 +120,7 @@ def root_of(parents, i):
 
 
 @kernel("int64(float64[:, ::1], int64[::1])")
-def label_clusters(poses, labels):
+def label_clusters(poses: Array, labels: Wholes) -> int:
     """Number the clusters of particles whose bins touch; returns how many numbers are in use.
 
     Args:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
 
 @kernel("float32[:, ::1](boolean[:, ::1], int64)")
-def bounded_distances(marked, bound):
+def bounded_distances(marked: NDArray[np.bool_], bound: int) -> NDArray[np.float32]:
     """Distance of each cell to the nearest marked one, in cells, at most `bound`; shape as `marked`.
 
     First along the columns, by one sweep up and one down over whole rows; then along each row by the lower envelope
