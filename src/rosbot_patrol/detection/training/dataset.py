@@ -1,0 +1,87 @@
+"""The shards that `render.py` wrote, as batches: pictures in the network's letterbox and their boxes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH, column
+
+MARGIN = 8
+NET_HEIGHT = HEIGHT + 2 * MARGIN
+
+
+@dataclass
+class Pictures:
+    """A set of pictures, opened as memory maps, and the label rows of each."""
+
+    shards: list[np.ndarray]
+    labels: list[list[np.ndarray]]
+
+    @classmethod
+    def open(cls, folder: Path, name: str) -> Pictures:
+        """All finished shards of that name."""
+        files = [f for f in sorted(folder.glob(f"{name}-[0-9]*.npy")) if ".part" not in f.name]
+        if not files:
+            raise FileNotFoundError(f"{folder} holds no pictures named {name}-*.npy; make them with render.py")
+        shards = [np.load(f, mmap_mode="r") for f in files]
+        labels = []
+        for file, shard in zip(files, shards, strict=True):
+            rows = np.load(file.with_suffix(".npz"))["boxes"]
+            labels.append([rows[column(rows, "picture") == i] for i in range(len(shard))])
+        return cls(shards, labels)
+
+    def __len__(self) -> int:
+        return sum(len(shard) for shard in self.shards)
+
+    def index(self) -> np.ndarray:
+        """(shard, picture) of each picture, shape (N, 2)."""
+        return np.array([(s, i) for s, shard in enumerate(self.shards) for i in range(len(shard))])
+
+    def picture(self, shard: int, i: int) -> np.ndarray:
+        """RGB, uint8, shape (240, 320, 3)."""
+        return self.shards[shard][i]
+
+
+def asked(rows: np.ndarray) -> np.ndarray:
+    """Whether a network is asked to find each: not the hardly visible, nor what is too dark or small to make out."""
+    big = column(rows, "pixels") > np.where(column(rows, "distance") > 4.0, 150, 400)
+    height = column(rows, "y1") - column(rows, "y0")
+    return big & (column(rows, "seen_of_part") > 0.25) & (column(rows, "light") > 6.0) & (height > 0.05)
+
+
+def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
+    """Pictures uint8 (B, 256, 320, 3) and rows (batch, kind, centre x, y, width, height [px], asked).
+
+    Args:
+        pictures: the set.
+        chosen: (shard, picture) of each, shape (B, 2).
+        rng: to mirror and to shift colours by chance; None for neither.
+    """
+    images = np.full((len(chosen), NET_HEIGHT, WIDTH, 3), 127, np.uint8)
+    boxes = []
+    for b, (shard, i) in enumerate(chosen):
+        images[b, MARGIN:-MARGIN] = pictures.shards[shard][i]
+        rows = pictures.labels[shard][i]
+        x0, y0, x1, y1 = (column(rows, k) for k in ("x0", "y0", "x1", "y1"))
+        if rng is not None:
+            if rng.random() < 0.5:
+                images[b] = images[b, :, ::-1]
+                x0, x1 = 1 - x1, 1 - x0
+            images[b, MARGIN:-MARGIN] = _recolour(images[b, MARGIN:-MARGIN], rng)
+        centre = [(x0 + x1) / 2 * WIDTH, (y0 + y1) / 2 * HEIGHT + MARGIN]
+        size = [(x1 - x0) * WIDTH, (y1 - y0) * HEIGHT]
+        boxes.append(np.stack([np.full(len(rows), b), column(rows, "kind"), *centre, *size, asked(rows)], axis=1))
+    return images, np.concatenate(boxes).astype(np.float32)
+
+
+def _recolour(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    if rng.random() < 0.4:
+        return picture
+    levels = np.arange(256, dtype=np.float32)
+    gains = np.exp(rng.normal(0, 0.15)) * (1 + rng.normal(0, 0.06, 3))
+    tables = [np.clip(levels * gain + rng.normal(0, 4), 0, 255).astype(np.uint8) for gain in gains]
+    order = rng.permutation(3) if rng.random() < 0.1 else np.arange(3)
+    return np.stack([tables[c][picture[..., order[c]]] for c in range(3)], axis=-1)

@@ -1,0 +1,21 @@
+"""What a row of labels says, and the size of the pictures of a set."""
+
+from __future__ import annotations
+
+import numpy as np
+
+WIDTH, HEIGHT = 320, 240
+COLUMNS = (
+    "picture", "kind", "x0", "y0", "x1", "y1", "distance", "seen_of_whole", "seen_of_part", "pixels", "light", "test",
+)  # fmt: skip
+_AT = {name: i for i, name in enumerate(COLUMNS)}
+
+
+def column(rows: np.ndarray, name: str) -> np.ndarray:
+    """One column of label rows by its name.
+
+    `kind` is 0 for a person and 1 for a hydrant; x0 to y1 are shares of the picture, `distance` [m] along the floor;
+    `seen_of_whole` is the share of the figure's outline that is seen, `seen_of_part` the share of what lies inside the
+    picture's edges; `pixels` counts those seen at 640 x 480, `light` is the picture's mean level.
+    """
+    return rows[:, _AT[name]]

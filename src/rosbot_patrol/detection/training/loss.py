@@ -1,0 +1,126 @@
+"""How far a network's values are from the boxes that pictures hold: YOLOv3's decoding, generalised-IoU boxes.
+
+Each box is learnt by every anchor whose shape overlaps it by `MATCH`, and by its best one in any case. Predictions that
+overlap a box well but are not made for it, and all that lie on something too hidden to ask for, are left alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+import torch.nn.functional as fn
+
+from rosbot_patrol.detection.darknet_layers import Yolo
+
+MATCH = 0.45
+IGNORE_IOU = 0.5
+
+
+@dataclass
+class Truth:
+    """Boxes of a batch, in the network's input: shape (N, 4) centre and size [px], batch index, class, and whether
+    the box is asked for (else it is left alone).
+    """
+
+    boxes: torch.Tensor
+    batch: torch.Tensor
+    kinds: torch.Tensor
+    asked: torch.Tensor
+
+
+def yolo_loss(heads: list[Yolo], values: list[torch.Tensor], truth: Truth, width: int) -> dict[str, torch.Tensor]:
+    """Parts of the loss: box, objectness, kind; each already weighted."""
+    sizes = torch.tensor([a for head in heads for a in head.anchors])
+    overlap = _shape_iou(truth.boxes[:, 2:], sizes)
+    take = (overlap > MATCH) | (overlap == overlap.max(dim=1, keepdim=True).values)
+    take &= truth.asked[:, None]
+    parts = {name: values[0].new_zeros(()) for name in ("box", "object", "kind")}
+    matched = torch.zeros(())
+    first = 0
+    for head, raw in zip(heads, values, strict=True):
+        count = len(head.anchors)
+        found = _head_loss(head, raw.float(), truth, take[:, first : first + count], width)
+        for name in ("box", "object", "kind"):
+            parts[name] = parts[name] + found[name]
+        matched = matched + found["matched"]
+        first += count
+    batch = values[0].shape[0]
+    matched = matched.clamp(min=1.0)
+    return {
+        "box": 2.0 * parts["box"] / matched,
+        "object": 4.0 * parts["object"] / batch / 2.0,
+        "kind": 0.5 * parts["kind"] / matched,
+    }
+
+
+def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, width: int) -> dict[str, torch.Tensor]:
+    batch, _, rows, columns = raw.shape
+    stride = width / columns
+    grid = raw.view(batch, len(head.anchors), 5 + head.classes, rows, columns)
+    which, anchor = take.nonzero(as_tuple=True)
+    place = truth.batch[which]
+    column = (truth.boxes[which, 0] / stride).long().clamp(0, columns - 1)
+    row = (truth.boxes[which, 1] / stride).long().clamp(0, rows - 1)
+    target = torch.zeros(batch, len(head.anchors), rows, columns)
+    weight = _weight(head, grid, truth, stride)
+    result = {"box": raw.new_zeros(()), "kind": raw.new_zeros(()), "matched": torch.tensor(float(len(which)))}
+    if len(which):
+        mine = grid[place, anchor, :, row, column]
+        sizes = torch.tensor(head.anchors)[anchor]
+        centre = (torch.sigmoid(mine[:, :2]) + torch.stack([column, row], 1)) * stride
+        predicted = torch.cat([centre, torch.exp(mine[:, 2:4].clamp(max=6)) * sizes], 1)
+        result["box"] = (1 - _generalised_iou(predicted, truth.boxes[which])).sum()
+        wanted = fn.one_hot(truth.kinds[which], head.classes).float()
+        result["kind"] = fn.binary_cross_entropy_with_logits(mine[:, 5:], wanted, reduction="sum")
+        target[place, anchor, row, column] = 1.0
+        weight[place, anchor, row, column] = 1.0
+    # focal: the many cells that are surely empty count little
+    logits = grid[:, :, 4]
+    surprise = (torch.sigmoid(logits) - target).abs().detach() ** 1.5
+    each = fn.binary_cross_entropy_with_logits(logits, target, reduction="none")
+    result["object"] = (each * surprise * weight * (1 + target)).sum()
+    return result
+
+
+def _weight(head: Yolo, grid: torch.Tensor, truth: Truth, stride: float) -> torch.Tensor:
+    """0 where a prediction is left alone, else 1."""
+    batch, anchors, _, rows, columns = grid.shape
+    weight = torch.ones(batch, anchors, rows, columns)
+    with torch.no_grad():
+        y, x = torch.meshgrid(torch.arange(rows), torch.arange(columns), indexing="ij")
+        centre = (torch.sigmoid(grid[:, :, :2]) + torch.stack([x, y])) * stride
+        size = torch.exp(grid[:, :, 2:4].clamp(max=6)) * torch.tensor(head.anchors)[None, :, :, None, None]
+        for i in range(len(truth.boxes)):
+            b, box = truth.batch[i], truth.boxes[i]
+            low = torch.maximum(centre[b] - size[b] / 2, (box[:2] - box[2:] / 2)[None, :, None, None])
+            high = torch.minimum(centre[b] + size[b] / 2, (box[:2] + box[2:] / 2)[None, :, None, None])
+            shared = (high - low).clamp(min=0).prod(dim=1)
+            if bool(truth.asked[i]):
+                union = size[b].prod(dim=1) + box[2] * box[3] - shared
+                weight[b][shared / union > IGNORE_IOU] = 0.0
+            else:
+                weight[b][shared / size[b].prod(dim=1).clamp(min=1.0) > 0.3] = 0.0
+                middle = (((x + 0.5) * stride - box[0]).abs() < box[2] / 2 + stride) & (
+                    ((y + 0.5) * stride - box[1]).abs() < box[3] / 2 + stride
+                )
+                weight[b][middle.expand(anchors, -1, -1)] = 0.0
+    return weight
+
+
+def _shape_iou(sizes: torch.Tensor, anchors: torch.Tensor) -> torch.Tensor:
+    shared = torch.minimum(sizes[:, None], anchors[None]).prod(dim=2)
+    return shared / (sizes.prod(dim=1)[:, None] + anchors.prod(dim=1)[None] - shared)
+
+
+def _generalised_iou(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    a_low, a_high, b_low, b_high = (
+        a[:, :2] - a[:, 2:] / 2,
+        a[:, :2] + a[:, 2:] / 2,
+        b[:, :2] - b[:, 2:] / 2,
+        b[:, :2] + b[:, 2:] / 2,
+    )
+    shared = (torch.minimum(a_high, b_high) - torch.maximum(a_low, b_low)).clamp(min=0).prod(dim=1)
+    union = a[:, 2:].prod(dim=1) + b[:, 2:].prod(dim=1) - shared
+    hull = (torch.maximum(a_high, b_high) - torch.minimum(a_low, b_low)).prod(dim=1)
+    return shared / union.clamp(min=1e-6) - (hull - union) / hull.clamp(min=1e-6)

@@ -1,0 +1,232 @@
+"""Write a set of labelled pictures as shards on disk: seeded, by several processes, going on where it was left.
+
+A shard NAME-0007.npz holds `boxes`, one row per visible actor (see `labels.py`), and NAME-0007.npy the pictures as
+the network gets them without its grey margins, uint8, shape (count, 240, 320, 3).
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import multiprocessing
+import os
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from rosbot_patrol.detection.training import scenes
+from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
+from rosbot_patrol.simulation.actors import person_body, person_pose_parts
+from rosbot_patrol.simulation.renderer import EglRenderer, Light
+from rosbot_patrol.simulation.scene import Intrinsics, Matrix
+from rosbot_patrol.simulation.textures import SIDE, Texture, standard_textures
+from rosbot_patrol.simulation.world import World, load_world
+
+PER_SHARD = 500
+VIEWS = 5
+_FORWARD = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
+
+
+class Studio:
+    """A renderer with the textures of training, and the house."""
+
+    def __init__(self, world: World | None) -> None:
+        textures = standard_textures()
+        painter = EglRenderer()
+        rng = np.random.default_rng(99)
+        for i, look in enumerate(scenes.poster_looks(rng)):
+            textures[f"poster{i}"] = _poster(painter, look, rng)
+        painter.close()
+        for i in range(4):
+            textures.update({f"{k}{i}": v for k, v in standard_textures(100 + i).items() if k in ("picture", "books")})
+        self.renderer = EglRenderer(textures=textures)
+        self.world = world
+
+    def shard(self, seed: list[int], count: int, *, test: bool) -> tuple[np.ndarray, np.ndarray]:
+        """`count` pictures and the rows of their labels."""
+        rng = np.random.default_rng(seed)
+        pictures, rows = [], []
+        while len(pictures) < count:
+            scene = scenes.draw_house(rng, self.world) if self.world and rng.random() < 0.3 else scenes.draw_room(rng)
+            self.renderer.clear()
+            self.renderer.light = scene.light
+            for body in scene.bodies:
+                self.renderer.add(body)
+            for _ in range(VIEWS):
+                camera = scenes.draw_camera(scene, rng)
+                if camera is None or len(pictures) == count:
+                    break
+                picture, labels = self._view(scene, camera, rng, test)
+                rows += [[len(pictures), *label] for label in labels]
+                pictures.append(picture)
+        return np.array(pictures), np.array(rows, np.float32).reshape(-1, len(COLUMNS))
+
+    def _view(self, scene: scenes.Scene, camera: tuple[float, float, float], rng: np.random.Generator, test: bool):
+        actors = scenes.draw_actors(scene, camera, rng, reserved=test)
+        for i, actor in enumerate(actors):
+            self.renderer.add(actor.body, label=i + 1)
+            self.renderer.move(actor.body.name, actor.pose)
+            if actor.parts is not None:
+                self.renderer.pose_visuals(actor.body.name, actor.parts)
+            for extra in actor.extra:
+                self.renderer.add(extra)
+                self.renderer.move(extra.name, extra.pose)
+        optical, intrinsics = _eye(camera, rng)
+        picture = self.renderer.render(optical, intrinsics)[0]
+        seen = self.renderer.labels()
+        labels = [
+            _label(actor, seen == i + 1, optical, intrinsics, camera, float(picture.mean()), test)
+            for i, actor in enumerate(actors)
+        ]
+        for actor in actors:
+            for body in (actor.body, *actor.extra):
+                self.renderer.remove(body.name)
+        return degrade(picture, rng), [label for label in labels if label]
+
+
+def degrade(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """What a camera, a turning robot and jpeg make of a picture, and the network's own reduction to 320 x 240."""
+    out = picture
+    if rng.random() < 0.7:
+        gains = np.exp(rng.normal(0, 0.25)) * (1 + rng.normal(0, 0.05, 3))
+        levels = np.clip(np.arange(256)[:, None] * gains / 255.0, 0, 1) ** np.exp(rng.normal(0, 0.2))
+        out = cv2.LUT(out, (255.0 * levels).astype(np.uint8)[None])
+    if rng.random() < 0.3:
+        out = cv2.blur(out, (int(rng.integers(2, 15)), 1))
+    if rng.random() < 0.15:
+        out = cv2.GaussianBlur(out, (0, 0), float(rng.uniform(0.5, 1.3)))
+    if rng.random() < 0.6:
+        out = cv2.add(out, _noise(rng, float(rng.uniform(1, 9))), dtype=cv2.CV_8U)
+    if rng.random() < 0.7:
+        quality = 80 if rng.random() < 0.6 else int(rng.integers(45, 97))
+        out = cv2.imdecode(cv2.imencode(".jpg", out, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_COLOR)
+    return reduce(out, exact=rng.random() < 0.8)
+
+
+@functools.cache
+def _noise_bank() -> np.ndarray:
+    return np.random.default_rng(5).normal(0, 20, (1200, 1200, 3)).astype(np.int16)
+
+
+def _noise(rng: np.random.Generator, level: float) -> np.ndarray:
+    """Noise of a standard deviation of `level`, cut out of a bank anywhere."""
+    y, x = rng.integers(0, 700), rng.integers(0, 540)
+    return _noise_bank()[y : y + 480, x : x + 640] * np.int16(level * 12.8) >> 8
+
+
+def reduce(picture: np.ndarray, *, exact: bool = True) -> np.ndarray:
+    """640 x 480 to 320 x 240, as darknet's letterbox does it, or by area."""
+    if not exact:
+        return cv2.resize(picture, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    x = np.linspace(0, picture.shape[1] - 1, WIDTH, dtype=np.float32)
+    y = np.linspace(0, picture.shape[0] - 1, HEIGHT, dtype=np.float32)
+    return cv2.remap(picture, *np.meshgrid(x, y), cv2.INTER_LINEAR)
+
+
+def _eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[Matrix, Intrinsics]:
+    x, y, yaw = camera
+    pitch, roll = rng.normal(0, 0.012, 2)
+    tilt = np.array([[1, 0, pitch, 0], [0, 1, -roll, 0], [-pitch, roll, 1, 0], [0, 0, 0, 1.0]])
+    tilt[:3, :3] = np.linalg.qr(tilt[:3, :3])[0] * np.sign(np.diag(np.linalg.qr(tilt[:3, :3])[1]))
+    zoom = float(rng.uniform(0.97, 1.03))
+    height = 0.22 + float(rng.normal(0, 0.01))
+    intrinsics = Intrinsics(fx=554.3827 * zoom, fy=554.3827 * zoom)
+    return scenes.placed(x, y, height, yaw) @ tilt @ _FORWARD, intrinsics
+
+
+def _label(actor, mask, optical: Matrix, intrinsics: Intrinsics, camera, light: float, test: bool):
+    pixels = int(mask.sum())
+    if pixels < 12:
+        return None
+    columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
+    whole, part = _silhouette(actor, optical, intrinsics)
+    distance = float(np.hypot(actor.pose[0, 3] - camera[0], actor.pose[1, 3] - camera[1]))
+    kind = 0 if actor.body.kind == "person" else 1
+    w, h = intrinsics.width, intrinsics.height
+    corners = [columns[0] / w, rows[0] / h, (columns[-1] + 1) / w, (rows[-1] + 1) / h]
+    return [kind, *corners, distance, pixels / max(whole, pixels), pixels / max(part, pixels), pixels, light, test]
+
+
+def _silhouette(actor, optical: Matrix, intrinsics: Intrinsics) -> tuple[int, int]:
+    """Pixels of an actor were nothing before it: on a picture without edges, and inside the real one's edges."""
+    scale, pad = 2, 640
+    canvas = np.zeros(((480 + 2 * pad) // scale, (640 + 2 * pad) // scale), np.uint8)
+    eye_from_body = np.linalg.inv(optical) @ actor.pose
+    poses = actor.parts if actor.parts is not None else [v.pose for v in actor.body.visuals]
+    for visual, pose in zip(actor.body.visuals, poses, strict=True):
+        vertices = visual.shape.vertices if visual.shape.vertices is not None else _corners(visual.shape)
+        points = vertices @ (eye_from_body @ pose)[:3, :3].T + (eye_from_body @ pose)[:3, 3]
+        depth = np.maximum(points[:, 2], 0.1)
+        u = intrinsics.fx * points[:, 0] / depth + intrinsics.cx + pad
+        v = intrinsics.fy * points[:, 1] / depth + intrinsics.cy + pad
+        hull = cv2.convexHull((np.stack([u, v], axis=1) / scale).astype(np.float32))
+        cv2.fillConvexPoly(canvas, hull.astype(np.int32), 1)
+    inner = canvas[pad // scale : (pad + 480) // scale, pad // scale : (pad + 640) // scale]
+    return int(canvas.sum()) * scale * scale, int(inner.sum()) * scale * scale
+
+
+def _corners(shape) -> np.ndarray:
+    from rosbot_patrol.simulation.meshes import mesh_of
+
+    return mesh_of(shape).positions
+
+
+def _poster(painter: EglRenderer, look, rng: np.random.Generator) -> Texture:
+    painter.clear()
+    painter.light = Light(sky=tuple(rng.uniform(0.1, 1, 3)))
+    painter.add(person_body("model", look))
+    painter.move("model", scenes.placed(0, 0, 0, float(rng.uniform(2.2, 4.0))))
+    painter.pose_visuals("model", person_pose_parts(look, float(rng.random()), bool(rng.random() < 0.5)))
+    high = float(rng.uniform(0.7, 1.3))
+    eye = scenes.placed(-3.0, 0.0, high) @ _FORWARD
+    view = Intrinsics(width=SIDE, height=SIDE, fx=200.0, fy=150.0, cx=SIDE / 2, cy=SIDE / 2)
+    return Texture(painter.render(eye, view)[0][::-1].copy(), 0.0)
+
+
+def _work(job: tuple[Path, str, int, int, Path | None, bool]) -> str:
+    folder, name, seed, index, house, test = job
+    target = folder / f"{name}-{index:04d}.npy"
+    if target.exists():
+        return target.name
+    if os.nice(0) < 5:
+        os.nice(5)
+    cv2.setNumThreads(1)
+    global _studio
+    if _studio is None:
+        _studio = Studio(load_world(house) if house else None)
+    pictures, boxes = _studio.shard([seed, index, int(test)], PER_SHARD, test=test)
+    np.savez_compressed(target.with_suffix(".npz"), boxes=boxes)
+    part = target.with_suffix(".part.npy")
+    np.save(part, pictures)
+    part.rename(target)
+    return target.name
+
+
+_studio: Studio | None = None
+
+
+def main() -> None:
+    """Make a set from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--name", default="train")
+    parser.add_argument("--pictures", type=int, default=20000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--house", type=Path, help="a world in which 30 %% of the pictures are taken")
+    parser.add_argument("--test", action="store_true", help="people whom training never draws")
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    shards = -(-options.pictures // PER_SHARD)
+    jobs = [(options.folder, options.name, options.seed, i, options.house, options.test) for i in range(shards)]
+    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
+        for done, name in enumerate(pool.imap_unordered(_work, jobs), 1):
+            sys.stdout.write(f"\r{done}/{shards} shards ({name}) ")
+            sys.stdout.flush()
+    sys.stdout.write("\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,332 @@
+"""Scenes by chance: a room, or the house of a world file, with furniture and light; and where people could stand in it.
+
+Looks and postures that `simulation/looks.py` and `simulation/actors.py` reserve for tests are drawn only for test sets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rosbot_patrol.detection.training.furniture import (
+    any_colour,
+    box,
+    build,
+    chair,
+    draw_thing,
+    placed,
+    tube,
+    wood_colour,
+)
+from rosbot_patrol.simulation.actors import POSTURES, hydrant_body, person_body, person_pose_parts
+from rosbot_patrol.simulation.looks import HEIGHTS, LOOKS, RESERVED_HEIGHTS, Look, draw_look
+from rosbot_patrol.simulation.renderer import Light
+from rosbot_patrol.simulation.scene import Body, Material, Matrix, Shape, Visual
+from rosbot_patrol.simulation.world import World
+
+Rng = np.random.Generator
+FLOORS = ("wood", "tiles", "carpet", "marble", "plaster", "checks", "")
+WALLS = ("plaster", "plaster", "", "bricks", "stripes", "tiles", "wood", "marble", "checks")
+POSTERS = 8
+
+
+@dataclass
+class Place:
+    """An upright box that stands in the way: middle, half sizes and yaw on the floor."""
+
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    yaw: float
+
+
+@dataclass
+class Scene:
+    """Bodies that stand still, what is in the way, light, and the extent in which cameras are put."""
+
+    bodies: list[Body]
+    light: Light
+    extent: tuple[float, float, float, float]
+    places: list[Place] = field(default_factory=list)
+
+    def is_free(self, x: float, y: float, margin: float) -> bool:
+        """Whether nothing stands within `margin` of a point."""
+        return all(not _near(p, x, y, margin) for p in self.places)
+
+
+@dataclass
+class Actor:
+    """A person or a hydrant in a picture."""
+
+    body: Body
+    pose: Matrix
+    parts: Matrix | None
+    extra: list[Body]
+
+
+def draw_room(rng: Rng) -> Scene:
+    """A room by chance."""
+    x, y, z = float(rng.uniform(3.0, 14.0)), float(rng.uniform(3.0, 11.0)), float(rng.uniform(2.1, 3.2))
+    bodies = [_floor(rng)]
+    places: list[Place] = []
+    plain = rng.random() < 0.45
+    colour, texture = _wall_paint(rng), str(rng.choice(WALLS))
+    sides = [(x / 2, 0, 0.15, y), (-x / 2, 0, 0.15, y), (0, y / 2, x, 0.15), (0, -y / 2, x, 0.15)]
+    for i, (wx, wy, sx, sy) in enumerate(sides):
+        if not plain:
+            colour, texture = _wall_paint(rng), str(rng.choice(WALLS))
+        if rng.random() < 0.93:
+            bodies.append(build(f"wall{i}", [(box(sx, sy, z), (0, 0, z / 2), colour, texture)], placed(wx, wy)))
+        places.append(Place(wx, wy, sx / 2, sy / 2, 0.0))
+    for i in range(int(rng.integers(0, 4))):
+        long, yaw = float(rng.uniform(0.6, 4.0)), float(rng.choice([0, np.pi / 2, rng.uniform(0, 3)]))
+        wx, wy = float(rng.uniform(-x, x) / 2), float(rng.uniform(-y, y) / 2)
+        high = z if rng.random() < 0.8 else float(rng.uniform(0.4, 1.5))
+        bodies.append(
+            build(f"part{i}", [(box(long, 0.15, high), (0, 0, high / 2), colour, texture)], placed(wx, wy, 0, yaw))
+        )
+        places.append(Place(wx, wy, long / 2, 0.08, yaw))
+    if rng.random() < 0.5:
+        ceiling = Shape(kind="plane", size=(x, y))
+        level = float(rng.uniform(0.5, 1.0))
+        bodies.append(build("ceiling", [(ceiling, (0, 0, z), (level, level, level), "")], placed(0, 0)))
+    bodies += _wall_things(rng, x, y, z)
+    scene = Scene(bodies, _draw_light(rng, x, y, z), (-x / 2, x / 2, -y / 2, y / 2), places)
+    furnish(scene, rng, int(rng.integers(0, 16)))
+    return scene
+
+
+def draw_house(rng: Rng, world: World) -> Scene:
+    """The house of a world, in its own colours or painted by chance, with some more furniture."""
+    bodies = list(world.bodies)
+    places = [p for b in bodies for p in _footprints(b)]
+    if rng.random() < 0.75:
+        bodies = [_repaint(b, rng) for b in bodies]
+    walls = np.array([(p.x, p.y) for p in places])
+    low, high = walls.min(axis=0), walls.max(axis=0)
+    light = _draw_light(rng, *(high - low), 2.5) if rng.random() < 0.8 else Light()
+    scene = Scene(bodies, light, (low[0], high[0], low[1], high[1]), places)
+    furnish(scene, rng, int(rng.integers(0, 25)))
+    return scene
+
+
+def furnish(scene: Scene, rng: Rng, count: int) -> None:
+    """Put things by chance where there is room."""
+    x0, x1, y0, y1 = scene.extent
+    for i in range(count):
+        x, y = float(rng.uniform(x0, x1)), float(rng.uniform(y0, y1))
+        if scene.is_free(x, y, 0.35):
+            body = draw_thing(rng, f"thing{i}", placed(x, y, 0, float(rng.uniform(0, 2 * np.pi))))
+            scene.bodies.append(body)
+            scene.places += _footprints(body)
+
+
+def draw_camera(scene: Scene, rng: Rng) -> tuple[float, float, float] | None:
+    """x, y, yaw of a robot with some room about it, or None where none was found."""
+    x0, x1, y0, y1 = scene.extent
+    for _ in range(60):
+        x, y = float(rng.uniform(x0, x1)), float(rng.uniform(y0, y1))
+        if scene.is_free(x, y, 0.3):
+            return x, y, float(rng.uniform(-np.pi, np.pi))
+    return None
+
+
+def draw_actors(scene: Scene, camera: tuple[float, float, float], rng: Rng, *, reserved: bool = False) -> list[Actor]:
+    """People and hydrants before a camera, where there is room for them; often none at all.
+
+    Args:
+        scene: where; what stands in the way is kept clear of.
+        camera: x, y, yaw.
+        rng: chance.
+        reserved: draw people that training never sees.
+    """
+    people = int(rng.choice([0, 1, 2, 3, 4], p=[0.30, 0.47, 0.14, 0.06, 0.03]))
+    hydrants = int(rng.choice([0, 1, 2], p=[0.76, 0.20, 0.04]))
+    actors: list[Actor] = []
+    for i in range(people + hydrants):
+        spot = _spot(scene, camera, rng)
+        if spot is None:
+            continue
+        pose = placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi)))
+        make = draw_person if i < people else _draw_hydrant
+        actors.append(make(rng, f"actor{i}", pose, reserved))
+        if not (i < people and rng.random() < 0.25):
+            scene_margin = Place(spot[0], spot[1], 0.15, 0.15, 0.0)
+            scene.places.append(scene_margin)
+    for _ in actors:
+        if scene.places and scene.places[-1].half_x == 0.15:
+            scene.places.pop()
+    return actors
+
+
+def draw_person(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
+    """A person by chance; a reserved one has a height, colour, mask or posture that training never draws."""
+    look = draw_look(rng) if rng.random() < 0.9 else _named(rng)
+    posture = str(rng.choice(POSTURES, p=[0.80, 0.12, 0.08]))
+    if reserved:
+        look = draw_reserved(rng)
+        posture = str(rng.choice(["standing", "creeping", "sitting", "crouching"], p=[0.55, 0.25, 0.1, 0.1]))
+    walking = posture == "creeping" or bool(rng.random() < 0.55)
+    parts = person_pose_parts(look, float(rng.random()), walking, posture)  # type: ignore[arg-type]
+    extra: list[Body] = []
+    if posture == "sitting" and rng.random() < 0.85:
+        seat = float(parts[0][2, 3]) - 0.09
+        extra.append(build(name + "_chair", chair(rng, seat), pose @ placed(-0.05, 0.0)))
+    return Actor(person_body(name, look), pose, parts, extra)
+
+
+def draw_reserved(rng: Rng) -> Look:
+    """A look that training never draws."""
+    tests = [look for look in LOOKS.values() if look.name.startswith("intruder_test_")]
+    if rng.random() < 0.4:
+        return tests[int(rng.integers(len(tests)))]
+    look = replace(draw_look(rng), height=float(rng.uniform(*RESERVED_HEIGHTS)))
+    if rng.random() < 0.5:
+        return replace(look, mask=any_colour(rng), hair_style="bald")
+    return replace(look, top=tests[1].top, hair_style="hood")
+
+
+def poster_looks(rng: Rng) -> list[Look]:
+    """Who is on the posters on the walls: people as flat pictures, which are no people."""
+    return [replace(draw_look(rng), height=float(rng.uniform(*HEIGHTS))) for _ in range(POSTERS)]
+
+
+def _named(rng: Rng) -> Look:
+    plain = [look for look in LOOKS.values() if not look.name.startswith("intruder_test_")]
+    return plain[int(rng.integers(len(plain)))]
+
+
+def _draw_hydrant(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
+    red = (float(rng.uniform(0.5, 0.95)), float(rng.uniform(0.03, 0.2)), float(rng.uniform(0.02, 0.15)))
+    yellow = (float(rng.uniform(0.7, 1.0)), float(rng.uniform(0.55, 0.8)), float(rng.uniform(0.02, 0.2)))
+    colour = red if rng.random() < 0.6 else yellow if rng.random() < 0.6 else any_colour(rng)
+    caps = any_colour(rng) if rng.random() < 0.5 else None
+    return Actor(hydrant_body(name, colour, caps=caps, height=float(rng.uniform(0.6, 0.95))), pose, None, [])
+
+
+def _spot(scene: Scene, camera: tuple[float, float, float], rng: Rng) -> tuple[float, float] | None:
+    x, y, yaw = camera
+    for _ in range(25):
+        near = float(np.exp(rng.uniform(np.log(0.7), np.log(8.5))))
+        distance = near if rng.random() < 0.5 else float(rng.uniform(1.2, 8.5))
+        bearing = yaw + float(rng.uniform(-0.6, 0.6))
+        px, py = x + distance * np.cos(bearing), y + distance * np.sin(bearing)
+        x0, x1, y0, y1 = scene.extent
+        inside = x0 < px < x1 and y0 < py < y1
+        if inside and scene.is_free(px, py, 0.22) and (rng.random() < 0.1 or _sees(scene, (x, y), (px, py))):
+            return float(px), float(py)
+    return None
+
+
+def _sees(scene: Scene, start: tuple[float, float], end: tuple[float, float]) -> bool:
+    """Whether no wall stands between two points."""
+    ways = np.linspace(0.05, 0.95, 24)
+    points = np.array(start) + ways[:, None] * (np.array(end) - np.array(start))
+    walls = [p for p in scene.places if max(p.half_x, p.half_y) > 0.5 and min(p.half_x, p.half_y) < 0.1]
+    return all(not _near(p, px, py, 0.0) for p in walls for px, py in points)
+
+
+def _near(place: Place, x: float, y: float, margin: float) -> bool:
+    c, s = np.cos(place.yaw), np.sin(place.yaw)
+    dx, dy = x - place.x, y - place.y
+    return bool(abs(c * dx + s * dy) < place.half_x + margin and abs(-s * dx + c * dy) < place.half_y + margin)
+
+
+def _footprints(body: Body) -> list[Place]:
+    places = []
+    for visual in body.visuals:
+        shape, size = visual.shape, visual.shape.size
+        if shape.kind == "plane":
+            continue
+        matrix = body.pose @ visual.pose
+        if matrix[2, 3] > 1.6:
+            continue
+        if shape.kind == "box":
+            half = (size[0] / 2, size[1] / 2)
+        elif shape.vertices is not None:
+            half = tuple(np.abs(shape.vertices[:, :2]).max(axis=0))  # type: ignore[assignment]
+        else:
+            half = (size[0], size[0]) if size else (0.3, 0.3)
+        yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
+        places.append(Place(float(matrix[0, 3]), float(matrix[1, 3]), *half, yaw))
+    return places
+
+
+def _floor(rng: Rng) -> Body:
+    shape = Shape(kind="plane", size=(60, 60))
+    colour = wood_colour(rng) if rng.random() < 0.6 else any_colour(rng)
+    return build("floor", [(shape, (0, 0, 0), colour, str(rng.choice(FLOORS)))], placed(0, 0))
+
+
+def _wall_paint(rng: Rng) -> tuple[float, float, float]:
+    if rng.random() < 0.3:
+        return any_colour(rng)
+    level = float(rng.uniform(0.45, 1.0))
+    r, g, b = np.clip(level + rng.uniform(-0.08, 0.08, 3), 0, 1)
+    return (float(r), float(g), float(b))
+
+
+def _wall_things(rng: Rng, x: float, y: float, z: float) -> list[Body]:
+    """Posters, pictures, windows, doors and skirtings on the walls."""
+    things = []
+    for i in range(int(rng.integers(0, 7))):
+        wide, high = float(rng.uniform(0.3, 1.4)), float(rng.uniform(0.3, 1.3))
+        middle = float(rng.uniform(0.9, max(z - 0.4, 1.0)))
+        kind = rng.random()
+        colour, texture = (0.95, 0.95, 0.95), "picture"
+        if kind < 0.3:
+            texture, wide, high = f"poster{int(rng.integers(POSTERS))}", 0.55 * high + 0.2, high
+        elif kind < 0.6:
+            colour, texture = any_colour(rng), ""
+            if rng.random() < 0.5:
+                wide, high, middle = 0.9, 2.0, 1.0
+        side, along = int(rng.integers(4)), float(rng.uniform(-0.4, 0.4))
+        yaw = side * np.pi / 2
+        reach = (x / 2, y / 2, x / 2, y / 2)[side] - 0.085
+        off = along * (y, x, y, x)[side]
+        px, py = reach * np.cos(yaw) - off * np.sin(yaw), reach * np.sin(yaw) + off * np.cos(yaw)
+        thing = box(0.03, wide, high)
+        things.append(build(f"on_wall{i}", [(thing, (0, 0, middle), colour, texture)], placed(px, py, 0, yaw)))
+    if rng.random() < 0.2:
+        pipe = tube(float(rng.uniform(0.02, 0.1)), z)
+        things.append(build("pipe", [(pipe, (x / 2 - 0.2, y / 2 - 0.3, z / 2), any_colour(rng), "")], placed(0, 0)))
+    return things
+
+
+def _draw_light(rng: Rng, x: float, y: float, z: float) -> Light:
+    if rng.random() < 0.2:
+        return Light()
+    level = 1.35 * float(np.exp(rng.uniform(np.log(0.25), 0.0))) if rng.random() < 0.3 else float(rng.uniform(0.8, 1.5))
+    warm = np.array([1.0, 1.0, 1.0]) + rng.uniform(-0.15, 0.15, 3)
+    sun, lamp = rng.dirichlet([1.2, 1.0]) * rng.uniform(0.1, 0.9)
+    soft = max(1.0 - sun, 0.35)
+    tilt = rng.uniform(-1, 1, 3)
+    return Light(
+        sun_direction=(float(tilt[0]), float(tilt[1]), float(rng.uniform(0.1, 1.0))),
+        sun=_rgb(warm * level * sun),
+        above=_rgb(level * soft * rng.uniform(0.5, 0.95) * (2 - warm)),
+        below=_rgb(level * soft * rng.uniform(0.2, 0.7)),
+        lamp_place=(float(rng.uniform(-x, x) / 2), float(rng.uniform(-y, y) / 2), float(z * rng.uniform(0.4, 0.95))),
+        lamp=_rgb(warm * level * lamp * 1.5),
+        lamp_reach=float(rng.uniform(1.5, 6.0)),
+        sky=_rgb(rng.uniform(0, 1, 3) * 0.5 + rng.uniform(0, 0.5)),
+    )
+
+
+def _rgb(values: np.ndarray | float) -> tuple[float, float, float]:
+    r, g, b = np.broadcast_to(np.clip(values, 0.0, 1.5), 3)
+    return (float(r), float(g), float(b))
+
+
+def _repaint(body: Body, rng: Rng) -> Body:
+    texture = str(rng.choice(FLOORS if body.kind == "floor" else WALLS if body.kind == "wall" else ("", "wood", "")))
+    colour = _wall_paint(rng) if body.kind == "wall" else wood_colour(rng)
+    keep = body.kind == "furniture"
+    visuals = tuple(_painted(v, (*(any_colour(rng) if keep else colour), 1.0), texture) for v in body.visuals)
+    return replace(body, visuals=visuals)
+
+
+def _painted(visual: Visual, rgba: tuple[float, float, float, float], texture: str) -> Visual:
+    return replace(visual, material=Material(rgba=rgba, texture=texture))

@@ -1,0 +1,185 @@
+"""Train the network of a cfg file on the pictures that `render.py` made; goes on from its last checkpoint.
+
+Seeded: order of the pictures, their recolouring and the first weights come from `--seed`. Writes darknet weights of
+the running mean of the weights (EMA) after every epoch.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import math
+import os
+import queue
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from rosbot_patrol.detection.darknet_cfg import read_cfg
+from rosbot_patrol.detection.darknet_weights import format_weights
+from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
+from rosbot_patrol.detection.training.dataset import Pictures, batch_of
+from rosbot_patrol.detection.training.loss import Truth, yolo_loss
+from rosbot_patrol.detection.training.network import Darknet
+
+
+class Trainer:
+    """A network in training, with its optimiser and its running mean."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        torch.manual_seed(options.seed)
+        self.options = options
+        if options.anchors and not options.checkpoint.exists():
+            write_anchors(options.cfg, find_anchors(Pictures.open(options.data, options.name), 6, options.seed))
+        self.spec = read_cfg(str(options.cfg))
+        self.network = Darknet(self.spec).to(memory_format=torch.channels_last)
+        self.network.set_prior(0.01)
+        self.mean = copy.deepcopy(self.network).eval()
+        decayed = [p for p in self.network.parameters() if p.ndim > 1]
+        plain = [p for p in self.network.parameters() if p.ndim <= 1]
+        groups = [{"params": decayed, "weight_decay": 5e-3}, {"params": plain, "weight_decay": 0.0}]
+        self.optimiser = torch.optim.AdamW(groups, lr=options.rate)
+        self.steps_each = options.samples // options.batch
+        self.total = self.steps_each * options.epochs
+        self.step = 0
+        self.epoch = 0
+
+    def run(self) -> None:
+        """Train all epochs that are left."""
+        self._resume()
+        while self.epoch < self.options.epochs:
+            self._epoch()
+            self.epoch += 1
+            self._save()
+
+    def _epoch(self) -> None:
+        rng = np.random.default_rng([self.options.seed, self.epoch])
+        pictures = Pictures.open(self.options.data, self.options.name)
+        index = self._share(pictures.index())
+        batches = _ahead(pictures, index, self.options.batch, rng)
+        self.network.train()
+        sums: dict[str, float] = {}
+        bar = tqdm(batches, total=self.steps_each, desc=f"epoch {self.epoch + 1}/{self.options.epochs}", mininterval=5)
+        for done, (images, rows) in enumerate(bar, 1):
+            parts = self._step(images, rows)
+            for name, value in parts.items():
+                sums[name] = sums.get(name, 0.0) + value
+            bar.set_postfix({k: f"{v / done:.3f}" for k, v in sums.items()}, refresh=False)
+        means = ", ".join(f"{k} {v / self.steps_each:.4f}" for k, v in sums.items())
+        sys.stdout.write(f"\n{time.strftime('%H:%M:%S')} epoch {self.epoch + 1}: {means}\n")
+        sys.stdout.flush()
+
+    def _share(self, index: np.ndarray) -> np.ndarray:
+        """This epoch's pictures: each picture comes once before any comes again."""
+        count = self.steps_each * self.options.batch
+        first = self.epoch * count
+        rounds = range(first // len(index), (first + count) // len(index) + 1)
+        orders = [np.random.default_rng([self.options.seed, r]).permutation(len(index)) for r in rounds]
+        start = first - rounds[0] * len(index)
+        return index[np.concatenate(orders)[start : start + count]]
+
+    def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
+        for group in self.optimiser.param_groups:
+            group["lr"] = self.options.rate * _schedule(self.step, self.total)
+        inputs = torch.from_numpy(images).permute(0, 3, 1, 2).float().div_(255.0)
+        inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
+        inputs = inputs.contiguous(memory_format=torch.channels_last)
+        boxes = torch.from_numpy(rows)
+        truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0)
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.options.bf16):
+            values = self.network(inputs)
+        parts = yolo_loss(self.spec.heads, values, truth, self.spec.width)  # type: ignore[arg-type]
+        self.optimiser.zero_grad(set_to_none=True)
+        sum(parts.values()).backward()  # type: ignore[union-attr]
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 10.0)
+        self.optimiser.step()
+        self.step += 1
+        self._average()
+        return {name: float(value.detach()) for name, value in parts.items()}
+
+    def _average(self) -> None:
+        keep = min(0.998, (1 + self.step) / (20 + self.step))
+        with torch.no_grad():
+            for mine, now in zip(self.mean.state_dict().values(), self.network.state_dict().values(), strict=True):
+                if mine.dtype.is_floating_point:
+                    mine.lerp_(now, 1 - keep)
+                else:
+                    mine.copy_(now)
+
+    def _save(self) -> None:
+        state = {
+            "network": self.network.state_dict(),
+            "mean": self.mean.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "step": self.step,
+            "epoch": self.epoch,
+        }
+        part = self.options.checkpoint.with_suffix(".part")
+        torch.save(state, part)
+        os.replace(part, self.options.checkpoint)
+        weights = format_weights(self.spec, self.mean.to_weights(), seen=self.step * self.options.batch)
+        self.options.weights.write_bytes(weights)
+
+    def _resume(self) -> None:
+        if self.options.start and not self.options.checkpoint.exists():
+            state = torch.load(self.options.start, weights_only=True)
+            self.network.load_state_dict(state["mean"])
+            self.mean.load_state_dict(state["mean"])
+        if not self.options.checkpoint.exists():
+            return
+        state = torch.load(self.options.checkpoint, weights_only=True)
+        self.network.load_state_dict(state["network"])
+        self.mean.load_state_dict(state["mean"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.step, self.epoch = state["step"], state["epoch"]
+        sys.stdout.write(f"going on after epoch {self.epoch}\n")
+
+
+def _schedule(step: int, total: int) -> float:
+    warm = min(1.0, (step + 1) / 200)
+    return warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(step / total, 1.0))))
+
+
+def _ahead(pictures: Pictures, index: np.ndarray, batch: int, rng: np.random.Generator):
+    """Batches, made by a thread two ahead."""
+    ready: queue.Queue = queue.Queue(2)
+
+    def fill() -> None:
+        for start in range(0, len(index), batch):
+            ready.put(batch_of(pictures, index[start : start + batch], rng))
+        ready.put(None)
+
+    threading.Thread(target=fill, daemon=True).start()
+    while (item := ready.get()) is not None:
+        yield item
+
+
+def main() -> None:
+    """Train from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--name", default="train")
+    parser.add_argument("--cfg", type=Path, required=True)
+    parser.add_argument("--weights", type=Path, required=True, help="written after each epoch")
+    parser.add_argument("--checkpoint", type=Path, required=True)
+    parser.add_argument("--start", type=Path, help="a checkpoint whose weights to begin with")
+    parser.add_argument("--epochs", type=int, default=24)
+    parser.add_argument("--samples", type=int, default=10000, help="pictures of an epoch")
+    parser.add_argument("--batch", type=int, default=24)
+    parser.add_argument("--rate", type=float, default=2e-3)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--bf16", action="store_true")
+    parser.add_argument("--anchors", action="store_true", help="find anchors and put them into the cfg file first")
+    options = parser.parse_args()
+    torch.set_num_threads(options.threads)
+    Trainer(options).run()
+
+
+if __name__ == "__main__":
+    main()
