@@ -61,9 +61,10 @@ def _edge_distances(corners: Array) -> Array:
 
 @dataclass(frozen=True)
 class Footprint:
-    """A padded outline, shape (N, 2), in the robot's frame."""
+    """A padded outline and the robot's own, shape (N, 2) each, in the robot's frame."""
 
     corners: Array
+    body: Array
 
     @classmethod
     def of(cls, value: Any, *, robot_radius: float, padding: float, name: str = "footprint") -> Footprint:
@@ -71,7 +72,7 @@ class Footprint:
         corners = read_footprint(value, name)
         if not len(corners):
             corners = circle_footprint(robot_radius)
-        return cls(padded(corners, padding))
+        return cls(padded(corners, padding), corners)
 
     @property
     def inscribed_radius(self) -> float:

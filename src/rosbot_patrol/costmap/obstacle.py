@@ -97,7 +97,11 @@ class ObservationBuffer:
 
 
 class ObstacleLayer(Layer):
-    """Matches costmap_2d::ObstacleLayer for laser scans: rays clear, hits mark, the robot's own cells are free."""
+    """Matches costmap_2d::ObstacleLayer for laser scans: rays clear, hits mark, the robot's own cells are free.
+
+    Differs: only the robot itself is cleared, without its padding; upstream clears the padding too, so that a slow
+    robot eats its way into an obstacle.
+    """
 
     def __init__(
         self, params: ObstacleParams, sources: dict[str, SourceParams], *, name: str = "obstacle_layer"
@@ -148,7 +152,7 @@ class ObstacleLayer(Layer):
     def _clear_footprint(self, info: GridInfo, pose: Pose2D) -> Bounds:
         if not self.params.footprint_clearing_enabled or self._footprint is None:
             return NOTHING
-        corners = (self._footprint.at(pose) - (info.origin_x, info.origin_y)) / info.resolution
+        corners = (transform_points(pose, self._footprint.body) - (info.origin_x, info.origin_y)) / info.resolution
         self._outline = np.ascontiguousarray(corners)
         kernels.fill_polygon(self._cells, self._outline, FREE)
         low, high = np.floor(corners.min(axis=0)), np.ceil(corners.max(axis=0))

@@ -35,12 +35,46 @@ def simulate(pose, samples, velocity, sim_time, steps, acc_x, acc_theta):
     return out
 
 
-@kernel("int64(uint8[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64, int64)")
-def footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, free_below):
+@kernel("int64(uint8[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64)")
+def count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw):
+    """How many points of the outline lie in lethal cells with the robot at a pose."""
+    height, width = cells.shape
+    c, s = math.cos(yaw), math.sin(yaw)
+    count = 0
+    for k in range(outline.shape[0]):
+        px = x + c * outline[k, 0] - s * outline[k, 1]
+        py = y + s * outline[k, 0] + c * outline[k, 1]
+        jx, jy = math.floor((px - origin_x) / resolution), math.floor((py - origin_y) / resolution)
+        if 0 <= jx < width and 0 <= jy < height and cells[jy, jx] == 254:
+            count += 1
+    return count
+
+
+@kernel("float64[::1](float64[:, :, ::1], uint8[:, ::1], float64, float64, float64, float64[:, ::1], int64)")
+def leaving_costs(trajectories, cells, resolution, origin_x, origin_y, outline, touching):
+    """For a robot that touches something: how much it still touches at each end, -1 where it ever touches more.
+
+    `touching` is how many points of the outline touch now; a trajectory has to end with fewer. Shape (K,).
+    """
+    count, steps, _ = trajectories.shape
+    out = np.zeros(count, np.float64)
+    for k in range(count):
+        n = touching
+        for i in range(steps):
+            x, y, yaw = trajectories[k, i, 0], trajectories[k, i, 1], trajectories[k, i, 2]
+            n = count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw)
+            if n > touching:
+                break
+        out[k] = n if n < touching else -1.0
+    return out
+
+
+@kernel("int64(uint8[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64, int64, int64)")
+def footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, free_below, taken_from):
     """Cost of the robot standing at a pose, -1 in collision, -2 where it is unknown, -3 off the map.
 
     `outline` holds points along the footprint's edges in the robot's frame, shape (M, 2); where the centre costs less
-    than `free_below`, it need not be looked at.
+    than `free_below`, it need not be looked at; where it costs `taken_from` or more, the robot cannot be.
     """
     height, width = cells.shape
     ix, iy = math.floor((x - origin_x) / resolution), math.floor((y - origin_y) / resolution)
@@ -49,7 +83,7 @@ def footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, fr
     highest = np.int64(cells[iy, ix])
     if highest == 255:
         return -2
-    if highest >= 253:
+    if highest >= taken_from:
         return -1
     if highest < free_below:
         return highest
@@ -69,9 +103,9 @@ def footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, fr
 
 
 @kernel(
-    "float64[::1](float64[:, :, ::1], uint8[:, ::1], float64, float64, float64, float64[:, ::1], int64)",
+    "float64[::1](float64[:, :, ::1], uint8[:, ::1], float64, float64, float64, float64[:, ::1], int64, int64)",
 )
-def worst_footprint_costs(trajectories, cells, resolution, origin_x, origin_y, outline, free_below):
+def worst_footprint_costs(trajectories, cells, resolution, origin_x, origin_y, outline, free_below, taken_from):
     """Highest cost along each trajectory, negative as `footprint_cost` where one pose is not free; shape (K,)."""
     count, steps, _ = trajectories.shape
     out = np.zeros(count, np.float64)
@@ -79,7 +113,7 @@ def worst_footprint_costs(trajectories, cells, resolution, origin_x, origin_y, o
         worst = 0
         for i in range(steps):
             x, y, yaw = trajectories[k, i, 0], trajectories[k, i, 1], trajectories[k, i, 2]
-            cost = footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, free_below)
+            cost = footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, free_below, taken_from)
             if cost < 0:
                 worst = cost
                 break

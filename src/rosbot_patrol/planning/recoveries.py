@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rosbot_patrol.costmap.costs import LETHAL
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.geometry import Pose2D, Twist2D, angle_difference
 from rosbot_patrol.params import param
@@ -110,4 +111,4 @@ def _is_free(costmap: LayeredCostmap, pose: Pose2D, angle: float, step: float) -
     trajectory[0, :, 0], trajectory[0, :, 1], trajectory[0, :, 2] = pose.x, pose.y, yaws
     outline = costmap.footprint.outline(costmap.info.resolution * 0.7)
     place = (costmap.info.resolution, costmap.info.origin_x, costmap.info.origin_y)
-    return bool(kernels.worst_footprint_costs(trajectory, costmap.cells, *place, outline, 0)[0] >= 0.0)
+    return bool(kernels.worst_footprint_costs(trajectory, costmap.cells, *place, outline, 0, LETHAL)[0] >= 0.0)

@@ -9,9 +9,10 @@ Differs:
     - Distances are Euclidean around obstacles, interpolated, and judged at the trajectory's end and at a point
       `heading_lookahead` ahead of it; upstream counts 4-connected cells.
     - It backs up only where the way behind is free; upstream does so blindly.
-    - A robot whose footprint already touches an obstacle may move away from it; upstream finds no trajectory.
-    - `heading_scoring`, `simple_attractor`, `dwa`, `holonomic_robot`, `y_vels` and the y limits are accepted; the
-      robot is treated as a differential drive. `acc_lim_y` therefore has no effect.
+    - A robot whose footprint touches an obstacle may move so that it touches less; upstream finds no trajectory.
+    - Where the plan is blocked in view and nothing leads round, it stops short of the place and says so.
+    - `heading_scoring`, `simple_attractor`, `dwa`, `holonomic_robot`, `y_vels` and `acc_lim_y` are accepted and have no
+      effect: the base is driven as a differential drive.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ from typing import Any
 
 import numpy as np
 
-from rosbot_patrol.costmap import costmap_kernels
-from rosbot_patrol.costmap.costs import FREE, INSCRIBED
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.errors import ControlError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, angle_difference, compose_poses
-from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.grid import Grid, GridInfo, cells_of_points
 from rosbot_patrol.params import param
 from rosbot_patrol.planning import critic_kernels as kernels
 from rosbot_patrol.planning.critics import GoalDistanceCritic, ObstacleCritic, PathDistanceCritic, Situation
+from rosbot_patrol.planning.critics.field import distance_field
 from rosbot_patrol.planning.interfaces import Array, LocalPlanner, LocalView
 
 _COARSE = 0.05  # edge of the cells of distance fields [m]
+_TOO_NEAR = 0.3  # of a plan that is blocked, less than this ahead is not worth driving [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +113,6 @@ class TrajectoryPlanner(LocalPlanner):
     ) -> None:
         self.params = params
         self._obstacles = ObstacleCritic(footprint, resolution=resolution, circumscribed_cost=circumscribed_cost)
-        self._footprint = footprint
         self._path_distance = PathDistanceCritic()
         self._goal_distance = GoalDistanceCritic()
         self._plan: Array = np.empty((0, 3))
@@ -169,26 +169,12 @@ class TrajectoryPlanner(LocalPlanner):
         """The velocity for this cycle; raises ControlError."""
         if len(self._plan) == 0:
             raise ControlError("there is no plan to follow")
-        self._free_own_cells(view)
         if self._is_at_goal_xy(view):
             return self._turn_to_goal(view)
         self._memory.turning_to_goal = False
         plan = self._part_in_view(view)
         self._visible = plan
         return self._follow(view, plan)
-
-    def _free_own_cells(self, view: LocalView) -> None:
-        """What touches the robot already must not keep it from moving away."""
-        info = view.costmap.info
-        cells = view.costmap.cells
-        corners = (self._footprint.at(view.pose) - (info.origin_x, info.origin_y)) / info.resolution
-        costmap_kernels.fill_polygon(cells, np.ascontiguousarray(corners), FREE)
-        points = view.pose.x, view.pose.y
-        if info.contains(*points):
-            ix, iy = info.cell_of(*points)
-            reach = math.ceil(self._footprint.inscribed_radius / info.resolution) + 1
-            area = cells[max(iy - reach, 0) : iy + reach + 1, max(ix - reach, 0) : ix + reach + 1]
-            area[area == INSCRIBED] = INSCRIBED - 1
 
     # ---- following
 
@@ -223,10 +209,11 @@ class TrajectoryPlanner(LocalPlanner):
             origin_x=info.origin_x,
             origin_y=info.origin_y,
         )
-        plan = _reachable_part(plan, Grid(coarse, cells))
+        plan = self._reachable_part(view, plan, Grid(coarse, cells))
         to_goal = float(np.hypot(plan[-1, 0] - view.pose.x, plan[-1, 1] - view.pose.y))
         nose = min(self.params.heading_lookahead, 0.5 * to_goal)
         return Situation(
+            pose=view.pose,
             trajectories=trajectories,
             costmap=view.costmap,
             coarse=coarse,
@@ -234,6 +221,25 @@ class TrajectoryPlanner(LocalPlanner):
             plan=plan,
             nose=nose,
         )
+
+    def _reachable_part(self, view: LocalView, plan: Array, grid: Grid) -> Array:
+        """The plan up to its last pose in view that the robot can get to.
+
+        Raises:
+            ControlError: something stands on the plan right ahead, and nothing leads round it.
+        """
+        info = grid.info
+        here = np.array([info.cell_of_clamped(view.pose.x, view.pose.y)])
+        distances = distance_field(info, grid.cells, here)
+        ix, iy = cells_of_points(info, plan[:, :2]).T
+        reachable = np.isfinite(distances[iy.clip(0, info.height - 1), ix.clip(0, info.width - 1)])
+        last = int(np.flatnonzero(reachable)[-1]) if reachable.any() else -1
+        if last == len(plan) - 1:
+            return plan
+        gap = math.hypot(plan[last, 0] - view.pose.x, plan[last, 1] - view.pose.y) if last >= 0 else 0.0
+        if gap < _TOO_NEAR:
+            raise ControlError("something stands on the plan and there is no way round it in view")
+        return plan[: last + 1]
 
     def _follow(self, view: LocalView, plan: Array) -> Twist2D:
         p = self.params
@@ -243,13 +249,16 @@ class TrajectoryPlanner(LocalPlanner):
         scale = situation.coarse.resolution
         if not p.meter_scoring:
             scale /= view.costmap.info.resolution
-        cost = p.occdist_scale * self._obstacles.score(situation)
+        danger = self._obstacles.score(situation)
+        if not np.isfinite(danger).any():
+            return self._escape(view)
+        cost = p.occdist_scale * danger
         cost += p.path_distance_bias * scale * self._path_distance.score(situation)
         cost += p.goal_distance_bias * scale * self._goal_distance.score(situation)
         cost = self._without_reversals(view, samples, cost)
         best = int(np.argmin(cost))
         if not math.isfinite(cost[best]):
-            return self._escape(view)
+            raise ControlError("no free trajectory leads on along the plan")
         self._memory.escape_from = None
         self._local_plan = trajectories[best]
         twist = Twist2D(float(samples[best, 0]), 0.0, float(samples[best, 1]))
@@ -331,15 +340,7 @@ class TrajectoryPlanner(LocalPlanner):
         return Twist2D(p.escape_vel, 0.0, 0.0)
 
     def _is_free(self, view: LocalView, trajectories: Array) -> bool:
-        empty = Situation(
-            trajectories=trajectories,
-            costmap=view.costmap,
-            coarse=view.costmap.info,
-            coarse_cells=view.costmap.cells,
-            plan=np.empty((0, 3)),
-            nose=0.0,
-        )
-        return bool(np.isfinite(self._obstacles.score(empty)).all())
+        return bool(np.isfinite(self._obstacles.check(trajectories, view.costmap, view.pose)).all())
 
     # ---- at the goal
 
@@ -367,10 +368,3 @@ class TrajectoryPlanner(LocalPlanner):
         if not self._is_free(view, short):
             raise ControlError("there is no room to turn to the goal's heading")
         return twist
-
-
-def _reachable_part(plan: Array, grid: Grid) -> Array:
-    """The plan up to its last pose that is not in an obstacle (of the local costmap)."""
-    cells = np.floor((plan[:, :2] - (grid.info.origin_x, grid.info.origin_y)) / grid.info.resolution).astype(int)
-    free = grid.cells[cells[:, 1].clip(0, grid.info.height - 1), cells[:, 0].clip(0, grid.info.width - 1)] < INSCRIBED
-    return plan[: int(np.flatnonzero(free)[-1]) + 1] if free.any() else plan

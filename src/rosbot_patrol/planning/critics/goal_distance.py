@@ -14,6 +14,6 @@ class GoalDistanceCritic:
     def score(self, situation: Situation) -> Array:
         """Distances of the trajectories, shape (K,); inf where the local goal cannot be reached."""
         info = situation.coarse
-        field = distance_field(situation, cells_of_points(info, situation.plan[-1:, :2]))
+        field = distance_field(info, situation.coarse_cells, cells_of_points(info, situation.plan[-1:, :2]))
         place = (info.resolution, info.origin_x, info.origin_y)
         return kernels.end_distances(situation.trajectories, field, *place, situation.nose)

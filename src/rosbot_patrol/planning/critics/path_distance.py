@@ -17,6 +17,6 @@ class PathDistanceCritic:
         """Distances of the trajectories, shape (K,); inf where the plan cannot be reached."""
         info = situation.coarse
         sources = np.unique(cells_of_points(info, situation.plan[:, :2]), axis=0)
-        field = distance_field(situation, sources)
+        field = distance_field(info, situation.coarse_cells, sources)
         place = (info.resolution, info.origin_x, info.origin_y)
         return kernels.end_distances(situation.trajectories, field, *place, situation.nose)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.costmap.costs import CostCells
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
 
 Array = NDArray[np.float64]
@@ -18,6 +19,7 @@ class Situation:
     """One control cycle.
 
     Attributes:
+        pose: where the robot is.
         trajectories: simulated poses in the local costmap's frame, shape (K, T, 3).
         costmap: the local costs.
         coarse, coarse_cells: the same in cells of about 5 cm, for distance fields.
@@ -25,6 +27,7 @@ class Situation:
         nose: how far ahead of the last pose alignment is judged [m].
     """
 
+    pose: Pose2D
     trajectories: Array
     costmap: Grid
     coarse: GridInfo
