@@ -74,7 +74,7 @@ class ParticleFilter:
 
     def weigh(self, weighing: Weighing) -> None:
         """Take a scan's word on each particle."""
-        fit = float(self.weights @ weighing.fit)
+        fit = float((self.weights * weighing.fit).sum())
         weights = self.weights * weighing.likelihood
         total = weights.sum()
         if total > 0.0 and math.isfinite(total):
@@ -131,21 +131,6 @@ class ParticleFilter:
         labels = np.empty(len(self.poses), dtype=np.int64)
         numbers = kernels.label_clusters(self.poses, labels)
         weight_of = np.bincount(labels, weights=self.weights, minlength=numbers)
-        best = int(weight_of.argmax())
-        chosen = labels == best
-        mean, _ = _moments(self.poses[chosen], self.weights[chosen])
-        _, covariance = _moments(self.poses, self.weights)
-        return Estimate(Pose2D(*mean.tolist()), covariance, float(weight_of[best]), len(self.poses))
-
-
-def _moments(poses: Array, weights: Array) -> tuple[Array, Array]:
-    """Weighted mean and covariance of poses, the heading on the circle."""
-    share = weights / weights.sum()
-    place = share @ poses[:, :2]
-    c, s = float(share @ np.cos(poses[:, 2])), float(share @ np.sin(poses[:, 2]))
-    mean = np.array([place[0], place[1], math.atan2(s, c)])
-    off = poses - mean
-    off[:, 2] = wrap_angles(off[:, 2])
-    covariance = (off * share[:, None]).T @ off
-    covariance[2, 2] = max(-2.0 * math.log(max(math.hypot(c, s), 1e-12)), 0.0)
-    return mean, covariance
+        best = kernels.moments(self.poses, self.weights, labels, int(weight_of.argmax()))
+        whole = kernels.moments(self.poses, self.weights, labels, -1)
+        return Estimate(Pose2D(*best[0].tolist()), whole[1:4].copy(), float(best[4, 0]), len(self.poses))

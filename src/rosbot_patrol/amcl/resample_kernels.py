@@ -110,6 +110,41 @@ def draw(
     return most
 
 
+@kernel("float64[:, ::1](float64[:, ::1], float64[::1], int64[::1], int64)")
+def moments(poses: Array, weights: Array, labels: Wholes, label: int) -> Array:
+    """Weighted moments of the particles of one cluster, or of all where `label` is negative.
+
+    Returns:
+        Row 0: mean x, y, yaw (on the circle); rows 1 to 3: covariance, that of yaw alone the circular one; row 4: the
+        weight, 0, 0. Shape (5, 3). Plain sums in order, so that the same particles give the same bits.
+    """
+    out = np.zeros((5, 3))
+    total, c, s = 0.0, 0.0, 0.0
+    for i in range(poses.shape[0]):
+        if label < 0 or labels[i] == label:
+            total += weights[i]
+            out[0, 0] += weights[i] * poses[i, 0]
+            out[0, 1] += weights[i] * poses[i, 1]
+            c += weights[i] * math.cos(poses[i, 2])
+            s += weights[i] * math.sin(poses[i, 2])
+    out[4, 0] = total
+    out[0, 0], out[0, 1], out[0, 2] = out[0, 0] / total, out[0, 1] / total, math.atan2(s, c)
+    for i in range(poses.shape[0]):
+        if label < 0 or labels[i] == label:
+            share = weights[i] / total
+            dx, dy = poses[i, 0] - out[0, 0], poses[i, 1] - out[0, 1]
+            turn = poses[i, 2] - out[0, 2]
+            turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+            out[1, 0] += share * dx * dx
+            out[1, 1] += share * dx * dy
+            out[1, 2] += share * dx * turn
+            out[2, 1] += share * dy * dy
+            out[2, 2] += share * dy * turn
+    out[2, 0], out[3, 0], out[3, 1] = out[1, 1], out[1, 2], out[2, 2]
+    out[3, 2] = max(-2.0 * math.log(max(math.sqrt(c * c + s * s) / total, 1e-12)), 0.0)
+    return out
+
+
 @kernel("int64(int64[::1], int64)")
 def root_of(parents: Wholes, i: int) -> int:
     """The representative of a set, with its path halved (disjoint sets)."""
