@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.distance_kernels import bounded_distances
-from rosbot_patrol.maps.occupancy import OCCUPIED
+from rosbot_patrol.maps.occupancy import FREE, OCCUPIED, UNKNOWN
 
 Table = NDArray[np.float32]
 
@@ -38,35 +38,29 @@ class Field:
 
 def obstacle_distances(grid: Grid, max_dist: float) -> Field:
     """Distance to the nearest occupied cell [m], at most `max_dist`; cut to the occupied part and a margin."""
-    return _distances(grid, grid.cells == OCCUPIED, max_dist, margin=True)
+    occupied = grid.cells == OCCUPIED
+    margin = max(math.ceil(max_dist / grid.info.resolution), 1) + 1
+    return _distances(grid, occupied, occupied, margin, max_dist)
 
 
 def blocked_distances(grid: Grid, max_dist: float) -> Field:
-    """Distance to the nearest cell that is not free [m], at most `max_dist`; cut to the occupied part."""
-    return _distances(grid, grid.cells == OCCUPIED, max_dist, margin=False, marked=grid.cells != 0)
+    """Distance to the nearest cell that is not free [m], at most `max_dist`; cut to the known part."""
+    return _distances(grid, grid.cells != FREE, grid.cells != UNKNOWN, 0, max_dist)
 
 
-def _distances(
-    grid: Grid,
-    occupied: NDArray[np.bool_],
-    max_dist: float,
-    *,
-    margin: bool,
-    marked: NDArray[np.bool_] | None = None,
-) -> Field:
+def _distances(grid: Grid, marked: NDArray[np.bool_], shown: NDArray[np.bool_], margin: int, max_dist: float) -> Field:
+    """Distances to the marked cells, on the smallest box about the shown ones and a margin [cells]."""
     info = grid.info
-    bound = max(math.ceil(max_dist / info.resolution), 1)
-    rows, columns = np.flatnonzero(occupied.any(axis=1)), np.flatnonzero(occupied.any(axis=0))
+    rows, columns = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
     if not len(rows):
         empty = np.full((1, 1), max_dist, dtype=np.float32)
         return Field(empty, info.origin_x, info.origin_y, info.resolution)
-    pad = bound + 1 if margin else 0
     y0, y1, x0, x1 = int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
-    part = np.pad((occupied if marked is None else marked)[y0:y1, x0:x1], pad)
-    cells = bounded_distances(np.ascontiguousarray(part), bound)
+    part = np.pad(marked[y0:y1, x0:x1], margin)
+    cells = bounded_distances(np.ascontiguousarray(part), max(math.ceil(max_dist / info.resolution), 1))
     return Field(
         np.minimum(cells * np.float32(info.resolution), np.float32(max_dist)),
-        info.origin_x + (x0 - pad) * info.resolution,
-        info.origin_y + (y0 - pad) * info.resolution,
+        info.origin_x + (x0 - margin) * info.resolution,
+        info.origin_y + (y0 - margin) * info.resolution,
         info.resolution,
     )
