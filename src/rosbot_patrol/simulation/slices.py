@@ -40,13 +40,13 @@ class Slice:
 
     def cast(self, x: float, y: float, first: float, step: float, count: int, longest: float) -> Array:
         """Lengths of a fan of beams from a point; `longest` where nothing is met [m], shape (count,)."""
-        ranges = np.full(count, longest)
-        kernels.cast_fan(x, y, first, step, self.segments, self.circles, ranges)
+        ranges = np.full(count, float(longest))
+        kernels.cast_fan(float(x), float(y), float(first), float(step), self.segments, self.circles, ranges)
         return ranges
 
     def is_blocked(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
         """Whether something lies between two points."""
-        return bool(kernels.is_blocked(*start, *end, self.segments, self.circles))
+        return bool(kernels.is_blocked(*map(float, (*start, *end)), self.segments, self.circles))
 
 
 EMPTY = Slice(kernels.NO_SEGMENTS, kernels.NO_CIRCLES)
