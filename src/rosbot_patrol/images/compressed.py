@@ -78,7 +78,10 @@ def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
     if encoding and encoding not in ENCODINGS:
         raise ImageError(f"the encoding '{encoding}' (of the format '{text}') is not known here")
     flag = {"gray": cv2.IMREAD_GRAYSCALE, "color": cv2.IMREAD_COLOR}.get(mode, cv2.IMREAD_UNCHANGED)
-    pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flag) if data else None
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flag) if data else None
+    except cv2.error as err:  # such as a header that speaks of a billion pixels
+        raise ImageError(f"{len(data)} bytes of the format '{text}' cannot be decoded: {err}") from err
     if pixels is None:
         raise ImageError(f"{len(data)} bytes of the format '{text}' are no picture that can be read")
     return _restore(pixels.reshape(*pixels.shape[:2], -1), encoding, mode)

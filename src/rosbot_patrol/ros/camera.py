@@ -37,6 +37,8 @@ class Camera:
         frozen_timeout: sameness that means it is frozen [s] of wall time, 0 for never.
         health: where to tell.
         notify: called when a picture has come.
+        once: leave out a picture that comes again (same stamp), and tell on ~camera_ok how the camera is.
+        mode: how compressed pictures are decoded: unchanged, color or gray.
     """
 
     def __init__(
@@ -48,6 +50,8 @@ class Camera:
         frozen_timeout: float,
         health: diagnostics.Health,
         notify: Callable[[], None],
+        once: bool = True,
+        mode: str = "unchanged",
     ) -> None:
         self._kind = CompressedImage if transport == "compressed" else Image
         self._topic = rospy.resolve_name(topic if transport == "raw" else f"{topic}/{transport}")
@@ -58,7 +62,9 @@ class Camera:
         self._refused = ""
         self._health = health
         self._notify = notify
-        self._ok = rospy.Publisher("~camera_ok", Bool, queue_size=1, latch=True)
+        self._once = once
+        self._mode = mode
+        self._ok = rospy.Publisher("~camera_ok", Bool, queue_size=1, latch=True) if once else None
         self._subscriber = rospy.Subscriber(
             self._topic, self._kind, self._on_picture, queue_size=1, buff_size=BUFFER_SIZE, tcp_nodelay=True
         )
@@ -79,7 +85,7 @@ class Camera:
         """The picture in a message; ImageError where it cannot be read."""
         if isinstance(message, CompressedImage):
             codec = importlib.import_module("rosbot_patrol.images.compressed")
-            picture: Picture = codec.decompress(message.format, message.data)
+            picture: Picture = codec.decompress(message.format, message.data, mode=self._mode)
         else:
             picture = picture_from_msg(message)
         self._refused = ""
@@ -96,7 +102,7 @@ class Camera:
         with self._lock:
             # the camera's own time and some of its bytes: what a frozen driver repeats
             self._watch.note(time.monotonic(), bytes(message.data[::997]))
-            if stamp == self._last_stamp and not stamp.is_zero():
+            if self._once and stamp == self._last_stamp and not stamp.is_zero():
                 return  # the same picture again
             self._last_stamp = stamp
             self._newest = message
@@ -119,7 +125,8 @@ class Camera:
             time.sleep(WATCH_PERIOD)
 
     def _changed(self, state: Stream, before: Stream | None, silent: float) -> None:
-        self._ok.publish(Bool(state is Stream.FLOWING))
+        if self._ok is not None:
+            self._ok.publish(Bool(state is Stream.FLOWING))
         if state is Stream.STOPPED:
             log.error("%s: the camera has been silent for %.1f s: %s", self._topic, silent, self._who_publishes())
         elif state is Stream.FROZEN:
