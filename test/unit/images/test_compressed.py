@@ -1,0 +1,81 @@
+import cv2
+import numpy as np
+import pytest
+
+from rosbot_patrol.errors import ImageError
+from rosbot_patrol.images.compressed import CompressedParams, compress, decompress
+from rosbot_patrol.images.encodings import ENCODINGS, Picture
+
+COLOURS = ("rgb8", "bgr8", "rgba8", "bgra8")
+
+
+def make_picture(encoding, *, width=64, height=48):
+    known = ENCODINGS[encoding]
+    small = np.random.default_rng(0).integers(0, 255, (6, 8, known.channels), dtype=np.uint8)
+    pixels = cv2.resize(small, (width, height)).reshape(height, width, -1)
+    return Picture(pixels.astype(known.dtype) * (257 if known.dtype == "u2" else 1), encoding)
+
+
+@pytest.mark.parametrize("encoding", [*COLOURS, "mono8"])
+def test_jpeg_round_trip_keeps_encoding_and_colours(encoding):
+    picture = make_picture(encoding)
+    text, data = compress(picture, CompressedParams(jpeg_quality=95))
+    back = decompress(text, data)
+    assert back.encoding == encoding
+    difference = back.to("rgb8").pixels.astype(int) - picture.to("rgb8").pixels
+    assert np.abs(difference).mean() < 4
+
+
+@pytest.mark.parametrize("encoding", ["rgb8", "bgr8", "mono8", "mono16", "16UC1"])
+def test_png_round_trip_loses_nothing(encoding):
+    picture = make_picture(encoding)
+    text, data = compress(picture, CompressedParams(format="png", png_level=1))
+    back = decompress(text, data)
+    assert back.encoding == encoding
+    np.testing.assert_array_equal(back.pixels, picture.pixels)
+
+
+def test_text_is_upstreams():
+    assert compress(make_picture("rgb8"), CompressedParams())[0] == "rgb8; jpeg compressed bgr8"
+    assert compress(make_picture("mono8"), CompressedParams(format="png"))[0] == "mono8; png compressed "
+
+
+def test_mono16_as_jpeg_keeps_its_range():
+    text, data = compress(make_picture("mono16"), CompressedParams())
+    back = decompress(text, data)
+    assert back.encoding == "mono16"
+    assert np.abs(back.pixels.astype(int) - make_picture("mono16").pixels).mean() < 4 * 257
+
+
+def test_modes():
+    text, data = compress(make_picture("rgb8"), CompressedParams())
+    assert decompress(text, data, mode="gray").encoding == "mono8"
+    assert decompress(text, data, mode="color").encoding == "rgb8"
+    text, data = compress(make_picture("mono8"), CompressedParams())
+    assert decompress(text, data, mode="color").encoding == "bgr8"
+
+
+def test_format_of_an_old_sender_names_no_encoding():
+    _, data = compress(make_picture("rgb8"), CompressedParams())
+    assert decompress("jpeg", data).encoding == "bgr8"
+
+
+def test_quality_makes_it_larger():
+    small, large = (len(compress(make_picture("rgb8"), CompressedParams(jpeg_quality=q))[1]) for q in (20, 95))
+    assert small < large
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00\x01\x02", b"\xff\xd8\xff\xe0 no jpeg at all"])
+def test_broken_bytes_are_a_sentence(data):
+    with pytest.raises(ImageError, match=rf"{len(data)} bytes of the format 'rgb8; jpeg compressed bgr8'"):
+        decompress("rgb8; jpeg compressed bgr8", data)
+
+
+def test_unknown_encoding_in_the_format():
+    with pytest.raises(ImageError, match="'nv21'"):
+        decompress("nv21; jpeg compressed bgr8", b"x")
+
+
+def test_depth_is_refused():
+    with pytest.raises(ImageError, match="32FC1"):
+        compress(Picture(np.zeros((4, 4, 1), np.float32), "32FC1"), CompressedParams())
