@@ -55,10 +55,25 @@ def master():
     import rosgraph
 
     wait_until(rosgraph.is_master_online, 30, "roscore")
+    rate = float(
+        os.environ.get("ROSBOT_TEST_SIM_RATE", 0)
+    )  # simulated time at so many times the wall's, for a run by hand
+    rospy.set_param("/use_sim_time", rate > 0)
     rospy.init_node("patrol_test", disable_signals=True)
+    threading.Thread(target=run_clock, args=(rate,), daemon=True).start()
     yield port
     rospy.signal_shutdown("done")
     stop(core)
+
+
+def run_clock(rate):
+    from rosgraph_msgs.msg import Clock
+
+    began = time.monotonic()
+    clock = rospy.Publisher("/clock", Clock, queue_size=1) if rate else None
+    while clock and not rospy.is_shutdown():
+        clock.publish(Clock(clock=rospy.Time.from_sec(5.0 + rate * (time.monotonic() - began))))
+        time.sleep(0.01 / rate)
 
 
 class House:

@@ -59,6 +59,7 @@ class Narrator:
         self.missions: list[MissionSummary] = []
         self.on_guard_at: float | None = None
         self.ended = 0
+        self.is_home = True
         self._last: Telling | None = None
         self._called: set[int] = set()
 
@@ -96,8 +97,8 @@ class Narrator:
         if mission:
             mission.mails.append(told.location)
         if told.transport == "maildir":
-            return [f"The mail with the picture lies in {told.location}"]
-        return [f"The mail with the picture was sent to {told.location} by {told.transport}."]
+            return [f"The mail lies in {told.location}"]
+        return [f"The mail was sent to {told.location} by {told.transport}."]
 
     def is_told(self, mission: MissionSummary) -> bool:
         """Whether nothing more is to come of a mission that ended."""
@@ -128,7 +129,8 @@ class Narrator:
         mission.times["end"] = now
         self.ended += 1
         self._called.discard(mission.room_id)
-        place = "Not home" if "not at home" in told.why else "Home again"
+        self.is_home = "not at home" not in told.why
+        place = "Home again" if self.is_home else "Not home"
         return [f"{place}. Verdict for {last.room}: {told.last_verdict}.", f"On guard ({_details(told.why)})."]
 
     @staticmethod

@@ -1,7 +1,7 @@
 """narrator: prints one plain sentence for each step of the patrol; with ~exit_after_mission it ends with the mission.
 
 Exit status: 0, or 3 where the verdict is not ~expect_verdict, 4 where ~time_limit passed, 5 where a confirmed
-intruder's mail was not delivered within ~delivery_wait.
+intruder's mail was not delivered within ~delivery_wait, 6 where the robot did not come home.
 """
 
 from __future__ import annotations
@@ -117,7 +117,9 @@ class NarratorNode:
             if not all(map(narrator.is_told, narrator.missions)):
                 return 5 if late else None
             expected = self.params.expect_verdict
-            return 3 if expected and narrator.missions[-1].verdict != expected else 0
+            if expected and narrator.missions[-1].verdict != expected:
+                return 3
+            return 0 if narrator.is_home else 6
 
     def _finish(self, status: int) -> None:
         with self._lock:
@@ -134,6 +136,7 @@ class NarratorNode:
 _ENDS = {
     3: "The verdict is not the one that was expected, {p.expect_verdict}.",
     4: "The mission did not end within {p.time_limit:.0f} s.",
+    6: "The robot did not come home.",
     5: "The mail was not delivered within {p.delivery_wait:.0f} s; it stays in the outbox.",
 }
 

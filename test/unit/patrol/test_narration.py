@@ -44,7 +44,7 @@ def test_a_whole_patrol():
         "Arrived in room 3 (kitchen).",
         "Turning once to look around in room 3 (kitchen).",
         "INTRUDER: a person seen on the mission to room 3 (kitchen), probability 0.91. The notice is on disk.",
-        "The mail with the picture lies in /mail/new/1",
+        "The mail lies in /mail/new/1",
         "Driving home. Confirmed: person seen in room 3 (kitchen).",
         "Home again. Verdict for room 3 (kitchen): confirmed.",
         "On guard (at home again; confirmed: person seen in room 3).",
@@ -68,7 +68,7 @@ def test_a_confirmed_mission_is_told_only_with_its_mail():
 
 def test_a_mail_that_was_sent_says_to_whom():
     assert Narrator().alert(alert(delivered=True, transport="smtp", location="a@b.org")) == [
-        "The mail with the picture was sent to a@b.org by smtp."
+        "The mail was sent to a@b.org by smtp."
     ]
 
 
@@ -85,6 +85,7 @@ def test_a_robot_that_is_not_home_is_not_said_to_be():
     n.state(1.0, state("returning"))
     lines = n.state(2.0, state("idle", "on guard, not at home (move_base gave up)", mission="", last="clear"))
     assert lines[0] == "Not home. Verdict for room 3 (kitchen): clear."
+    assert not n.is_home
 
 
 def test_a_wait_for_move_base_in_a_mission_is_said():
