@@ -44,7 +44,7 @@ class Choice:
 
     Attributes:
         source: who is heard, None for nobody.
-        lock: which lock keeps a source that speaks from being heard, None for none.
+        lock: which lock holds while nobody is heard, None for none.
         fresh: whether the command has not been chosen before.
     """
 
@@ -113,18 +113,16 @@ class TwistMux:
     def choose(self, now: float) -> Choice:
         """Who is heard now, and what it says."""
         barrier = next((lock for lock in self._locks.values() if lock.holds(now)), None)
-        held_by = None
         for source in self._sources.values():
             if source.twist is None or source.has_expired(now):
                 continue
             if barrier is not None and barrier.params.priority > source.params.priority:
-                held_by = barrier.params.name
                 continue
             this = (source.params.name, source.count)
             fresh, self._taken = this != self._taken, this
             return Choice(source.params.name, source.twist, None, fresh)
         self._taken = None
-        return Choice(None, STOP, held_by)
+        return Choice(None, STOP, barrier.params.name if barrier is not None else None)
 
 
 def _check_distinct(group: str, key: str, values: list[object] | list[str] | list[int]) -> None:

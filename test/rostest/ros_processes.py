@@ -1,0 +1,124 @@
+"""A master, nodes and a probe as processes, so that tests in one pytest run may each have a master of their own."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("localhost", 0))
+        return s.getsockname()[1]
+
+
+def wait_for(condition, seconds=10.0, what="the condition"):
+    until = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < until, f"{what} did not come within {seconds} s"
+        time.sleep(0.02)
+    return found
+
+
+class Process:
+    """A program with its output collected line by line."""
+
+    def __init__(self, command, env, stdin=None):
+        self.lines = []
+        self.popen = subprocess.Popen(
+            command, env=env, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        for line in self.popen.stdout:
+            self.lines.append(line.rstrip())
+
+    @property
+    def output(self):
+        return "\n".join(self.lines)
+
+    def says(self, text, seconds=10.0):
+        wait_for(lambda: text in self.output or self.popen.poll() is not None, seconds, f"'{text}'")
+        time.sleep(0.1)
+        assert text in self.output, self.output
+
+    def stop(self, sig=signal.SIGINT):
+        if self.popen.poll() is None:
+            self.popen.send_signal(sig)
+            try:
+                self.popen.wait(8.0)
+            except subprocess.TimeoutExpired:
+                print("killed, as it did not stop:", self.popen.args, self.output[-3000:])
+                self.popen.kill()
+                self.popen.wait()
+        return self.popen.returncode
+
+
+class Ros:
+    """A roscore on a port of its own, and what runs on it."""
+
+    def __init__(self):
+        port = int(os.environ.get("ROSBOT_TEST_PORT", 0)) or free_port()
+        self.env = dict(os.environ, ROS_MASTER_URI=f"http://localhost:{port}", ROS_HOSTNAME="localhost")
+        self.env.update(PYTHONUNBUFFERED="1")
+        self.core = Process(["roscore", "-p", str(port)], self.env)
+        self.core.says("started core service", 30.0)
+        self.processes = []
+
+    def command(self, program):
+        """How to start a program of ours as a process of its own, without rosrun."""
+        for folder in self.env["CMAKE_PREFIX_PATH"].split(":"):
+            path = Path(folder, "lib", "rosbot_patrol", program)
+            if path.exists():
+                return [sys.executable, str(path)]
+        raise AssertionError(f"{program} is not built")
+
+    def node(self, program, *arguments):
+        process = Process([*self.command(program), *arguments], self.env, stdin=subprocess.DEVNULL)
+        self.processes.append(process)
+        return process
+
+    def probe(self):
+        probe = Probe(self.env)
+        self.processes.append(probe.process)
+        return probe
+
+    def stop_nodes(self):
+        for process in reversed(self.processes):
+            process.stop()
+        self.processes.clear()
+
+    def stop(self):
+        self.stop_nodes()
+        self.core.stop()
+
+
+class Probe:
+    """topic_probe.py at the other end of two pipes."""
+
+    def __init__(self, env):
+        self.process = Process([sys.executable, str(HERE / "topic_probe.py")], env, stdin=subprocess.PIPE)
+        self.expect(lambda said: said.get("ready"), 15.0)
+
+    def tell(self, **command):
+        line = json.dumps(command)
+        self.process.popen.stdin.write(line + "\n")
+        self.process.popen.stdin.flush()
+        self.expect(lambda said: said.get("done") == line)
+
+    def heard(self, **fields):
+        """Everything said so far that has these fields."""
+        said = [json.loads(line) for line in list(self.process.lines) if line.startswith("{")]
+        return [each for each in said if all(each.get(key) == value for key, value in fields.items())]
+
+    def expect(self, condition, seconds=10.0):
+        """The first thing said, from now or before, that meets a condition."""
+        return wait_for(lambda: next((s for s in self.heard() if condition(s)), None), seconds, "what the probe awaits")

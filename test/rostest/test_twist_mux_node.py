@@ -1,0 +1,113 @@
+"""twist_mux with the collision guard, and teleop in a terminal, before a real master; needs the built workspace."""
+
+import os
+import pty
+import subprocess
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+from ros_processes import Process, Ros, wait_for
+
+CONFIG = Path(__file__).resolve().parents[2] / "config" / "twist_mux.yaml"
+TWIST, BOOL = "geometry_msgs/Twist", "std_msgs/Bool"
+
+
+@pytest.fixture(scope="module")
+def master():
+    ros = Ros()
+    yield ros
+    ros.stop()
+
+
+@pytest.fixture
+def ros(master):
+    yield master
+    master.stop_nodes()
+
+
+@pytest.fixture
+def base(ros):
+    """The probe in place of the base."""
+    subprocess.run(["rosparam", "delete", "/twist_mux"], env=ros.env, stderr=subprocess.DEVNULL)  # of the test before
+    subprocess.run(["rosparam", "load", str(CONFIG), "/twist_mux"], env=ros.env, check=True)
+    probe = ros.probe()
+    probe.tell(subscribe=["/cmd_vel", TWIST], advertise=["/e_stop", BOOL])
+    for name in ("teleop", "patrol", "move_base"):
+        probe.tell(advertise=[f"/cmd_vel/{name}", TWIST])
+    return probe
+
+
+def speeds(base):
+    return [float(said["linear"].split("x: ")[1].split()[0]) for said in base.heard(topic="/cmd_vel")]
+
+
+def drive(base, name, speed, until, seconds=8.0):
+    """Command a speed at 20 Hz until the base hears another one."""
+
+    def done():
+        base.tell(publish=[f"/cmd_vel/{name}", {"linear": {"x": speed}}])
+        return speeds(base)[-1:] == [until]
+
+    wait_for(done, seconds, f"{until} m/s")
+
+
+def test_priorities_time_out_and_lock(ros, base):
+    mux = ros.node("twist_mux", "_guard:=false", "cmd_vel_out:=/cmd_vel")
+    drive(base, "move_base", 0.5, 0.5)
+    drive(base, "teleop", -0.2, -0.2)
+    for _ in range(3):
+        base.tell(publish=["/cmd_vel/move_base", {"linear": {"x": 0.5}}])
+        assert speeds(base)[-1] == -0.2
+    wait_for(lambda: speeds(base)[-1] == 0.0, 3.0, "a zero after silence")
+    base.tell(publish=["/e_stop", {"data": True}])
+    mux.says("the base is stopped: e_stop is set")
+    base.tell(publish=["/cmd_vel/teleop", {"linear": {"x": 0.5}}])
+    assert speeds(base)[-1] == 0.0
+
+
+def test_without_a_scan_it_creeps_and_says_so(ros, base):
+    mux = ros.node("twist_mux", "cmd_vel_out:=/cmd_vel")
+    drive(base, "patrol", 0.5, 0.1)
+    mux.says("patrol is held back: no scan yet")
+
+
+def test_two_sources_of_one_priority_are_one_sentence(ros, base):
+    subprocess.run(
+        [
+            "rosparam",
+            "set",
+            "/twist_mux/topics",
+            "[{name: a, topic: a, priority: 1}, {name: b, topic: b, priority: 1}]",
+        ],
+        env=ros.env,
+        check=True,
+    )
+    mux = ros.node("twist_mux")
+    mux.says("topics/priority: 1 is given twice")
+    assert mux.popen.wait(5.0) == 1
+
+
+def test_teleop_without_a_terminal_waits(ros):
+    teleop = ros.node("teleop_twist_keyboard.py")
+    teleop.says("no terminal here")
+    assert teleop.popen.poll() is None
+    assert teleop.stop() == 0
+
+
+def test_teleop_in_a_terminal(ros):
+    probe = ros.probe()
+    probe.tell(subscribe=["/cmd_vel", TWIST])
+    keyboard, terminal = pty.openpty()
+    teleop = Process(ros.command("teleop_twist_keyboard.py"), ros.env, stdin=terminal)
+    teleop.says("currently:")
+    for key, speed in ((b"i", 0.5), (b",", -0.5), (b"k", 0.0), (b"w", 0.0), (b"i", 0.55)):
+        os.write(keyboard, key)
+        wait_for(lambda speed=speed: speeds(probe)[-1:] == [pytest.approx(speed)], 3.0, f"{speed} m/s")
+    os.write(keyboard, b"\x03")
+    assert teleop.popen.wait(5.0) == 0
+    wait_for(lambda: speeds(probe)[-1] == 0.0, 3.0, "a zero at the end")
+    os.close(keyboard)
+    os.close(terminal)
