@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.mesh_files import load_mesh
+from rosbot_patrol.simulation.meshes import Mesh, mesh_of
+from rosbot_patrol.simulation.scene import Shape
+from rosbot_patrol.simulation.textures import NAMES, SIDE, standard_textures
+
+SHAPES = [
+    Shape(kind="box", size=(1.0, 2.0, 3.0)),
+    Shape(kind="cylinder", size=(0.5, 2.0)),
+    Shape(kind="sphere", size=(0.7,)),
+    Shape(kind="capsule", size=(0.3, 1.0)),
+]
+VOLUMES = [6.0, np.pi * 0.25 * 2, 4 / 3 * np.pi * 0.343, np.pi * 0.09 * 1.0 + 4 / 3 * np.pi * 0.027]
+
+
+def volume(mesh: Mesh) -> float:
+    a, b, c = (mesh.positions[mesh.faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"), list(zip(SHAPES, VOLUMES, strict=True)), ids=lambda s: getattr(s, "kind", "")
+)
+def test_triangles_enclose_the_volume_and_face_outwards(shape: Shape, expected: float) -> None:
+    mesh = mesh_of(shape)
+    assert volume(mesh) == pytest.approx(expected, rel=0.06)
+    assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1.0)
+    assert (np.einsum("ij,ij->i", mesh.normals, mesh.positions) >= -1e-9).all()
+    assert mesh.uv.shape == mesh.span.shape == (len(mesh.positions), 2)
+    assert (np.abs(mesh.uv) <= mesh.span / 2 + 1e-9).all()
+
+
+def test_a_shape_with_too_few_sizes_is_named() -> None:
+    with pytest.raises(WorldError, match="box: needs 3 sizes"):
+        mesh_of(Shape(kind="box", size=(1.0,)))
+    with pytest.raises(WorldError, match="neither a file nor triangles"):
+        mesh_of(Shape(kind="mesh"))
+
+
+def test_binary_and_text_stl_and_obj_give_the_same_triangle(tmp_path: Path) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+    binary = bytes(80) + (1).to_bytes(4, "little") + bytes(12) + corners.tobytes() + bytes(2)
+    (tmp_path / "a.stl").write_bytes(binary)
+    lines = "".join(f"vertex {x} {y} {z}\n" for x, y, z in corners)
+    (tmp_path / "b.stl").write_text(f"solid t\nfacet normal 0 0 1\nouter loop\n{lines}endloop\nendfacet\nendsolid\n")
+    (tmp_path / "c.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "f 1/1/1 2/2/2 -1\n")
+    for name in ("a.stl", "b.stl", "c.obj"):
+        vertices, faces = load_mesh(tmp_path / name)
+        assert np.array_equal(vertices[faces[0]], corners), name
+    mesh = mesh_of(Shape(kind="mesh", mesh=tmp_path / "c.obj", size=(2.0, 1.0, 1.0)))
+    assert mesh.positions[:, 0].max() == 2.0
+    assert np.allclose(mesh.normals, [0, 0, 1])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("short.stl", bytes(80) + (5).to_bytes(4, "little") + bytes(50), "134 bytes do not fit 5 triangles"),
+        ("empty.obj", b"# nothing\n", "has no triangles"),
+        ("wrong.obj", b"v 0 0 0\nf 1 2 3\n", "names a vertex that is not there"),
+        ("words.obj", b"v a b c\n", "is broken"),
+        ("mesh.ply", b"ply", "no mesh that can be read"),
+    ],
+)
+def test_a_bad_mesh_file_is_named_with_its_problem(tmp_path: Path, name: str, content: bytes, problem: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(WorldError, match=f"{name}.*{problem}"):
+        load_mesh(tmp_path / name)
+
+
+def test_a_missing_mesh_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(WorldError, match=r"gone\.stl: the mesh cannot be read: No such file"):
+        load_mesh(tmp_path / "gone.stl")
+
+
+def test_textures_are_pictures_and_repeat_with_the_seed() -> None:
+    textures = standard_textures(3)
+    assert set(textures) == set(NAMES)
+    for name, texture in textures.items():
+        assert texture.pixels.shape == (SIDE, SIDE, 3), name
+        assert np.array_equal(texture.pixels, standard_textures(3)[name].pixels)
