@@ -18,6 +18,7 @@ from rosbot_patrol.amcl.motion_model import OdometryNoise, move_particles
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.particle_filter import Estimate, ParticleFilter
 from rosbot_patrol.amcl.sensor_model import MODELS, Mount, SensorModel, pick_beams
+from rosbot_patrol.errors import MapError
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.occupancy import FREE
@@ -96,9 +97,12 @@ class Localizer:
         """Take a map; the particles stay where they are.
 
         Raises:
-            MapError: the map is turned.
+            MapError: the map is turned, empty, or its place makes no sense.
         """
         grid.info.require_aligned("amcl")
+        info = grid.info
+        if not (0.0 < info.resolution < math.inf and math.isfinite(info.origin_x + info.origin_y) and grid.cells.size):
+            raise MapError("amcl", f"a map of {info.width} x {info.height} cells of {info.resolution} m makes no sense")
         self._model = MODELS[self._params.laser_model_type](grid, self._params)
         self._grid = grid
         self._free = np.flatnonzero(grid.cells == FREE)

@@ -262,6 +262,7 @@ class AmclNode:
         if current < self._last_time - 1.0:
             log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
             self._transforms.buffer.clear()
+        if abs(current - self._last_time) > SILENT_S:  # the clock was set, nobody was silent for so long
             self._last_scan = current
         self._last_time = current
         level, message = self._state(current)

@@ -133,10 +133,16 @@ def grid_to_msg(grid: Grid, frame: str, stamp: float, load_time: float = 0.0) ->
 
 
 def grid_from_msg(msg: OccupancyGrid) -> Grid:
-    """An occupancy grid as int8 cells (-1 unknown, 0 to 100); subscribe by `numpy_msg(OccupancyGrid)`."""
+    """An occupancy grid as int8 cells (-1 unknown, 0 to 100); subscribe by `numpy_msg(OccupancyGrid)`.
+
+    Raises:
+        ValueError: its size or its origin makes no sense.
+    """
     info = grid_info_from_msg(msg.info)
-    cells = np.array(msg.data, dtype=np.int8).reshape(info.shape)
-    return Grid(info, cells)
+    cells = np.array(msg.data, dtype=np.int8)
+    if cells.size != info.width * info.height:
+        raise ValueError(f"it has {cells.size} cells, expected {info.width} x {info.height}")
+    return Grid(info, cells.reshape(info.shape))
 
 
 def path_to_msg(poses: np.ndarray, frame: str, stamp: float) -> Path:

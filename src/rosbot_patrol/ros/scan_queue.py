@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
+import time
 from collections import deque
 from dataclasses import dataclass
 
@@ -16,8 +18,8 @@ from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.scan import LaserScan
 
-POLL_S, SLOW_POLL_S, SLOW_AFTER_S = 0.005, 0.05, 0.1
-GIVE_UP_S = 1.0  # a scan that is this much older than the newest, or has waited so long, is dropped
+POLL_S, IDLE_S = 0.008, 0.2
+GIVE_UP_S, GIVE_UP_WALL_S = 1.0, 2.0  # a scan this much older than the newest, or waiting for so long, is dropped
 
 
 @dataclass(frozen=True)
@@ -47,21 +49,21 @@ def mount_of(transforms: Transforms, base: str, laser: str) -> Mount:
 
 
 class ScanQueue:
-    """Hands out scans in their order, each once its odometry is known.
+    """Hands out scans in their order, each once its odometry is known; one that cannot be placed holds up no other.
 
     Args:
         transforms: the node's tf.
-        odom, base: frames of odometry and robot.
+        odom: frame of the odometry.
+        base: frame of the robot.
         size: most scans that wait; the oldest goes first.
     """
 
     def __init__(self, transforms: Transforms, odom: str, base: str, size: int = 100) -> None:
         self._transforms = transforms
         self._odom, self._base = odom, base
-        self._waiting: deque[LaserScan] = deque(maxlen=size)
+        self._waiting: deque[tuple[LaserScan, float]] = deque(maxlen=size)
         self._arrived = threading.Event()
         self._mounts: dict[str, Mount] = {}
-        self._waited = 0.0
         self._newest = -math.inf
         self.problem = ""  # why the last scan that was dropped could not be placed
         self.dropped = 0
@@ -71,45 +73,46 @@ class ScanQueue:
         if scan.stamp < self._newest - GIVE_UP_S:  # the clock was set back: what waits is of another time
             self._waiting.clear()
         self._newest = scan.stamp
-        self._waiting.append(scan)
+        self._waiting.append((scan, time.monotonic()))
         self._arrived.set()
 
     def take(self) -> PlacedScan | None:
-        """The oldest scan, once it can be placed; None where none can be now. Waits a few milliseconds at most."""
+        """The oldest scan that can be placed, None where none can be now; waits for a few milliseconds at most."""
         if not self._waiting:
-            self._arrived.wait(SLOW_POLL_S)
-            self._arrived.clear()
-        try:
-            scan = self._waiting[0]
-        except IndexError:
-            return None
-        try:
-            placed = PlacedScan(
-                scan, self._transforms.lookup(self._odom, self._base, scan.stamp), self._mount(scan.frame_id)
-            )
-        except (TransformError, ValueError) as err:
-            self._wait_or_drop(scan, str(err))
-            return None
-        self._done(scan)
-        self.problem = ""
-        return placed
+            self._arrived.wait(IDLE_S)
+        self._arrived.clear()
+        for entry in list(self._waiting):
+            try:
+                placed = self._place(entry[0])
+            except (TransformError, ValueError) as err:
+                self._drop_when_old(entry, str(err))
+                continue
+            self._forget(entry)
+            self.problem = ""
+            return placed
+        if self._waiting:
+            time.sleep(POLL_S)
+        return None
+
+    def _place(self, scan: LaserScan) -> PlacedScan:
+        mount = self._mount(scan.frame_id)
+        return PlacedScan(scan, self._transforms.lookup(self._odom, self._base, scan.stamp), mount)
 
     def _mount(self, frame: str) -> Mount:
         if frame not in self._mounts:
             self._mounts[frame] = mount_of(self._transforms, self._base, frame)
         return self._mounts[frame]
 
-    def _wait_or_drop(self, scan: LaserScan, why: str) -> None:
-        if self._newest - scan.stamp > GIVE_UP_S or self._waited > GIVE_UP_S:
+    def _drop_when_old(self, entry: tuple[LaserScan, float], why: str) -> None:
+        scan, arrival = entry
+        if self._newest - scan.stamp > GIVE_UP_S or time.monotonic() - arrival > GIVE_UP_WALL_S:
+            self._forget(entry)
             self.problem = why
             self.dropped += 1
-            self._done(scan)
-            return
-        pause = POLL_S if self._waited < SLOW_AFTER_S else SLOW_POLL_S
-        self._waited += pause
-        threading.Event().wait(pause)
 
-    def _done(self, scan: LaserScan) -> None:
-        self._waited = 0.0
-        if self._waiting and self._waiting[0] is scan:
-            self._waiting.popleft()
+    def _forget(self, entry: tuple[LaserScan, float]) -> None:
+        with contextlib.suppress(ValueError, IndexError):  # a full queue or a clock set back was faster
+            if self._waiting[0] is entry:
+                self._waiting.popleft()
+            else:
+                self._waiting.remove(entry)

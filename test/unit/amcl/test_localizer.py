@@ -149,6 +149,20 @@ def test_a_turned_map_is_refused_and_the_old_one_stays() -> None:
     assert made.update(scan_at(Pose2D(), np.random.default_rng(0)), Pose2D(), MOUNT).updated
 
 
+@pytest.mark.parametrize(
+    "info",
+    [
+        GridInfo(resolution=0.0, width=1, height=1),
+        GridInfo(resolution=math.nan, width=1, height=1),
+        GridInfo(resolution=0.05, width=0, height=0),
+        GridInfo(resolution=0.05, width=1, height=1, origin_x=math.nan),
+    ],
+)
+def test_a_map_that_makes_no_sense_is_refused(info: GridInfo) -> None:
+    with pytest.raises(MapError, match="makes no sense"):
+        localizer().set_map(Grid(info, np.zeros(info.shape, dtype=np.int8)))
+
+
 @pytest.mark.parametrize("value", [-1, 0, 100])
 @pytest.mark.parametrize("model", ["likelihood_field", "likelihood_field_prob", "beam"])
 def test_a_map_of_one_cell(value: int, model: str) -> None:
