@@ -1,10 +1,15 @@
-"""The look around in a room: one full turn before a live detector, and whether it may be relied on."""
+"""The look around in a room: one full turn before a live detector, and whether it may be relied on.
+
+The turn is measured in odom. Wheels slip, so that a full turn there may be several degrees off; where the pose in the
+map (amcl) says so, within reason, the rest is turned on top.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.inputs import Inputs
 from rosbot_patrol.patrol.spin import Spin, SpinParams
@@ -18,6 +23,12 @@ class LookParams:
     camera_timeout: float = param(3.0, unit="s", lo=0.1, doc="a camera silent for longer has not watched")
     detector_wait: float = param(10.0, unit="s", lo=0.0, doc="wait this long for detector and camera before turning")
     linger: float = param(1.0, unit="s", lo=0.0, hi=30.0, doc="wait after the turn for the detector's last pictures")
+    correction_min: float = param(
+        0.04, unit="rad", lo=0.01, doc="a turn is corrected where the map says it is off by this"
+    )
+    correction_max: float = param(
+        0.4, unit="rad", lo=0.0, hi=3.0, doc="off by more the pose in the map is not believed"
+    )
     hold: float = param(2.0, unit="s", lo=0.0, hi=30.0, doc="stand still this long while something may be an intruder")
 
 
@@ -51,6 +62,10 @@ class Look:
         self._needs_camera = needs_camera
         self._began: float | None = None
         self._turning = False
+        self._correction: Spin | None = None
+        self._spin_params = spin
+        self._map_yaw: float | None = None
+        self._map_turned = 0.0
         self._turned_at: float | None = None
         self._problem = ""
         self._held_since: float | None = None
@@ -74,11 +89,35 @@ class Look:
                 return LookStep(why=f"waiting before the turn: {blind}")
             self._turning = True
         self._note_blindness(now, inputs)
-        step = self.spin.step(now, inputs.yaw, inputs.clearance, hold=self._hold(now, candidate))
-        if step.done:
-            self._problem = step.problem or self._problem
+        self._measure_in_map(inputs.pose)
+        spin = self._correction or self.spin
+        step = spin.step(now, inputs.yaw, inputs.clearance, hold=self._hold(now, candidate))
+        if step.done and spin is self.spin and not step.problem and self._is_off():
+            self._correction = Spin(abs(self._left()), clockwise=self._left() < 0.0, params=self._spin_params)
+        elif step.done:
+            if spin is self.spin:  # a correction that fails takes nothing from the turn
+                self._problem = step.problem or self._problem
             self._turned_at = now
         return LookStep(speed=step.speed, why=f"turning to look around, {self._progress()}")
+
+    @property
+    def turned_deg(self) -> float:
+        """How far it has turned [deg]: by the map where that is believed, else by odom."""
+        by_map = abs(self._left()) <= self.params.correction_max
+        return math.degrees(self._map_turned) if by_map else self.spin.turned_deg
+
+    def _measure_in_map(self, pose: Pose2D | None) -> None:
+        if pose is None:
+            return
+        if self._map_yaw is not None:
+            self._map_turned += angle_difference(pose.yaw, self._map_yaw)
+        self._map_yaw = pose.yaw
+
+    def _left(self) -> float:
+        return math.tau - self._map_turned
+
+    def _is_off(self) -> bool:
+        return self.params.correction_min < abs(self._left()) <= self.params.correction_max
 
     def _progress(self) -> str:
         return f"{max(self.spin.turned_deg, 0.0) // 30 * 30:.0f} of 360 degrees"

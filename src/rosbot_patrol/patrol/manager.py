@@ -307,7 +307,7 @@ class PatrolManager:
             self._say(out, Phase.LOOKING, f"{step.why}, in {mission.room.title}")
             return
         mission.looked = now
-        turned = f"turned {look.spin.turned_deg:.0f} degrees"
+        turned = f"turned {look.turned_deg:.0f} degrees"
         if step.problem:
             self._decide(Verdict.UNVERIFIED, f"{mission.room.title} could not be verified: {step.problem}")
         else:
