@@ -22,7 +22,7 @@ class LockstepParams:
     """Nodes that the clock waits for at rate 0: each topic speaks once in so much simulated time, or is idle."""
 
     topics: tuple[str, ...] = param((), doc="topics of the nodes that have to keep up")
-    slack: float = param(0.25, unit="s", lo=0.02, doc="simulated time that the clock may run ahead of their last message")
+    slack: float = param(0.25, unit="s", lo=0.02, doc="how far the clock may run ahead of their last message")
     patience: float = param(0.4, unit="s", lo=0.0, doc="wall time after which a silent topic is taken for idle")
 
 

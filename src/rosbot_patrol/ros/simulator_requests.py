@@ -115,5 +115,3 @@ class Requests:
 
 def _pose(msg: Any) -> Pose2D:
     return Pose2D(msg.x, msg.y, msg.theta)
-
-

@@ -27,7 +27,7 @@ class CameraParams:
     depth_max: float = param(5.0, unit="m", lo=0.1, doc="farther depth is NaN")
     noise: float = param(2.0, lo=0.0, hi=50.0, doc="standard deviation of a colour, of 255")
     depth_noise: float = param(0.0012, lo=0.0, doc="standard deviation of a depth at 1 m [m], grows with its square")
-    renderer: str = param("egl", choices=("egl", "tiny"), doc="egl: OpenGL without a display; tiny: PyBullet's software")
+    renderer: str = param("egl", choices=("egl", "tiny"), doc="egl: OpenGL without a display; tiny: PyBullet's")
 
     @property
     def intrinsics(self) -> Intrinsics:

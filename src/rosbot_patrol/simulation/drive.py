@@ -25,14 +25,14 @@ class DriveParams:
     wheel_radius: float = param(0.04, unit="m", lo=0.001, doc="radius of the wheels")
     effective_track: float = param(0.20, unit="m", lo=0.01, doc="wheel distance by which the base really turns")
     legacy_wheel_separation: float = param(
-        0.0, unit="m", lo=0.0, doc="wheel distance that the controller assumes, 0: the effective track (2019 model: 0.1)"
+        0.0, unit="m", lo=0.0, doc="wheel distance that the controller assumes, 0: the real one (2019 model: 0.1)"
     )
     max_wheel_speed: float = param(10.0, unit="rad/s", lo=0.1, doc="fastest turn of a wheel")
     wheel_acceleration: float = param(40.0, unit="rad/s^2", lo=0.1, doc="fastest change of a wheel's speed")
-    command_timeout: float = param(0.5, unit="s", lo=0.0, doc="the base stops that long after the last command, 0: never")
+    command_timeout: float = param(0.5, unit="s", lo=0.0, doc="after the last command the base stops, 0: never")
     traction: float = param(0.8, lo=0.01, doc="friction of the tyres on the floor")
-    slip: float = param(0.004, lo=0.0, hi=0.5, doc="relative spread of the way of each side against its wheels'")
-    scrub: float = param(0.010, lo=0.0, hi=0.5, doc="relative spread of the angle turned against the wheels'")
+    slip: float = param(0.002, lo=0.0, hi=0.5, doc="relative spread of the way of each side against its wheels'")
+    scrub: float = param(0.004, lo=0.0, hi=0.5, doc="relative spread of the angle turned against the wheels'")
     slip_time: float = param(3.0, unit="s", lo=0.01, doc="how long a slip lasts")
 
     @property

@@ -40,6 +40,7 @@ from rosbot_patrol.simulation.world import World
 
 STEP = 0.005  # [s]
 EYE_LEVEL = 1.3  # height at which a motion sensor's line of sight is judged [m]
+HOME = Pose2D()
 RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")
 
 _ODOMETRY_EVERY = 10  # steps
@@ -177,7 +178,7 @@ class Engine:
         """Whether a robot is there."""
         return self._robot is not None
 
-    def spawn_robot(self, description: RobotDescription, pose: Pose2D = Pose2D()) -> None:
+    def spawn_robot(self, description: RobotDescription, pose: Pose2D = HOME) -> None:
         """Put the robot into the world; raises WorldError where there is one, or no room for it."""
         if self._robot is not None:
             raise WorldError(f"robot '{description.name}'", f"'{self._robot.description.name}' is there already")
@@ -268,7 +269,8 @@ class Engine:
         """One picture of the camera; always from the same thread.
 
         Args:
-            colour, depth: whether the picture's noise and limits are wanted of each; what is not may be left raw.
+            colour: whether the colour is wanted with its noise; else it may stay as it was drawn.
+            depth: whether the depth is wanted with its limits and noise.
 
         Raises:
             WorldError: the engine has no renderer, or the robot no camera.

@@ -15,7 +15,7 @@ class OdometryParams:
 
     ticks_per_turn: float = param(1024.0, lo=1.0, doc="encoder ticks a turn of a wheel")
     radius_error: float = param(0.004, lo=-0.5, hi=0.5, doc="relative error of the wheel radius that odometry believes")
-    track_error: float = param(-0.004, lo=-0.5, hi=0.5, doc="relative error of the track that odometry believes")
+    track_error: float = param(-0.002, lo=-0.5, hi=0.5, doc="relative error of the track that odometry believes")
 
 
 class EncoderOdometry:

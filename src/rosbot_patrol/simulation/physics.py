@@ -134,7 +134,8 @@ class Physics:
         if stuck:
             pybullet.removeBody(self._robot, physicsClientId=self._client)
             self._robot = None
-            raise WorldError(f"robot '{robot.name}'", f"({pose.x:.2f}, {pose.y:.2f}) is no place for it, '{stuck}' is there")
+            place = f"({pose.x:.2f}, {pose.y:.2f})"
+            raise WorldError(f"robot '{robot.name}'", f"{place} is no place for it, '{stuck}' is there")
 
     @property
     def pose(self) -> Pose2D:
@@ -225,9 +226,7 @@ class Physics:
             return int(pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **place))
         if shape.kind != "mesh" and len(parts) == 1:
             length = shape.size[1] if len(shape.size) > 1 else 0.0
-            return int(
-                pybullet.createCollisionShape(_bullet_kind(shape), radius=shape.size[0], height=length, **place)
-            )
+            return int(pybullet.createCollisionShape(_bullet_kind(shape), radius=shape.size[0], height=length, **place))
         vertices, faces = _merged(parts)
         return int(
             pybullet.createCollisionShape(

@@ -23,7 +23,9 @@ class RangeParams:
     noise: float = param(0.005, unit="m", lo=0.0, doc="standard deviation")
 
 
-def measure_range(params: RangeParams, scene: Slice, world_from_sensor: Pose2D, rng: np.random.Generator | None) -> float:
+def measure_range(
+    params: RangeParams, scene: Slice, world_from_sensor: Pose2D, rng: np.random.Generator | None
+) -> float:
     """Distance to the nearest thing in the cone [m], within the sensor's limits."""
     x, y, yaw = world_from_sensor
     step = params.field_of_view / (_BEAMS - 1)

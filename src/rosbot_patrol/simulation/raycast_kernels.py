@@ -5,17 +5,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
+Array = NDArray[np.float64]
+
 
 @kernel("void(float64, float64, float64, float64, float64[:, ::1], float64[:, ::1], float64[::1])")
-def cast_fan(px, py, first, step, segments, circles, ranges):
+def cast_fan(px: float, py: float, first: float, step: float, segments: Array, circles: Array, ranges: Array) -> None:
     """Shorten each beam of a fan to the nearest obstacle.
 
     Args:
-        px, py: where the beams start [m].
-        first, step: bearing of beam 0 and from beam to beam [rad], step > 0, at most one turn in all.
+        px: where the beams start [m].
+        py: where the beams start [m].
+        first: bearing of beam 0 [rad].
+        step: from beam to beam [rad], positive; at most one turn in all.
         segments: x0, y0, x1, y1, shape (S, 4).
         circles: x, y, radius, shape (C, 3).
         ranges: longest length on entry, length to the nearest obstacle on return [m], shape (N,).
@@ -35,8 +40,8 @@ def cast_fan(px, py, first, step, segments, circles, ranges):
         low = a0 if width >= 0.0 else a0 + width
         offset = (low - first) % turn - 1e-9
         for lap in range(2):
-            k0 = int(math.ceil((offset - lap * turn) / step))
-            k1 = int(math.floor((offset - lap * turn + abs(width) + 2e-9) / step))
+            k0 = math.ceil((offset - lap * turn) / step)
+            k1 = math.floor((offset - lap * turn + abs(width) + 2e-9) / step)
             for k in range(max(k0, 0), min(k1, n - 1) + 1):
                 bearing = first + k * step
                 below = math.cos(bearing) * dy - math.sin(bearing) * dx
@@ -51,8 +56,8 @@ def cast_fan(px, py, first, step, segments, circles, ranges):
         half = math.pi if away <= radius else math.asin(radius / away)
         offset = (centre - half - first) % turn
         for lap in range(2):
-            k0 = int(math.ceil((offset - lap * turn) / step))
-            k1 = int(math.floor((offset - lap * turn + 2.0 * half) / step))
+            k0 = math.ceil((offset - lap * turn) / step)
+            k1 = math.floor((offset - lap * turn + 2.0 * half) / step)
             for k in range(max(k0, 0), min(k1, n - 1) + 1):
                 bearing = first + k * step
                 along = cx * math.cos(bearing) + cy * math.sin(bearing)
@@ -66,7 +71,7 @@ def cast_fan(px, py, first, step, segments, circles, ranges):
 
 
 @kernel("boolean(float64, float64, float64, float64, float64[:, ::1], float64[:, ::1])")
-def is_blocked(x0, y0, x1, y1, segments, circles):
+def is_blocked(x0: float, y0: float, x1: float, y1: float, segments: Array, circles: Array) -> bool:
     """Whether a segment or a circle lies between two points."""
     dx, dy = x1 - x0, y1 - y0
     for s in range(segments.shape[0]):

@@ -123,9 +123,7 @@ class _Parser:
         name = self.root.get("name", "robot")
         masses = [float(e.get("value", 0.0)) for e in self.root.findall("link/inertial/mass")]
         body = Body(name=name, kind="robot", static=False, visuals=tuple(visuals), collisions=tuple(collisions))
-        return RobotDescription(
-            name=name, base=base, frames=frames, wheels=wheels, body=body, mass=sum(masses) or 5.0
-        )
+        return RobotDescription(name=name, base=base, frames=frames, wheels=wheels, body=body, mass=sum(masses) or 5.0)
 
     def _place(self, links: dict[str, ET.Element], joints: list[ET.Element]) -> tuple[str, dict[str, Matrix]]:
         below: dict[str, list[tuple[str, Matrix]]] = {}
@@ -134,7 +132,8 @@ class _Parser:
             parent, child = _link_of(joint, "parent"), _link_of(joint, "child")
             for end in (parent, child):
                 if end not in links:
-                    raise WorldError(self.source, f"joint '{joint.get('name')}' names the link '{end}', which is not there")
+                    name = joint.get("name")
+                    raise WorldError(self.source, f"joint '{name}' names the link '{end}', which is not there")
             below.setdefault(parent, []).append((child, self._origin(joint)))
             children.add(child)
         roots = [name for name in links if name not in children]

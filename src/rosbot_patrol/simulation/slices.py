@@ -46,7 +46,8 @@ class Slice:
 
     def is_blocked(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
         """Whether something lies between two points."""
-        return bool(kernels.is_blocked(*map(float, (*start, *end)), self.segments, self.circles))
+        x0, y0, x1, y1 = map(float, (*start, *end))
+        return bool(kernels.is_blocked(x0, y0, x1, y1, self.segments, self.circles))
 
 
 EMPTY = Slice(kernels.NO_SEGMENTS, kernels.NO_CIRCLES)

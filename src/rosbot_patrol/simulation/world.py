@@ -174,8 +174,9 @@ class _Reader:
             body_name = name if len(links) == 1 else f"{name}/{label}"
             world_from_link = state.get(f"{name}/{label}", pose @ _pose(link, path, where))
             visuals = [self._visual(v, path, f"{where}, visual '{v.get('name')}'") for v in link.findall("visual")]
-            shapes = [self._collision(c, path, f"{where}, collision '{c.get('name')}'") for c in link.findall("collision")]
-            collisions = [c for c in shapes if c is not None]
+            shapes = link.findall("collision")
+            solid = [self._collision(c, path, f"{where}, collision '{c.get('name')}'") for c in shapes]
+            collisions = [c for c in solid if c is not None]
             self.bodies.append(
                 Body(
                     name=body_name,
