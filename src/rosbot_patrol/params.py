@@ -61,7 +61,8 @@ def param(
     Args:
         default: its value where none is given; without it the parameter must be given. Lists and dicts are copied.
         unit: SI unit, for the table and the message.
-        lo: smallest value allowed, hi: largest; for a sequence they hold for each element.
+        lo: smallest value allowed; for a sequence it holds for each element.
+        hi: largest value allowed, likewise.
         choices: values allowed.
         doc: one line for the README's table.
         name: upstream's name where it is no Python name or differs from the field's.
@@ -129,7 +130,7 @@ def table(cls: type) -> str:
     for key, _, default, info in declared(cls):
         if dataclasses.is_dataclass(default):
             continue
-        shown = "(required)" if default is dataclasses.MISSING else f"`{default}`"
+        shown = "(required)" if default is dataclasses.MISSING else f"`{default if default != '' else repr('')}`"
         lines.append(f"| `{key}` | {shown} | {info.unit} | {info.doc} |")
     return "\n".join(lines)
 

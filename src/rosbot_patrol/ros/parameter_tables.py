@@ -1,0 +1,115 @@
+"""docs/parameters.md, made from the declarations: `scripts/parameter_tables`."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import typing
+from pathlib import Path
+
+from rosbot_patrol.alerts.transports import MailParams
+from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.control.teleop import TeleopParams
+from rosbot_patrol.costmap.params import (
+    CostmapParams,
+    InflationParams,
+    ObstacleParams,
+    SourceParams,
+    StaticParams,
+)
+from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.navigation.params import MoveBaseParams
+from rosbot_patrol.params import declared, table
+from rosbot_patrol.patrol.drive import DriveParams
+from rosbot_patrol.patrol.look import LookParams
+from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.planning.navfn import NavfnParams
+from rosbot_patrol.planning.recoveries import ClearCostmapParams, RotateParams
+from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
+from rosbot_patrol.ros.demo_intruder_node import DemoParams
+from rosbot_patrol.ros.map_server_node import MapServerParams
+from rosbot_patrol.ros.narrator_node import NarratorParams
+from rosbot_patrol.ros.patrol_node import NodeParams
+from rosbot_patrol.ros.republish_node import RepublishParams
+from rosbot_patrol.ros.simulator_node import SimulatorParams
+from rosbot_patrol.ros.twist_mux_node import TwistMuxParams
+from rosbot_patrol.rosserial.settings import SerialNodeParams
+
+# Title, namespace below the node's own, declaration.
+SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
+    (
+        "patrol_robot",
+        [("", NodeParams), ("", MailParams), ("", DriveParams), ("", LookParams), ("", SpinParams)],
+    ),
+    (
+        "move_base",
+        [
+            ("", MoveBaseParams),
+            ("NavfnROS/", NavfnParams),
+            ("TrajectoryPlannerROS/", TrajectoryPlannerParams),
+            ("conservative_reset/, aggressive_reset/", ClearCostmapParams),
+            ("rotate_recovery/", RotateParams),
+            ("global_costmap/, local_costmap/", CostmapParams),
+            ("<costmap>/static_layer/", StaticParams),
+            ("<costmap>/obstacle_layer/", ObstacleParams),
+            ("<costmap>/obstacle_layer/<source>/", SourceParams),
+            ("<costmap>/inflation_layer/", InflationParams),
+        ],
+    ),
+    ("amcl", [("", AmclParams)]),
+    ("map_server", [("", MapServerParams)]),
+    ("darknet_ros", [("", DarknetParams)]),
+    ("republish", [("", RepublishParams)]),
+    ("serial_node.py", [("", SerialNodeParams)]),
+    ("twist_mux", [("", TwistMuxParams)]),
+    ("teleop_twist_keyboard.py", [("", TeleopParams)]),
+    ("simulator", [("", SimulatorParams)]),
+    ("narrator", [("", NarratorParams)]),
+    ("demo_intruder", [("", DemoParams)]),
+]
+
+
+def _groups(prefix: str, cls: type) -> list[tuple[str, type]]:
+    """A declaration and the ones nested in it, with their namespaces."""
+    found = [(prefix, cls)]
+    hints = typing.get_type_hints(cls)
+    for field, (name, *_) in zip(dataclasses.fields(cls), declared(cls), strict=True):
+        if dataclasses.is_dataclass(hints[field.name]):
+            found += _groups(f"{prefix}{name}/", hints[field.name])
+    return found
+
+
+def document() -> str:
+    """The whole page."""
+    lines = [
+        "# Parameters",
+        "",
+        "Made from the declarations in the code by `scripts/parameter_tables`; names and defaults of the drop-ins are",
+        "upstream's.",
+    ]
+    for node, sections in SECTIONS:
+        lines += ["", f"## {node}"]
+        for prefix, cls in sections:
+            for namespace, group in _groups(prefix, cls):
+                rows = table(group)
+                if rows.count("\n") > 1:
+                    lines += ["", *([f"`~{namespace}`", ""] if namespace else []), rows]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Write the page, or with --check compare it; exit status 1 where it is out of date."""
+    target, text = Path(sys.argv[1]), document()
+    if "--check" in sys.argv[2:]:
+        current = target.read_text(encoding="utf-8") if target.exists() else ""
+        if current != text:
+            sys.stderr.write(f"{target} is out of date: run scripts/parameter_tables\n")
+            return 1
+        return 0
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
