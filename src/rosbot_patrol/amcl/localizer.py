@@ -39,11 +39,13 @@ class Outcome:
         updated: the particles were moved and weighed.
         resampled: they were drawn anew.
         estimate: the pose to give out, or None where there is no news.
+        is_blind: the particles were moved, but no beam of the scan could weigh them.
     """
 
     updated: bool = False
     resampled: bool = False
     estimate: Estimate | None = None
+    is_blind: bool = False
 
 
 class Localizer:
@@ -156,14 +158,15 @@ class Localizer:
             self._move(self._odometry, odom_from_base)
         self._odometry, self._forced = odom_from_base, False
         weighing = self._model.weigh(self.filter.poses, pick_beams(scan, mount, self._params))
+        is_blind = weighing is None
         if weighing is not None:
             self.filter.weigh(weighing)
         resampled = self._resample_when_due()
         if not (resampled or is_start):
-            return Outcome(updated=True)
+            return Outcome(updated=True, is_blind=is_blind)
         self.estimate = self.filter.estimate()
         self.map_from_odom = compose(self.estimate.pose, invert(odom_from_base))
-        return Outcome(updated=True, resampled=resampled, estimate=self.estimate)
+        return Outcome(updated=True, resampled=resampled, estimate=self.estimate, is_blind=is_blind)
 
     def _move(self, start: Pose2D, end: Pose2D) -> None:
         move_particles(self.filter.poses, start, end, self._params.odom_model_type, self._alphas, self._rng)

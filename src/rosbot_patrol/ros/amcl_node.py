@@ -221,6 +221,10 @@ class AmclNode:
         if correction is not None and self._params.tf_broadcast:
             stamp = scan.stamp + self._params.transform_tolerance
             self._broadcaster.sendTransform(transform_to_msg(correction, self._global, self._odom, stamp))
+        if outcome.is_blind:
+            rospy.logwarn_throttle(
+                10.0, f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
+            )
         self._publish(outcome, poses, scan.stamp)
 
     def _publish(self, outcome: Outcome, poses: np.ndarray, stamp: float) -> None:

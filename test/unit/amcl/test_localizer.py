@@ -182,7 +182,8 @@ def test_scans_that_say_nothing_are_survived(model: str, ranges: list[float]) ->
     made = localizer(AmclParams(laser_model_type=model, max_particles=200))
     good = scan_at(Pose2D(), np.random.default_rng(0))
     for i in range(4):
-        made.update(replace(good, ranges=np.array(ranges)), Pose2D(0.3 * i, 0.0, 0.0), MOUNT)
+        outcome = made.update(replace(good, ranges=np.array(ranges)), Pose2D(0.3 * i, 0.0, 0.0), MOUNT)
+    assert outcome.is_blind or model == "beam" or 1.0 in ranges
     assert np.isfinite(made.filter.poses).all()
     assert made.update(good, Pose2D(1.2, 0.0, 0.0), MOUNT).updated
 
