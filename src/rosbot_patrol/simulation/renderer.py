@@ -7,7 +7,7 @@ its visuals. Colours are taken as the display's own (as Gazebo classic takes the
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.meshes import mesh_of
 from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, SceneRenderer
-from rosbot_patrol.simulation.shaders import DEPTH_SHADER, FRAGMENT_SHADER, VERTEX_SHADER
+from rosbot_patrol.simulation.shaders import sources
 from rosbot_patrol.simulation.textures import SIDE, Texture, standard_textures
 
 log = logging.getLogger(__name__)
@@ -59,15 +59,19 @@ class Light:
 _Arrays = tuple[NDArray[np.void], NDArray[np.int64]]
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Drawn:
-    """What OpenGL holds of some triangles: arrays for the depth and the shading pass, and their buffers."""
+    """What OpenGL holds of some triangles: corners, their order, and an array for each program that has drawn them."""
 
-    things: tuple[Any, ...] = ()
+    corners: Any = None
+    order: Any = None
+    textured: bool = False
+    arrays: dict[Any, Any] = field(default_factory=dict)
 
     def release(self) -> None:
-        for thing in self.things:
-            thing.release()
+        for thing in (*self.arrays.values(), self.corners, self.order):
+            if thing is not None:
+                thing.release()
 
 
 @dataclass
@@ -99,8 +103,11 @@ class EglRenderer(SceneRenderer):
         self._still: _Drawn | None = None
         self._target: tuple[tuple[int, int], Any, Any, Any] | None = None
         context = self._context
-        self._program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
-        self._depth_program = context.program(vertex_shader=VERTEX_SHADER, fragment_shader=DEPTH_SHADER)
+        self._programs = {
+            (lamp, textured): context.program(*sources(lamp=lamp, textured=textured))
+            for lamp in (False, True)
+            for textured in (False, True)
+        }
         self._layers: dict[str, tuple[int, float]] = {}
         self._texture = self._upload(textures if textures is not None else standard_textures())
         self._parts = np.tile(np.eye(4, dtype="<f4"), (MAX_PARTS, 1, 1))
@@ -179,60 +186,57 @@ class EglRenderer(SceneRenderer):
     def _draw(self, world_from_optical: Matrix, intrinsics: Intrinsics, size: tuple[int, int]) -> Any:
         buffer = self._buffer(size)
         buffer.use()
-        context, program = self._context, self._program
+        context, lamp = self._context, any(self.light.lamp)
         context.enable_only(context.DEPTH_TEST)
         buffer.clear(*self.light.sky, 0.0, depth=1.0)
         self._texture.use(0)
-        _set(program, "view", np.linalg.inv(world_from_optical).T)
-        _set(program, "projection", _projection(intrinsics).T)
-        _set(program, "eye", world_from_optical[:3, 3])
-        self._set_light()
-        # Depth first, then only what is seen is shaded: a house is many walls behind each other.
-        _set(self._depth_program, "view", np.linalg.inv(world_from_optical).T)
-        _set(self._depth_program, "projection", _projection(intrinsics).T)
-        buffer.color_mask = False, False, False, False
-        self._draw_all(depth_only=True)
-        buffer.color_mask = True, True, True, True
-        buffer.depth_mask = False
-        context.depth_func = "<="
-        self._draw_all(depth_only=False)
-        buffer.depth_mask = True
-        context.depth_func = "<"
-        return buffer
-
-    def _draw_all(self, *, depth_only: bool) -> None:
+        shading = {textured: self._programs[lamp, textured] for textured in (False, True)}
+        for program in shading.values():
+            _set(program, "view", np.linalg.inv(world_from_optical).T)
+            _set(program, "projection", _projection(intrinsics).T)
+            _set(program, "eye", world_from_optical[:3, 3])
+            self._set_light(program, lamp)
+        # What moves stands before what does not, as a rule: drawn first, it spares the fragments behind it. A pass for
+        # depth alone, to shade only what is seen, cost more than it saved.
         for item in self._items.values():
             if item.moving:
-                self._draw_item(item, depth_only)
+                self._draw_item(item, shading)
+        self._draw_still(shading)
+        return buffer
+
+    def _draw_still(self, programs: dict[bool, Any]) -> None:
         if self._still is None:
             arrays = [placed for item in self._items.values() if not item.moving for placed in _placed(item)]
-            self._still = self._array(arrays) if arrays else _Drawn()
+            self._still = self._buffers(arrays) if arrays else _Drawn()
         self._parts[0] = np.eye(4)
-        self._draw_array(self._still, depth_only)
+        self._draw_array(self._still, programs)
 
-    def _draw_item(self, item: _Item, depth_only: bool) -> None:
+    def _draw_item(self, item: _Item, programs: dict[bool, Any]) -> None:
         if not item.drawn:
-            item.drawn = [self._array(item.arrays[i : i + MAX_PARTS]) for i in range(0, len(item.arrays), MAX_PARTS)]
+            item.drawn = [self._buffers(item.arrays[i : i + MAX_PARTS]) for i in range(0, len(item.arrays), MAX_PARTS)]
         world = item.pose @ item.visuals
         for i, drawn in enumerate(item.drawn):
             some = world[i * MAX_PARTS : (i + 1) * MAX_PARTS]
             self._parts[: len(some)] = some.transpose(0, 2, 1)
-            self._draw_array(drawn, depth_only)
+            self._draw_array(drawn, programs)
 
-    def _draw_array(self, drawn: _Drawn, depth_only: bool) -> None:
-        if not drawn.things:
+    def _draw_array(self, drawn: _Drawn, programs: dict[bool, Any]) -> None:
+        if drawn.corners is None:
             return
-        program = self._depth_program if depth_only else self._program
+        program = programs[drawn.textured]
+        if program not in drawn.arrays:
+            drawn.arrays[program] = self._array(program, drawn)
         program["parts"].write(self._parts)
-        drawn.things[0 if depth_only else 1].render()
+        drawn.arrays[program].render()
 
-    def _set_light(self) -> None:
-        light, program = self.light, self._program
+    def _set_light(self, program: Any, lamp: bool) -> None:
+        light = self.light
         towards = np.array(light.sun_direction, float)
         _set(program, "sun_direction", towards / max(float(np.linalg.norm(towards)), 1e-9))
-        for name in ("sun", "above", "below", "lamp_place", "lamp"):
+        for name in ("sun", "above", "below", *(("lamp_place", "lamp") if lamp else ())):
             _set(program, name, np.array(getattr(light, name)))
-        _set(program, "lamp_reach", np.array(1.0 / light.lamp_reach**2))
+        if lamp:
+            _set(program, "lamp_reach", np.array(1.0 / light.lamp_reach**2))
 
     def _vertices(self, body: Body, index: int, label: int) -> _Arrays:
         visual = body.visuals[index]
@@ -245,22 +249,24 @@ class EglRenderer(SceneRenderer):
         vertices["part_layer_label"] = (index % MAX_PARTS, layer, label / 255.0)
         return vertices, mesh.faces
 
-    def _array(self, parts: list[_Arrays]) -> _Drawn:
+    def _buffers(self, parts: list[_Arrays]) -> _Drawn:
         starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
         vertices = np.concatenate([vertices for vertices, _ in parts])
         faces = np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=False)])
-        corners = self._context.buffer(vertices.tobytes())
-        order = self._context.buffer(np.ascontiguousarray(faces, "<i4").tobytes())
-        shaded = [(corners, "3f 3f 2f 3f 3f", *(_VERTEX.names or ()))]
-        outline = [(corners, "3f 32x 3f", "position", "part_layer_label")]
         return _Drawn(
-            (
-                self._context.vertex_array(self._depth_program, outline, order),
-                self._context.vertex_array(self._program, shaded, order),
-                corners,
-                order,
-            )
+            corners=self._context.buffer(vertices.tobytes()),
+            order=self._context.buffer(np.ascontiguousarray(faces, "<i4").tobytes()),
+            textured=bool(vertices["part_layer_label"][:, 1].any()),
         )
+
+    def _array(self, program: Any, drawn: _Drawn) -> Any:
+        """Corners as one program takes them: what it does not use is skipped."""
+        names = [name for name in _VERTEX.names or () if name in program]
+        layout = " ".join(
+            f"{_VERTEX[name].shape[0]}f" if name in names else f"{_VERTEX[name].itemsize}x"
+            for name in _VERTEX.names or ()
+        )
+        return self._context.vertex_array(program, [(drawn.corners, layout, *names)], drawn.order)
 
     def _layer(self, name: str) -> tuple[int, float]:
         if name not in self._layers:

@@ -1,64 +1,84 @@
-"""The renderer's programs in GLSL: place a vertex by its visual's matrix; light a fragment by sun, room and lamp."""
+"""The renderer's programs in GLSL: place a vertex by its visual's matrix, light it, and shade what is seen.
 
-VERTEX_SHADER = """
-#version 330
+Sun and room light a corner; a lamp, where there is one, lights each fragment, since a wall has only four corners.
+"""
+
+_VERTEX = """
 uniform mat4 view;
 uniform mat4 projection;
 uniform mat4 parts[48];
-in vec3 position;
-in vec3 normal;
-in vec2 uv;
-in vec3 colour;
-in vec3 part_layer_label;
-invariant gl_Position;
-out vec3 v_world;
-out vec3 v_normal;
-out vec3 v_colour;
-out vec3 v_uv;
-flat out float v_label;
-void main() {
-    mat4 placed = parts[int(part_layer_label.x)];
-    vec4 world = placed * vec4(position, 1.0);
-    v_world = world.xyz;
-    v_normal = mat3(placed) * normal;
-    v_colour = colour;
-    v_uv = vec3(uv, part_layer_label.y);
-    v_label = part_layer_label.z;
-    gl_Position = projection * (view * world);
-}
-"""
-
-DEPTH_SHADER = """
-#version 330
-void main() {}
-"""
-
-FRAGMENT_SHADER = """
-#version 330
-uniform sampler2DArray textures;
 uniform vec3 eye;
 uniform vec3 sun_direction;
 uniform vec3 sun;
 uniform vec3 above;
 uniform vec3 below;
+in vec3 position;
+in vec3 normal;
+in vec3 colour;
+in vec3 part_layer_label;
+out vec3 v_colour;
+out vec3 v_light;
+flat out float v_label;
+#ifdef TEXTURED
+in vec2 uv;
+out vec3 v_uv;
+#endif
+#ifdef LAMP
+out vec3 v_world;
+out vec3 v_normal;
+#endif
+void main() {
+    mat4 placed = parts[int(part_layer_label.x)];
+    vec4 world = placed * vec4(position, 1.0);
+    gl_Position = projection * (view * world);
+    vec3 n = normalize(mat3(placed) * normal);
+    if (dot(n, eye - world.xyz) < 0.0) n = -n;
+    v_light = mix(below, above, 0.5 + 0.5 * n.z) + sun * max(dot(n, sun_direction), 0.0);
+    v_colour = colour;
+    v_label = part_layer_label.z;
+#ifdef TEXTURED
+    v_uv = vec3(uv, part_layer_label.y);
+#endif
+#ifdef LAMP
+    v_world = world.xyz;
+    v_normal = n;
+#endif
+}
+"""
+
+_FRAGMENT = """
+in vec3 v_colour;
+in vec3 v_light;
+flat in float v_label;
+out vec4 fragment;
+#ifdef TEXTURED
+uniform sampler2DArray textures;
+in vec3 v_uv;
+#endif
+#ifdef LAMP
 uniform vec3 lamp_place;
 uniform vec3 lamp;
 uniform float lamp_reach;
 in vec3 v_world;
 in vec3 v_normal;
-in vec3 v_colour;
-in vec3 v_uv;
-flat in float v_label;
-out vec4 colour;
+#endif
 void main() {
-    vec3 n = normalize(v_normal);
-    if (dot(n, eye - v_world) < 0.0) n = -n;
+    vec3 light = v_light;
+#ifdef LAMP
     vec3 to_lamp = lamp_place - v_world;
     float squared = dot(to_lamp, to_lamp);
-    float facing = max(dot(n, to_lamp), 0.0) * inversesqrt(squared + 1e-6);
-    vec3 light = mix(below, above, 0.5 + 0.5 * n.z)
-        + sun * max(dot(n, sun_direction), 0.0)
-        + lamp * (facing / (1.0 + squared * lamp_reach));
-    colour = vec4(v_colour * texture(textures, v_uv).rgb * light, v_label);
+    float facing = max(dot(v_normal, to_lamp), 0.0) * inversesqrt(squared * dot(v_normal, v_normal) + 1e-6);
+    light += lamp * (facing / (1.0 + squared * lamp_reach));
+#endif
+#ifdef TEXTURED
+    light *= texture(textures, v_uv).rgb;
+#endif
+    fragment = vec4(v_colour * light, v_label);
 }
 """
+
+
+def sources(*, lamp: bool, textured: bool) -> tuple[str, str]:
+    """Vertex and fragment program that light by a lamp or not, with textures or plain."""
+    head = "#version 330\n" + ("#define LAMP\n" if lamp else "") + ("#define TEXTURED\n" if textured else "")
+    return head + _VERTEX, head + _FRAGMENT
