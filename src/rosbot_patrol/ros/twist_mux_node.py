@@ -37,7 +37,7 @@ log = logging.getLogger(__name__)
 
 STEP = 0.04  # wall time between two looks where nothing comes [s]
 REPEAT_STOP = 0.2  # a lock's zero is repeated [s]
-REPEAT_LOG = 5.0
+REPEAT_LOG = 15.0
 
 
 @dataclass(frozen=True, kw_only=True)
