@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import rospy
+from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.params import param
 
@@ -15,13 +16,14 @@ log = logging.getLogger(__name__)
 
 _BEHIND = 0.25  # what the clock has lost beyond this is not caught up [s]
 _REPORT = 10.0
+_TF = "tf:"
 
 
 @dataclass(frozen=True, kw_only=True)
 class LockstepParams:
     """Nodes that the clock waits for at rate 0: each topic speaks once in so much simulated time, or is idle."""
 
-    topics: tuple[str, ...] = param((), doc="topics of the nodes that have to keep up")
+    topics: tuple[str, ...] = param((), doc="topics of the nodes that have to keep up; tf:FRAME for who places a frame")
     slack: float = param(0.25, unit="s", lo=0.02, doc="how far the clock may run ahead of their last message")
     patience: float = param(0.4, unit="s", lo=0.0, doc="wall time after which a silent topic is taken for idle")
 
@@ -59,10 +61,17 @@ class Lockstep:
         self._heard: dict[str, float] = {}
         self._said = 0.0
         for topic in params.topics:
-            rospy.Subscriber(topic, rospy.AnyMsg, self._note, callback_args=topic, queue_size=1)
+            if topic.startswith(_TF):
+                rospy.Subscriber("/tf", TFMessage, self._note_frame, callback_args=topic, tcp_nodelay=True)
+            else:
+                rospy.Subscriber(topic, rospy.AnyMsg, self._note, callback_args=topic, queue_size=1, tcp_nodelay=True)
 
     def _note(self, _: object, topic: str) -> None:
         self._heard[topic] = self._now()
+
+    def _note_frame(self, message: TFMessage, topic: str) -> None:
+        if any(t.child_frame_id.lstrip("/") == topic.removeprefix(_TF) for t in message.transforms):
+            self._heard[topic] = self._now()
 
     def wait(self) -> None:
         """Return when every topic that is not idle has spoken within the slack; a silent one is idle from then on."""

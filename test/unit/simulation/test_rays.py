@@ -15,7 +15,7 @@ from rosbot_patrol.simulation.range_sensors import RangeParams, measure_range
 from rosbot_patrol.simulation.scene import Body, Collision, Shape
 from rosbot_patrol.simulation.slices import EMPTY, Slice, slice_bodies, slice_shape
 
-CUBE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 
 
 def box_room(width: float = 4.0, depth: float = 3.0) -> Slice:
@@ -97,7 +97,7 @@ def test_cuts_of_shapes() -> None:
     lying = cut(Shape(kind="cylinder", size=(0.5, 2.0)), 0.01, (0.0, math.pi / 2, 0.0)).segments
     assert lying[:, 0].max() - lying[:, 0].min() == pytest.approx(2.0)
     mesh = Shape(
-        kind="mesh", size=(1, 1, 1), vertices=CUBE, faces=np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+        kind="mesh", size=(1, 1, 1), vertices=TETRAHEDRON, faces=np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
     )
     assert len(cut(mesh, 0.5).segments) == 3
     assert len(cut(Shape(kind="plane", size=(9, 9)), 0.1).segments) == 0
