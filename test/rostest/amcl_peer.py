@@ -1,0 +1,107 @@
+"""What amcl has about it, as a process: odometry and a lidar in a square room, and an ear for what it says.
+
+Reads commands as lines, answers each with a line of JSON: what came since the last one.
+"""
+
+import json
+import math
+import signal
+import sys
+import time
+
+import rospy
+import tf2_ros
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, TransformStamped
+from sensor_msgs.msg import LaserScan
+from std_srvs.srv import Empty
+from tf2_msgs.msg import TFMessage
+
+HALF = 2.0  # of the room's edge [m]
+
+
+def transform(parent, child, x, y, yaw, stamp):
+    message = TransformStamped()
+    message.header.frame_id, message.child_frame_id, message.header.stamp = parent, child, stamp
+    message.transform.translation.x, message.transform.translation.y = x, y
+    message.transform.rotation.z, message.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+    return message
+
+
+def ranges_at(x, y, count=180):
+    found = []
+    for k in range(count):
+        c, s = math.cos(-math.pi + 2 * math.pi * k / (count - 1)), math.sin(-math.pi + 2 * math.pi * k / (count - 1))
+        wall_x = ((HALF - x) / c) if c > 1e-9 else ((-HALF - x) / c if c < -1e-9 else math.inf)
+        wall_y = ((HALF - y) / s) if s > 1e-9 else ((-HALF - y) / s if s < -1e-9 else math.inf)
+        found.append(min(wall_x, wall_y))
+    return found
+
+
+class Peer:
+    def __init__(self):
+        self.poses, self.clouds, self.corrections = [], [], []
+        self.x = 0.0
+        self.tf = tf2_ros.TransformBroadcaster()
+        self.static = tf2_ros.StaticTransformBroadcaster()
+        self.static.sendTransform(transform("base_link", "laser", 0.0, 0.0, 0.0, rospy.Time()))
+        self.scan = rospy.Publisher("scan", LaserScan, queue_size=10)
+        self.initial = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=10)
+        rospy.Subscriber("amcl_pose", PoseWithCovarianceStamped, self.poses.append)
+        rospy.Subscriber("particlecloud", PoseArray, self.clouds.append)
+        rospy.Subscriber("tf", TFMessage, self.hear_tf)
+
+    def hear_tf(self, message):
+        self.corrections += [t for t in message.transforms if t.child_frame_id == "odom"]
+
+    def drive(self, scans, step=0.0, broken="", frame="laser"):
+        for _ in range(scans):
+            stamp = rospy.Time.now()
+            self.tf.sendTransform(transform("odom", "base_link", 5.0 + self.x, 0.0, 0.0, stamp))
+            message = LaserScan(angle_min=-math.pi, angle_max=math.pi, range_min=0.1, range_max=8.0)
+            message.header.frame_id, message.header.stamp = frame, stamp
+            ranges = ranges_at(self.x, 0.0)
+            ranges = {"nan": [math.nan] * 180, "none": [], "few": ranges[:20]}.get(broken, ranges)
+            message.ranges, message.angle_increment = ranges, 2 * math.pi / 179
+            self.scan.publish(message)
+            time.sleep(0.05)
+            self.x += step
+
+    def initialpose(self, x, frame="map"):
+        message = PoseWithCovarianceStamped()
+        message.header.frame_id, message.pose.pose.position.x = frame, x
+        message.pose.pose.orientation.w = 1.0
+        message.pose.covariance[0] = message.pose.covariance[7] = message.pose.covariance[35] = 1e-4
+        self.initial.publish(message)
+
+    def call(self, service):
+        rospy.ServiceProxy(service, Empty)()
+
+    def report(self):
+        time.sleep(0.3)
+        said = {"poses": len(self.poses), "tf": len(self.corrections), "x": self.x}
+        if self.poses:
+            last = self.poses[-1]
+            said |= {"pose": last.pose.pose.position.x, "frame": last.header.frame_id, "var": last.pose.covariance[0]}
+        if self.clouds:
+            said["particles"] = len(self.clouds[-1].poses)
+        if self.corrections:
+            last = self.corrections[-1]
+            said |= {"odom": last.transform.translation.x, "parent": last.header.frame_id}
+        for heard in (self.poses, self.clouds, self.corrections):
+            heard.clear()
+        return said
+
+
+def main():
+    rospy.init_node("peer", disable_signals=True)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # a read of stdin does not hold up the end
+    peer = Peer()
+    print(json.dumps({"ready": True}), flush=True)
+    for line in sys.stdin:
+        order = json.loads(line)
+        getattr(peer, order.pop("do"))(**order)
+        print(json.dumps(peer.report()), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""amcl as a process before a real master, with a made-up room; needs the built workspace."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+from ros_processes import Process, Ros, wait_for
+
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.map_io import write_map
+
+HERE = Path(__file__).resolve().parent
+
+
+@pytest.fixture(scope="module")
+def master():
+    ros = Ros()
+    yield ros
+    ros.stop()
+
+
+@pytest.fixture
+def ros(master):
+    yield master
+    master.stop_nodes()
+
+
+class Peer:
+    def __init__(self, ros):
+        self.process = Process([sys.executable, str(HERE / "amcl_peer.py")], ros.env, stdin=subprocess.PIPE)
+        ros.processes.append(self.process)
+        self.answers = 0
+        self.process.says("ready", 20.0)
+
+    def do(self, what, **options):
+        """Let it do something and hear what amcl said meanwhile."""
+        self.process.popen.stdin.write(json.dumps({"do": what, **options}) + "\n")
+        self.process.popen.stdin.flush()
+        self.answers += 1
+        lines = wait_for(self._answered, 20.0, "the peer's answer")
+        return json.loads(lines[self.answers])
+
+    def _answered(self):
+        lines = [line for line in self.process.lines if line.startswith("{")]
+        return lines if len(lines) > self.answers else None
+
+
+@pytest.fixture
+def room(tmp_path):
+    """The yaml of a room of 4 m x 4 m."""
+    cells = np.full((100, 100), -1, dtype=np.int8)
+    cells[10:91, 10:91] = 100
+    cells[11:90, 11:90] = 0
+    info = GridInfo(resolution=0.05, width=100, height=100, origin_x=-2.525, origin_y=-2.525)
+    write_map(str(tmp_path / "room"), Grid(info, cells))
+    return tmp_path / "room.yaml"
+
+
+def started(ros, room, *arguments):
+    ros.node("map_server", str(room))
+    node = ros.node("amcl", "_update_min_d:=0.1", "_initial_cov_xx:=0.01", "_initial_cov_yy:=0.01", *arguments)
+    node.says("Received a 100 X 100 map", 20.0)
+    return node, Peer(ros)
+
+
+def test_it_localises_and_sends_a_correction_with_every_scan(ros, room):
+    _, peer = started(ros, room)
+    first = peer.do("drive", scans=5)
+    assert first["poses"] == 1
+    assert first["frame"] == "map"
+    assert first["tf"] == 5
+    assert first["parent"] == "map"
+    driven = peer.do("drive", scans=20, step=0.05)
+    assert driven["tf"] == 20
+    assert 2 <= driven["poses"] <= 5  # every second of the updates at each 0.15 m
+    assert abs(driven["odom"] + 5.0) < 0.2
+    assert driven["particles"] >= 100
+
+
+def test_bad_scans_are_named_and_survived(ros, room):
+    node, peer = started(ros, room)
+    peer.do("drive", scans=3)
+    peer.do("drive", scans=2, broken="none")
+    node.says("it has no beams; it is left out")
+    peer.do("drive", scans=6, step=0.12, broken="nan")
+    node.says("no beam of the scan of frame 'laser' measured anything")
+    peer.do("drive", scans=2, broken="few")
+    peer.do("drive", scans=2, frame="nowhere")
+    after = peer.do("drive", scans=10)
+    assert after["tf"] >= 10
+    assert node.popen.poll() is None
+
+
+def test_services_and_initial_poses(ros, room):
+    node, peer = started(ros, room)
+    peer.do("drive", scans=3)
+    peer.do("initialpose", x=0.7, frame="odom")
+    node.says("initial pose in frame 'odom' is ignored, expected frame 'map'")
+    peer.do("initialpose", x=0.7)
+    placed = peer.do("drive", scans=1)
+    assert abs(placed["pose"] - 0.7) < 0.1
+    peer.do("call", service="request_nomotion_update")
+    peer.do("drive", scans=1)
+    peer.do("call", service="global_localization")
+    assert peer.do("drive", scans=1)["var"] > 0.3
+
+
+def test_a_respawned_node_goes_on_where_it_was(ros, room):
+    node, peer = started(ros, room, "_save_pose_rate:=5.0")
+    peer.do("initialpose", x=0.5)
+    peer.do("drive", scans=10)
+    node.stop()
+    ros.node("amcl").says("Received a 100 X 100 map", 20.0)
+    assert abs(peer.do("drive", scans=2)["pose"] - 0.5) < 0.2
+
+
+def test_a_bad_parameter_is_named(ros):
+    node = ros.node("amcl", "_laser_model_type:=sonar", "__name:=amcl_bad")
+    node.says("/amcl_bad/laser_model_type: is 'sonar', expected one of beam, likelihood_field", 20.0)
+    assert wait_for(lambda: node.popen.poll() is not None)
+    assert node.popen.returncode == 1
+
+
+def test_the_map_may_come_late_and_by_topic(ros, room):
+    node = ros.node("amcl", "_use_map_topic:=true", "__name:=amcl_topic")
+    peer = Peer(ros)
+    assert peer.do("drive", scans=3)["tf"] == 0
+    ros.node("map_server", str(room))
+    node.says("Received a 100 X 100 map", 20.0)
+    assert peer.do("drive", scans=3)["tf"] == 3

@@ -1,0 +1,88 @@
+"""map_server and map_saver as processes before a real master; needs the built workspace."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+from ros_processes import Ros, wait_for
+
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.map_io import write_map
+
+INFO = GridInfo(resolution=0.05, width=30, height=20, origin_x=-1.0, origin_y=-2.0)
+
+
+@pytest.fixture(scope="module")
+def master():
+    ros = Ros()
+    yield ros
+    ros.stop()
+
+
+@pytest.fixture
+def ros(master):
+    yield master
+    master.stop_nodes()
+
+
+@pytest.fixture
+def first(tmp_path):
+    cells = np.random.default_rng(0).choice(np.array([-1, 0, 100], dtype=np.int8), INFO.shape)
+    write_map(str(tmp_path / "first"), Grid(INFO, cells))
+    return tmp_path / "first.yaml"
+
+
+def exit_code(process):
+    wait_for(lambda: process.popen.poll() is not None, 20.0, "the end of the program")
+    return process.popen.returncode
+
+
+def test_a_map_goes_round_byte_for_byte(ros, first, tmp_path):
+    ros.node("map_server", str(first)).says("Read a 30 X 20 map @ 0.050 m/cell", 20.0)
+    saver = ros.node("map_saver", "-f", str(tmp_path / "again"))
+    assert exit_code(saver) == 0
+    assert (tmp_path / "again.pgm").read_bytes() == (tmp_path / "first.pgm").read_bytes()
+    yaml = (tmp_path / "again.yaml").read_text()
+    assert yaml == (tmp_path / "first.yaml").read_text().replace("first", "again")
+
+
+def test_map_saver_waits_on_the_topic_it_is_given(ros, first, tmp_path):
+    saver = ros.node("map_saver", "-f", str(tmp_path / "late"), "map:=/other/map")
+    saver.says("Waiting for the map on /other/map", 20.0)
+    ros.node("map_server", str(first), "map:=/other/map")
+    assert exit_code(saver) == 0
+    assert (tmp_path / "late.pgm").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("resolution", "resolute"), "key 'resolution' is missing"),
+        (("first.pgm", "gone.pgm"), "gone.pgm: the map's picture cannot be read: No such file"),
+        (("]", ""), "is no valid yaml"),
+    ],
+)
+def test_a_broken_map_ends_the_program_with_a_sentence(ros, first, change, says):
+    first.write_text(first.read_text().replace(*change))
+    server = ros.node("map_server", str(first))
+    server.says(says, 20.0)
+    assert exit_code(server) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [((), "expected `map_server FILE.yaml`"), (("a.pgm", "fine"), "'fine' is no resolution")],
+)
+def test_arguments_that_make_no_sense(ros, arguments, says):
+    server = ros.node("map_server", *arguments)
+    server.says(says, 20.0)
+    assert exit_code(server) == 1
+
+
+def test_map_saver_names_a_folder_that_is_not_there(ros, first, tmp_path):
+    ros.node("map_server", str(first)).says("Read a", 20.0)
+    (tmp_path / "file").write_text("")
+    saver = ros.node("map_saver", "-f", str(tmp_path / "file" / "map"))
+    saver.says("cannot be written", 20.0)
+    assert exit_code(saver) == 1
