@@ -68,7 +68,7 @@ class Actor:
 
 def draw_room(rng: Rng) -> Scene:
     """A room by chance."""
-    x, y, z = float(rng.uniform(3.0, 14.0)), float(rng.uniform(3.0, 11.0)), float(rng.uniform(2.1, 3.2))
+    x, y, z = float(rng.uniform(3.5, 16.0)), float(rng.uniform(3.5, 12.0)), float(rng.uniform(2.1, 3.2))
     bodies = [_floor(rng)]
     places: list[Place] = []
     plain = rng.random() < 0.45
@@ -102,11 +102,11 @@ def draw_house(rng: Rng, world: World) -> Scene:
     """The house of a world, in its own colours or painted by chance, with some more furniture."""
     bodies = list(world.bodies)
     places = [p for b in bodies for p in _footprints(b)]
-    if rng.random() < 0.75:
+    if rng.random() < 0.6:
         bodies = [_repaint(b, rng) for b in bodies]
     walls = np.array([(p.x, p.y) for p in places])
     low, high = walls.min(axis=0), walls.max(axis=0)
-    light = _draw_light(rng, *(high - low), 2.5) if rng.random() < 0.8 else Light()
+    light = _draw_light(rng, *(high - low), 2.5) if rng.random() < 0.6 else Light()
     scene = Scene(bodies, light, (low[0], high[0], low[1], high[1]), places)
     furnish(scene, rng, int(rng.integers(0, 25)))
     return scene
@@ -129,7 +129,8 @@ def draw_camera(scene: Scene, rng: Rng) -> tuple[float, float, float] | None:
     for _ in range(60):
         x, y = float(rng.uniform(x0, x1)), float(rng.uniform(y0, y1))
         if scene.is_free(x, y, 0.3):
-            return x, y, float(rng.uniform(-np.pi, np.pi))
+            yaws = [float(rng.uniform(-np.pi, np.pi)) for _ in range(6)]
+            return x, y, max(yaws, key=lambda yaw: _view(scene, x, y, yaw)) if rng.random() < 0.65 else yaws[0]
     return None
 
 
@@ -208,16 +209,26 @@ def _draw_hydrant(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
 
 def _spot(scene: Scene, camera: tuple[float, float, float], rng: Rng) -> tuple[float, float] | None:
     x, y, yaw = camera
-    for _ in range(25):
-        near = float(np.exp(rng.uniform(np.log(0.7), np.log(8.5))))
-        distance = near if rng.random() < 0.5 else float(rng.uniform(1.2, 8.5))
+    near = float(np.exp(rng.uniform(np.log(0.7), np.log(8.5))))
+    distance = near if rng.random() < 0.35 else float(rng.uniform(1.2, 8.5))
+    for attempt in range(30):
+        if attempt >= 12:
+            distance = max(0.7, distance * 0.93)
         bearing = yaw + float(rng.uniform(-0.6, 0.6))
         px, py = x + distance * np.cos(bearing), y + distance * np.sin(bearing)
         x0, x1, y0, y1 = scene.extent
         inside = x0 < px < x1 and y0 < py < y1
-        if inside and scene.is_free(px, py, 0.22) and (rng.random() < 0.1 or _sees(scene, (x, y), (px, py))):
+        if inside and scene.is_free(px, py, 0.22) and (rng.random() < 0.05 or _sees(scene, (x, y), (px, py))):
             return float(px), float(py)
     return None
+
+
+def _view(scene: Scene, x: float, y: float, yaw: float) -> float:
+    """How far one sees that way, up to 9 m."""
+    for distance in np.arange(0.5, 9.0, 0.5):
+        if not scene.is_free(x + distance * np.cos(yaw), y + distance * np.sin(yaw), 0.05):
+            return float(distance)
+    return 9.0
 
 
 def _sees(scene: Scene, start: tuple[float, float], end: tuple[float, float]) -> bool:
