@@ -162,6 +162,8 @@ def translate_legacy(tree: Mapping[str, Any]) -> dict[str, Any]:
         plugins.insert(0, {"name": "static_layer", "type": "costmap_2d::StaticLayer"})
     plugins.append({"name": "inflation_layer", "type": "costmap_2d::InflationLayer"})
     for layer, keys in _LEGACY.items():
+        if all(plugin["name"] != layer for plugin in plugins):
+            continue
         moved = {key: tree[key] for key in keys if key in tree}
         if layer == "obstacle_layer":
             moved.update({s: tree[s] for s in str(tree.get("observation_sources", "")).split() if s in tree})

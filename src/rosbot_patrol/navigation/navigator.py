@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.errors import ControlError, PlanningError
+from rosbot_patrol.errors import ControlError, OutOfBounds, PlanningError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.planning.interfaces import LocalPlanner, LocalView, Recovery, RecoveryView
@@ -50,6 +50,7 @@ class Trigger(enum.Enum):
 
 REACHED = "Goal reached."
 BAD_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
+OFF_MAP = "The goal sent to the navfn planner is off the global costmap. Planning will always fail to this goal."
 PLAN_REFUSED = "Failed to pass global plan to the controller."
 
 
@@ -233,6 +234,8 @@ class Navigator:
             self.reason = str(result.error)
             if self.state is State.PLANNING and (not context.failures or context.failures[-1] != self.reason):
                 log.warning("no plan: %s", self.reason)
+                if isinstance(result.error, OutOfBounds) and result.error.what == "goal":
+                    log.warning(OFF_MAP)
                 context.failures.append(self.reason)
             return None
         progress.last_plan, progress.retries = now, 0

@@ -8,7 +8,7 @@ Differs:
     - The field is an exact upwind solution, searched towards the goal, so plans are smoother and come sooner.
     - A robot that stands within the inscribed radius of an obstacle (localisation is not exact) still gets a plan
       that leads out of it; upstream finds none and the robot stays stuck.
-    - Poses carry the heading of the path; upstream leaves all but the last at zero. They are one cell apart, not half.
+    - Poses carry the heading of the path; upstream leaves all but the last at zero.
 """
 
 from __future__ import annotations
@@ -128,8 +128,7 @@ class NavfnPlanner(GlobalPlanner):
         if not arrived:
             raise NoPath((start.x, start.y), (goal.x, goal.y))
         cells = points[::-1]
-        keep = np.unique(np.append(np.arange(0, len(cells), 2), len(cells) - 1))
-        xy = (cells[keep] + 0.5) * info.resolution + (info.origin_x, info.origin_y)
+        xy = (cells + 0.5) * info.resolution + (info.origin_x, info.origin_y)
         xy[-1] = goal.x, goal.y
         if len(xy) == 1:
             xy = np.array([[start.x, start.y], [goal.x, goal.y]])

@@ -8,6 +8,7 @@ dynamic_reconfigure file, which win there.
 Differs:
     - Distances are Euclidean around obstacles, interpolated, and judged at the trajectory's end and at a point
       `heading_lookahead` ahead of it; upstream counts 4-connected cells.
+    - Where nothing is free over `sim_time`, slow motions are tried over 0.6 s before it backs up.
     - It backs up only where the way behind is free; upstream does so blindly.
     - A robot whose footprint touches an obstacle may move so that it touches less; upstream finds no trajectory.
     - Where the plan is blocked in view and nothing leads round, it stops short of the place and says so.
@@ -34,6 +35,7 @@ from rosbot_patrol.planning.critics.field import distance_field
 from rosbot_patrol.planning.interfaces import Array, LocalPlanner, LocalView
 
 _COARSE = 0.05  # edge of the cells of distance fields [m]
+_SHORT, _SLOW = 0.6, 0.1  # how far ahead [s] slow motions [m/s] are looked at where it is narrow
 _TOO_NEAR = 0.3  # of a plan that is blocked, less than this ahead is not worth driving [m]
 
 
@@ -242,16 +244,33 @@ class TrajectoryPlanner(LocalPlanner):
         return plan[: last + 1]
 
     def _follow(self, view: LocalView, plan: Array) -> Twist2D:
+        """The best of all samples; where none is free, of slow ones that are looked at less far ahead."""
         p = self.params
         samples = self._samples(view)
-        trajectories = self._simulate(view, samples)
+        slow = np.ascontiguousarray(samples[samples[:, 0] <= max(p.min_vel_x, _SLOW)])
+        for tried, horizon in ((samples, p.sim_time), (slow, min(p.sim_time, _SHORT))):
+            best = self._best(view, plan, tried, horizon)
+            if best is not None:
+                self._memory.escape_from = None
+                self._remember_turn(view, best)
+                return self._limited(view, best)
+        return self._escape(view)
+
+    def _best(self, view: LocalView, plan: Array, samples: Array, horizon: float) -> Twist2D | None:
+        """The cheapest sample, None where none is free.
+
+        Raises:
+            ControlError: some are free, but lead nowhere.
+        """
+        p = self.params
+        trajectories = self._simulate(view, samples, horizon)
         situation = self._situation(view, trajectories, plan)
+        danger = self._obstacles.score(situation)
+        if not np.isfinite(danger).any():
+            return None
         scale = situation.coarse.resolution
         if not p.meter_scoring:
             scale /= view.costmap.info.resolution
-        danger = self._obstacles.score(situation)
-        if not np.isfinite(danger).any():
-            return self._escape(view)
         cost = p.occdist_scale * danger
         cost += p.path_distance_bias * scale * self._path_distance.score(situation)
         cost += p.goal_distance_bias * scale * self._goal_distance.score(situation)
@@ -259,11 +278,8 @@ class TrajectoryPlanner(LocalPlanner):
         best = int(np.argmin(cost))
         if not math.isfinite(cost[best]):
             raise ControlError("no free trajectory leads on along the plan")
-        self._memory.escape_from = None
         self._local_plan = trajectories[best]
-        twist = Twist2D(float(samples[best, 0]), 0.0, float(samples[best, 1]))
-        self._remember_turn(view, twist)
-        return self._limited(view, twist)
+        return Twist2D(float(samples[best, 0]), 0.0, float(samples[best, 1]))
 
     def _samples(self, view: LocalView) -> Array:
         """Velocities to try (vx, wz), shape (K, 2): all pairs, turns on the spot."""
@@ -285,14 +301,14 @@ class TrajectoryPlanner(LocalPlanner):
         spot = np.column_stack((np.zeros_like(turns), turns))
         return np.ascontiguousarray(np.concatenate((pairs, spot)))
 
-    def _simulate(self, view: LocalView, samples: Array) -> Array:
+    def _simulate(self, view: LocalView, samples: Array, horizon: float) -> Array:
         p = self.params
         speed, turn = float(np.abs(samples[:, 0]).max()), float(np.abs(samples[:, 1]).max())
-        steps = max(speed * p.sim_time / p.sim_granularity, turn * p.sim_time / p.angular_sim_granularity)
+        steps = max(speed * horizon / p.sim_granularity, turn * horizon / p.angular_sim_granularity)
         pose = np.array(view.pose, dtype=np.float64)
         velocity = np.array([view.velocity.vx, view.velocity.wz])
         return kernels.simulate(
-            pose, samples, velocity, p.sim_time, max(4, math.ceil(steps)), p.acc_lim_x, p.acc_lim_theta
+            pose, samples, velocity, horizon, max(4, math.ceil(steps)), p.acc_lim_x, p.acc_lim_theta
         )
 
     def _limited(self, view: LocalView, twist: Twist2D) -> Twist2D:
@@ -333,7 +349,7 @@ class TrajectoryPlanner(LocalPlanner):
             memory.escape_from = None
             raise ControlError("no trajectory is free of obstacles")
         samples = np.array([[p.escape_vel, 0.0]])
-        trajectories = self._simulate(view, samples)
+        trajectories = self._simulate(view, samples, p.sim_time)
         if not self._is_free(view, trajectories):
             raise ControlError("no trajectory is free of obstacles, not even backwards")
         self._local_plan = trajectories[0]

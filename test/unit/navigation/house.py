@@ -52,7 +52,7 @@ def house_map(walls: Path, resolution: float = 0.05) -> Grid:
     return Grid(info, cells)
 
 
-def cast(grid: Grid, x: float, y: float, yaw: float, *, beams: int = 360, reach: float = 12.0) -> np.ndarray:
+def cast(grid: Grid, x: float, y: float, yaw: float, *, beams: int = 180, reach: float = 6.0) -> np.ndarray:
     """Ranges of a full turn of beams from a pose over occupied cells, inf where nothing is within reach."""
     info = grid.info
     angles = yaw - math.pi + np.arange(beams) * math.tau / beams

@@ -1,0 +1,188 @@
+"""The local planner on small costmaps, and in a closed loop with a unicycle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rosbot_patrol.costmap import costmap_kernels as kernels
+from rosbot_patrol.costmap.footprint import Footprint
+from rosbot_patrol.costmap.inflation import cost_table
+from rosbot_patrol.errors import ControlError
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, wrap_angle
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.planning.interfaces import LocalView
+from rosbot_patrol.planning.navfn import with_headings
+from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
+
+CORNERS = np.array([[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]])
+ORIGIN = Pose2D()
+TABLE = cost_table(12, 0.05, inscribed_radius=0.12, cost_scaling_factor=6.0)
+INFO = GridInfo(resolution=0.05, width=80, height=80, origin_x=-2.0, origin_y=-2.0)
+
+
+def make(**changes):
+    values = {
+        "max_vel_x": 0.36,
+        "min_vel_x": 0.04,
+        "meter_scoring": True,
+        "vx_samples": 8,
+        "vtheta_samples": 12,
+        "path_distance_bias": 0.6,
+        "occdist_scale": 0.002,
+        "controller_frequency": 10.0,
+        "latch_xy_goal_tolerance": True,
+        "rot_stopped_velocity": 0.05,
+        "trans_stopped_velocity": 0.03,
+        **changes,
+    }
+    return TrajectoryPlanner(TrajectoryPlannerParams(**values), Footprint(CORNERS, CORNERS), resolution=0.05)
+
+
+def line(x0, y0, x1, y1, yaw=0.0):
+    t = np.linspace(0.0, 1.0, max(2, round(math.dist((x0, y0), (x1, y1)) / 0.05)))[:, None]
+    return with_headings(np.array([x0, y0]) * (1 - t) + np.array([x1, y1]) * t, yaw)
+
+
+def view(pose=ORIGIN, velocity=STOP, cells=None, now=0.0):
+    cells = np.zeros(INFO.shape, np.uint8) if cells is None else cells.copy()
+    return LocalView(now=now, pose=pose, velocity=velocity, costmap=Grid(INFO, cells))
+
+
+def block(cells, x0, y0, x1, y1):
+    a, b = INFO.cell_of(x0, y0), INFO.cell_of(x1, y1)
+    cells[a[1] : b[1] + 1, a[0] : b[0] + 1] = 254
+    return cells
+
+
+def empty():
+    return np.zeros(INFO.shape, np.uint8)
+
+
+def drive(planner, pose, cells=None, seconds=30.0):
+    """Where it is after driving to the goal, and the poses on the way."""
+    velocity, poses = STOP, [pose]
+    for _ in range(round(seconds / 0.1)):
+        seen = view(pose, velocity, cells)
+        if planner.is_goal_reached(seen):
+            break
+        twist = planner.compute(seen)
+        velocity = Twist2D(twist.vx, 0.0, twist.wz)
+        middle = pose.yaw + twist.wz * 0.05
+        pose = Pose2D(
+            pose.x + twist.vx * math.cos(middle) * 0.1,
+            pose.y + twist.vx * math.sin(middle) * 0.1,
+            wrap_angle(pose.yaw + twist.wz * 0.1),
+        )
+        poses.append(pose)
+    return pose, poses
+
+
+def test_a_straight_plan_is_driven_fast():
+    planner = make()
+    planner.set_plan(line(0, 0, 5, 0))
+    twist = planner.compute(view(velocity=Twist2D(0.36)))
+    assert twist.vx == pytest.approx(0.36)
+    assert abs(twist.wz) < 0.1
+    assert len(planner.local_plan) > 3
+
+
+def test_a_plan_behind_begins_with_a_turn():
+    planner = make()
+    planner.set_plan(line(0, 0, -1.5, 0.05))
+    twist = planner.compute(view())
+    assert twist.vx < 0.05
+    assert abs(twist.wz) >= 0.4
+
+
+@pytest.mark.parametrize(("goal", "yaw"), [((1.0, 0.0), 2.0), ((0.0, 0.8), 0.0), ((-0.7, -0.6), -3.0)])
+def test_goals_around_are_reached_with_their_heading(goal, yaw):
+    planner = make()
+    planner.set_plan(line(0, 0, *goal, yaw))
+    pose, _ = drive(planner, Pose2D())
+    assert math.dist(pose[:2], goal) <= 0.12
+    assert abs(wrap_angle(pose.yaw - yaw)) <= 0.06
+
+
+def test_an_obstacle_on_the_plan_is_driven_around_without_touching():
+    cells = block(empty(), 0.7, -0.2, 0.9, 0.1)
+    kernels.inflate(cells, 0, 0, 80, 80, 12, TABLE, False)
+    planner = make()
+    planner.set_plan(line(0, 0, 1.6, 0))
+    pose, poses = drive(planner, Pose2D(), cells)
+    assert math.dist(pose[:2], (1.6, 0.0)) <= 0.12
+    for at in poses:
+        assert not touches(at, cells)
+
+
+def touches(pose, cells):
+    outline = Footprint(CORNERS, CORNERS).outline(0.03)
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    points = outline @ np.array([[c, s], [-s, c]]) + (pose.x, pose.y)
+    index = np.floor((points - (INFO.origin_x, INFO.origin_y)) / INFO.resolution).astype(int)
+    return bool((cells[index[:, 1], index[:, 0]] == 254).any())
+
+
+def test_a_wall_across_the_plan_stops_it():
+    cells = block(empty(), 0.3, -2.0, 0.4, 1.95)
+    planner = make()
+    planner.set_plan(line(0, 0, 1.5, 0))
+    with pytest.raises(ControlError, match="stands on the plan"):
+        planner.compute(view(cells=cells))
+
+
+def test_boxed_in_it_moves_nowhere():
+    cells = np.full(INFO.shape, 254, np.uint8)
+    a, b = INFO.cell_of(-0.14, -0.16), INFO.cell_of(0.14, 0.16)
+    cells[a[1] : b[1] + 1, a[0] : b[0] + 1] = 0
+    planner = make()
+    planner.set_plan(line(0, 0, 1.5, 0))
+    with pytest.raises(ControlError):
+        planner.compute(view(cells=cells))
+
+
+def test_a_robot_that_touches_something_moves_away_and_not_into_it():
+    cells = block(empty(), 0.11, -0.5, 0.3, 0.5)
+    planner = make(escape_vel=-0.1)
+    planner.set_plan(line(0, 0, -1.5, 0))
+    twist = planner.compute(view(cells=cells))
+    assert twist.vx <= 0.0
+
+
+def test_unknown_space_and_the_edge_of_the_map_are_not_driven_into():
+    cells = empty()
+    cells[:, INFO.cell_of(0.2, 0)[0] :] = 255
+    planner = make(escape_vel=0.0)
+    planner.set_plan(line(0, 0, 0.1, 0))
+    pose, poses = Pose2D(), []
+    for _ in range(30):
+        try:
+            twist = planner.compute(view(pose, cells=cells))
+        except ControlError:
+            break
+        pose = Pose2D(pose.x + 0.1 * twist.vx, pose.y, pose.yaw)
+        poses.append(pose)
+    assert pose.x < 0.1
+
+
+def test_no_plan_no_velocity():
+    with pytest.raises(ControlError):
+        make().compute(view())
+    with pytest.raises(ControlError):
+        make().set_plan(np.empty((0, 3)))
+
+
+def test_a_plan_that_is_elsewhere_is_refused():
+    planner = make()
+    planner.set_plan(line(10, 10, 12, 10))
+    with pytest.raises(ControlError, match="local costmap"):
+        planner.compute(view())
+
+
+def test_the_goal_is_not_reached_while_moving():
+    planner = make()
+    planner.set_plan(line(0, 0, 0.05, 0))
+    assert planner.is_goal_reached(view())
+    assert not planner.is_goal_reached(view(velocity=Twist2D(0.2)))
