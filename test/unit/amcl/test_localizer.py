@@ -47,6 +47,12 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+def test_the_tuned_profile_names_only_known_parameters(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        assert tuned().laser_max_beams == 60
+    assert not caplog.records
+
+
 def test_a_patrol_stays_within_five_centimetres() -> None:
     errors = follow(localizer())
     assert rms(errors[:, 0]) < 0.03
