@@ -126,8 +126,8 @@ class DarknetNode:
         if goal is not None:
             self._answer(goal)
             return True
-        message = self._camera.take() if self._enabled else None
-        if message is None:
+        message = self._camera.take()  # also while switched off: what came then is not looked at later
+        if message is None or not self._enabled:
             return False
         started = time.monotonic()
         try:
@@ -161,7 +161,7 @@ class DarknetNode:
 
     def _wait(self) -> None:
         with self._wake:
-            if not (self._action.pending or (self._enabled and self._camera.pending)):
+            if not (self._action.pending or self._camera.pending):
                 self._wake.wait(IDLE_WAIT)
 
     def _notify(self) -> None:

@@ -1,0 +1,238 @@
+"""The camera before the detector, or the picture before republish, and the listener behind it; prints lines of JSON.
+
+    camera_client.py SCENARIO
+
+One process a scenario, because rospy knows one master in its life. The network of the tests sees a person where a
+picture is red and a fire hydrant where it is blue.
+"""
+
+import json
+import sys
+import time
+
+import actionlib
+import numpy as np
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from darknet_ros_msgs.msg import BoundingBoxes, CheckForObjectsAction, CheckForObjectsGoal, ObjectCount
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+from rosbot_patrol.images.compressed import CompressedParams, compress
+from rosbot_patrol.images.encodings import Picture
+from rosbot_patrol.ros.convert_images import picture_from_msg, picture_to_msg
+
+CAMERA = "/camera/rgb/image_raw"
+COLOURS = {"red": (255, 0, 0), "blue": (0, 0, 255), "black": (0, 0, 0)}
+
+
+def say(**what):
+    print(json.dumps(what), flush=True)
+
+
+def make_picture(colour="red", encoding="rgb8"):
+    """Black but for 8 x 8 pixels at (16, 24)."""
+    pixels = np.zeros((64, 64, 3), dtype=np.uint8)
+    pixels[24:32, 16:24] = COLOURS[colour]
+    if encoding in ("rgba8", "bgra8"):
+        order = [0, 1, 2] if encoding == "rgba8" else [2, 1, 0]
+        return Picture(np.concatenate([pixels[:, :, order], pixels[:, :, :1]], axis=2), encoding)
+    if encoding == "mono16":
+        return Picture(pixels[:, :, :1].astype(np.uint16) * 257, encoding)
+    return Picture(pixels, "rgb8").to(encoding)
+
+
+def make_message(stamp, colour="red", encoding="rgb8"):
+    message = picture_to_msg(make_picture(colour, encoding), rospy.Header())
+    message.header.stamp, message.header.frame_id = rospy.Time(stamp), "camera_optical"
+    return message
+
+
+class Client:
+    """A camera, and everything heard from the detector."""
+
+    def __init__(self, *, topic=CAMERA, kind=Image, drawn=False):
+        self.heard = {"boxes": [], "count": [], "drawn": [], "ok": [], "health": []}
+        self.camera = rospy.Publisher(topic, kind, queue_size=10)
+        self._listen("/darknet_ros/bounding_boxes", BoundingBoxes, "boxes")
+        self._listen("/darknet_ros/found_object", ObjectCount, "count")
+        self._listen("/darknet_ros/camera_ok", Bool, "ok")
+        self._listen("/diagnostics", DiagnosticArray, "health")
+        if drawn:
+            self._listen("/darknet_ros/detection_image", Image, "drawn")
+        self.wait(lambda: self.camera.get_num_connections() > 0, 10.0)
+        time.sleep(0.5)
+
+    def _listen(self, topic, kind, name):
+        subscriber = rospy.Subscriber(topic, kind, self.heard[name].append)
+        if name in ("boxes", "count"):
+            self.wait(lambda: subscriber.get_num_connections() > 0, 10.0)
+
+    def wait(self, condition, seconds=5.0):
+        until = time.monotonic() + seconds
+        while not condition() and time.monotonic() < until:
+            time.sleep(0.01)
+        return condition()
+
+    def look(self, message):
+        """Send one picture and wait for its count; then the boxes that came with it."""
+        counts, boxes = len(self.heard["count"]), len(self.heard["boxes"])
+        self.camera.publish(message)
+        self.wait(lambda: len(self.heard["count"]) > counts, 3.0)
+        time.sleep(0.1)
+        return self.heard["count"][counts:], self.heard["boxes"][boxes:]
+
+
+def describe(boxes):
+    return [[b.Class, b.id, b.xmin, b.ymin, b.xmax, b.ymax, round(b.probability, 2)] for b in boxes.bounding_boxes]
+
+
+def boxes():
+    client = Client(drawn=True)
+    counts, found = client.look(make_message(100))
+    message = found[0]
+    say(
+        boxes=describe(message),
+        stamp=message.header.stamp.secs,
+        frame=message.header.frame_id,
+        image_stamp=message.image_header.stamp.secs,
+        image_frame=message.image_header.frame_id,
+        counts=[c.count for c in counts],
+        count_stamp=counts[0].header.stamp.secs,
+    )
+    client.wait(lambda: client.heard["drawn"])
+    drawn = client.heard["drawn"][0]
+    say(
+        drawn=[drawn.encoding, drawn.header.stamp.secs, drawn.width],
+        colour=picture_from_msg(drawn).pixels[28, 20].tolist(),
+    )
+    say(again=len(client.look(make_message(100))[0]))
+    counts, found = client.look(make_message(101, "black"))
+    say(nothing=[c.count for c in counts], messages=len(found))
+
+
+def empty():
+    found = Client().look(make_message(100, "black"))[1]
+    say(messages=[describe(m) for m in found])
+
+
+def encodings():
+    client = Client()
+    for i, encoding in enumerate(("rgb8", "bgr8", "rgba8", "bgra8", "mono8", "mono16")):
+        counts, found = client.look(make_message(100 + i, "blue", encoding))
+        say(encoding=encoding, counts=[c.count for c in counts], boxes=[describe(m) for m in found])
+    broken = make_message(200)
+    broken.encoding = "yuv422"
+    client.look(broken)
+    broken = make_message(201)
+    broken.data = broken.data[:100]
+    client.look(broken)
+    part = [s for m in client.heard["health"] for s in m.status if s.name.endswith("camera")]
+    say(health=[[s.level, s.message] for s in part if "bytes" in s.message or "yuv" in s.message][:1])
+    say(alive=[describe(m) for m in client.look(make_message(300, "blue"))[1]])
+
+
+def compressed():
+    client = Client(topic=CAMERA + "/compressed", kind=CompressedImage)
+    text, data = compress(make_picture(), CompressedParams(format="png"))
+    message = CompressedImage(format=text, data=b"\xff\xd8 broken")
+    message.header.stamp = rospy.Time(90)
+    client.look(message)
+    message = CompressedImage(format=text, data=data)
+    message.header.stamp = rospy.Time(100)
+    say(boxes=[describe(m) for m in client.look(message)[1]])
+
+
+def action():
+    client = Client()
+    server = actionlib.ActionClient("/darknet_ros/check_for_objects", CheckForObjectsAction)
+    server.wait_for_server()
+    client.look(make_message(50, "red"))
+    handles = [
+        server.send_goal(CheckForObjectsGoal(id=7, image=make_message(100, "blue"))),
+        server.send_goal(CheckForObjectsGoal(id=8, image=make_message(101, "red"))),
+        server.send_goal(CheckForObjectsGoal(id=9, image=Image())),
+    ]
+    for handle in handles:
+        client.wait(lambda h=handle: h.get_goal_status() > GoalStatus.ACTIVE)
+        time.sleep(0.2)
+        result = handle.get_result()
+        say(
+            status=handle.get_goal_status(),
+            text=handle.get_goal_status_text(),
+            id=result.id,
+            stamp=result.bounding_boxes.image_header.stamp.secs,
+            boxes=describe(result.bounding_boxes),
+        )
+
+
+def preempt():
+    """Many goals at once: those that wait when they are cancelled are preempted, and the node goes on."""
+    client = Client()
+    server = actionlib.ActionClient("/darknet_ros/check_for_objects", CheckForObjectsAction)
+    server.wait_for_server()
+    large = Image(height=1500, width=2000, step=6000, encoding="rgb8", data=bytes(9_000_000))
+    handles = [server.send_goal(CheckForObjectsGoal(id=i, image=large)) for i in range(3)]
+    handles[-1].cancel()
+    ended = client.wait(lambda: all(h.get_goal_status() > GoalStatus.ACTIVE for h in handles), 20.0)
+    say(ended=ended, status=[h.get_goal_status() for h in handles])
+    say(alive=[describe(m) for m in client.look(make_message(300))[1]])
+
+
+def switch():
+    client = Client()
+    enable = rospy.ServiceProxy("/darknet_ros/enable", SetBool)
+    say(off=enable(False).success, counts=len(client.look(make_message(100))[0]))
+    enable(True)
+    say(counts=len(client.look(make_message(101))[0]))
+
+
+def silent():
+    """A camera that goes on with one picture, stops, and comes back."""
+    client = Client()
+    until = time.monotonic() + 2.5
+    while time.monotonic() < until:
+        client.camera.publish(make_message(100))
+        time.sleep(0.05)
+    say(frozen=[m.data for m in client.heard["ok"]])
+    client.wait(lambda: "stopped" in str(client.heard["health"][-1:]), 5.0)
+    say(health=[[s.level, s.message] for s in client.heard["health"][-1].status if s.name.endswith("camera")])
+    client.look(make_message(101))
+    client.wait(lambda: client.heard["ok"][-1].data, 3.0)
+    say(ok=client.heard["ok"][-1].data)
+
+
+def newest():
+    """30 pictures at once: the newest is looked at, without working off the rest."""
+    client = Client()
+    for i in range(30):
+        client.camera.publish(make_message(100 + i))
+    client.wait(lambda: client.heard["count"] and client.heard["count"][-1].header.stamp.secs == 129)
+    time.sleep(0.5)
+    say(stamps=[m.header.stamp.secs for m in client.heard["count"]])
+
+
+def republish():
+    """A picture into /in, and what comes out of /middle/compressed and /out."""
+    heard = []
+    rospy.Subscriber("/middle/compressed", CompressedImage, lambda m: heard.append(("compressed", m)))
+    rospy.Subscriber("/out", Image, lambda m: heard.append(("raw", m)))
+    source = rospy.Publisher("/in", Image, queue_size=1)
+    until = time.monotonic() + 15.0
+    while len({kind for kind, _ in heard}) < 2 and time.monotonic() < until:
+        source.publish(make_message(100))
+        time.sleep(0.1)
+    for kind in ("compressed", "raw"):
+        message = next(m for k, m in heard if k == kind)
+        text = message.format if kind == "compressed" else message.encoding
+        say(kind=kind, text=text, stamp=message.header.stamp.secs, frame=message.header.frame_id)
+    pixel = picture_from_msg(next(m for k, m in heard if k == "raw")).pixels[28, 20]
+    say(pixel=pixel.tolist(), start=next(m for k, m in heard if k == "compressed").data[:4].hex())
+
+
+if __name__ == "__main__":
+    rospy.init_node("camera_client", disable_signals=True)
+    globals()[sys.argv[1]]()
+    say(done=True)
