@@ -33,7 +33,8 @@ class StreamWatch:
 
     def note(self, now: float, content: object) -> None:
         """A picture has come in; equal contents mean that nothing has changed."""
-        if self._last is None or now < self._last or content != self._content:
+        fresh = self._last is None or not 0.0 <= now - self._last <= self.timeout
+        if fresh or content != self._content:
             self._changed = now
         if self._last is not None and now > self._last:
             gap = now - self._last

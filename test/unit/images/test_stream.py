@@ -25,6 +25,13 @@ def test_the_same_picture_for_long_is_frozen():
     assert watch.state(7.2) is Stream.FLOWING
 
 
+def test_a_camera_that_comes_back_with_its_old_picture_is_not_frozen_at_once():
+    watch = make_watch()
+    watch.note(0.0, b"same")
+    watch.note(30.0, b"same")
+    assert watch.state(30.1) is Stream.FLOWING
+
+
 def test_zero_means_never_frozen():
     watch = make_watch(frozen_timeout=0.0)
     for i in range(200):
