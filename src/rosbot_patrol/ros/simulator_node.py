@@ -17,6 +17,7 @@ import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import rospy
 import yaml
@@ -47,6 +48,9 @@ from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.robot import RobotDescription, load_robot, parse_robot
 from rosbot_patrol.simulation.world import World, load_world
 
+if TYPE_CHECKING:
+    from rosbot_patrol.ros.simulator_window import Window
+
 log = logging.getLogger(__name__)
 
 _HEALTH_PERIOD = 1.0
@@ -67,7 +71,7 @@ class SimulatorParams:
     rate: float = param(1.0, lo=0.0, doc="real-time factor, 0: as fast as it goes")
     seed: int = param(1, lo=0, doc="of all noise")
     paused: bool = param(False, doc="begin paused")
-    gui: bool = param(False, doc="open PyBullet's window")
+    gui: bool = param(False, doc="a window with the house from above, where there is a display")
     odometry: str = param("encoder", choices=("encoder", "ground_truth"), doc="what /odom tells")
     motion_sensors: str = param("", doc="file of the motion sensors, empty: none")
     prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
@@ -130,16 +134,11 @@ class Simulator:
     """Runs the engine on one thread, in step with the wall or with the nodes that listen."""
 
     def __init__(self, p: SimulatorParams) -> None:
-        gui = p.gui and bool(os.environ.get("DISPLAY"))
-        if p.gui and not gui:
-            log.warning("gui: there is no display, the simulation runs without a window")
         folders = [*p.model_path, *filter(None, os.environ.get("GAZEBO_MODEL_PATH", "").split(":"))]
         world = load_world(p.world, folders) if p.world else World()
         places = read_sensors(p.motion_sensors)
         self._params = p
-        self._engine = Engine(
-            world, p.engine, sensors=places, make_renderer=lambda: make_renderer(p.camera.renderer), gui=gui
-        )
+        self._engine = Engine(world, p.engine, sensors=places, make_renderer=lambda: make_renderer(p.camera.renderer))
         if p.robot:
             self._engine.spawn_robot(_description(p), Pose2D(p.x, p.y, p.yaw))
         self._paused = p.paused
@@ -150,6 +149,7 @@ class Simulator:
         self._requests = Requests(self._engine, self._set_paused)
         self._lockstep = Lockstep(p.lockstep, lambda: self._engine.now) if p.rate == 0.0 else None
         self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id).start() for s in places}
+        self._window = _open_window(self._engine) if p.gui else None
         self._health = Health("simulation")
         rospy.Subscriber("/cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
         log.info("world '%s': %d bodies, %d motion sensors", world.name, len(world.bodies), len(places))
@@ -167,6 +167,8 @@ class Simulator:
                 self._pace.restart(self._engine.now)
             else:
                 self._advance()
+            if self._window is not None:
+                self._window.show()
             wall = time.monotonic()
             if wall - report_at >= _HEALTH_PERIOD:
                 self._report((self._engine.now - report_sim) / (wall - report_at))
@@ -176,7 +178,7 @@ class Simulator:
     def close(self) -> None:
         """End the sensors' links and give the engine back."""
         for client in self._clients.values():
-            client.stop(0.2)
+            client.stop(0.0)
         self._engine.close()
 
     def _advance(self) -> None:
@@ -207,6 +209,12 @@ class Simulator:
             "motion sensors linked": sum(c.connected for c in self._clients.values()),
         }
         self._health.set("", WARN if slow else OK, text, values)
+
+
+def _open_window(engine: Engine) -> Window:
+    from rosbot_patrol.ros.simulator_window import Window  # OpenCV takes 100 MB, and only the window needs it
+
+    return Window(engine)
 
 
 def _description(p: SimulatorParams) -> RobotDescription:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, SceneRender
 from rosbot_patrol.simulation.walkers import Walker
 
 _BANK = 8
+_ROBOT = "the robot, in the window"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +98,17 @@ class Camera:
             self._noisy_colour(drawn, sample) if colour else drawn,
             self._sensed_depth(metres, sample) if depth else metres,
         )
+
+    def view(self, world_from_optical: Matrix, walkers: Iterable[Walker], robot: Body | None) -> NDArray[np.uint8]:
+        """A picture from elsewhere without noise, shape (height, width, 3), with the robot in it."""
+        self._show(list(walkers))
+        if robot is not None:
+            self.renderer.add(replace(robot, name=_ROBOT))
+        try:
+            return self.renderer.render(world_from_optical, self.params.intrinsics)[0]
+        finally:
+            if robot is not None:
+                self.renderer.remove(_ROBOT)
 
     def close(self) -> None:
         """Give the renderer back."""

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, compose
@@ -95,7 +96,6 @@ class Engine:
         params: of every part.
         sensors: motion sensors on the walls.
         make_renderer: builds the camera's renderer, in the thread that takes pictures.
-        gui: opens PyBullet's window.
     """
 
     def __init__(
@@ -105,12 +105,11 @@ class Engine:
         *,
         sensors: Sequence[SensorPlace] = (),
         make_renderer: Callable[[], SceneRenderer] | None = None,
-        gui: bool = False,
     ) -> None:
         self.world = world
         self.params = params or EngineParams()
         self.sensors = tuple(sensors)
-        self._physics = Physics(STEP, gui=gui)
+        self._physics = Physics(STEP)
         for body in world.bodies:
             self._physics.add(body)
         self._eye_slice = slice_bodies(world.bodies, EYE_LEVEL)
@@ -281,6 +280,18 @@ class Engine:
         world_from_base = from_pose2d(self.pose, robot.description.axle_height)
         pose = world_from_base @ robot.base_from_optical
         return self._camera.take(pose, self._walkers.values(), self._steps, colour=colour, depth=depth)
+
+    def view_from_above(self, height: float = 9.0) -> NDArray[np.uint8]:
+        """A picture of the house from a height [m] above the robot, north up; same thread as `picture`."""
+        if self._camera is None:
+            raise WorldError("simulation", "has no camera")
+        robot = self._robot
+        shown = None
+        if robot is not None:
+            shown = replace(robot.description.body, pose=from_pose2d(self.pose, robot.description.axle_height))
+        above = np.diag([1.0, -1.0, -1.0, 1.0])  # x right, y down, z into the picture
+        above[:3, 3] = self.pose.x, self.pose.y, height
+        return self._camera.view(above, self._walkers.values(), shown)
 
     def motion(self) -> dict[int, bool]:
         """Whether each motion sensor's output is high, by id."""

@@ -46,16 +46,15 @@ class Touch:
 class Physics:
     """One PyBullet world; `close` gives it back."""
 
-    def __init__(self, dt: float, *, gui: bool = False) -> None:
-        self._client = pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT)
+    def __init__(self, dt: float) -> None:
+        self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
-            raise WorldError("pybullet", "cannot be started" + (" with a window: is there a display?" if gui else ""))
+            raise WorldError("pybullet", "cannot be started")
         self._bodies: dict[int, Body] = {}
         self._ids: dict[str, int] = {}
         self._robot: int | None = None
         self._limits = (0.0, 0.0, 0.0)
         self._height = 0.0
-        self._gui = gui
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=dt, deterministicOverlappingPairs=1, numSubSteps=0, physicsClientId=self._client
         )
@@ -76,9 +75,6 @@ class Physics:
         )
         self._bodies[number] = body
         self._ids[body.name] = number
-        if self._gui and body.visuals:
-            colour = body.visuals[0].material.rgba
-            pybullet.changeVisualShape(number, -1, rgbaColor=colour, physicsClientId=self._client)
 
     def remove(self, name: str) -> None:
         """Take a body out."""
