@@ -265,7 +265,9 @@ class TrajectoryPlanner(LocalPlanner):
         p = self.params
         trajectories = self._simulate(view, samples, horizon)
         situation = self._situation(view, trajectories, plan)
-        danger = self._obstacles.score(situation)
+        # the base may follow at once, or as slowly as its accelerations say: both have to be free
+        sudden = self._simulate(view, samples, min(horizon, _SHORT), sudden=True)
+        danger = 0.5 * self._obstacles.score(situation) + 0.5 * self._obstacles.check(sudden, view.costmap, view.pose)
         if not np.isfinite(danger).any():
             return None
         scale = situation.coarse.resolution
@@ -301,15 +303,14 @@ class TrajectoryPlanner(LocalPlanner):
         spot = np.column_stack((np.zeros_like(turns), turns))
         return np.ascontiguousarray(np.concatenate((pairs, spot)))
 
-    def _simulate(self, view: LocalView, samples: Array, horizon: float) -> Array:
+    def _simulate(self, view: LocalView, samples: Array, horizon: float, *, sudden: bool = False) -> Array:
         p = self.params
+        limits = (1e6, 1e6) if sudden else (p.acc_lim_x, p.acc_lim_theta)
         speed, turn = float(np.abs(samples[:, 0]).max()), float(np.abs(samples[:, 1]).max())
         steps = max(speed * horizon / p.sim_granularity, turn * horizon / p.angular_sim_granularity)
         pose = np.array(view.pose, dtype=np.float64)
         velocity = np.array([view.velocity.vx, view.velocity.wz])
-        return kernels.simulate(
-            pose, samples, velocity, horizon, max(4, math.ceil(steps)), p.acc_lim_x, p.acc_lim_theta
-        )
+        return kernels.simulate(pose, samples, velocity, horizon, max(4, math.ceil(steps)), *limits)
 
     def _limited(self, view: LocalView, twist: Twist2D) -> Twist2D:
         """Never more than an acceleration allows in two cycles (the measured velocity lags)."""

@@ -68,7 +68,10 @@ def drive(planner, pose, cells=None, seconds=30.0):
         seen = view(pose, velocity, cells)
         if planner.is_goal_reached(seen):
             break
-        twist = planner.compute(seen)
+        try:
+            twist = planner.compute(seen)
+        except ControlError:
+            twist = STOP  # as the navigator does
         velocity = Twist2D(twist.vx, 0.0, twist.wz)
         middle = pose.yaw + twist.wz * 0.05
         pose = Pose2D(
