@@ -37,7 +37,8 @@ class Trainer:
         if options.anchors and not options.checkpoint.exists():
             write_anchors(options.cfg, find_anchors(Pictures.open(options.data, options.name), 6, options.seed))
         self.spec = read_cfg(str(options.cfg))
-        self.network = Darknet(self.spec).to(memory_format=torch.channels_last)
+        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.network = Darknet(self.spec).to(self.device, memory_format=torch.channels_last)
         self.network.set_prior(0.01)
         self.mean = copy.deepcopy(self.network).eval()
         decayed = [p for p in self.network.parameters() if p.ndim > 1]
@@ -86,13 +87,13 @@ class Trainer:
     def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
         for group in self.optimiser.param_groups:
             group["lr"] = self.options.rate * _schedule(self.step, self.total)
-        inputs = torch.from_numpy(images).permute(0, 3, 1, 2).float().div_(255.0)
+        inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
         inputs = inputs.contiguous(memory_format=torch.channels_last)
         boxes = torch.from_numpy(rows)
         truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0)
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.options.bf16):
-            values = self.network(inputs)
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.options.bf16):
+            values = [value.float().cpu() for value in self.network(inputs)]
         parts = yolo_loss(self.spec.heads, values, truth, self.spec.width)  # type: ignore[arg-type]
         self.optimiser.zero_grad(set_to_none=True)
         sum(parts.values()).backward()  # type: ignore[union-attr]
@@ -127,12 +128,12 @@ class Trainer:
 
     def _resume(self) -> None:
         if self.options.start and not self.options.checkpoint.exists():
-            state = torch.load(self.options.start, weights_only=True)
+            state = torch.load(self.options.start, map_location=self.device, weights_only=True)
             self.network.load_state_dict(state["mean"])
             self.mean.load_state_dict(state["mean"])
         if not self.options.checkpoint.exists():
             return
-        state = torch.load(self.options.checkpoint, weights_only=True)
+        state = torch.load(self.options.checkpoint, map_location=self.device, weights_only=True)
         self.network.load_state_dict(state["network"])
         self.mean.load_state_dict(state["mean"])
         self.optimiser.load_state_dict(state["optimiser"])

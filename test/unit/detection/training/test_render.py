@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from rosbot_patrol.detection.letterbox import Letterbox
+from rosbot_patrol.detection.training import render
+from rosbot_patrol.detection.training.furniture import box, build, placed
+from rosbot_patrol.detection.training.labels import COLUMNS, column
+from rosbot_patrol.detection.training.scenes import Actor, Scene
+from rosbot_patrol.simulation.actors import person_body, person_pose_parts
+from rosbot_patrol.simulation.looks import Look
+from rosbot_patrol.simulation.renderer import EglRenderer, Light
+
+
+@pytest.fixture(scope="module")
+def studio() -> render.Studio:
+    return render.Studio(None)
+
+
+def look_at(studio: render.Studio, monkeypatch: pytest.MonkeyPatch, distance: float, *others) -> np.ndarray:
+    """The label of a person that far before the camera, with other things in the way."""
+    look = Look()
+    person = Actor(person_body("actor0", look), placed(distance, 0), person_pose_parts(look), [])
+    monkeypatch.setattr(render.scenes, "draw_actors", lambda *a, **k: [person])
+    scene = Scene(list(others), Light(), (-9, 9, -9, 9))
+    studio.renderer.clear()
+    for body in scene.bodies:
+        studio.renderer.add(body)
+    _, labels = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), False)
+    return np.array([[0, *label] for label in labels]).reshape(-1, len(COLUMNS))
+
+
+def test_who_stands_free_is_wholly_seen(studio: render.Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = look_at(studio, monkeypatch, 5.0)
+    assert column(rows, "seen_of_whole")[0] > 0.85
+    assert column(rows, "seen_of_part")[0] > 0.85
+    height = column(rows, "y1")[0] - column(rows, "y0")[0]
+    assert height * 480 == pytest.approx(554 * 1.75 / 5.0, rel=0.08)
+    assert (column(rows, "x0")[0] + column(rows, "x1")[0]) / 2 == pytest.approx(0.5, abs=0.04)
+
+
+def test_a_near_person_is_seen_in_part_only_for_the_picture_s_edge(
+    studio: render.Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = look_at(studio, monkeypatch, 1.2)
+    assert 0.1 < column(rows, "seen_of_whole")[0] < 0.6
+    assert column(rows, "seen_of_part")[0] > 0.85
+
+
+def test_who_is_half_hidden_is_said_to_be(studio: render.Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    chest = build("chest", [(box(0.3, 2.0, 0.8), (0, 0, 0.4), (1, 1, 1), "")], placed(4.0, 0))
+    rows = look_at(studio, monkeypatch, 5.0, chest)
+    assert 0.3 < column(rows, "seen_of_whole")[0] < 0.65
+
+
+def test_who_is_behind_a_wall_is_not_labelled(studio: render.Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    wall = build("wall", [(box(0.2, 9.0, 9.0), (0, 0, 1), (1, 1, 1), "")], placed(4.0, 0))
+    assert len(look_at(studio, monkeypatch, 5.0, wall)) == 0
+
+
+def test_a_shard_repeats_with_its_seed(studio: render.Studio) -> None:
+    pictures, rows = studio.shard([7, 0], 3, test=False)
+    again, rows_again = studio.shard([7, 0], 3, test=False)
+    assert pictures.shape == (3, 240, 320, 3)
+    assert np.array_equal(pictures, again)
+    assert np.array_equal(rows, rows_again)
+
+
+def test_reduction_is_darknet_s_letterbox() -> None:
+    picture = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
+    picture = cv2.GaussianBlur(picture, (0, 0), 2)
+    exact = Letterbox(640, 480, 320, 256).draw(picture)[:, 8:-8].transpose(1, 2, 0) * 255
+    assert np.abs(render.reduce(picture) - exact)[:-1].max() < 4.0  # darknet's last row comes out black
+
+
+def test_degrading_keeps_size_and_kind() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        out = render.degrade(np.full((480, 640, 3), 128, np.uint8), rng)
+        assert out.shape == (240, 320, 3)
+        assert out.dtype == np.uint8
+    assert render._noise(rng, 5.0).std() == pytest.approx(5.0, rel=0.1)
+
+
+def test_labels_tell_bodies_apart() -> None:
+    renderer = EglRenderer()
+    renderer.add(build("a", [(box(0.2, 0.2, 0.2), (0, 0, 0), (1, 0, 0), "")], placed(2, 0.5, 0.2)), label=3)
+    renderer.add(build("b", [(box(0.2, 0.2, 0.2), (0, 0, 0), (0, 1, 0), "")], placed(2, -0.5, 0.2)), label=200)
+    optical, intrinsics = render._eye((0.0, 0.0, 0.0), np.random.default_rng(0))
+    renderer.render(optical, intrinsics)
+    assert set(np.unique(renderer.labels())) == {0, 3, 200}
+    renderer.close()

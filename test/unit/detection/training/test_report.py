@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rosbot_patrol.detection.training import report
+from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
+from rosbot_patrol.detection.training.dataset import Pictures, asked, batch_of
+
+CFG = Path(__file__).parents[4] / "models" / "house.cfg"
+
+
+def row(picture=0, kind=0, box=(0.2, 0.1, 0.4, 0.9), distance=3.0, whole=1.0, part=1.0, pixels=9000, light=100.0):
+    return [picture, kind, *box, distance, whole, part, pixels, light, 0]
+
+
+@pytest.fixture
+def pictures(tmp_path: Path) -> Pictures:
+    """Two pictures: a person on the left of the first, nothing in the second."""
+    shots = np.zeros((2, 240, 320, 3), np.uint8)
+    shots[0, 24:216, 64:128] = (10, 200, 30)
+    np.save(tmp_path / "set-0000.npy", shots)
+    np.savez(tmp_path / "set-0000.npz", boxes=np.array([row()], np.float32))
+    return Pictures.open(tmp_path, "set")
+
+
+def test_a_batch_lies_in_the_letterbox_with_its_boxes(pictures: Pictures) -> None:
+    images, rows = batch_of(pictures, pictures.index(), None)
+    assert images.shape == (2, 256, 320, 3)
+    assert (images[:, :8] == 127).all()
+    assert rows.tolist() == [[0, 0, pytest.approx(96), pytest.approx(128), pytest.approx(64), pytest.approx(192), 1]]
+    assert (images[0, 32:224, 64:128] == (10, 200, 30)).all()
+
+
+def test_a_mirrored_picture_has_mirrored_boxes(pictures: Pictures) -> None:
+    seen = set()
+    for seed in range(12):
+        images, rows = batch_of(pictures, pictures.index()[:1], np.random.default_rng(seed))
+        x, y = int(rows[0, 2]), int(rows[0, 3])
+        seen.add(x)
+        assert images[0, y, x].max() > 100
+        assert images[0, y, 320 - x].max() < 30
+    assert seen == {96, 224}
+
+
+def test_hardly_seen_people_are_not_asked_for() -> None:
+    rows = np.array([row(), row(part=0.1), row(pixels=50), row(light=2.0), row(box=(0.5, 0.5, 0.51, 0.52))])
+    assert asked(rows).tolist() == [True, False, False, False, False]
+
+
+def test_a_folder_without_pictures_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"holds no pictures named train"):
+        Pictures.open(tmp_path, "train")
+
+
+def test_anchors_are_the_usual_sizes_and_go_into_the_cfg(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    rows = []
+    for w, h in ((0.1, 0.2), (0.3, 0.8)):
+        for _ in range(50):
+            rows.append(row(box=(0.1, 0.1, 0.1 + w * rng.uniform(0.95, 1.05), 0.1 + h * rng.uniform(0.95, 1.05))))
+    anchors = find_anchors(Pictures([], [[np.array(rows)]]), 2, 1)
+    assert np.allclose(anchors, [[32, 48], [96, 192]], rtol=0.06)
+    cfg = tmp_path / "a.cfg"
+    cfg.write_text("[yolo]\nanchors = 1,1, 2,2\nmask=0\n[yolo]\nanchors=1,1\n")
+    write_anchors(cfg, np.array([[32.4, 48.0], [96.0, 192.0]]))
+    assert cfg.read_text().count("anchors=32,48, 96,192\n") == 2
+
+
+def forward_of(*boxes):
+    """A network that answers with given boxes (x, y, w, h shares of the input, kind) in the first picture."""
+    spec = report.read_cfg(str(CFG))
+
+    def forward(images: np.ndarray) -> list[np.ndarray]:
+        values = [np.full((len(images), len(h.anchors) * 7, *h.in_shape[1:]), -12.0, np.float32) for h in spec.heads]
+        head, grid = spec.heads[0], values[0].reshape(len(images), 3, 7, *spec.heads[0].in_shape[1:])
+        rows, columns = head.in_shape[1:]
+        for x, y, w, h, kind in boxes:
+            c, r = int(x * columns), int(y * rows)
+            offset = np.clip([x * columns - c, y * rows - r], 1e-4, 1 - 1e-4)
+            grid[0, 0, :2, r, c] = np.log(offset / (1 - offset))
+            grid[0, 0, 2:4, r, c] = np.log(np.array([w * spec.width, h * spec.height]) / head.anchors[0])
+            grid[0, 0, 4, r, c] = 3.0
+            grid[0, 0, 5 + kind, r, c] = 6.0
+        return values
+
+    return forward
+
+
+GOOD = (96 / 320, 128 / 256, 64 / 320, 192 / 256, 0)
+
+
+def test_a_found_person_counts_once(pictures: Pictures) -> None:
+    found = report.find_all(pictures, CFG, forward_of(GOOD))
+    result = report.figures(found, 0.5)
+    assert result["persons 1-6 m, half of the whole figure seen: there"] == 1
+    assert result["persons 1-6 m, half of the whole figure seen: found"] == 1
+    assert (result["person: boxes"], result["person: false"]) == (1, 0)
+    assert report.average_precision(found, 0) == pytest.approx(1.0)
+    assert "1/1 = 100.00 %" in report.say(result)
+
+
+def test_a_box_beside_the_person_is_a_miss_and_a_false_alarm(pictures: Pictures) -> None:
+    found = report.find_all(pictures, CFG, forward_of((0.8, 0.5, 0.2, 0.7, 0)))
+    result = report.figures(found, 0.5)
+    assert result["persons 1-6 m, half of the whole figure seen: found"] == 0
+    assert (result["person: boxes"], result["person: false"]) == (1, 1)
+    assert result["person: false where there is none"] == 0
+    assert report.average_precision(found, 0) == 0.0
+
+
+def test_a_person_taken_for_a_hydrant_is_false(pictures: Pictures) -> None:
+    result = report.figures(report.find_all(pictures, CFG, forward_of((*GOOD[:4], 1))), 0.5)
+    assert result["fire hydrant: false where there is none"] == 1
+    assert result["persons 1-6 m, half of the whole figure seen: found"] == 0
+
+
+def test_sheets_are_drawn(pictures: Pictures, tmp_path: Path) -> None:
+    found = report.find_all(pictures, CFG, forward_of((0.8, 0.5, 0.2, 0.7, 0)))
+    report.draw_worst(pictures, found, 0.5, tmp_path / "worst.jpg")
+    report.draw_found(pictures, found, 0.5, tmp_path / "found.jpg", count=5)
+    report.draw_samples(pictures, tmp_path / "samples.jpg", count=2)
+    assert all((tmp_path / f"{n}.jpg").stat().st_size > 1000 for n in ("worst", "found", "samples"))
