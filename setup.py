@@ -1,6 +1,6 @@
-from setuptools import find_packages
 from distutils.core import setup
 
 from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import find_packages
 
 setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}))

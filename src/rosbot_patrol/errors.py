@@ -107,9 +107,7 @@ class NoPath(PlanningError):
     """Start and goal are free, but nothing connects them."""
 
     def __init__(self, start: tuple[float, float], goal: tuple[float, float]) -> None:
-        super().__init__(
-            f"no way from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})"
-        )
+        super().__init__(f"no way from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})")
         self.start = start
         self.goal = goal
 

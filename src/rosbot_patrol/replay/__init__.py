@@ -1,0 +1,1 @@
+"""Recorded data fed through the same objects that run on the robot."""

@@ -1,0 +1,1 @@
+"""The edge to ROS: the only modules that know it."""

@@ -1,0 +1,1 @@
+"""The simulated house, robot, sensors and people."""
