@@ -185,11 +185,12 @@ def _sequence(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
         inner = list(args)
         if len(inner) != len(value):
             raise ParamError(name, f"expected {len(inner)} values, got {len(value)}: {value!r}")
-    items = [
-        load(h, v, name=f"{name}[{i}]/") if dataclasses.is_dataclass(h) else _typed(h, v, f"{name}[{i}]", info)
-        for i, (h, v) in enumerate(zip(inner, value, strict=True))
-    ]
+    items = [_element(h, v, f"{name}[{i}]", info) for i, (h, v) in enumerate(zip(inner, value, strict=True))]
     return kind(items)
+
+
+def _element(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
+    return load(hint, value, name=name + "/") if dataclasses.is_dataclass(hint) else _typed(hint, value, name, info)
 
 
 def _check_bounds(value: Any, info: ParamInfo, name: str) -> None:
