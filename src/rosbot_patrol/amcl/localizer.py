@@ -161,10 +161,11 @@ class Localizer:
         is_blind = weighing is None
         if weighing is not None:
             self.filter.weigh(weighing)
+        estimate = self.filter.estimate()  # before the draw, which forgets how well each particle fits
         resampled = self._resample_when_due()
         if not (resampled or is_start):
             return Outcome(updated=True, is_blind=is_blind)
-        self.estimate = self.filter.estimate()
+        self.estimate = estimate
         self.map_from_odom = compose(self.estimate.pose, invert(odom_from_base))
         return Outcome(updated=True, resampled=resampled, estimate=self.estimate, is_blind=is_blind)
 

@@ -52,24 +52,27 @@ class ParticleFilter:
         self._rng = rng
         self.poses: Array = np.zeros((1, 3))
         self.weights: Array = np.ones(1)
+        self._evidence: Array = np.zeros(1)
 
     def spread_about(self, pose: Pose2D, covariance: Array) -> None:
         """Start anew from a Gaussian about a pose; covariance of x, y, yaw, shape (3, 3), symmetrised and clipped."""
         values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
         scaled = self._rng.standard_normal((self._rule.most, 3)) * np.sqrt(np.maximum(values, 0.0))
-        self._restart(np.array(pose) + scaled @ vectors.T)
+        self.set_particles(np.array(pose) + scaled @ vectors.T)
 
     def spread_over(self, random_poses: RandomPoses) -> None:
         """Start anew from anywhere."""
-        self._restart(random_poses(self._rule.most))
+        self.set_particles(random_poses(self._rule.most))
 
-    def _restart(self, poses: Array) -> None:
+    def set_particles(self, poses: Array) -> None:
+        """Start anew from given poses, shape (N, 3), all of one weight."""
         poses[:, 2] = wrap_angles(poses[:, 2])
         self.poses = np.ascontiguousarray(poses)
         self._level()
         self._slow = self._fast = 0.0
 
     def _level(self) -> None:
+        self._evidence = np.zeros(len(self.poses))
         self.weights = np.full(len(self.poses), 1.0 / len(self.poses))
 
     def weigh(self, weighing: Weighing) -> None:
@@ -81,6 +84,7 @@ class ParticleFilter:
             self.weights = weights / total
         else:
             self._level()
+        self._evidence = weighing.evidence
         self._slow = fit if self._slow == 0.0 else self._slow + self._alpha_slow * (fit - self._slow)
         self._fast = fit if self._fast == 0.0 else self._fast + self._alpha_fast * (fit - self._fast)
 
@@ -127,10 +131,17 @@ class ParticleFilter:
         return strangers
 
     def estimate(self) -> Estimate:
-        """The heaviest cluster's mean and the spread of all."""
+        """The heaviest cluster's mean and the spread of all.
+
+        Within the cluster each particle counts by how well it fits the newest scan: the weights of upstream's sensor
+        model are so soft that their plain mean is half a metre off where updates are few.
+        """
         labels = np.empty(len(self.poses), dtype=np.int64)
         numbers = kernels.label_clusters(self.poses, labels)
         weight_of = np.bincount(labels, weights=self.weights, minlength=numbers)
-        best = kernels.moments(self.poses, self.weights, labels, int(weight_of.argmax()))
+        chosen = int(weight_of.argmax())
+        top = self._evidence[labels == chosen].max()
+        sharp = self.weights * np.exp(np.minimum(self._evidence - top, 0.0))
+        best = kernels.moments(self.poses, sharp, labels, chosen)
         whole = kernels.moments(self.poses, self.weights, labels, -1)
-        return Estimate(Pose2D(*best[0].tolist()), whole[1:4].copy(), float(best[4, 0]), len(self.poses))
+        return Estimate(Pose2D(*best[0].tolist()), whole[1:4].copy(), float(weight_of[chosen]), len(self.poses))

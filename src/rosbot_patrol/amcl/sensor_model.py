@@ -52,10 +52,17 @@ class Beams:
 
 @dataclass(frozen=True)
 class Weighing:
-    """What a scan says about particles: factors of their weights and a measure of the fit, 0 to 1, shapes (N,)."""
+    """What a scan says about particles.
+
+    Attributes:
+        likelihood: factors of their weights, shape (N,).
+        fit: how well each agrees, 0 to 1, shape (N,).
+        evidence: logarithm of a sharper likelihood, by which the pose is picked among them, shape (N,).
+    """
 
     likelihood: Array
     fit: Array
+    evidence: Array
 
 
 class SensorModel(Protocol):
@@ -111,7 +118,7 @@ class LikelihoodFieldModel:
         if not len(beams.xs):
             return None
         sums = _summed(poses, beams, self._table.at(beams.reach))
-        return Weighing(1.0 + sums, sums / len(beams.xs))
+        return Weighing(1.0 + sums, sums / len(beams.xs), sums)
 
 
 class LikelihoodFieldProbModel:
@@ -134,7 +141,7 @@ class LikelihoodFieldProbModel:
             return None
         used = Beams(xs, ys, beams.mount, beams.angles, beams.ranges, beams.reach)
         sums = _summed(poses, used, self._table.at(beams.reach))
-        return Weighing(np.exp(sums - sums.max()), np.exp(sums / len(xs)))
+        return Weighing(np.exp(sums - sums.max()), np.exp(sums / len(xs)), np.zeros(len(sums)))
 
     def _agreed(self, poses: Array, beams: Beams) -> tuple[Array, Array]:
         p = self._params
@@ -199,7 +206,7 @@ class BeamModel:
             self._mixture,
             sums,
         )
-        return Weighing(1.0 + sums, sums / len(beams.ranges))
+        return Weighing(1.0 + sums, sums / len(beams.ranges), sums)
 
 
 MODELS: dict[str, type[LikelihoodFieldModel] | type[LikelihoodFieldProbModel] | type[BeamModel]] = {

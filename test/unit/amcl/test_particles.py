@@ -100,7 +100,7 @@ def test_the_heavier_of_two_clusters_is_the_pose_but_both_are_the_spread() -> No
     rng = np.random.default_rng(0)
     near = rng.normal(0.0, 0.05, (300, 3))
     far = rng.normal(0.0, 0.05, (100, 3)) + np.array([10.0, 0.0, 0.0])
-    made.poses, made.weights = np.concatenate([near, far]), np.full(400, 1.0 / 400.0)
+    made.set_particles(np.concatenate([near, far]))
     found = made.estimate()
     assert found.cluster_weight == pytest.approx(0.75)
     assert abs(found.pose.x) < 0.02
@@ -110,8 +110,7 @@ def test_the_heavier_of_two_clusters_is_the_pose_but_both_are_the_spread() -> No
 def test_headings_about_half_a_turn_are_one_cluster() -> None:
     made = particle_filter()
     yaw = np.array([math.pi - 0.05, -math.pi + 0.05, math.pi - 0.01, -math.pi + 0.01])
-    made.poses = np.column_stack([np.zeros(4), np.zeros(4), yaw])
-    made.weights = np.full(4, 0.25)
+    made.set_particles(np.column_stack([np.zeros(4), np.zeros(4), yaw]))
     found = made.estimate()
     assert found.cluster_weight == 1.0
     assert abs(abs(found.pose.yaw) - math.pi) < 1e-6
@@ -122,7 +121,7 @@ def test_random_poses_come_in_when_the_fit_falls() -> None:
     made = particle_filter(alpha_slow=0.001, alpha_fast=0.5)
     made.spread_about(Pose2D(), np.diag([0.01, 0.01, 0.001]))
     for fit in (0.8, 0.8, 0.1, 0.1):
-        made.weigh(Weighing(np.ones(2000), np.full(2000, fit)))
+        made.weigh(Weighing(np.ones(2000), np.full(2000, fit), np.zeros(2000)))
     assert made.stranger_share > 0.5
     made.resample(lambda count: np.full((count, 3), 50.0))
     assert 0.3 < (made.poses[:, 0] == 50.0).mean() < 0.9
@@ -132,7 +131,7 @@ def test_random_poses_come_in_when_the_fit_falls() -> None:
 def test_weights_that_all_vanish_are_levelled() -> None:
     made = particle_filter()
     made.spread_about(Pose2D(), np.eye(3))
-    made.weigh(Weighing(np.zeros(2000), np.zeros(2000)))
+    made.weigh(Weighing(np.zeros(2000), np.zeros(2000), np.zeros(2000)))
     np.testing.assert_allclose(made.weights, 1.0 / 2000.0)
 
 
