@@ -190,7 +190,9 @@ def _sequence(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
 
 
 def _element(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
-    return load(hint, value, name=name + "/") if dataclasses.is_dataclass(hint) else _typed(hint, value, name, info)
+    if dataclasses.is_dataclass(hint):
+        return load(hint, value, name=name + "/")  # type: ignore[arg-type]
+    return _typed(hint, value, name, info)
 
 
 def _check_bounds(value: Any, info: ParamInfo, name: str) -> None:
