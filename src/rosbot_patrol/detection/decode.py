@@ -13,6 +13,9 @@ import numpy as np
 from rosbot_patrol.detection.darknet_layers import Head, Region, Yolo
 from rosbot_patrol.detection.letterbox import Letterbox
 
+BLOCK = 64
+"""Boxes compared with all others at once."""
+
 
 @dataclass(frozen=True)
 class Candidates:
@@ -87,9 +90,12 @@ def suppress_by_objectness(found: Candidates, iou_threshold: float) -> Candidate
     """Whatever its class, a box goes that overlaps one of higher objectness (darknet's do_nms_obj); sorted by it."""
     ranked = found.only(np.argsort(-found.objectness, kind="stable"))
     alive = np.ones(len(ranked), dtype=bool)
-    for i in range(len(ranked)):
-        if alive[i]:
-            alive[i + 1 :] &= iou(ranked.boxes[i], ranked.boxes[i + 1 :]) <= iou_threshold
+    for start in range(0, len(ranked), BLOCK):
+        rows = start + np.flatnonzero(alive[start : start + BLOCK])
+        apart = iou(ranked.boxes[rows, None], ranked.boxes[None, start:]) <= iou_threshold
+        for row, i in zip(apart, rows, strict=True):
+            if alive[i]:
+                alive[i + 1 :] &= row[i + 1 - start :]
     return ranked.only(alive)
 
 
@@ -107,11 +113,14 @@ def suppress_by_class(found: Candidates, iou_threshold: float) -> Candidates:
 
 
 def iou(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Intersection over union of one box with others, shape (N,)."""
-    low = np.maximum(box[:2] - box[2:] / 2, boxes[:, :2] - boxes[:, 2:] / 2)
-    high = np.minimum(box[:2] + box[2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2)
-    shared = np.prod(np.clip(high - low, 0.0, None), axis=1)
-    union = box[2] * box[3] + boxes[:, 2] * boxes[:, 3] - shared
+    """Intersection over union of boxes, last axis x, y, width, height, the others as numpy broadcasts them."""
+    with np.errstate(invalid="ignore"):
+        half, halves = box[..., 2:] / 2, boxes[..., 2:] / 2
+        low = np.maximum(box[..., :2] - half, boxes[..., :2] - halves)
+        high = np.minimum(box[..., :2] + half, boxes[..., :2] + halves)
+        width, height = (np.maximum(high[..., axis] - low[..., axis], 0.0) for axis in (0, 1))
+        shared = width * height
+        union = box[..., 2] * box[..., 3] + boxes[..., 2] * boxes[..., 3] - shared
     return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0.0)
 
 

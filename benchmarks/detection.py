@@ -1,0 +1,199 @@
+#!/usr/bin/env python3
+"""The detector: how long a picture takes, against Debian's darknet, in what memory; and what republish costs.
+
+    . scripts/env; python3 benchmarks/detection.py [--json FILE] [--repeats N]
+
+yolov2_tiny_ms: bytes of a sensor_msgs/Image (640x480 rgb8) to bytes of a BoundingBoxes message, yolov2-tiny at 416 with
+random weights, pinned to two cores; everything that the node does, transport apart. yolov2_tiny_vs_darknet: the forward
+pass of Debian's own library (package `darknet`) on the same cfg, weights and picture, over that. house_net_fps: as the
+first, for the network in models/, on one core. house_net_mb: the resident memory of a process that has done so, with
+rospy loaded. republish_vs_imencode: message bytes in to message bytes out, over `cv2.imencode` of the picture alone.
+
+A figure that cannot be had here (no weights, no darknet) is left out, and the table says why.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+AIMS = {
+    "yolov2_tiny_ms": "<= 35",
+    "yolov2_tiny_vs_darknet": ">= 12",
+    "house_net_fps": ">= 60",
+    "house_net_mb": "<= 220",
+    "republish_vs_imencode": "<= 1.3",
+}
+LIBRARY = Path("/usr/lib/darknet/libdarknet.so")
+REFERENCE = ROOT / "test/contract/darknet_reference.py"
+CFG = ROOT / "drop_in/darknet_ros/yolo_network_config/cfg/yolov2-tiny.cfg"
+
+
+def make_picture() -> np.ndarray:
+    """Soft colours with some noise, shape (480, 640, 3)."""
+    rng = np.random.default_rng(1)
+    blocks = np.kron(rng.integers(0, 255, (24, 32, 3)), np.ones((20, 20, 1)))
+    return np.clip(blocks + rng.normal(0.0, 4.0, blocks.shape), 0, 255).astype(np.uint8)
+
+
+def medians(action: Callable[[], object], repeats: int) -> float:
+    """Median milliseconds of an action, after a warm-up."""
+    for _ in range(3):
+        action()
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        action()
+        times.append((time.perf_counter() - start) * 1e3)
+    return statistics.median(times)
+
+
+def message_bytes() -> bytes:
+    """A picture message as it comes over the wire."""
+    from std_msgs.msg import Header
+
+    from rosbot_patrol.images.encodings import Picture
+    from rosbot_patrol.ros.convert_images import picture_to_msg
+
+    out = io.BytesIO()
+    picture_to_msg(Picture(make_picture(), "rgb8"), Header()).serialize(out)
+    return out.getvalue()
+
+
+def detection_ms(cfg: str, weights: str, names: list[str], threads: int, repeats: int) -> float:
+    """Message bytes to message bytes."""
+    from sensor_msgs.msg import Image
+
+    from rosbot_patrol.detection.detector import load_detector
+    from rosbot_patrol.ros.convert_images import picture_from_msg
+    from rosbot_patrol.ros.darknet_node import boxes_to_msg
+
+    detector = load_detector(cfg, weights, names, threads=threads)
+    data = message_bytes()
+
+    def once() -> None:
+        message = Image().deserialize(data)
+        found = detector.detect(picture_from_msg(message))
+        boxes_to_msg(found, message.header).serialize(io.BytesIO())
+
+    return medians(once, repeats)
+
+
+def republish_times(repeats: int) -> tuple[float, float]:
+    """Milliseconds from message bytes to message bytes, and of imencode alone."""
+    import cv2
+    from sensor_msgs.msg import CompressedImage, Image
+
+    from rosbot_patrol.images.compressed import CompressedParams, compress
+    from rosbot_patrol.ros.convert_images import picture_from_msg
+
+    cv2.setNumThreads(1)
+    params, data = CompressedParams(), message_bytes()
+    pixels = make_picture()
+
+    def once() -> None:
+        message = Image().deserialize(data)
+        text, coded = compress(picture_from_msg(message), params)
+        CompressedImage(header=message.header, format=text, data=coded).serialize(io.BytesIO())
+
+    return medians(once, repeats), medians(lambda: cv2.imencode(".jpg", pixels, params.options()), repeats)
+
+
+def darknet_ms(folder: Path, classes: int) -> float:
+    """A forward pass of Debian's darknet."""
+    files = [str(CFG), str(folder / "tiny.weights"), str(folder / "picture.png")]
+    command = [sys.executable, str(REFERENCE), *files, str(classes), "0.3", "0.4", "5"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return statistics.median(json.loads(done.stdout.splitlines()[-1])["ms"][1:])
+
+
+def write_tiny(folder: Path) -> int:
+    """yolov2-tiny with random weights and the picture; how many classes it has."""
+    import cv2
+
+    from rosbot_patrol.detection.darknet_cfg import read_cfg
+    from rosbot_patrol.detection.darknet_weights import format_weights
+    from rosbot_patrol.detection.random_weights import random_weights
+
+    spec = read_cfg(str(CFG))
+    weights = random_weights(spec, np.random.default_rng(0))
+    (folder / "tiny.weights").write_bytes(format_weights(spec, weights))
+    cv2.imwrite(str(folder / "picture.png"), make_picture()[:, :, ::-1])
+    return spec.classes
+
+
+def resident_mb() -> float:
+    """Resident memory of this process."""
+    with open("/proc/self/status", encoding="ascii") as status:
+        return next(int(line.split()[1]) / 1024 for line in status if line.startswith("VmRSS"))
+
+
+def part(name: str, repeats: int, folder: Path) -> dict[str, float]:
+    """One part of the measurement, in a process of its own."""
+    if name == "tiny":
+        pin(2)
+        classes = write_tiny(folder)
+        ours = detection_ms(str(CFG), str(folder / "tiny.weights"), [str(i) for i in range(classes)], 2, repeats)
+        figures = {"yolov2_tiny_ms": ours}
+        if LIBRARY.exists():
+            figures["darknet_ms"] = darknet_ms(folder, classes)
+            figures["yolov2_tiny_vs_darknet"] = figures["darknet_ms"] / ours
+        return figures
+    if name == "house":
+        pin(1)
+        models = ROOT / "models"
+        cfg, weights = str(models / "house.cfg"), str(models / "house.weights")
+        ms = detection_ms(cfg, weights, ["person", "fire hydrant"], 1, 5 * repeats)
+        return {"house_net_fps": 1000.0 / ms, "house_net_mb": resident_mb()}
+    pin(1)
+    ours, theirs = republish_times(5 * repeats)
+    return {"republish_ms": ours, "imencode_ms": theirs, "republish_vs_imencode": ours / theirs}
+
+
+def pin(cores: int) -> None:
+    """Use so many of this machine's cores."""
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--repeats", type=int, default=30)
+    parser.add_argument("--part", choices=("tiny", "house", "republish"), help=argparse.SUPPRESS)
+    parser.add_argument("--folder", type=Path, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.part:
+        print(json.dumps(part(arguments.part, arguments.repeats, arguments.folder)))
+        return
+    figures: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("tiny", "house", "republish"):
+            command = [sys.executable, __file__, "--part", name, "--repeats", str(arguments.repeats)]
+            done = subprocess.run([*command, "--folder", folder], capture_output=True, text=True, check=False)
+            if done.returncode:
+                print(f"{name}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
+                continue
+            figures |= json.loads(done.stdout.splitlines()[-1])
+    if not LIBRARY.exists():
+        print("yolov2_tiny_vs_darknet: Debian's package darknet is not installed", file=sys.stderr)
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}\n\n| figure | value | aim |\n|---|---|---|")
+    for name, value in figures.items():
+        print(f"| {name} | {value:.2f} | {AIMS.get(name, '')} |")
+    if arguments.json:
+        Path(arguments.json).write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
