@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+
+pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 from genpy import Message
 
 from rosbot_patrol import params

@@ -181,6 +181,8 @@ class Engine:
         """Put the robot into the world; raises WorldError where there is one, or no room for it."""
         if self._robot is not None:
             raise WorldError(f"robot '{description.name}'", f"'{self._robot.description.name}' is there already")
+        if not all(map(math.isfinite, pose)):
+            raise WorldError(f"robot '{description.name}'", f"{tuple(pose)} is no pose")
         robot = _Robot(self, description, pose)
         self._physics.add_robot(description, pose, self.params.drive.traction)
         self._robot = robot

@@ -159,6 +159,14 @@ def test_a_robot_in_a_wall_is_refused(build) -> None:
     assert not engine.has_robot
 
 
+def test_a_pose_that_is_not_finite_is_refused(build) -> None:
+    engine = build(robot=False)
+    with pytest.raises(WorldError, match="is no pose"):
+        engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"), Pose2D(math.nan, 0.0, 0.0))
+    with pytest.raises(WorldError, match="is no pose"):
+        engine.spawn_actor("", "person", "", Pose2D(0.0, math.inf, 0.0))
+
+
 def test_a_second_robot_is_refused(build) -> None:
     with pytest.raises(WorldError, match="is there already"):
         build().spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))

@@ -1,0 +1,147 @@
+"""simulator before a real master: topics and frames, driving, contacts, actors, sensors over TCP, pause, bad input."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+from ros_processes import Ros, free_port, wait_for
+
+ROOT = Path(__file__).resolve().parents[2]
+URDF, WORLD = f"_urdf:={ROOT}/urdf/rosbot.urdf", f"_world:={ROOT}/worlds/house.world"
+FRAMES = {
+    "/scan": ("sensor_msgs/LaserScan", "laser"),
+    "/odom": ("nav_msgs/Odometry", "odom"),
+    "/rosbot/imu": ("sensor_msgs/Imu", "imu_link"),
+    "/range/fl": ("sensor_msgs/Range", "range_fl"),
+    "/battery": ("sensor_msgs/BatteryState", "base_link"),
+    "/camera/rgb/camera_info": ("sensor_msgs/CameraInfo", "camera_depth_frame"),
+    "/ground_truth/odom": ("nav_msgs/Odometry", "map"),
+}
+WALK = """
+import rospy
+from geometry_msgs.msg import Pose2D
+from rosbot_patrol.srv import MoveActor, SpawnActor
+
+rospy.wait_for_service("/simulator/spawn_actor")
+placed = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)("bob", "person", "", Pose2D(3, 7, 0))
+moved = rospy.ServiceProxy("/simulator/move_actor", MoveActor)("bob", [Pose2D(3, 8.2, 0)], 1.0, False)
+print(placed.success, moved.success)
+"""
+SPAWN = f"""
+import rospy
+from geometry_msgs.msg import Pose2D
+from rosbot_patrol.srv import SpawnRobot
+
+rospy.wait_for_service("/simulator/spawn_robot")
+spawn = rospy.ServiceProxy("/simulator/spawn_robot", SpawnRobot)
+urdf = open("{ROOT}/urdf/rosbot.urdf").read()
+answers = [spawn("rosbot", urdf, pose) for pose in (Pose2D(-0.9, -1.2, 0), Pose2D(0, 0, 0))]
+print(*(a.success for a in answers), *(a.message for a in answers), sep="|")
+"""
+
+
+@pytest.fixture(scope="module")
+def master():
+    ros = Ros()
+    subprocess.run(["rosparam", "set", "/use_sim_time", "true"], env=ros.env, check=True)
+    yield ros
+    ros.stop()
+
+
+@pytest.fixture
+def ros(master):
+    yield master
+    master.stop_nodes()
+    subprocess.run(["rosparam", "delete", "/simulator"], env=master.env, stderr=subprocess.DEVNULL)
+
+
+def test_topics_frames_and_driving_into_a_wall(ros):
+    probe = ros.probe()
+    for topic, (kind, _) in FRAMES.items():
+        probe.tell(subscribe=[topic, kind])
+    probe.tell(subscribe=["/ground_truth/contacts", "rosbot_patrol/Contacts"])
+    probe.tell(advertise=["/cmd_vel", "geometry_msgs/Twist"])
+    node = ros.node("simulator", URDF, WORLD, "_rate:=3.0", "_yaw:=3.0")
+    node.says("motion sensors", 20.0)
+    for topic, (_, frame) in FRAMES.items():
+        said = probe.expect(lambda s, topic=topic: s.get("topic") == topic, 15.0)
+        assert f'frame_id: "{frame}"' in said["header"], topic
+
+    def touches():
+        probe.tell(publish=["/cmd_vel", {"linear": {"x": 0.4}}])
+        return [s for s in probe.heard(topic="/ground_truth/contacts") if "house/Wall_4" in s["contacts"]]
+
+    wait_for(touches, 15.0, "a contact with the wall")
+
+
+def test_actors_come_walk_trigger_a_sensor_over_tcp_and_go(ros, tmp_path):
+    port = free_port()
+    sensors = tmp_path / "sensors.yaml"
+    sensors.write_text(f"sensors: [{{id: 5, room: 5, port: {port}, x: 5.2, y: 6.36, yaw: 2.3}}]")
+    probe = ros.probe()
+    probe.tell(subscribe=["/motion_trigger", "rosbot_patrol/EspTrigger"])
+    bridge = ros.node("serial_node.py", "tcp", str(port))
+    ros.node("simulator", URDF, WORLD, f"_motion_sensors:={sensors}").says("motion sensors", 20.0)
+    bridge.says("motion sensor 5", 15.0)
+
+    def answer(service, kind, *arguments):
+        before = len(probe.heard(called=service))
+        probe.tell(call=[service, kind, list(arguments)])
+        return wait_for(lambda: probe.heard(called=service)[before:], 8.0, service)[0]
+
+    refused = answer("/simulator/remove_actor", "rosbot_patrol/RemoveActor", "bob")
+    assert not refused["success"]
+    assert "is not there" in refused["message"]
+    done = subprocess.run([sys.executable, "-c", WALK], env=ros.env, capture_output=True, text=True)
+    assert done.stdout.split() == ["True", "True"], done.stderr
+    probe.expect(lambda s: s.get("topic") == "/motion_trigger" and s["move"] and s["id"] == 5, 10.0)
+    assert answer("/simulator/remove_actor", "rosbot_patrol/RemoveActor", "bob")["success"]
+
+
+def test_paused_time_stands_still_and_the_robot_comes_by_service(ros):
+    probe = ros.probe()
+    node = ros.node("simulator", WORLD, "_robot:=false")
+    node.says("motion sensors", 20.0)
+    probe.tell(subscribe=["/clock", "rosgraph_msgs/Clock"])
+    probe.expect(lambda s: s.get("topic") == "/clock")
+    probe.tell(call=["/simulator/pause", "std_srvs/Empty", []])
+    node.says("is paused")
+    count = len(probe.heard(topic="/clock"))
+    time.sleep(0.4)
+    assert len(probe.heard(topic="/clock")) <= count + 2
+    done = subprocess.run([sys.executable, "-c", SPAWN], env=ros.env, capture_output=True, text=True)
+    assert done.stdout.split("|")[:2] == ["False", "True"], done.stderr
+    assert "is no place for it" in done.stdout
+    probe.tell(subscribe=["/scan", "sensor_msgs/LaserScan"], call=["/simulator/unpause", "std_srvs/Empty", []])
+    probe.expect(lambda s: s.get("topic") == "/scan")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([URDF, "_world:=/nowhere.world"], "/nowhere.world: cannot be read"),
+        ([WORLD], "/robot_description: is missing"),
+        ([URDF, WORLD, "_rate:=-1.0"], "/simulator/rate: is -1.0, expected at least 0.0"),
+        ([URDF, WORLD, "_odometry:=magic"], "expected one of encoder, ground_truth"),
+        ([URDF, WORLD, "_x:=-0.9", "_y:=-1.2"], "is no place for it, 'house/Wall_12' is there"),
+        ([URDF, WORLD, "_motion_sensors:=/nowhere.yaml"], "/nowhere.yaml: cannot be read"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_the_end(ros, arguments, sentence):
+    node = ros.node("simulator", *arguments)
+    node.says(sentence, 20.0)
+    assert node.popen.wait(5.0) == 1
+    assert "Traceback" not in node.output
+
+
+def test_it_ends_soon_on_an_interrupt(ros):
+    node = ros.node("simulator", URDF, WORLD, "_rate:=0.0")
+    node.says("motion sensors", 20.0)
+    began = time.monotonic()
+    assert node.stop() == 0
+    assert time.monotonic() - began < 5.0
