@@ -52,7 +52,7 @@ def count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw):
 
 @kernel("float64[::1](float64[:, :, ::1], uint8[:, ::1], float64, float64, float64, float64[:, ::1], int64)")
 def leaving_costs(trajectories, cells, resolution, origin_x, origin_y, outline, touching):
-    """For a robot that touches something: how much it still touches at each end, -1 where it touches more on the way.
+    """For a robot that touches something: how much it still touches at each end, -1 where it ever touches more.
 
     `touching` is how many points of the outline touch now; a trajectory has to end with fewer. Shape (K,).
     """
@@ -63,7 +63,7 @@ def leaving_costs(trajectories, cells, resolution, origin_x, origin_y, outline, 
         for i in range(steps):
             x, y, yaw = trajectories[k, i, 0], trajectories[k, i, 1], trajectories[k, i, 2]
             n = count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw)
-            if n > touching + 2:  # cells are coarse: a corner may brush another one on its way out
+            if n > touching:
                 break
         out[k] = n if n < touching else -1.0
     return out
