@@ -5,11 +5,12 @@ Matches amcl of ROS Noetic's navigation 1.17: topics `scan`, `initialpose`, `map
 `request_nomotion_update`, `set_map`; the map from the service `static_map`; parameters in `AmclParams`, with the pose
 saved to them for a respawn. Written from Probabilistic Robotics and upstream's documentation.
 
-Differs: within the best cluster particles that fit the newest scan count for more, where upstream takes the plain mean:
-with the tutorial's few updates that is 5 cm off instead of 25. All particles in one bin ask for the fewest particles, upstream's rule then asks for the most. The averages
-behind the recovery are of a beam's fit, so that more or fewer beams are no cause for random poses. Draws follow an even
-sequence instead of independent numbers. A new map keeps the pose that the filter has. An odometry that jumps or a
-clock that goes back is a restart, not a motion. A turned map is refused with a sentence. No dynamic_reconfigure.
+Differs: within the best cluster particles that fit the newest scan count for more, where upstream takes the plain
+mean: with the tutorial's few updates that is 5 cm off instead of 25. All particles in one bin ask for the fewest
+particles, upstream's rule then asks for the most. The averages behind the recovery are of a beam's fit, so that more
+or fewer beams are no cause for random poses. Draws follow an even sequence instead of independent numbers. A new map
+keeps the pose that the filter has. An odometry that jumps or a clock that goes back is a restart, not a motion. A
+turned map is refused with a sentence. No dynamic_reconfigure.
 """
 
 from __future__ import annotations
