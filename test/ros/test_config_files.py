@@ -23,8 +23,9 @@ from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.ros.demo_intruder_node import read_walk
 from rosbot_patrol.ros.parameter_tables import document
-from rosbot_patrol.ros.simulator_node import SimulatorParams, read_sensors
+from rosbot_patrol.ros.simulator_node import SimulatorParams
 from rosbot_patrol.ros.twist_mux_node import TwistMuxParams
+from rosbot_patrol.simulation.sensor_places import read_sensors
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import dataclass
-from pathlib import Path
 
 import rospy
-import yaml
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from rosbot_patrol import params
-from rosbot_patrol.errors import ParamError
 from rosbot_patrol.msg import EspTrigger, PatrolState
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.rooms import Room, Rooms, load_rooms
 from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.simulation.motion_sensors import SensorPlace
+from rosbot_patrol.simulation.sensor_places import read_sensors
 
 QUIET, BUSY, MOTION = ColorRGBA(0.2, 0.5, 0.9, 0.8), ColorRGBA(1.0, 0.6, 0.0, 1.0), ColorRGBA(1.0, 0.1, 0.1, 1.0)
 MOTION_SHOWN_S = 5.0
@@ -30,33 +28,6 @@ class MarkersParams:
 
     path_to_params: str = param(doc="room points, as for the patrol")
     motion_sensors: str = param("", doc="motion sensors of the house, empty: none")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SensorPlace:
-    """Where a motion sensor hangs."""
-
-    id: int = param(doc="id that it reports")
-    room: int = param(0, doc="room that it watches")
-    port: int = param(0, doc="port of the bridge")
-    x: float = param(unit="m", doc="place in the frame map")
-    y: float = param(unit="m", doc="place in the frame map")
-    z: float = param(1.6, unit="m", doc="height")
-    yaw: float = param(0.0, unit="rad", doc="where it looks")
-
-
-def read_sensors(path: str) -> list[SensorPlace]:
-    """The sensors of a house_sensors.yaml, [] for an empty name; ParamError names file and key."""
-    if not path:
-        return []
-    try:
-        tree = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as err:
-        raise ParamError(path, f"cannot be read: {err}") from err
-    rows = (tree or {}).get("sensors")
-    if not isinstance(rows, list):
-        raise ParamError(f"{path}: sensors", "is missing, expected a list of sensors")
-    return [params.load(SensorPlace, row, name=f"{path}: sensors[{i}]/") for i, row in enumerate(rows)]
 
 
 def _marker(name: str, key: int, kind: int, x: float, y: float, z: float) -> Marker:

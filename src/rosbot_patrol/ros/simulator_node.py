@@ -16,15 +16,12 @@ import logging
 import os
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rospy
-import yaml
 from geometry_msgs.msg import Twist
 
-from rosbot_patrol import params
-from rosbot_patrol.errors import ParamError, WorldError
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
 from rosbot_patrol.ros.convert import twist_from_msg
@@ -41,11 +38,12 @@ from rosbot_patrol.simulation.drive import DriveParams
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.imu import ImuParams
 from rosbot_patrol.simulation.lidar import LidarParams
-from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace
+from rosbot_patrol.simulation.motion_sensors import MotionSensorParams
 from rosbot_patrol.simulation.odometry import OdometryParams
 from rosbot_patrol.simulation.range_sensors import RangeParams
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.robot import RobotDescription, load_robot, parse_robot
+from rosbot_patrol.simulation.sensor_places import read_sensors
 from rosbot_patrol.simulation.world import World, load_world
 
 if TYPE_CHECKING:
@@ -101,33 +99,6 @@ class SimulatorParams:
             motion=dataclasses.replace(self.motion, prewarmed=self.prewarmed and self.motion.prewarmed),
             seed=self.seed,
         )
-
-
-def read_sensors(file: str) -> list[SensorPlace]:
-    """The motion sensors of a file, none where the name is empty.
-
-    Raises:
-        ParamError: the file cannot be read, or a key is wrong; names file and key.
-    """
-    if not file:
-        return []
-    try:
-        tree = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as err:
-        raise ParamError(file, f"cannot be read: {err}") from err
-    listed = tree.get("sensors") if isinstance(tree, dict) else None
-    if not isinstance(listed, list):
-        raise ParamError(f"{file}: sensors", f"expected a list of sensors, got {listed!r}")
-    unit = tree.get("angle_unit", "rad")
-    if unit not in ("rad", "deg"):
-        raise ParamError(f"{file}: angle_unit", f"is {unit!r}, expected rad or deg")
-    places = [params.load(SensorPlace, item, name=f"{file}: sensors[{i}]/") for i, item in enumerate(listed)]
-    twice = [p.id for i, p in enumerate(places) if p.id in {q.id for q in places[:i]}]
-    if twice:
-        raise ParamError(f"{file}: sensors", f"the id {twice[0]} is used twice")
-    if unit == "deg":
-        places = [dataclasses.replace(p, yaw=p.yaw * 3.141592653589793 / 180.0) for p in places]
-    return places
 
 
 class Simulator:
