@@ -215,9 +215,21 @@ def _type_name(hint: Any) -> str:
 
 
 def _describe(hint: Any, info: ParamInfo) -> str:
-    text = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}.get(
-        _type_name(hint), _type_name(hint)
-    )
+    text = _kind(hint)
     if info.choices:
         text += f" of {', '.join(map(str, info.choices))}"
     return f"{text} [{info.unit}]" if info.unit else text
+
+
+def _kind(hint: Any) -> str:
+    """What a value of this type is, for people."""
+    args = [a for a in typing.get_args(hint) if a not in (type(None), Ellipsis)]
+    origin = typing.get_origin(hint)
+    if origin in (typing.Union, types.UnionType):
+        return _kind(args[0])
+    if origin in (list, tuple):
+        return "a list" if not args or len(set(args)) > 1 else f"a list, each {_kind(args[0])}"
+    if origin is dict or dataclasses.is_dataclass(hint):
+        return "a group of parameters"
+    names = {"float": "a number", "int": "a whole number", "bool": "true or false", "str": "a text"}
+    return names.get(_type_name(hint), _type_name(hint))

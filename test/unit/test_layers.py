@@ -13,7 +13,7 @@ SRC = ROOT / "src" / "rosbot_patrol"
 # Rows from the bottom up: a module may import from rows below its own, and from its own package.
 ROWS: list[set[str]] = [
     {"errors", "kernels"},
-    {"params", "files"},
+    {"params", "files", "yaml_files"},
     {"geometry"},
     {"grid", "scan"},
     {"maps", "images"},

@@ -23,6 +23,8 @@ class Outer:
     corner: tuple[float, float] = param((0.0, 0.0), doc="corner")
     inner: Inner = param(Inner(), doc="nested")
     maybe: float | None = param(None, doc="may be absent")
+    stops: tuple[Inner, ...] = param((), doc="a list of groups")
+    lamps: dict[str, float] = param({}, doc="a group of any names")
     odd: float = param(1.0, name="acc_lim_Y", doc="another name outside")
 
 
@@ -45,7 +47,11 @@ def test_int_becomes_float_but_a_bool_is_no_int() -> None:
         ({"speed": float("nan")}, "expected a number"),
         ({"mode": "c"}, "expected one of a, b"),
         ({"flag": 1}, "expected true or false"),
-        ({"names": "x"}, "got 'x'"),
+        ({"names": "x"}, "~names: expected a list, each a text, got 'x'"),
+        ({"corner": 5}, "~corner: expected a list, each a number, got 5"),
+        ({"stops": 5}, "~stops: expected a list, each a group of parameters, got 5"),
+        ({"lamps": 5}, "~lamps: expected a group of parameters, got 5"),
+        ({"maybe": "soon"}, "~maybe: expected a number, got 'soon'"),
         ({"names": [1]}, r"names\[0\]"),
         ({"corner": [1.0]}, "expected 2 values, got 1"),
         ({"inner": 3}, "expected a group"),

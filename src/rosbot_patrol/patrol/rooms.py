@@ -13,16 +13,15 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.geometry import Pose2D, wrap_angle
+from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +112,7 @@ def load_rooms(path: str | Path) -> Rooms:
     """
     path = Path(path)
     prefix = f"{path}: "
-    file = params.load(_File, _read(path), name=prefix)
+    file = params.load(_File, read_mapping(path, keys="rooms_num and rooms"), name=prefix)
     expected = [f"room{i}" for i in range(file.rooms_num)]
     _check_listed(file, expected, prefix)
     return Rooms(tuple(_room(file, i, key, prefix) for i, key in enumerate(expected)), str(path))
@@ -145,39 +144,3 @@ def _room(file: _File, index: int, key: str, prefix: str) -> Room:
             math.degrees(wrap_angle(entry.angle)),
         )
     return Room(id=index, name=entry.name.strip(), pose=Pose2D(entry.x, entry.y, wrap_angle(angle)))
-
-
-class _StrictLoader(yaml.SafeLoader):
-    """A loader for which a key that stands twice is an error."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        seen: set[object] = set()
-        for key_node, _ in node.value:
-            if isinstance(key_node, yaml.ScalarNode) and key_node.tag != "tag:yaml.org,2002:merge":
-                if key_node.value in seen:
-                    raise yaml.constructor.ConstructorError(
-                        None, None, f"the key '{key_node.value}' stands twice", key_node.start_mark
-                    )
-                seen.add(key_node.value)
-        return super().construct_mapping(node, deep)
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as err:
-        raise ParamError(str(path), f"is no text in UTF-8 ({err.reason} at byte {err.start})") from err
-    except OSError as err:
-        raise ParamError(str(path), f"cannot be read: {err.strerror}") from err
-    try:
-        tree = yaml.load(text, _StrictLoader)
-    except yaml.MarkedYAMLError as err:
-        where = (
-            f" at line {err.problem_mark.line + 1}, column {err.problem_mark.column + 1}" if err.problem_mark else ""
-        )
-        raise ParamError(str(path), f"is no valid yaml{where}: {err.problem}") from err
-    except yaml.YAMLError as err:
-        raise ParamError(str(path), f"is no valid yaml: {' '.join(str(err).split())}") from err
-    if not isinstance(tree, dict):
-        raise ParamError(str(path), f"expected the keys rooms_num and rooms, got {str(tree)[:40]!r}")
-    return tree

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rospy
-import yaml
 from geometry_msgs.msg import Pose2D
 
 from rosbot_patrol import params
@@ -16,6 +15,7 @@ from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.params import param
 from rosbot_patrol.ros.node import load_params, run_node
 from rosbot_patrol.srv import MoveActor, SpawnActor
+from rosbot_patrol.yaml_files import read_mapping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,14 +41,12 @@ def read_walk(path: Path, room: int) -> WalkParams:
     """The walk into a room.
 
     Raises:
-        WorldError: the file cannot be read or has no such room.
-        ParamError: a key is wrong.
+        WorldError: the file has no such room.
+        ParamError: the file cannot be read or a key is wrong.
     """
-    try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as err:
-        raise WorldError(path, f"cannot be read: {err}") from err
-    walks = (tree or {}).get("walks", {})
+    walks = read_mapping(path, keys="walks").get("walks")
+    if not isinstance(walks, dict):
+        raise ParamError(f"{path}: walks", f"expected a walk for each room, got {walks!r}")
     if room not in walks:
         raise WorldError(path, f"has no walk into room {room}, only into {', '.join(map(str, sorted(walks)))}")
     walk = params.load(WalkParams, walks[room], name=f"{path}: walks/{room}/")

@@ -72,8 +72,10 @@ def load_robot(path: str | Path) -> RobotDescription:
     """Read a URDF file; raises WorldError."""
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as err:
-        raise WorldError(path, f"cannot be read: {err}") from err
+    except OSError as err:
+        raise WorldError(path, f"cannot be read: {err.strerror}") from err
+    except UnicodeDecodeError as err:
+        raise WorldError(path, f"is no text in UTF-8 ({err.reason} at byte {err.start})") from err
     return parse_robot(text, source=str(path))
 
 

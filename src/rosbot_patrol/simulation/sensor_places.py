@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
-
-import yaml
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.simulation.motion_sensors import SensorPlace
+from rosbot_patrol.yaml_files import read_mapping
 
 
 def read_sensors(file: str) -> list[SensorPlace]:
@@ -21,11 +19,8 @@ def read_sensors(file: str) -> list[SensorPlace]:
     """
     if not file:
         return []
-    try:
-        tree = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError, UnicodeDecodeError) as err:
-        raise ParamError(file, f"cannot be read: {err}") from err
-    listed = tree.get("sensors") if isinstance(tree, dict) else None
+    tree = read_mapping(file, keys="angle_unit and sensors")
+    listed = tree.get("sensors")
     if not isinstance(listed, list):
         raise ParamError(f"{file}: sensors", f"expected a list of sensors, got {listed!r}")
     unit = tree.get("angle_unit", "rad")

@@ -114,7 +114,7 @@ class _Reader:
         if root.tag != "sdf":
             raise WorldError(path, f"is no SDF file, its first element is <{root.tag}>")
         if root.get("version") not in VERSIONS:
-            log.warning("%s: SDF version %s, read as 1.6", path, root.get("version"))
+            log.warning("%s: SDF version %s, read as 1.6", path, root.get("version", "is not named"))
         return root
 
     def _include(self, element: ET.Element, state: dict[str, Matrix]) -> None:
