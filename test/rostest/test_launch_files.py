@@ -107,6 +107,16 @@ def test_an_unknown_profile_names_the_two() -> None:
         parse(ROOT / "launch" / "move_base_only.launch", "profile:=fast")
 
 
+def test_an_unknown_place_of_the_detector_names_the_two() -> None:
+    with pytest.raises(Exception, match="detector-is-local-or-pc-not-cloud"):
+        parse(ROOT / "launch" / "rosbot_patrol.launch", "detector:=cloud")
+
+
+def test_the_launch_ends_with_the_simulator() -> None:
+    nodes = parse(ROOT / "launch" / "rosbot_patrol.launch").nodes
+    assert [node.name for node in nodes if node.required] == ["simulator"]
+
+
 def test_respawn_has_a_delay() -> None:
     for node in parse(ROOT / "launch" / "rosbot_patrol.launch").nodes:
         if node.respawn:
