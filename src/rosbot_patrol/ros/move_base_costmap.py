@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections import deque
 from functools import partial
 
@@ -31,6 +32,7 @@ from rosbot_patrol.scan import LaserScan
 
 log = logging.getLogger(__name__)
 
+_START_GRACE_S = 3.0  # wall time in which a transform that is not there yet is no fault
 _SCANS_KEPT = 5
 
 
@@ -63,6 +65,7 @@ class CostmapNode:
         self.costmap = LayeredCostmap(config)
         self.problem = "has not been updated yet"
         self.updates = 0
+        self._born = time.monotonic()
         self._transforms = transforms
         self._said: str = ""
         self._sources: list[_Source] = []
@@ -164,6 +167,8 @@ class CostmapNode:
     def _complain(self, problem: str) -> None:
         self.problem = problem
         kind = problem.split(":")[0]
+        if problem and self.updates == 0 and time.monotonic() - self._born < _START_GRACE_S:
+            return  # the other nodes are starting too
         if problem and kind != self._said:
             log.warning("%s: %s", self.name, problem)
         self._said = kind
