@@ -32,15 +32,7 @@ from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RatePar
 from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
 from rosbot_patrol.ros.simulator_requests import Requests
 from rosbot_patrol.rosserial.tcp_client import EspClient
-from rosbot_patrol.simulation.battery import BatteryParams
-from rosbot_patrol.simulation.camera import CameraParams
-from rosbot_patrol.simulation.drive import DriveParams
 from rosbot_patrol.simulation.engine import Engine, EngineParams
-from rosbot_patrol.simulation.imu import ImuParams
-from rosbot_patrol.simulation.lidar import LidarParams
-from rosbot_patrol.simulation.motion_sensors import MotionSensorParams
-from rosbot_patrol.simulation.odometry import OdometryParams
-from rosbot_patrol.simulation.range_sensors import RangeParams
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.robot import RobotDescription, load_robot, parse_robot
 from rosbot_patrol.simulation.sensor_places import read_sensors
@@ -56,8 +48,8 @@ _PAUSED_PERIOD = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulatorParams:
-    """Parameters of the node simulator."""
+class SimulatorParams(EngineParams):
+    """Parameters of the node simulator: its own, and those of the engine's parts."""
 
     world: str = param("", doc="SDF file of the world, empty: a floor without walls")
     model_path: tuple[str, ...] = param((), doc="folders of model://, beside those of GAZEBO_MODEL_PATH")
@@ -74,30 +66,14 @@ class SimulatorParams:
     motion_sensors: str = param("", doc="file of the motion sensors, empty: none")
     prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
     bridge_host: str = param("localhost", doc="where the bridge of the motion sensors runs")
-    drive: DriveParams = field(default_factory=DriveParams)
-    encoder: OdometryParams = field(default_factory=OdometryParams)
-    lidar: LidarParams = field(default_factory=LidarParams)
-    range: RangeParams = field(default_factory=RangeParams)
-    imu: ImuParams = field(default_factory=ImuParams)
-    battery: BatteryParams = field(default_factory=BatteryParams)
-    camera: CameraParams = field(default_factory=CameraParams)
-    motion: MotionSensorParams = field(default_factory=MotionSensorParams)
     rates: RateParams = field(default_factory=RateParams)
     lockstep: LockstepParams = field(default_factory=LockstepParams)
 
     @property
     def engine(self) -> EngineParams:
         """What the engine takes of them."""
-        return EngineParams(
-            drive=self.drive,
-            encoder=self.encoder,
-            lidar=self.lidar,
-            range=self.range,
-            imu=self.imu,
-            battery=self.battery,
-            camera=self.camera,
-            motion=dataclasses.replace(self.motion, prewarmed=self.prewarmed and self.motion.prewarmed),
-            seed=self.seed,
+        return dataclasses.replace(
+            self, motion=dataclasses.replace(self.motion, prewarmed=self.prewarmed and self.motion.prewarmed)
         )
 
 
