@@ -35,6 +35,7 @@ from rosbot_patrol.patrol.mission import (
     mission_id,
     mission_to_plain,
 )
+from rosbot_patrol.patrol.repeats import Repeats
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.spin import SpinParams
 from rosbot_patrol.patrol.watch import Confirmation, Watch, WatchParams
@@ -136,6 +137,7 @@ class PatrolManager:
         self._at_rest = "on guard"
         self._report: Report | None = None
         self._last = -math.inf
+        self._repeats = Repeats()
         if memory:
             self._recall(memory)
 
@@ -179,7 +181,7 @@ class PatrolManager:
             log.warning("time went back by %.1f s", self._last - now)
             self._watch.start(now)
         self._last = now
-        self._accept(inputs, out)
+        self._accept(now, inputs, out)
         if self.mission is None and self._is_ready(now, inputs) and self.queue:
             self._begin(now, inputs, out)
         if self.mission is None:
@@ -206,16 +208,18 @@ class PatrolManager:
 
     # -- triggers
 
-    def _accept(self, inputs: Inputs, out: Commands) -> None:
+    def _accept(self, now: float, inputs: Inputs, out: Commands) -> None:
         for room_id in inputs.triggers:
             room = self.rooms.find(room_id)
             if room is None:
-                log.error("motion trigger refused: %s", self.rooms.refusal(room_id))
+                if self._repeats.is_news(room_id, now):
+                    log.error("motion trigger refused: %s", self.rooms.refusal(room_id))
                 continue
             mission = self.mission
             if mission and mission.room.id == room_id and self._answers(mission, inputs.pose):
                 mission.triggers += 1
-                log.info("motion in %s again, which the mission that runs answers", room.title)
+                if self._repeats.is_news(room_id, now):
+                    log.info("motion in %s again, which the mission that runs answers", room.title)
             elif self.queue.add(room_id):
                 log.info("motion in %s%s", room.title, ", which waits its turn" if mission else "")
                 out.changed = True

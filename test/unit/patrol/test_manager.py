@@ -180,6 +180,23 @@ def test_an_unknown_room_is_refused_and_the_next_is_taken(caplog):
     assert world.ended[0].room.id == 1
 
 
+def test_a_sender_in_a_loop_does_not_flood_the_log(caplog):
+    caplog.set_level("INFO")
+    world = World()
+    world.triggers = [9] * 50
+    world.run(lambda w: w.now > 102.0)
+    world.triggers = [9] * 50
+    world.run(lambda w: w.now > 104.0)
+    assert caplog.text.count("there is no room 9") == 1
+    world.run(lambda w: w.now > 115.0)
+    world.triggers = [9, 1]
+    world.run(lambda w: w.manager.mission)
+    assert caplog.text.count("there is no room 9") == 2
+    world.triggers = [1] * 50
+    world.run(looking)
+    assert caplog.text.count("motion in room 1") == 2  # taken, and again
+
+
 def test_room_0_is_a_room_like_others():
     assert World().mission(0).verdict.value == "clear"
 
