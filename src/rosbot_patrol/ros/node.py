@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 import sys
 import threading
 import time
@@ -31,8 +32,10 @@ def run_node(name: str, body: Callable[[], None], **init_options: Any) -> None:
     """
     rospy.init_node(name, **init_options)
     logs.install()
+    ending = _Ending()
     try:
         body()
+        ending.finish()
     except (PatrolError, OSError) as err:
         rospy.logfatal("%s: %s", rospy.get_name(), err)
         time.sleep(0.3)  # /rosout is sent by another thread
@@ -41,6 +44,43 @@ def run_node(name: str, body: Callable[[], None], **init_options: Any) -> None:
         os._exit(1)
     except rospy.ROSInterruptException:
         return
+
+
+class _Ending:
+    """Ends the node on a thread of its own when a signal comes.
+
+    rospy does so within the signal handler, on the main thread: where that waits for the master just then, rospy's
+    lock around the master is held, and the node never ends. The main thread must not block without looking at
+    `rospy.is_shutdown`.
+    """
+
+    def __init__(self) -> None:
+        self._read, self._write = os.pipe()
+        self._rospys: dict[int, Any] = {}
+        self._has_come = False
+        self._done = threading.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._rospys[number] = signal.signal(number, self._note)
+        threading.Thread(target=self._work, name="ending", daemon=True).start()
+
+    def finish(self) -> None:
+        """Let a shutdown that is under way tell the master."""
+        if self._has_come:
+            self._done.wait(5.0)
+
+    def _note(self, number: int, _frame: object) -> None:
+        self._has_come = True
+        os.write(self._write, bytes([number]))  # takes no lock
+
+    def _work(self) -> None:
+        while True:
+            number = os.read(self._read, 1)[0]
+            handler = self._rospys[number]
+            if callable(handler):
+                handler(number, None)
+            else:
+                rospy.signal_shutdown(f"signal {number}")
+            self._done.set()
 
 
 def load_params(cls: type[T], *, ignore: Iterable[str] = (), tree: dict[str, Any] | None = None) -> T:

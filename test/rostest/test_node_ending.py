@@ -1,0 +1,61 @@
+"""How a node ends on a signal, whatever its main thread does at that moment."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+from ros_processes import Process, Ros
+
+# As a node does that logs a line: rospy asks the master whether /rosout is to name the topics.
+BUSY = """
+import rospy
+from rosbot_patrol.ros.node import run_node
+
+def body():
+    rospy.on_shutdown(lambda: print("hook", flush=True))
+    rospy.Publisher("busy", rospy.AnyMsg, queue_size=1)
+    print("busy", flush=True)
+    while not rospy.is_shutdown():
+        rospy.get_param("/run_id")
+    print("left", flush=True)
+
+run_node("busy", body)
+"""
+
+
+@pytest.fixture(scope="module")
+def ros():
+    ros = Ros()
+    yield ros
+    ros.stop()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_node_ends_on_a_signal_while_it_talks_to_the_master(ros, number):
+    node = Process([sys.executable, "-c", BUSY], ros.env, stdin=subprocess.DEVNULL)
+    ros.processes.append(node)
+    node.says("busy", 20.0)
+    time.sleep(0.3)
+    began = time.monotonic()
+    node.popen.send_signal(number)
+    assert node.popen.wait(8.0) == 0, node.output
+    assert time.monotonic() - began < 4.0
+    assert node.output.count("hook") == 1
+    assert "left" in node.output
+    assert "Traceback" not in node.output
+    listed = subprocess.run(["rosnode", "list"], env=ros.env, capture_output=True, text=True, check=True).stdout
+    assert "/busy" not in listed
+
+
+def test_a_node_that_ends_by_itself_needs_no_signal(ros):
+    node = Process(
+        [sys.executable, "-c", "from rosbot_patrol.ros.node import run_node; run_node('brief', lambda: None)"],
+        ros.env,
+        stdin=subprocess.DEVNULL,
+    )
+    assert node.popen.wait(20.0) == 0, node.output
