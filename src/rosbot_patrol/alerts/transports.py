@@ -185,12 +185,16 @@ class SmtpTransport:
             said = _said(err.smtp_code, err.smtp_error)
             raise DeliveryError(f"{self._where} refused the mail: {said}", permanent=err.smtp_code >= 500) from err
         except (OSError, smtplib.SMTPException) as err:
-            problem = str(err) or type(err).__name__
-            raise DeliveryError(f"the mail server {self._where} cannot be used: {problem}") from err
+            raise DeliveryError(f"the mail server {self._where} cannot be used: {self._problem(err)}") from err
         if refused:
             taken = ", ".join(address for address in self._to if address not in refused)
             return f"{taken} (refused: {', '.join(refused)})"
         return ", ".join(self._to)
+
+    def _problem(self, err: Exception) -> str:
+        if isinstance(err, TimeoutError) or isinstance(err.__context__, TimeoutError):  # smtplib says "closed"
+            return f"no answer within {self._params.mail_timeout:g} s"
+        return str(err) or type(err).__name__
 
     def _connect(self) -> smtplib.SMTP:
         p = self._params
