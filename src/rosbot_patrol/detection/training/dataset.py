@@ -22,8 +22,10 @@ class Pictures:
 
     @classmethod
     def open(cls, folder: Path, name: str) -> Pictures:
-        """All finished shards of that name."""
-        files = [f for f in sorted(folder.glob(f"{name}-[0-9]*.npy")) if ".part" not in f.name]
+        """All finished shards of that name, or of several names with commas between them."""
+        files = [
+            f for one in name.split(",") for f in sorted(folder.glob(f"{one}-[0-9]*.npy")) if ".part" not in f.name
+        ]
         if not files:
             raise FileNotFoundError(f"{folder} holds no pictures named {name}-*.npy; make them with render.py")
         shards = [np.load(f, mmap_mode="r") for f in files]

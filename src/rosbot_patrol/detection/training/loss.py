@@ -15,6 +15,7 @@ from rosbot_patrol.detection.darknet_layers import Yolo
 
 MATCH = 0.45
 IGNORE_IOU = 0.5
+SURPRISE = 0.5
 
 
 @dataclass
@@ -75,11 +76,11 @@ def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, 
         result["kind"] = fn.binary_cross_entropy_with_logits(mine[:, 5:], wanted, reduction="sum")
         target[place, anchor, row, column] = 1.0
         weight[place, anchor, row, column] = 1.0
-    # focal: the many cells that are surely empty count little
+    # a little focal: the many cells that are surely empty count less
     logits = grid[:, :, 4]
-    surprise = (torch.sigmoid(logits) - target).abs().detach() ** 1.5
+    surprise = (torch.sigmoid(logits) - target).abs().detach() ** SURPRISE
     each = fn.binary_cross_entropy_with_logits(logits, target, reduction="none")
-    result["object"] = (each * surprise * weight * (1 + target)).sum()
+    result["object"] = (each * surprise * weight).sum()
     return result
 
 

@@ -44,12 +44,14 @@ class Studio:
         self.renderer = EglRenderer(textures=textures)
         self.world = world
 
-    def shard(self, seed: list[int], count: int, *, test: bool) -> tuple[np.ndarray, np.ndarray]:
-        """`count` pictures and the rows of their labels."""
+    def shard(
+        self, seed: list[int], count: int, *, test: bool, house_share: float = 0.3
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`count` pictures and the rows of their labels; a share of them is taken in the house, if there is one."""
         rng = np.random.default_rng(seed)
         pictures, rows = [], []
         while len(pictures) < count:
-            scene = scenes.draw_house(rng, self.world) if self.world and rng.random() < 0.3 else scenes.draw_room(rng)
+            scene = self._scene(rng, house_share)
             self.renderer.clear()
             self.renderer.light = scene.light
             for body in scene.bodies:
@@ -62,6 +64,11 @@ class Studio:
                 rows += [[len(pictures), *label] for label in labels]
                 pictures.append(picture)
         return np.array(pictures), np.array(rows, np.float32).reshape(-1, len(COLUMNS))
+
+    def _scene(self, rng: np.random.Generator, house_share: float) -> scenes.Scene:
+        if self.world and rng.random() < house_share:
+            return scenes.draw_house(rng, self.world)
+        return scenes.draw_room(rng)
 
     def _view(self, scene: scenes.Scene, camera: tuple[float, float, float], rng: np.random.Generator, test: bool):
         actors = scenes.draw_actors(scene, camera, rng, reserved=test)
@@ -185,9 +192,9 @@ def _poster(painter: EglRenderer, look, rng: np.random.Generator) -> Texture:
     return Texture(painter.render(eye, view)[0][::-1].copy(), 0.0)
 
 
-def _work(job: tuple[Path, str, int, int, Path | None, bool]) -> str:
-    folder, name, seed, index, house, test = job
-    target = folder / f"{name}-{index:04d}.npy"
+def _work(job: tuple[argparse.Namespace, int]) -> str:
+    options, index = job
+    target = options.folder / f"{options.name}-{index:04d}.npy"
     if target.exists():
         return target.name
     if os.nice(0) < 5:
@@ -195,8 +202,10 @@ def _work(job: tuple[Path, str, int, int, Path | None, bool]) -> str:
     cv2.setNumThreads(1)
     global _studio
     if _studio is None:
-        _studio = Studio(load_world(house) if house else None)
-    pictures, boxes = _studio.shard([seed, index, int(test)], PER_SHARD, test=test)
+        _studio = Studio(load_world(options.house) if options.house else None)
+    pictures, boxes = _studio.shard(
+        [options.seed, index, int(options.test)], PER_SHARD, test=options.test, house_share=options.house_share
+    )
     np.savez_compressed(target.with_suffix(".npz"), boxes=boxes)
     part = target.with_suffix(".part.npy")
     np.save(part, pictures)
@@ -214,13 +223,14 @@ def main() -> None:
     parser.add_argument("--name", default="train")
     parser.add_argument("--pictures", type=int, default=20000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--house", type=Path, help="a world in which 30 %% of the pictures are taken")
+    parser.add_argument("--house", type=Path, help="a world in which a share of the pictures is taken")
+    parser.add_argument("--house-share", type=float, default=0.3)
     parser.add_argument("--test", action="store_true", help="people whom training never draws")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     shards = -(-options.pictures // PER_SHARD)
-    jobs = [(options.folder, options.name, options.seed, i, options.house, options.test) for i in range(shards)]
+    jobs = [(options, i) for i in range(shards)]
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         for done, name in enumerate(pool.imap_unordered(_work, jobs), 1):
             sys.stdout.write(f"\r{done}/{shards} shards ({name}) ")
