@@ -71,3 +71,11 @@ def test_an_incident_reads_back(tmp_path, make_incident):
     assert load_incident(tmp_path, "another") is None
     (home / "incident.json").write_text("{}")
     assert load_incident(tmp_path, incident.id) is None
+
+
+def test_a_label_at_the_right_edge_is_whole():
+    def white(left):
+        box = LabelledBox(text="person 0.87", xmin=left, ymin=30, xmax=left + 9, ymax=90)
+        return (decode(to_jpeg(picture(width=200, height=100), [box])).min(axis=2) > 150).sum()
+
+    assert white(190) > 0.8 * white(100)
