@@ -88,7 +88,7 @@ def _draw_box(draw: ImageDraw.ImageDraw, box: LabelledBox) -> None:
     top, bottom = sorted((box.ymin, box.ymax))
     draw.rectangle((left, top, right, bottom), outline=_RED, width=3)
     text = box.text.encode("latin-1", "replace").decode("latin-1")  # all that the built-in font has
-    width = draw.textlength(text)
+    width = draw.textbbox((0, 0), text)[2]
     place = (max(min(left + 3, draw.im.size[0] - width - 3), 1), max(top - 13, 1))  # whole, also at the picture's edge
     x0, y0, x1, y1 = draw.textbbox(place, text)
     draw.rectangle((x0 - 2, y0 - 1, x1 + 2, y1 + 1), fill=_RED)
