@@ -10,25 +10,12 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, Ros, wait_for
+from ros_processes import Process, wait_for
 
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import write_map
 
 HERE = Path(__file__).resolve().parent
-
-
-@pytest.fixture(scope="module")
-def master():
-    ros = Ros()
-    yield ros
-    ros.stop()
-
-
-@pytest.fixture
-def ros(master):
-    yield master
-    master.stop_nodes()
 
 
 class Peer:

@@ -27,7 +27,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, Ros, free_port, wait_for
+from ros_processes import Process, free_port, wait_for
 
 from rosbot_patrol.alerts.incident import Incident
 from rosbot_patrol.alerts.mail import build_mail, make_envelope
@@ -44,19 +44,6 @@ ROOT = HERE.parents[1]
 ROOMS = ROOT / "params" / "room_points.yaml"
 TRIGGER = ["/motion_trigger", "rosbot_patrol/EspTrigger"]
 STATE = ["/patrol/state", "rosbot_patrol/PatrolState"]
-
-
-@pytest.fixture(scope="module")
-def master():
-    ros = Ros()
-    yield ros
-    ros.stop()
-
-
-@pytest.fixture
-def ros(master):
-    yield master
-    master.stop_nodes()
 
 
 _names = (f"tried{i}" for i in range(1000))

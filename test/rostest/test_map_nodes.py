@@ -5,25 +5,12 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Ros, wait_for
+from ros_processes import wait_for
 
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import write_map
 
 INFO = GridInfo(resolution=0.05, width=30, height=20, origin_x=-1.0, origin_y=-2.0)
-
-
-@pytest.fixture(scope="module")
-def master():
-    ros = Ros()
-    yield ros
-    ros.stop()
-
-
-@pytest.fixture
-def ros(master):
-    yield master
-    master.stop_nodes()
 
 
 @pytest.fixture

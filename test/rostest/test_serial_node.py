@@ -13,7 +13,7 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 import contextlib
 
-from ros_processes import Ros, free_port, wait_for
+from ros_processes import free_port, wait_for
 
 from rosbot_patrol.rosserial.packet import Parser, encode
 from rosbot_patrol.rosserial.tcp_client import EspClient
@@ -21,19 +21,6 @@ from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, 
 
 STRING, BOOL = "992ce8a1687cec8c8bd883ec73ca41d1", "8b94c1b53db61fb6aed406028ad6332a"
 SET_BOOL_REQUEST, SET_BOOL_RESPONSE = BOOL, "937c9679a518e3a18d831e57125ea522"
-
-
-@pytest.fixture(scope="module")
-def master():
-    ros = Ros()
-    yield ros
-    ros.stop()
-
-
-@pytest.fixture
-def ros(master):
-    yield master
-    master.stop_nodes()
 
 
 def announce(kind, topic_id, name, message_type, md5):

@@ -9,23 +9,10 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, Ros, wait_for
+from ros_processes import Process, wait_for
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "twist_mux.yaml"
 TWIST, BOOL = "geometry_msgs/Twist", "std_msgs/Bool"
-
-
-@pytest.fixture(scope="module")
-def master():
-    ros = Ros()
-    yield ros
-    ros.stop()
-
-
-@pytest.fixture
-def ros(master):
-    yield master
-    master.stop_nodes()
 
 
 @pytest.fixture
