@@ -45,13 +45,21 @@ class Studio:
         self.world = world
 
     def shard(
-        self, seed: list[int], count: int, *, test: bool, house_share: float = 0.3
+        self, seed: list[int], count: int, *, test: bool, house_share: float = 0.3, plain: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """`count` pictures and the rows of their labels; a share of them is taken in the house, if there is one."""
+        """`count` pictures and the rows of their labels; a share of them is taken in the house, if there is one.
+
+        Args:
+            seed: of all chance.
+            count: of pictures.
+            test: draw people whom training never draws.
+            house_share: share of scenes in the house.
+            plain: leave the house's colours, light and furniture as they are.
+        """
         rng = np.random.default_rng(seed)
         pictures, rows = [], []
         while len(pictures) < count:
-            scene = self._scene(rng, house_share)
+            scene = self._scene(rng, house_share, plain)
             self.renderer.clear()
             self.renderer.light = scene.light
             for body in scene.bodies:
@@ -65,9 +73,9 @@ class Studio:
                 pictures.append(picture)
         return np.array(pictures), np.array(rows, np.float32).reshape(-1, len(COLUMNS))
 
-    def _scene(self, rng: np.random.Generator, house_share: float) -> scenes.Scene:
+    def _scene(self, rng: np.random.Generator, house_share: float, plain: bool) -> scenes.Scene:
         if self.world and rng.random() < house_share:
-            return scenes.draw_house(rng, self.world)
+            return scenes.draw_house(rng, self.world, plain=plain)
         return scenes.draw_room(rng)
 
     def _view(self, scene: scenes.Scene, camera: tuple[float, float, float], rng: np.random.Generator, test: bool):
@@ -204,7 +212,11 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
     if _studio is None:
         _studio = Studio(load_world(options.house) if options.house else None)
     pictures, boxes = _studio.shard(
-        [options.seed, index, int(options.test)], PER_SHARD, test=options.test, house_share=options.house_share
+        [options.seed, index, int(options.test)],
+        PER_SHARD,
+        test=options.test,
+        house_share=options.house_share,
+        plain=options.plain,
     )
     np.savez_compressed(target.with_suffix(".npz"), boxes=boxes)
     part = target.with_suffix(".part.npy")
@@ -225,6 +237,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--house", type=Path, help="a world in which a share of the pictures is taken")
     parser.add_argument("--house-share", type=float, default=0.3)
+    parser.add_argument("--plain", action="store_true", help="leave the house as it is")
     parser.add_argument("--test", action="store_true", help="people whom training never draws")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()

@@ -193,7 +193,7 @@ def draw_found(
     numbers = np.random.default_rng(seed).permutation(len(found.index))
     with_some = [n for n in numbers if (found.labels[:, 0] == n).any()][: count - 3]
     tiles = []
-    for n in [*with_some, *numbers[:3]]:
+    for n in [*with_some, *[n for n in numbers[-50:] if n not in with_some][:3]]:
         picture = _picture(pictures, found, int(n))
         for box in found.boxes[(found.boxes[:, 0] == n) & (found.boxes[:, 2] > threshold)]:
             colour = (255, 40, 40) if box[1] == 0 else (60, 255, 60)

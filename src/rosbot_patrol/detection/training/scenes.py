@@ -98,17 +98,17 @@ def draw_room(rng: Rng) -> Scene:
     return scene
 
 
-def draw_house(rng: Rng, world: World) -> Scene:
-    """The house of a world, in its own colours or painted by chance, with some more furniture."""
+def draw_house(rng: Rng, world: World, *, plain: bool = False) -> Scene:
+    """The house of a world, in its own colours or painted by chance, with some more furniture; `plain`: as it is."""
     bodies = list(world.bodies)
     places = [p for b in bodies for p in _footprints(b)]
-    if rng.random() < 0.6:
+    if not plain and rng.random() < 0.6:
         bodies = [_repaint(b, rng) for b in bodies]
     walls = np.array([(p.x, p.y) for p in places])
     low, high = walls.min(axis=0), walls.max(axis=0)
-    light = _draw_light(rng, *(high - low), 2.5) if rng.random() < 0.6 else Light()
+    light = _draw_light(rng, *(high - low), 2.5) if not plain and rng.random() < 0.6 else Light()
     scene = Scene(bodies, light, (low[0], high[0], low[1], high[1]), places)
-    furnish(scene, rng, int(rng.integers(0, 25)))
+    furnish(scene, rng, 0 if plain else int(rng.integers(0, 25)))
     return scene
 
 
