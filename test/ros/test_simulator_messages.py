@@ -105,8 +105,8 @@ def test_the_shipped_files_fit_their_declarations(caplog: pytest.LogCaptureFixtu
     ("text", "words"),
     [
         ("sensors: 3", "expected a list"),
-        ("[1, 2]", "expected a list"),
-        ("sensors: [", "cannot be read"),
+        ("[1, 2]", "expected the keys angle_unit and sensors"),
+        ("sensors: [", "no valid yaml at line 1"),
         ("sensors: [{id: 1, room: 1, x: 0, y: 0}]", "yaw: is missing"),
         ("sensors: [{id: 300, room: 1, x: 0, y: 0, yaw: 0}]", "expected at most 255"),
         ("angle_unit: turns\nsensors: []", "expected rad or deg"),

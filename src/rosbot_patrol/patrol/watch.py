@@ -22,7 +22,7 @@ class WatchParams:
     window: int = param(5, lo=1, hi=100, doc="out of this many last pictures")
     span: float = param(0.2, unit="s", lo=0.0, hi=10.0, doc="least time from the first of them to the last")
     max_age: float = param(10.0, unit="s", lo=0.1, doc="older pictures are forgotten")
-    min_score: float = param(0.5, lo=0.0, hi=1.0, doc="least mean probability")
+    min_score: float = param(0.65, lo=0.0, hi=1.0, doc="least mean probability")
     min_height: int = param(16, unit="px", lo=1, doc="smaller boxes are not believed")
     min_aspect: float = param(0.15, lo=0.0, doc="least height / width of a box")
     max_aspect: float = param(8.0, lo=0.1, doc="greatest height / width of a box")
