@@ -28,7 +28,7 @@ from geometry_msgs.msg import Pose2D
 from rosbot_patrol.srv import MoveActor, SpawnActor
 
 rospy.wait_for_service("/simulator/spawn_actor")
-placed = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)("bob", "person", "", Pose2D(3, 7, 0))
+placed = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)("bob", "person", "", "", Pose2D(3, 7, 0))
 moved = rospy.ServiceProxy("/simulator/move_actor", MoveActor)("bob", [Pose2D(3, 8.2, 0)], 1.0, False)
 print(placed.success, moved.success)
 """

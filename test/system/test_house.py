@@ -19,8 +19,8 @@ ROOM = 1
 ROOM_POINT = (2.819, -0.175)
 INTRUDER_AT = (4.7, 0.2)
 GOAL_TOLERANCE = 0.15  # [m] the planner's 0.10, and what localisation may be off
-# A look that training never rendered (test/unit/simulation checks that the sets are disjoint).
-UNSEEN_LOOK = "intruder_test_1"
+# A look and a posture that training never rendered (test/unit/simulation/test_actors.py holds the sets apart).
+UNSEEN = {"look": "intruder_test_balaclava", "posture": "creeping"}
 
 
 def check_turn_and_home(mission: Mission) -> None:
@@ -55,7 +55,7 @@ def test_an_intruder_is_mailed_once_and_an_empty_room_is_not(master: object, fol
         assert house.mails() == []
 
         # The motion sensor itself raises the alarm: nobody publishes the trigger.
-        house.spawn("burglar", INTRUDER_AT[0] + 0.5, INTRUDER_AT[1] + 0.3, look=UNSEEN_LOOK)
+        house.spawn("burglar", INTRUDER_AT[0] + 0.5, INTRUDER_AT[1] + 0.3, **UNSEEN)
         watched = house.mission(ROOM, start=lambda: house.walk("burglar", [INTRUDER_AT], speed=0.4))
         check_turn_and_home(watched)
         assert watched.verdict == "confirmed"
@@ -79,7 +79,7 @@ def test_without_the_detector_nothing_is_called_clear_and_nobody_is_mailed(maste
         detector = House(detector_folder, "rosbot_patrol", "darknet_yolo_simulation_only.launch", plain=True)
         with detector:
             house.wait_ready(90.0)
-            house.spawn("burglar", *INTRUDER_AT, look=UNSEEN_LOOK)
+            house.spawn("burglar", *INTRUDER_AT, **UNSEEN)
             detector.kill()
             mission = house.mission(ROOM)
         assert mission.verdict == "unverified"

@@ -76,7 +76,7 @@ def _body() -> None:
     rospy.sleep(demo.delay)
     rospy.wait_for_service(spawn_name)
     x, y = walk.path[0]
-    placed = rospy.ServiceProxy(spawn_name, SpawnActor)("intruder", "person", demo.look, Pose2D(x, y, 0.0))
+    placed = rospy.ServiceProxy(spawn_name, SpawnActor)("intruder", "person", demo.look, "", Pose2D(x, y, 0.0))
     if not placed.success:
         raise WorldError(spawn_name, placed.message)
     rospy.loginfo("an intruder walks into room %d", demo.room)

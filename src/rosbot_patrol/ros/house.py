@@ -229,10 +229,22 @@ class House:
         self.wait(lambda: self._trigger.get_num_connections() > 0, 10.0, "a subscriber of /motion_trigger")
         self._trigger.publish(EspTrigger(id=room, move=move))
 
-    def spawn(self, name: str, x: float, y: float, *, yaw: float = 0.0, model: str = "person", look: str = "") -> None:
+    def spawn(
+        self,
+        name: str,
+        x: float,
+        y: float,
+        *,
+        yaw: float = 0.0,
+        model: str = "person",
+        look: str = "",
+        posture: str = "",
+    ) -> None:
         """Place an actor."""
         rospy.wait_for_service("/simulator/spawn_actor", 10.0)
-        answer = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)(name, model, look, Pose2DMsg(x, y, yaw))
+        answer = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)(
+            name, model, look, posture, Pose2DMsg(x, y, yaw)
+        )
         if not answer.success:
             raise HouseError(answer.message)
 

@@ -80,7 +80,9 @@ class Requests:
     def _spawn_actor(self, request: SpawnActorRequest) -> SpawnActorResponse:
         try:
             name = self._ask(
-                lambda: self._engine.spawn_actor(request.name, request.model, request.look, _pose(request.pose))
+                lambda: self._engine.spawn_actor(
+                    request.name, request.model, request.look, _pose(request.pose), posture=request.posture
+                )
             )
         except PatrolError as err:
             return SpawnActorResponse(success=False, name=request.name, message=str(err))

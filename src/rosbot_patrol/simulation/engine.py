@@ -341,11 +341,11 @@ class Engine:
         robot = self._need_robot()
         return robot.lidar_slice, robot.range_slice
 
-    def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D) -> str:
+    def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D, *, posture: str = "") -> str:
         """Place an actor; returns its name, made up where it is "".
 
         Raises:
-            WorldError: the name is taken, the model or look unknown, or the pose not finite.
+            WorldError: the name is taken, the model, look or posture unknown, or the pose not finite.
         """
         self._spawned += 1
         name = name or f"{model}_{self._spawned}"
@@ -354,7 +354,7 @@ class Engine:
             raise WorldError(f"actor '{name}'", "the name is taken")
         if not all(map(math.isfinite, pose)):
             raise WorldError(f"actor '{name}'", f"{tuple(pose)} is no pose")
-        walker = Walker(name, model, look, pose, noise_of(self.params.seed, "look", self._spawned))
+        walker = Walker(name, model, look, pose, noise_of(self.params.seed, "look", self._spawned), posture=posture)
         self._physics.add(walker.body)
         self._physics.move(name, walker.matrix)
         self._walkers[name] = walker

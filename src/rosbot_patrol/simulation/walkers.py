@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, angle_difference, distance, wrap_angle
-from rosbot_patrol.simulation.actors import Look, draw_look, hydrant_body, look_named, person_body, person_pose_parts
+from rosbot_patrol.simulation.actors import (
+    POSTURES,
+    RESERVED_POSTURES,
+    Look,
+    Posture,
+    draw_look,
+    hydrant_body,
+    look_named,
+    person_body,
+    person_pose_parts,
+)
 from rosbot_patrol.simulation.matrices import Matrix, from_pose2d
 from rosbot_patrol.simulation.scene import Body, identity
 from rosbot_patrol.simulation.slices import slice_bodies
@@ -24,6 +34,14 @@ _ARRIVED = 0.05
 _ROOM = 0.42  # a person stops that far before the robot [m]
 
 
+def _posture_named(actor: str, posture: str) -> Posture:
+    for known in (*POSTURES, *RESERVED_POSTURES):
+        if known == (posture or "standing"):
+            return known
+    known_ones = ", ".join((*POSTURES, *RESERVED_POSTURES))
+    raise WorldError(f"actor '{actor}'", f"cannot be '{posture}', expected one of {known_ones}")
+
+
 class Walker:
     """One actor.
 
@@ -33,17 +51,21 @@ class Walker:
         look: name of a person's look, "" for one drawn.
         pose: where it stands.
         rng: draws the look.
+        posture: how a person holds itself, "" stands.
 
     Raises:
-        WorldError: the model or the look is not known.
+        WorldError: the model, the look or the posture is not known.
     """
 
-    def __init__(self, name: str, model: str, look: str, pose: Pose2D, rng: np.random.Generator) -> None:
+    def __init__(
+        self, name: str, model: str, look: str, pose: Pose2D, rng: np.random.Generator, *, posture: str = ""
+    ) -> None:
         self.name = name
         self.model = model
         self.pose = pose
         self.is_walking = False
         self._look: Look | None = None
+        self._posture = _posture_named(name, posture)
         self._phase = 0.0
         self._path: list[Pose2D] = []
         self._next = 0
@@ -119,7 +141,7 @@ class Walker:
         """body_from_visuals of a person's limbs, None for what has none."""
         if self._look is None:
             return None
-        return person_pose_parts(self._look, self._phase, self.is_walking)
+        return person_pose_parts(self._look, self._phase, self.is_walking, self._posture)
 
     def cut(self, height: float) -> NDArray[np.float64]:
         """Circles (x, y, radius) that a planar lidar meets at a height [m], shape (C, 3), legs swung."""

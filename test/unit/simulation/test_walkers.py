@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation.walkers import Walker
 
@@ -91,3 +92,13 @@ def test_legs_swing_while_walking_and_the_hydrant_stands() -> None:
 def test_numbers_that_are_not_finite_are_refused(speed: float) -> None:
     with pytest.raises(Exception, match="finite"):
         person().walk([Pose2D(1.0, 0.0)], speed)
+
+
+def test_a_posture_is_held_and_an_unknown_one_is_told() -> None:
+    def figure(posture: str) -> np.ndarray | None:
+        return Walker("w", "person", "burglar", Pose2D(), np.random.default_rng(1), posture=posture).pose_parts()
+
+    assert not np.allclose(figure("creeping"), figure(""))
+    assert np.allclose(figure("standing"), figure(""))
+    with pytest.raises(WorldError, match="cannot be 'flying', expected one of standing, sitting"):
+        figure("flying")
