@@ -19,10 +19,12 @@ from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
 from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.watch import WatchParams
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.ros.demo_intruder_node import read_walk
 from rosbot_patrol.ros.parameter_tables import document
+from rosbot_patrol.ros.patrol_node import NodeParams, load_flat
 from rosbot_patrol.ros.simulator_node import SimulatorParams
 from rosbot_patrol.ros.twist_mux_node import TwistMuxParams
 from rosbot_patrol.simulation.sensor_places import read_sensors
@@ -93,6 +95,12 @@ def test_networks_of_darknet_ros(name: str) -> None:
     loaded = load(DarknetParams, tree, name=f"{name}: ")
     assert loaded.yolo_model.weight_file.name.endswith(".weights")
     assert "person" in loaded.yolo_model.detection_classes.names
+
+
+def test_patrol() -> None:
+    tree = given("rosbot_patrol.launch", "patrolling_node")
+    assert load(WatchParams, tree["watch"], name="/patrolling_node/watch/").frames == 4
+    load_flat(NodeParams, tree)
 
 
 def test_rooms_sensors_and_walks_agree() -> None:
