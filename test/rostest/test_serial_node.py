@@ -126,7 +126,7 @@ def test_diagnostics_name_sensors_and_clients(ros):
     port, probe = free_port(), ros.probe()
     probe.tell(subscribe=["/diagnostics", "diagnostic_msgs/DiagnosticArray"])
     bridge = tcp_bridge(ros, port, "_sensor_timeout:=1.5")
-    sensor = EspClient("localhost", port, 6).start()
+    sensor = EspClient("127.0.0.1", port, 6).start()  # localhost may be ::1
     said = probe.expect(lambda said: "esp_client1: sensor 6" in str(said.get("status")))
     assert "heard of" in str(said["status"])
     sensor.stop()
