@@ -51,6 +51,7 @@ def wait_until(condition, seconds=20.0, what="the condition"):
 def master():
     port = int(os.environ.get("ROSBOT_TEST_PORT", 0)) or free_port()
     os.environ.update(ROS_MASTER_URI=f"http://localhost:{port}", ROS_HOSTNAME="localhost")
+    os.environ.update(PYTHONUNBUFFERED="1")  # the tests read the nodes' output while they run
     core = subprocess.Popen(["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     import rosgraph
 
