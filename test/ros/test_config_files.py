@@ -99,7 +99,7 @@ def test_networks_of_darknet_ros(name: str) -> None:
 
 def test_patrol() -> None:
     tree = given("rosbot_patrol.launch", "patrolling_node")
-    assert load(WatchParams, tree["watch"], name="/patrolling_node/watch/").frames == 4
+    assert load(WatchParams, tree["watch"], name="/patrolling_node/watch/").frames == 5
     load_flat(NodeParams, tree)
 
 
