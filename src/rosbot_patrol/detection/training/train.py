@@ -21,7 +21,7 @@ import torch
 from tqdm import tqdm
 
 from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_weights import format_weights
+from rosbot_patrol.detection.darknet_weights import format_weights, read_weights
 from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
 from rosbot_patrol.detection.training.dataset import Pictures, batch_of
 from rosbot_patrol.detection.training.loss import Truth, yolo_loss
@@ -128,9 +128,7 @@ class Trainer:
 
     def _resume(self) -> None:
         if self.options.start and not self.options.checkpoint.exists():
-            state = torch.load(self.options.start, map_location=self.device, weights_only=True)
-            self.network.load_state_dict(state["mean"])
-            self.mean.load_state_dict(state["mean"])
+            self._start_from(self.options.start)
         if not self.options.checkpoint.exists():
             return
         state = torch.load(self.options.checkpoint, map_location=self.device, weights_only=True)
@@ -139,6 +137,16 @@ class Trainer:
         self.optimiser.load_state_dict(state["optimiser"])
         self.step, self.epoch = state["step"], state["epoch"]
         sys.stdout.write(f"going on after epoch {self.epoch}\n")
+
+
+    def _start_from(self, file: Path) -> None:
+        """Begin with the weights of a checkpoint, or of a file in darknet's format."""
+        if file.suffix == ".weights":
+            self.network.from_weights(read_weights(str(file), self.spec))
+        else:
+            state = torch.load(file, map_location=self.device, weights_only=True)
+            self.network.load_state_dict(state["mean"])
+        self.mean.load_state_dict(self.network.state_dict())
 
 
 def _schedule(step: int, total: int) -> float:
@@ -168,7 +176,7 @@ def main() -> None:
     parser.add_argument("--cfg", type=Path, required=True)
     parser.add_argument("--weights", type=Path, required=True, help="written after each epoch")
     parser.add_argument("--checkpoint", type=Path, required=True)
-    parser.add_argument("--start", type=Path, help="a checkpoint whose weights to begin with")
+    parser.add_argument("--start", type=Path, help="a checkpoint or a .weights file whose weights to begin with")
     parser.add_argument("--epochs", type=int, default=24)
     parser.add_argument("--samples", type=int, default=10000, help="pictures of an epoch")
     parser.add_argument("--batch", type=int, default=24)
