@@ -48,7 +48,7 @@ def test_depth_of_the_floor_is_exact(renderer: SceneRenderer) -> None:
     renderer.add(thing("floor", "plane", (50, 50), at(0, 0, -0.22)))
     _, depth = renderer.render(CAMERA, VIEW)
     for row in (300, 400, 470):
-        assert depth[row, 320] == pytest.approx(0.22 * VIEW.fy / (row + 0.5 - VIEW.cy), rel=0.01)  # half a pixel
+        assert depth[row, 320] == pytest.approx(0.22 * VIEW.fy / (row - VIEW.cy), rel=0.002)
 
 
 def test_a_sphere_is_where_geometry_says(renderer: SceneRenderer) -> None:

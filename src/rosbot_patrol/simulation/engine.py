@@ -7,7 +7,7 @@ sample's number, not to who asked before. Nothing here knows of wall time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,8 +18,11 @@ from rosbot_patrol.geometry import Pose2D, Twist2D, compose
 from rosbot_patrol.params import param
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.battery import Battery, BatteryParams
-from rosbot_patrol.simulation.camera import Camera, CameraParams, Picture
+from rosbot_patrol.simulation.boxes import box_body
+from rosbot_patrol.simulation.camera import Camera, CameraParams, Picture, poses_before
 from rosbot_patrol.simulation.drive import Drive, DriveParams
+from rosbot_patrol.simulation.fault_board import FaultBoard
+from rosbot_patrol.simulation.faults import Doorway
 from rosbot_patrol.simulation.imu import Imu, ImuParams, ImuReading
 from rosbot_patrol.simulation.lidar import LidarParams, measure_scan
 from rosbot_patrol.simulation.matrices import Matrix, from_pose2d, to_pose2d
@@ -34,7 +37,7 @@ from rosbot_patrol.simulation.odometry import EncoderOdometry, OdometryParams
 from rosbot_patrol.simulation.physics import Physics, Touch
 from rosbot_patrol.simulation.range_sensors import RangeParams, measure_range
 from rosbot_patrol.simulation.robot import RobotDescription
-from rosbot_patrol.simulation.scene import SceneRenderer
+from rosbot_patrol.simulation.scene import Body, SceneRenderer
 from rosbot_patrol.simulation.slices import Slice, slice_bodies
 from rosbot_patrol.simulation.walkers import Walker, cuts
 from rosbot_patrol.simulation.world import World
@@ -83,9 +86,13 @@ class _Robot:
         heights = [description.frames[f][2, 3] for f in self.base_from_ranges]
         self.range_height = description.axle_height + float(np.mean(heights)) if heights else 0.05
         self.base_from_optical: Matrix | None = description.frames.get("camera_rgb_frame")
-        self.lidar_slice = slice_bodies(engine.world.bodies, self.lidar_height)
-        self.range_slice = slice_bodies(engine.world.bodies, self.range_height)
+        self.cut(engine.bodies)
         self.imu.reset(pose.yaw)
+
+    def cut(self, bodies: Sequence[Body]) -> None:
+        """Take the cuts through what stands still."""
+        self.lidar_slice = slice_bodies(bodies, self.lidar_height)
+        self.range_slice = slice_bodies(bodies, self.range_height)
 
 
 class Engine:
@@ -95,6 +102,7 @@ class Engine:
         world: what stands in it.
         params: of every part.
         sensors: motion sensors on the walls.
+        doorways: places that a fault may name.
         make_renderer: builds the camera's renderer, in the thread that takes pictures.
     """
 
@@ -104,6 +112,7 @@ class Engine:
         params: EngineParams | None = None,
         *,
         sensors: Sequence[SensorPlace] = (),
+        doorways: Mapping[str, Doorway] | None = None,
         make_renderer: Callable[[], SceneRenderer] | None = None,
     ) -> None:
         self.world = world
@@ -115,6 +124,9 @@ class Engine:
         self._eye_slice = slice_bodies(world.bodies, EYE_LEVEL)
         self._walkers: dict[str, Walker] = {}
         self._spawned = 0
+        self._boxes: dict[str, Body] = {}
+        self.faults = FaultBoard(self, doorways)
+        self._restarted: list[int] = []
         self._robot: _Robot | None = None
         self._steps = 0
         self._motion = {s.id: MotionSensor(self.params.motion) for s in self.sensors}
@@ -134,6 +146,7 @@ class Engine:
 
     def step(self) -> None:
         """Advance by one step."""
+        self.faults.advance(self.now)
         robot = self._robot
         where = self._physics.pose if robot is not None else None
         for walker in self._walkers.values():
@@ -142,7 +155,8 @@ class Engine:
         if robot is None:
             self._physics.step(Twist2D())
         else:
-            self._physics.step(robot.drive.step(self.now, STEP))
+            robot.drive.stuck = self.faults.stuck_wheels
+            self._physics.step(self.faults.driven(robot.drive.step(self.now, STEP)))
             robot.turned += np.array([robot.drive.left, robot.drive.right]) * STEP
             robot.imu.step(self._physics.twist, STEP)
         self._steps += 1
@@ -197,10 +211,26 @@ class Engine:
         if self._robot is not None:
             self._robot.drive.command(twist, self.now)
 
-    def set_pose(self, pose: Pose2D) -> None:
-        """Carry the robot elsewhere; its odometry does not notice."""
-        self._need_robot().drive.stop()
+    def remove_robot(self) -> None:
+        """Take the robot out; raises WorldError where there is none."""
+        self._need_robot()
+        self._physics.remove_robot()
+        self._robot = None
+
+    def carry(self, pose: Pose2D) -> None:
+        """Carry the robot elsewhere; its odometry does not notice. Raises WorldError where there is no room for it."""
+        robot, before = self._need_robot(), self.pose
+        name = f"robot '{robot.description.name}'"
+        if not all(map(math.isfinite, pose)):
+            raise WorldError(name, f"{tuple(pose)} is no pose")
         self._physics.set_pose(pose)
+        stuck = self._physics.blocker()
+        if stuck:
+            self._physics.set_pose(before)
+            raise WorldError(name, f"({pose.x:.2f}, {pose.y:.2f}) is no place for it, '{stuck}' is there")
+        robot.drive.stop()
+
+    set_pose = carry
 
     @property
     def pose(self) -> Pose2D:
@@ -248,14 +278,14 @@ class Engine:
     def scan(self) -> LaserScan:
         """One sweep of the lidar."""
         robot = self._need_robot()
-        scene = robot.lidar_slice.with_circles(cuts(self._walkers.values(), robot.lidar_height))
+        scene = robot.lidar_slice.plus(cuts(self._walkers.values(), robot.lidar_height))
         place = compose(self.pose, robot.base_from_laser)
         return measure_scan(self.params.lidar, scene, place, self.now, self._noise("lidar"))
 
     def ranges(self) -> dict[str, float]:
         """Frame and distance [m] of each range sensor."""
         robot = self._need_robot()
-        scene = robot.range_slice.with_circles(cuts(self._walkers.values(), robot.range_height))
+        scene = robot.range_slice.plus(cuts(self._walkers.values(), robot.range_height))
         noise = self._noise("range")
         return {
             frame: measure_range(self.params.range, scene, compose(self.pose, place), noise)
@@ -276,12 +306,19 @@ class Engine:
         Raises:
             WorldError: the engine has no renderer, or the robot no camera.
         """
+        if not self.faults.active:
+            return self._picture(colour, depth)
+        return self.faults.seen(lambda: self._picture(True, True))
+
+    def _picture(self, colour: bool, depth: bool) -> Picture:
         robot = self._need_robot()
         if self._camera is None or robot.base_from_optical is None:
             raise WorldError("simulation", "has no camera")
-        world_from_base = from_pose2d(self.pose, robot.description.axle_height)
-        pose = world_from_base @ robot.base_from_optical
-        return self._camera.take(pose, self._walkers.values(), self._steps, colour=colour, depth=depth)
+        *earlier, pose = (
+            from_pose2d(base, robot.description.axle_height) @ robot.base_from_optical
+            for base in (*poses_before(self.pose, self.twist, self.params.camera.blur), self.pose)
+        )
+        return self._camera.take(pose, self._walkers.values(), self._steps, colour=colour, depth=depth, earlier=earlier)
 
     def view_from_above(self, height: float = 9.0) -> NDArray[np.uint8]:
         """A picture of the house from a height [m] above the robot, north up; same thread as `picture`."""
@@ -297,13 +334,23 @@ class Engine:
 
     def motion(self) -> dict[int, bool]:
         """Whether each motion sensor's output is high, by id."""
-        return {number: sensor.is_high for number, sensor in self._motion.items()}
+        return {n: self.faults.level(n, s.is_high, self.now) for n, s in self._motion.items()}
 
     def motion_changes(self) -> list[tuple[int, bool]]:
         """Id and level of each motion sensor whose output has changed since this was last asked."""
-        changed = [(n, s.is_high) for n, s in self._motion.items() if s.is_high != self._told.get(n, False)]
+        changed = [(n, is_high) for n, is_high in self.motion().items() if is_high != self._told.get(n, False)]
         self._told.update(changed)
         return changed
+
+    def restart_sensor(self, sensor: int) -> None:
+        """Switch a motion sensor off and on: it warms up anew."""
+        self._motion[sensor] = MotionSensor(replace(self.params.motion, prewarmed=False), self.now)
+        self._restarted.append(sensor)
+
+    def restarted_sensors(self) -> list[int]:
+        """Ids of the motion sensors that were switched off and on since this was last asked."""
+        restarted, self._restarted = self._restarted, []
+        return restarted
 
     def warm_up(self) -> None:
         """Take one of each measurement, so that the first that counts does not come late."""
@@ -328,6 +375,43 @@ class Engine:
                 seen.append((walker.name, bearing))
         return seen
 
+    # What is put there -----------------------------------------------------------------------------------------------
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """What stands still."""
+        return (*self.world.bodies, *self._boxes.values())
+
+    def place_box(self, name: str, pose: Pose2D, size: tuple[float, float, float]) -> None:
+        """Put a box of a length, depth and height [m] on the floor; raises WorldError where the robot stands."""
+        if name in {b.name for b in self.bodies} | set(self._walkers):
+            raise WorldError(f"box '{name}'", "the name is taken")
+        body = box_body(name, pose, size)
+        free = self._physics.blocker() is None
+        self._physics.add(body)
+        if free and self._physics.blocker() == name:
+            self._physics.remove(name)
+            raise WorldError(f"box '{name}'", f"cannot stand at ({pose.x:.2f}, {pose.y:.2f}), the robot is there")
+        self._boxes[name] = body
+        if self._camera is not None:
+            self._camera.put(body)
+        self._cut()
+
+    def remove_box(self, name: str) -> None:
+        """Take a box away; raises WorldError where there is none of that name."""
+        if name not in self._boxes:
+            raise WorldError(f"box '{name}'", f"is not there (there: {', '.join(self._boxes) or 'none'})")
+        del self._boxes[name]
+        self._physics.remove(name)
+        if self._camera is not None:
+            self._camera.take_away(name)
+        self._cut()
+
+    def _cut(self) -> None:
+        self._eye_slice = slice_bodies(self.bodies, EYE_LEVEL)
+        if self._robot is not None:
+            self._robot.cut(self.bodies)
+
     # Actors ----------------------------------------------------------------------------------------------------------
 
     @property
@@ -349,7 +433,7 @@ class Engine:
         """
         self._spawned += 1
         name = name or f"{model}_{self._spawned}"
-        taken = {b.name for b in self.world.bodies} | set(self._walkers)
+        taken = {b.name for b in self.bodies} | set(self._walkers)
         if name in taken:
             raise WorldError(f"actor '{name}'", "the name is taken")
         if not all(map(math.isfinite, pose)):

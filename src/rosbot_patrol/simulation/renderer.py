@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation import picture_kernels as kernels
 from rosbot_patrol.simulation.meshes import mesh_of
 from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, SceneRenderer
 from rosbot_patrol.simulation.shaders import sources
@@ -165,9 +166,11 @@ class EglRenderer(SceneRenderer):
         """The picture in colour (height, width, 3) and depth [m] (height, width), inf where nothing was hit."""
         size = (intrinsics.width, intrinsics.height)
         buffer = self._draw(world_from_optical, intrinsics, size)
-        colour = np.frombuffer(buffer.read(components=3, alignment=1), np.uint8).reshape(size[1], size[0], 3)
-        raw = np.frombuffer(buffer.read(attachment=-1, components=1, dtype="f4"), np.float32)
-        return colour, _metres(raw.reshape(size[1], size[0]), intrinsics)
+        colour = np.empty((size[1], size[0], 3), np.uint8)
+        raw = np.empty((size[1], size[0]), np.float32)
+        buffer.read_into(colour, components=3, alignment=1)
+        buffer.read_into(raw, attachment=-1, components=1, dtype="f4")
+        return colour, _metres(raw, intrinsics)
 
     def labels(self) -> NDArray[np.uint8]:
         """The label of what the last picture shows in each pixel, shape (height, width)."""
@@ -357,8 +360,8 @@ def _projection(camera: Intrinsics) -> NDArray[np.float64]:
     near, far, width, height = camera.near, camera.far, camera.width, camera.height
     return np.array(
         [
-            [2 * camera.fx / width, 0, 2 * camera.cx / width - 1, 0],
-            [0, 2 * camera.fy / height, 2 * camera.cy / height - 1, 0],
+            [2 * camera.fx / width, 0, (2 * camera.cx + 1) / width - 1, 0],
+            [0, 2 * camera.fy / height, (2 * camera.cy + 1) / height - 1, 0],
             [0, 0, (far + near) / (far - near), -2 * far * near / (far - near)],
             [0, 0, 1, 0],
         ]
@@ -366,11 +369,9 @@ def _projection(camera: Intrinsics) -> NDArray[np.float64]:
 
 
 def _metres(raw: NDArray[np.float32], camera: Intrinsics) -> NDArray[np.float32]:
-    near, far = np.float32(camera.near), np.float32(camera.far)
-    depth = np.subtract(far, raw * (far - near))
-    np.divide(near * far, depth, out=depth)
-    depth[raw >= 1.0] = np.inf
-    return depth
+    metres = np.empty(raw.size, np.float32)
+    kernels.depth_from_clip(raw.ravel(), camera.near, camera.far, metres)
+    return metres.reshape(raw.shape)
 
 
 def _set(program: Any, name: str, value: NDArray[np.float64]) -> None:

@@ -30,7 +30,7 @@ class Shape:
         kind: box (size = x, y, z), cylinder (radius, length along z), sphere (radius,), capsule (radius, length of
             the cylindric part along z), plane (x, y; normal +z), mesh (scale x, y, z).
         mesh: file of a mesh (stl, obj, dae), or None.
-        vertices, faces: a mesh in memory instead of a file, shapes (V, 3) and (F, 3), or None.
+        vertices, faces: the triangles of a mesh, shapes (V, 3) and (F, 3), or None: they are read from the file.
     """
 
     kind: ShapeKind
@@ -79,14 +79,17 @@ class Body:
 
 @dataclass(frozen=True, kw_only=True)
 class Intrinsics:
-    """A pinhole camera without distortion: size [px], focal lengths and principal point [px], clip distances [m]."""
+    """A pinhole camera without distortion: size [px], focal lengths and principal point [px], clip distances [m].
+
+    As in camera_info, the middle of the first pixel is at 0, so that of the picture at (width - 1) / 2.
+    """
 
     width: int = 640
     height: int = 480
     fx: float = 554.3827
     fy: float = 554.3827
-    cx: float = 320.0
-    cy: float = 240.0
+    cx: float = 319.5
+    cy: float = 239.5
     near: float = 0.1
     far: float = 100.0
 

@@ -127,11 +127,12 @@ class TinyRenderer(SceneRenderer):
 
 
 def _projection(camera: Intrinsics) -> NDArray[np.float64]:
+    # TinyRenderer samples a pixel at its left lower corner, not in its middle.
     near, far, width, height = camera.near, camera.far, camera.width, camera.height
     return np.array(
         [
             [2 * camera.fx / width, 0, 1 - 2 * camera.cx / width, 0],
-            [0, 2 * camera.fy / height, 2 * camera.cy / height - 1, 0],
+            [0, 2 * camera.fy / height, 2 * (camera.cy + 1) / height - 1, 0],
             [0, 0, -(far + near) / (far - near), -2 * far * near / (far - near)],
             [0, 0, -1, 0],
         ]

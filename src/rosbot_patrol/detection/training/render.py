@@ -196,7 +196,7 @@ def _poster(painter: EglRenderer, look, rng: np.random.Generator) -> Texture:
     painter.pose_visuals("model", person_pose_parts(look, float(rng.random()), bool(rng.random() < 0.5)))
     high = float(rng.uniform(0.7, 1.3))
     eye = scenes.placed(-3.0, 0.0, high) @ _FORWARD
-    view = Intrinsics(width=SIDE, height=SIDE, fx=200.0, fy=150.0, cx=SIDE / 2, cy=SIDE / 2)
+    view = Intrinsics(width=SIDE, height=SIDE, fx=200.0, fy=150.0, cx=(SIDE - 1) / 2, cy=(SIDE - 1) / 2)
     return Texture(painter.render(eye, view)[0][::-1].copy(), 0.0)
 
 

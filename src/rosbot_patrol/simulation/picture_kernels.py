@@ -1,0 +1,62 @@
+"""Pixels of the camera: depth from what OpenGL stores, and noise and limits of the real sensor, one pass each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.kernels import kernel
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+
+@kernel("void(float32[::1], float32, float32, float32[::1])")
+def depth_from_clip(raw: Floats, near: float, far: float, metres: Floats) -> None:
+    """Depth along the optical axis of each pixel.
+
+    Args:
+        raw: what the depth buffer holds, 0 at the near clip, 1 at the far one, shape (N,).
+        near: near clip [m].
+        far: far clip [m].
+        metres: depth on return [m], shape (N,), inf at the far clip.
+    """
+    product, span = near * far, far - near
+    for i in range(raw.shape[0]):
+        metres[i] = product / (far - raw[i] * span) if raw[i] < np.float32(1.0) else np.float32(np.inf)
+
+
+@kernel("void(uint8[::1], int8[::1], uint8[::1])")
+def add_noise(drawn: Bytes, noise: NDArray[np.int8], seen: Bytes) -> None:
+    """Colours with noise, within 0 to 255.
+
+    Args:
+        drawn: colours without noise, shape (N,).
+        noise: of each colour, shape (N,).
+        seen: colours on return, shape (N,); may be `drawn` itself.
+    """
+    for i in range(drawn.shape[0]):
+        value = np.int16(drawn[i]) + np.int16(noise[i])
+        seen[i] = np.uint8(min(max(value, np.int16(0)), np.int16(255)))
+
+
+@kernel("void(float32[::1], float32[::1], float32, float32, float32[::1])")
+def sense_depth(depth: Floats, noise: Floats, nearest: float, farthest: float, sensed: Floats) -> None:
+    """Depth as the sensor gives it: NaN outside its limits, noise that grows with the square.
+
+    Args:
+        depth: exact, inf where nothing is [m], shape (N,).
+        noise: of a depth of 1 m [m], shape (N,) or (0,) for none.
+        nearest: shortest depth that is told [m].
+        farthest: longest depth that is told [m].
+        sensed: depth on return [m], shape (N,).
+    """
+    noisy = noise.shape[0] > 0
+    for i in range(depth.shape[0]):
+        d = depth[i]
+        if d < nearest or d > farthest:
+            sensed[i] = np.float32(np.nan)
+        elif noisy:
+            sensed[i] = d + noise[i] * d * d
+        else:
+            sensed[i] = d
