@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation import raycast_kernels as kernels
 from rosbot_patrol.simulation.matrices import Matrix, is_upright
-from rosbot_patrol.simulation.meshes import mesh_of
+from rosbot_patrol.simulation.meshes import triangles_of
 from rosbot_patrol.simulation.scene import Body, Shape
 
 Array = NDArray[np.float64]
@@ -32,11 +33,22 @@ class Slice:
     segments: Array
     circles: Array
 
-    def with_circles(self, circles: Array) -> Slice:
-        """The same cut with further circles."""
-        if not len(circles):
+    def plus(self, other: Slice) -> Slice:
+        """Both cuts together."""
+        if not len(other.segments) and not len(other.circles):
             return self
-        return Slice(self.segments, np.ascontiguousarray(np.vstack((self.circles, circles))))
+        segments = np.vstack((self.segments, other.segments)) if len(other.segments) else self.segments
+        circles = np.vstack((self.circles, other.circles)) if len(other.circles) else self.circles
+        return Slice(np.ascontiguousarray(segments), np.ascontiguousarray(circles))
+
+    def placed(self, pose: Pose2D) -> Slice:
+        """The cut through a body that stands at a pose, where this one is in the frame of the body."""
+        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+        turn, shift = np.array([[c, s], [-s, c]]), np.array([pose.x, pose.y])
+        circles = self.circles.copy()
+        circles[:, :2] = self.circles[:, :2] @ turn + shift
+        ends = self.segments.reshape(-1, 2) @ turn + shift
+        return Slice(ends.reshape(-1, 4), circles)
 
     def cast(self, x: float, y: float, first: float, step: float, count: int, longest: float) -> Array:
         """Lengths of a fan of beams from a point; `longest` where nothing is met [m], shape (count,)."""
@@ -77,9 +89,9 @@ def slice_shape(shape: Shape, world_from_shape: Matrix, height: float) -> Slice:
     if shape.kind == "sphere" or (shape.kind in ("cylinder", "capsule") and is_upright(world_from_shape)):
         return Slice(kernels.NO_SEGMENTS, _cut_round(shape, world_from_shape, height))
     if shape.kind == "mesh":
-        mesh = mesh_of(shape)
-        placed = mesh.positions @ world_from_shape[:3, :3].T + world_from_shape[:3, 3]
-        return Slice(_cut_triangles(placed, mesh.faces, height), kernels.NO_CIRCLES)
+        vertices, faces = triangles_of(shape)
+        placed = vertices @ world_from_shape[:3, :3].T + world_from_shape[:3, 3]
+        return Slice(_cut_triangles(placed, faces, height), kernels.NO_CIRCLES)
     return Slice(_cut_lying(shape, world_from_shape, height), kernels.NO_CIRCLES)
 
 
@@ -122,14 +134,19 @@ def _cut_convex(corners: Array, edges: NDArray[np.int64], height: float) -> Arra
 
 
 def _cut_triangles(vertices: Array, faces: NDArray[np.int64], height: float) -> Array:
+    """Cuts of triangles, each a segment, shape (S, 4)."""
     above = vertices[:, 2] > height
     hit = faces[above[faces].any(axis=1) & ~above[faces].all(axis=1)]
-    rows = []
-    for face in hit:
-        ends = []
-        for i, j in ((0, 1), (1, 2), (2, 0)):
-            p, q = vertices[face[i]], vertices[face[j]]
-            if above[face[i]] != above[face[j]]:
-                ends.append(p[:2] + (height - p[2]) / (q[2] - p[2]) * (q[:2] - p[:2]))
-        rows.append(np.concatenate(ends))
-    return np.array(rows) if rows else kernels.NO_SEGMENTS
+    if not len(hit):
+        return kernels.NO_SEGMENTS
+    # The corner that lies alone on its side, then the two others.
+    alone = above[hit] == (above[hit].sum(axis=1) == 1)[:, None]
+    first = np.argmax(alone, axis=1)
+    rows = np.arange(len(hit))
+    p = vertices[hit[rows, first]]
+    ends = []
+    for k in (1, 2):
+        q = vertices[hit[rows, (first + k) % 3]]
+        t = (height - p[:, 2]) / (q[:, 2] - p[:, 2])
+        ends.append(p[:, :2] + t[:, None] * (q[:, :2] - p[:, :2]))
+    return np.column_stack(ends)
