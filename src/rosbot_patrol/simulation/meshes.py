@@ -18,6 +18,7 @@ from rosbot_patrol.simulation.scene import Shape
 
 _SIDES = 20
 _RINGS = 12
+_SHARP = 0.766  # cosine
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,28 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
     return normals
 
 
-def _free_mesh(shape: Shape) -> Mesh:
+def sharp_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners of the triangles, shape (3 F, 3), and their normals: smooth but where an edge is sharper than 40 deg."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    flat = np.cross(b - a, c - a)
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
+    flat = np.repeat(flat, 3, axis=0)
+    smooth = smooth_normals(vertices, faces)[faces.ravel()]
+    is_sharp = np.einsum("ij,ij->i", flat, smooth) < _SHARP
+    return vertices[faces.ravel()], np.where(is_sharp[:, None], flat, smooth)
+
+
+def triangles_of(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices (V, 3) and triangles (F, 3) of any shape, without what only a camera needs. Raises WorldError."""
+    if shape.kind == "mesh":
+        return _triangles(shape)
+    mesh = mesh_of(shape)
+    return mesh.positions, mesh.faces
+
+
+def _triangles(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if shape.vertices is not None and shape.faces is not None:
         vertices, faces = np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int64)
     elif shape.mesh is not None:
@@ -155,7 +177,18 @@ def _free_mesh(shape: Shape) -> Mesh:
         raise WorldError("mesh", "has neither a file nor triangles")
     if len(shape.size) >= 3:
         vertices = vertices * np.array(shape.size[:3])
-    normals = smooth_normals(vertices, faces)
+        if np.prod(shape.size[:3]) < 0.0:
+            faces = faces[:, ::-1]  # mirrored: keep them facing outwards
+    return vertices, faces
+
+
+def _free_mesh(shape: Shape) -> Mesh:
+    vertices, faces = _triangles(shape)
+    if shape.mesh is not None:
+        vertices, normals = sharp_normals(vertices, faces)
+        faces = np.arange(len(vertices)).reshape(-1, 3)
+    else:
+        normals = smooth_normals(vertices, faces)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     middle, extent = (low + high) / 2, np.maximum(high - low, 1e-6)
     return Mesh(

@@ -1,53 +1,72 @@
 """A simulated world: the bodies of an SDF file (1.4 to 1.7, as Gazebo classic writes them), and who walks about in it.
 
-Read: models (also nested in <include>, found on a search path), links, poses, the <state> that overrides them, box,
-cylinder, sphere, plane and mesh geometry, materials as colours. A model or include whose name or uri speaks of a
-person or a fire hydrant becomes an actor.
+Read: models, nested ones too, links, poses and the frames they are relative to, <include> on a search path, the
+<state> that overrides poses and sizes, box, cylinder, sphere, plane and mesh geometry, materials as colours. A model
+whose name, uri or mesh speaks of a person or a fire hydrant becomes an actor, and so does an <actor>.
 
-Differs: every model is static (what Gazebo would push aside stands fast here); lights, plugins, sensors, joints and
-physics settings are skipped, and named once in a warning.
+Differs: every model is static (what Gazebo would push aside stands fast here); joints hold; lights, plugins, sensors
+and physics settings are skipped. What is not read is named once in a warning.
 """
 
 from __future__ import annotations
 
+import itertools
 import logging
+import re
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from rosbot_patrol.errors import WorldError
-from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.simulation.matrices import from_xyz_rpy, to_pose2d
+from rosbot_patrol.geometry import Pose2D, distance
+from rosbot_patrol.simulation.matrices import to_pose2d
 from rosbot_patrol.simulation.scene import Body, BodyKind, Collision, Material, Matrix, Shape, Visual, identity
+from rosbot_patrol.simulation.sdf_files import ModelPath, model_file
+from rosbot_patrol.simulation.sdf_frames import Frames
+from rosbot_patrol.simulation.sdf_shapes import PLANE, Scale, ShapeReader
+from rosbot_patrol.simulation.sdf_values import VERSIONS, Place, floats, pose_of, read_sdf
 
 log = logging.getLogger(__name__)
 
-VERSIONS = ("1.4", "1.5", "1.6", "1.7")
-
-_ACTOR_WORDS = {"person": "person", "fire_hydrant": "fire_hydrant", "hydrant": "fire_hydrant"}
+_ACTOR_WORDS = {"person": "person", "pedestrian": "person", "hydrant": "fire_hydrant"}
+_WALK_SPEED = 0.8  # of an actor whose waypoints tell no time [m/s]
 _KNOWN = {
-    "world": {"model", "include", "state"},
-    "model": {"link", "pose", "static"},
+    "world": {"model", "include", "state", "actor", "frame"},
+    "model": {"link", "model", "include", "frame", "joint", "pose", "static", "placement_frame"},
     "link": {"pose", "collision", "visual"},
+    "include": {"uri", "name", "pose", "static", "placement_frame"},
+    "actor": {"pose", "skin", "animation", "script", "link", "joint", "static"},
 }
-# Of Gazebo's own running: skipped without a word.
+# Of Gazebo's own running, or of what moves: skipped without a word.
 _WITHOUT_MEANING = {
-    "<gravity>", "<physics>", "<scene>", "<gui>", "<audio>", "<wind>", "<magnetic_field>", "<atmosphere>",
-    "<spherical_coordinates>", "<include> of model://sun", "<light>",
+    "gravity", "physics", "scene", "gui", "audio", "wind", "magnetic_field", "atmosphere", "spherical_coordinates",
+    "inertial", "self_collide", "kinematic", "enable_wind", "allow_auto_disable", "velocity_decay", "must_be_base_link",
+    "plugin_filename",
 }  # fmt: skip
-_SHAPES = {"box", "cylinder", "sphere", "plane", "mesh"}
+_ONES: Scale = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ActorPlace:
-    """An actor that the world's file puts somewhere: its name, its model (person, fire_hydrant) and where it stands."""
+    """An actor that the world's file puts somewhere.
+
+    Attributes:
+        name: unique in the world.
+        model: person or fire_hydrant.
+        pose: where it stands at first.
+        path: where it walks, () stays.
+        speed: of the walk [m/s].
+        loop: whether it walks round and round.
+    """
 
     name: str
     model: str
     pose: Pose2D
+    path: tuple[Pose2D, ...] = ()
+    speed: float = 0.0
+    loop: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,192 +83,247 @@ def load_world(path: str | Path, model_path: Iterable[str | Path] = ()) -> World
 
     Args:
         path: the file.
-        model_path: folders in which `model://NAME` is looked up.
+        model_path: folders in which `model://NAME` is looked up, before `models` beside the file or its folder.
 
     Raises:
         WorldError: the file cannot be read, is not SDF, or an element makes no sense; names file and element.
     """
-    reader = _Reader(Path(path), tuple(Path(p) for p in model_path))
+    path = Path(path)
+    folders = [*map(Path, model_path), path.parent / "models", path.parent.parent / "models"]
+    reader = _Reader(path, ModelPath(tuple(folders)))
     world = reader.read()
-    strange = sorted(reader.skipped - _WITHOUT_MEANING)
-    if strange:
-        log.warning("%s: skipped elements not simulated here: %s", path, ", ".join(strange))
+    if reader.lights:
+        log.info("%s: %d lights are not simulated, the camera has its own", path, reader.lights)
+    if reader.skipped:
+        log.warning("%s: skipped, not simulated here: %s", path, ", ".join(sorted(reader.skipped)))
     return world
+
+
+@dataclass
+class _State:
+    """What <state> says: poses and scales by "model", "model::inner" and "model/link", all against the world."""
+
+    poses: dict[str, Matrix] = field(default_factory=dict)
+    scales: dict[str, Scale] = field(default_factory=dict)
+    inserted: list[ET.Element] = field(default_factory=list)
+    deleted: set[str] = field(default_factory=set)
+
+    def read(self, element: ET.Element, place: Place) -> None:
+        for model in element.findall("model"):
+            self._model(model, "", place)
+        for inserted in element.findall("insertions"):
+            self.inserted += inserted.findall("model")
+        self.deleted |= {(name.text or "").strip() for name in element.findall("deletions/name")}
+
+    def _model(self, element: ET.Element, outer: str, place: Place) -> None:
+        name = outer + element.get("name", "")
+        here = place.inside(f"state of model '{name}'")
+        if element.find("pose") is not None:
+            self.poses[name] = pose_of(element, here)
+        scale = element.findtext("scale")
+        if scale:
+            x, y, z = floats(scale, 3, here.inside("<scale>"))
+            if min(x, y, z) <= 0.0:
+                raise here.inside("<scale>").error(f"expected positive numbers, got '{scale.strip()}'")
+            self.scales[name] = (x, y, z)
+        for link in element.findall("link"):
+            if link.find("pose") is not None:
+                label = link.get("name", "")
+                self.poses[f"{name}/{label}"] = pose_of(link, here.inside(f"link '{label}'"))
+        for inner in element.findall("model"):
+            self._model(inner, f"{name}::", place)
 
 
 @dataclass
 class _Reader:
     path: Path
-    model_path: tuple[Path, ...]
+    model_path: ModelPath
     skipped: set[str] = field(default_factory=set)
+    lights: int = 0
     bodies: list[Body] = field(default_factory=list)
     actors: list[ActorPlace] = field(default_factory=list)
+    state: _State = field(default_factory=_State)
+    files: dict[Path, ET.Element] = field(default_factory=dict)
+    including: list[Path] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.shapes = ShapeReader(self.model_path, self.skipped)
 
     def read(self) -> World:
-        root = self._parse(self.path)
-        world = root.find("world")
+        place = Place(self.path)
+        world = self._parse(self.path).find("world")
         if world is None:
             raise WorldError(self.path, "has no <world> element")
-        state = _read_state(world, self.path)
-        for child in world:
-            if child.tag == "model":
-                self._model(child, self.path, state)
-            elif child.tag == "include":
-                self._include(child, state)
-            elif child.tag not in _KNOWN["world"]:
-                self.skipped.add(f"<{child.tag}>")
-        names = [b.name for b in self.bodies] + [a.name for a in self.actors]
-        twice = next((n for n in names if names.count(n) > 1), None) if len(set(names)) < len(names) else None
-        if twice:
-            raise WorldError(self.path, f"the name '{twice}' is used twice")
+        for element in world.findall("state"):
+            self.state.read(element, place)
+        frames = Frames(world, place)
+        self._note_skipped(world)
+        for child in (*world, *self.state.inserted):
+            self._child(child, place, frames, identity(), "")
+        self._check_names()
         return World(name=world.get("name", "world"), bodies=tuple(self.bodies), actors=tuple(self.actors))
 
-    def _parse(self, path: Path) -> ET.Element:
-        try:
-            root = ET.fromstring(path.read_bytes())
-        except OSError as err:
-            raise WorldError(path, f"cannot be read: {err.strerror}") from err
-        except ET.ParseError as err:
-            raise WorldError(path, f"is not XML: {err}") from err
-        if root.tag != "sdf":
-            raise WorldError(path, f"is no SDF file, its first element is <{root.tag}>")
-        if root.get("version") not in VERSIONS:
-            log.warning("%s: SDF version %s, read as 1.6", path, root.get("version", "is not named"))
-        return root
+    def _child(self, child: ET.Element, place: Place, frames: Frames, world_from_outer: Matrix, outer: str) -> None:
+        if child.tag == "model":
+            name = child.get("name")
+            if not name:
+                raise place.error("a <model> has no name")
+            here = place.inside(f"model '{name}'")
+            self._model(child, here, world_from_outer @ frames.pose(child, here), outer + name)
+        elif child.tag == "include":
+            self._include(child, place, frames, world_from_outer, outer)
+        elif child.tag == "actor":
+            self._actor(child, place.inside(f"actor '{child.get('name')}'"), world_from_outer)
 
-    def _include(self, element: ET.Element, state: dict[str, Matrix]) -> None:
+    def _check_names(self) -> None:
+        counted = Counter([b.name for b in self.bodies] + [a.name for a in self.actors])
+        twice = [name for name, count in counted.items() if count > 1]
+        if twice:
+            raise WorldError(self.path, f"the name '{twice[0]}' is used twice")
+
+    def _parse(self, path: Path) -> ET.Element:
+        if path not in self.files:
+            root = self.files[path] = read_sdf(path)
+            if root.get("version") not in VERSIONS:
+                log.warning("%s: SDF version %s, read as 1.7", path, root.get("version", "is not named"))
+        return self.files[path]
+
+    def _include(self, element: ET.Element, place: Place, frames: Frames, world_from_outer: Matrix, outer: str) -> None:
+        self._note_skipped(element)
         uri = (element.findtext("uri") or "").strip()
-        model = uri.removeprefix("model://").strip("/")
-        if not model:
-            raise WorldError(self.path, "an <include> has no <uri>")
-        name = (element.findtext("name") or model).strip()
-        pose = state.get(name, _pose(element, self.path, f"<include> of {uri}"))
-        if model == "sun":
-            self.skipped.add("<include> of model://sun")
+        if not uri:
+            raise place.error("an <include> has no <uri>")
+        here = place.inside(f"<include> of {uri}")
+        short = re.sub(r"^\w+://", "", uri).strip("/")
+        if short == "sun":
+            self.lights += 1
             return
-        if self._is_actor(name, model, pose):
+        given = (element.findtext("name") or "").strip()
+        world_from_model = world_from_outer @ frames.pose(element, here)
+        if self._is_actor(outer + (given or short), (given, short), world_from_model):
             return
-        file = self._find_model(model)
-        if file is None and model == "ground_plane":
-            self.bodies.append(_floor(name))
+        try:
+            file = model_file(self.model_path.find(uri, place.path.parent, here), here)
+        except WorldError:
+            if short != "ground_plane":
+                raise
+            self.bodies.append(_floor(outer + (given or short)))
             return
-        if file is None:
-            where = ", ".join(map(str, self.model_path)) or "no folder is given"
-            raise WorldError(self.path, f"<include> of {uri}: no such model (looked in: {where})")
+        if file in self.including or file == self.path:
+            chain = " -> ".join(p.parent.name for p in (*self.including, file))
+            raise here.error(f"the models include each other in a circle: {chain}")
         found = self._parse(file).find("model")
         if found is None:
             raise WorldError(file, "has no <model> element")
-        placed = {**state, name: pose} if element.find("pose") is not None or name in state else state
-        found.set("name", name)
-        self._model(found, file, placed)
+        name = given or found.get("name") or short
+        self.including.append(file)
+        inside = Place(file, f"model '{name}'")
+        placement = element.findtext("placement_frame")
+        if placement:
+            world_from_model = world_from_model @ _inverse(Frames(found, inside).frame(placement.strip(), inside))
+        elif element.find("pose") is None:
+            world_from_model = world_from_model @ pose_of(found, inside)
+        self._model(found, inside, world_from_model, outer + name)
+        self.including.pop()
 
-    def _find_model(self, model: str) -> Path | None:
-        for folder in self.model_path:
-            for name in ("model.sdf", "model-1_4.sdf", "model-1_5.sdf"):
-                if (folder / model / name).is_file():
-                    return folder / model / name
-        return None
-
-    def _is_actor(self, name: str, model: str, pose: Matrix) -> bool:
-        text = f"{name} {model}".lower()
+    def _is_actor(self, name: str, words: Iterable[str], pose: Matrix) -> bool:
+        text = set(re.split(r"[^a-z]+", " ".join(words).lower()))
         kind = next((kind for word, kind in _ACTOR_WORDS.items() if word in text), None)
         if kind is None:
             return False
-        self.actors.append(ActorPlace(name=name, model=kind, pose=to_pose2d(pose)))
+        pose = self.state.poses.get(name, pose)
+        if name not in self.state.deleted:
+            self.actors.append(ActorPlace(name=name, model=kind, pose=to_pose2d(pose)))
         return True
 
-    def _model(self, element: ET.Element, path: Path, state: dict[str, Matrix]) -> None:
-        name = element.get("name")
-        if not name:
-            raise WorldError(path, "a <model> has no name")
-        pose = state.get(name, _pose(element, path, f"model '{name}'"))
-        if self._is_actor(name, "", pose):
+    def _model(self, element: ET.Element, place: Place, world_from_model: Matrix, name: str) -> None:
+        if name in self.state.deleted:
             return
-        self._note_skipped(element, "model")
+        world_from_model = self.state.poses.get(name, world_from_model)
+        meshes = {Path(uri.text or "").parts[1:2] for uri in element.iterfind("link/visual/geometry/mesh/uri")}
+        if self._is_actor(name, (name, *(part for parts in meshes for part in parts)), world_from_model):
+            return
+        self._note_skipped(element)
+        frames = Frames(element, place)
         links = element.findall("link")
         for link in links:
             label = link.get("name") or "link"
-            where = f"model '{name}', link '{label}'"
-            self._note_skipped(link, "link")
+            here = place.inside(f"link '{label}'")
+            model_from_link = frames.pose(link, here)
+            pose = self.state.poses.get(f"{name}/{label}", world_from_model @ model_from_link)
             body_name = name if len(links) == 1 else f"{name}/{label}"
-            world_from_link = state.get(f"{name}/{label}", pose @ _pose(link, path, where))
-            visuals = [self._visual(v, path, f"{where}, visual '{v.get('name')}'") for v in link.findall("visual")]
-            shapes = link.findall("collision")
-            solid = [self._collision(c, path, f"{where}, collision '{c.get('name')}'") for c in shapes]
-            collisions = [c for c in solid if c is not None]
+            body = self._link(link, here, frames, _inverse(model_from_link), self.state.scales.get(name, _ONES))
+            kind = _kind_of(name, label, body.collisions)
             self.bodies.append(
-                Body(
-                    name=body_name,
-                    kind=_kind_of(name, label, collisions),
-                    pose=world_from_link,
-                    visuals=tuple(v for v in visuals if v is not None),
-                    collisions=tuple(collisions),
-                )
+                Body(name=body_name, kind=kind, pose=pose, visuals=body.visuals, collisions=body.collisions)
             )
+        for child in element:
+            self._child(child, place, frames, world_from_model, f"{name}::")
 
-    def _note_skipped(self, element: ET.Element, tag: str) -> None:
-        self.skipped.update(f"<{c.tag}> of a {tag}" for c in element if c.tag not in _KNOWN[tag])
+    def _link(self, element: ET.Element, place: Place, frames: Frames, link_from_model: Matrix, scale: Scale) -> Body:
+        """What a link shows and what of it stops the robot."""
+        self._note_skipped(element)
+        visuals: list[Visual] = []
+        collisions: list[Collision] = []
+        for part in element:
+            if part.tag not in ("visual", "collision"):
+                continue
+            here = place.inside(f"{part.tag} '{part.get('name')}'")
+            pose = _part_pose(part, here, frames, link_from_model, element.get("name") or "")
+            if part.tag == "visual":
+                visuals += self.shapes.visuals(part, pose, here, scale)
+            else:
+                collisions += self.shapes.collisions(part, pose, here, scale)
+        return Body(name="", visuals=tuple(visuals), collisions=tuple(collisions))
 
-    def _visual(self, element: ET.Element, path: Path, where: str) -> Visual | None:
-        shape = self._shape(element, path, where)
-        if shape is None:
-            return None
-        return Visual(shape=shape, pose=_pose(element, path, where), material=_material(element, path, where))
+    def _actor(self, element: ET.Element, place: Place, world_from_outer: Matrix) -> None:
+        """A walking person of Gazebo's: its first trajectory, at its mean speed."""
+        self._note_skipped(element)
+        name = element.get("name") or "actor"
+        pose = to_pose2d(self.state.poses.get(name, world_from_outer @ pose_of(element, place)))
+        points, times = [], []
+        trajectory = element.find("script/trajectory")
+        for i, waypoint in enumerate(trajectory.findall("waypoint") if trajectory is not None else ()):
+            here = place.inside(f"waypoint {i}")
+            points.append(to_pose2d(world_from_outer @ pose_of(waypoint, here)))
+            times.append(floats(waypoint.findtext("time") or "0", 1, here.inside("<time>"))[0])
+        way = sum(distance(a, b) for a, b in itertools.pairwise(points))
+        if not points or way == 0.0:
+            self.actors.append(ActorPlace(name=name, model="person", pose=points[0] if points else pose))
+            return
+        lasts = times[-1] - times[0]
+        loops = (element.findtext("script/loop") or "true").strip().lower() in ("true", "1")
+        self.actors.append(
+            ActorPlace(
+                name=name, model="person", pose=points[0], path=tuple(points), loop=loops,
+                speed=way / lasts if lasts > 0.0 else _WALK_SPEED,
+            )
+        )  # fmt: skip
 
-    def _collision(self, element: ET.Element, path: Path, where: str) -> Collision | None:
-        shape = self._shape(element, path, where)
-        return None if shape is None else Collision(shape=shape, pose=_pose(element, path, where))
-
-    def _shape(self, element: ET.Element, path: Path, where: str) -> Shape | None:
-        geometry = element.find("geometry")
-        children = list(geometry) if geometry is not None else []
-        found = next((c for c in children if c.tag in _SHAPES), None)
-        if found is None:
-            if not children:
-                raise WorldError(path, f"{where}: has no geometry")
-            self.skipped.add(f"<{children[0].tag}> geometry")
-            return None
-        if found.tag == "box":
-            return Shape(kind="box", size=_sizes(found, "size", 3, path, where))
-        if found.tag == "cylinder":
-            size = _sizes(found, "radius", 1, path, where) + _sizes(found, "length", 1, path, where)
-            return Shape(kind="cylinder", size=size)
-        if found.tag == "sphere":
-            return Shape(kind="sphere", size=_sizes(found, "radius", 1, path, where))
-        if found.tag == "plane":
-            return Shape(kind="plane", size=_sizes(found, "size", 2, path, where))
-        return self._mesh(found, path, where)
-
-    def _mesh(self, element: ET.Element, path: Path, where: str) -> Shape:
-        uri = (element.findtext("uri") or "").strip()
-        plain = uri.removeprefix("file://")
-        if uri.startswith("model://"):
-            places = [folder / uri.removeprefix("model://") for folder in self.model_path]
-        else:
-            places = [path.parent / plain]
-        file = next((p for p in places if p.is_file()), None)
-        if not uri or file is None:
-            looked = ", ".join(map(str, places)) or "no folder for model:// is given"
-            raise WorldError(path, f"{where}: the mesh '{uri}' is missing (looked for {looked})")
-        scale = _floats(element.findtext("scale") or "1 1 1", 3, path, f"{where}, <scale>")
-        return Shape(kind="mesh", size=scale, mesh=file)
-
-
-def _read_state(world: ET.Element, path: Path) -> dict[str, Matrix]:
-    """Poses that <state> gives: model name -> world_from_model, "model/link" -> world_from_link."""
-    poses: dict[str, Matrix] = {}
-    for model in world.findall("state/model"):
-        name = model.get("name", "")
-        if model.find("pose") is not None:
-            poses[name] = _pose(model, path, f"state of model '{name}'")
-        for link in model.findall("link"):
-            if link.find("pose") is not None:
-                label = link.get("name", "")
-                poses[f"{name}/{label}"] = _pose(link, path, f"state of link '{name}/{label}'")
-    return poses
+    def _note_skipped(self, element: ET.Element) -> None:
+        self.lights += sum(child.tag == "light" for child in element)
+        strange = {c.tag for c in element} - _KNOWN[element.tag] - _WITHOUT_MEANING - {"light"}
+        of = "" if element.tag == "world" else f" of {'an' if element.tag[0] in 'ai' else 'a'} {element.tag}"
+        # a colon marks a vendor's extension
+        self.skipped.update(f"<{tag}>{of}" for tag in strange if ":" not in tag and "}" not in tag)
 
 
-def _kind_of(model: str, link: str, collisions: list[Collision]) -> BodyKind:
+def _part_pose(part: ET.Element, place: Place, frames: Frames, link_from_model: Matrix, link: str) -> Matrix:
+    """link_from_part."""
+    element = part.find("pose")
+    if element is not None and (element.get("relative_to") or element.get("frame")):
+        return link_from_model @ frames.pose(part, place, link)
+    return pose_of(part, place)
+
+
+def _inverse(pose: Matrix) -> Matrix:
+    turn = pose[:3, :3].T
+    inverse = identity()
+    inverse[:3, :3], inverse[:3, 3] = turn, -turn @ pose[:3, 3]
+    return inverse
+
+
+def _kind_of(model: str, link: str, collisions: Iterable[Collision]) -> BodyKind:
     text = f"{model} {link}".lower()
     if "ground_plane" in text or any(c.shape.kind == "plane" for c in collisions):
         return "floor"
@@ -261,74 +335,8 @@ def _kind_of(model: str, link: str, collisions: list[Collision]) -> BodyKind:
 
 
 def _floor(name: str) -> Body:
-    shape = Shape(kind="plane", size=(100.0, 100.0))
+    shape = Shape(kind="plane", size=PLANE)
     look = Material(rgba=(0.55, 0.55, 0.55, 1.0))
     return Body(
         name=name, kind="floor", visuals=(Visual(shape=shape, material=look),), collisions=(Collision(shape=shape),)
     )
-
-
-def _pose(element: ET.Element, path: Path, where: str) -> Matrix:
-    pose = element.find("pose")
-    if pose is None or not (pose.text or "").strip():
-        return identity()
-    if pose.get("relative_to") or pose.get("frame"):
-        log.warning("%s: %s: a pose relative to another frame is read as relative to its parent", path, where)
-    v = _floats(pose.text or "", 6, path, f"{where}, <pose>")
-    return from_xyz_rpy(v[:3], v[3:])
-
-
-def _material(element: ET.Element, path: Path, where: str) -> Material:
-    colour = element.findtext("material/diffuse") or element.findtext("material/ambient")
-    if not colour:
-        return Material(rgba=_named_colour(element.findtext("material/script/name") or ""))
-    values = [float(v) for v in colour.split()] if _all_numbers(colour) else []
-    if len(values) not in (3, 4):
-        raise WorldError(path, f"{where}, <diffuse>: expected 3 or 4 numbers, got '{colour}'")
-    rgba = [*values, 1.0][:4]
-    return Material(rgba=(rgba[0], rgba[1], rgba[2], rgba[3]))
-
-
-def _named_colour(script: str) -> tuple[float, float, float, float]:
-    names = {
-        "White": (0.95, 0.95, 0.95),
-        "Black": (0.05, 0.05, 0.05),
-        "Red": (0.8, 0.1, 0.1),
-        "Green": (0.1, 0.6, 0.15),
-        "Blue": (0.1, 0.2, 0.8),
-        "Yellow": (0.85, 0.8, 0.1),
-        "Orange": (0.9, 0.5, 0.1),
-        "Wood": (0.55, 0.40, 0.25),
-        "WoodFloor": (0.55, 0.43, 0.31),
-        "Bricks": (0.60, 0.33, 0.26),
-        "Grey": (0.6, 0.6, 0.6),
-        "DarkGrey": (0.3, 0.3, 0.3),
-    }
-    rgb = names.get(script.strip().removeprefix("Gazebo/"), (0.7, 0.7, 0.7))
-    return (*rgb, 1.0)
-
-
-def _all_numbers(text: str) -> bool:
-    try:
-        return all(np.isfinite(float(word)) for word in text.split())
-    except ValueError:
-        return False
-
-
-def _floats(text: str, count: int, path: Path, where: str) -> tuple[float, ...]:
-    words = text.split()
-    if len(words) != count or not _all_numbers(text):
-        raise WorldError(path, f"{where}: expected {count} numbers, got '{text.strip()}'")
-    return tuple(float(w) for w in words)
-
-
-def _sizes(shape: ET.Element, tag: str, count: int, path: Path, where: str) -> tuple[float, ...]:
-    text = shape.findtext(tag)
-    if text is None:
-        if shape.tag == "plane":
-            return (100.0, 100.0)
-        raise WorldError(path, f"{where}: <{shape.tag}> has no <{tag}>")
-    values = _floats(text, count, path, f"{where}, <{tag}>")
-    if min(values) <= 0.0:
-        raise WorldError(path, f"{where}, <{tag}>: expected positive numbers, got '{text.strip()}'")
-    return values

@@ -79,11 +79,12 @@ def test_state_overrides_poses(tmp_path: Path) -> None:
 
 def test_a_mesh_is_looked_up_beside_the_world_and_by_model_path(tmp_path: Path) -> None:
     (tmp_path / "m" / "chair" / "meshes").mkdir(parents=True)
-    (tmp_path / "m" / "chair" / "meshes" / "a.stl").write_bytes(b"")
+    file = tmp_path / "m" / "chair" / "meshes" / "a.stl"
+    file.write_bytes(bytes(80) + (1).to_bytes(4, "little") + bytes(50))
     geometry = "<geometry><mesh><uri>model://chair/meshes/a.stl</uri><scale>2 2 2</scale></mesh></geometry>"
     world = read(tmp_path, sdf(model(link(collision(geometry)))), model_path=[tmp_path / "m"])
     shape = world.bodies[0].collisions[0].shape
-    assert shape.mesh == tmp_path / "m" / "chair" / "meshes" / "a.stl"
+    assert shape.mesh == file
     assert shape.size == (2.0, 2.0, 2.0)
 
 
@@ -134,7 +135,7 @@ def test_unknown_elements_are_named_in_one_warning(tmp_path: Path, caplog: pytes
         (sdf(model(link(collision("<geometry><box/></geometry>")))), "has no <size>"),
         (sdf(model(link(collision("")))), "has no geometry"),
         (sdf(model(link(collision("<geometry><mesh><uri>a.stl</uri></mesh></geometry>")))), "'a.stl' is missing"),
-        (sdf("<include><uri>model://nowhere</uri></include>"), "no such model"),
+        (sdf("<include><uri>model://nowhere</uri></include>"), "'model://nowhere' is missing (looked for "),
         (sdf(model(link(collision())) * 2), "'thing' is used twice"),
         (sdf("<model/>"), "has no name"),
     ],

@@ -1,0 +1,149 @@
+"""The shapes of SDF: <geometry> of a <collision> or <visual>, meshes read from their files."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from rosbot_patrol.simulation.mesh_files import MeshPart, load_parts, merged
+from rosbot_patrol.simulation.scene import Collision, Matrix, Shape, Visual
+from rosbot_patrol.simulation.sdf_files import ModelPath
+from rosbot_patrol.simulation.sdf_looks import is_unseen, material_of
+from rosbot_patrol.simulation.sdf_values import Place, floats, sizes, turned_to
+
+log = logging.getLogger(__name__)
+
+PLANE = (100.0, 100.0)  # size of a plane that names none [m]
+
+_READ = {"box", "cylinder", "sphere", "plane", "mesh"}
+_KNOWN = {
+    "visual": {"pose", "geometry", "material", "transparency", "cast_shadows", "meta", "laser_retro"},
+    "collision": {"pose", "geometry", "surface", "laser_retro", "max_contacts", "bounce", "friction"},
+}
+
+Scale = tuple[float, float, float]
+
+
+@dataclass
+class ShapeReader:
+    """Reads shapes; each mesh file once.
+
+    Attributes:
+        model_path: where model:// is.
+        skipped: takes the names of what is not read.
+    """
+
+    model_path: ModelPath
+    skipped: set[str]
+    _meshes: dict[Path, tuple[MeshPart, ...]] = field(default_factory=dict)
+    _merged: dict[tuple[Path, str, bool], tuple[MeshPart, ...]] = field(default_factory=dict)
+
+    def visuals(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Visual]:
+        """What a <visual> shows: one for each colour of its mesh, none where it is transparent or of no known shape.
+
+        Raises:
+            WorldError: an element makes no sense, or a mesh is missing or broken.
+        """
+        self._note(element)
+        if is_unseen(element, place):
+            return []
+        visuals = []
+        for shape, own, turn in self._shapes(element, place, scale, apart=True):
+            material = material_of(element, own, place, self.skipped)
+            visuals.append(Visual(shape=shape, pose=pose @ turn, material=material))
+        return visuals
+
+    def collisions(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Collision]:
+        """The shape of a <collision>, none where it is of no known shape. Raises WorldError."""
+        self._note(element)
+        shapes = self._shapes(element, place, scale, apart=False)
+        return [Collision(shape=shape, pose=pose @ turn) for shape, _, turn in shapes]
+
+    def _note(self, element: ET.Element) -> None:
+        self.skipped.update(f"<{c.tag}> of a {element.tag}" for c in element if c.tag not in _KNOWN[element.tag])
+
+    def _shapes(
+        self, element: ET.Element, place: Place, scale: Scale, *, apart: bool
+    ) -> list[tuple[Shape, tuple[float, float, float, float] | None, Matrix]]:
+        """(shape, colour of its file, turn) of an element; the parts of a mesh apart or as one."""
+        geometry = element.find("geometry")
+        children = list(geometry) if geometry is not None else []
+        if not children:
+            raise place.error("has no geometry")
+        found = next((c for c in children if c.tag in _READ), None)
+        if found is None:
+            if children[0].tag != "empty":
+                self.skipped.add(f"<{children[0].tag}> geometry")
+            return []
+        if found.tag == "mesh":
+            return [(shape, own, np.eye(4)) for shape, own in self._mesh(found, place, scale, apart=apart)]
+        if found.tag == "plane":
+            size = sizes(found, "size", 2, place) if found.find("size") is not None else PLANE
+            normal = floats(found.findtext("normal") or "0 0 1", 3, place.inside("<normal>"))
+            if max(map(abs, normal)) == 0.0:
+                raise place.inside("<normal>").error("expected a direction, got '0 0 0'")
+            if element.tag == "collision" and abs(turned_to(normal)[2, 2]) < 0.99:
+                self.skipped.add("<collision> with a <plane> that does not lie flat")
+            turn = turned_to(normal) if normal[:2] != (0.0, 0.0) else np.eye(4)
+            return [(Shape(kind="plane", size=(size[0] * scale[0], size[1] * scale[1])), None, turn)]
+        return [(_scaled(_primitive(found, place), scale), None, np.eye(4))]
+
+    def _mesh(
+        self, element: ET.Element, place: Place, scale: Scale, *, apart: bool
+    ) -> list[tuple[Shape, tuple[float, float, float, float] | None]]:
+        uri = (element.findtext("uri") or "").strip()
+        if not uri:
+            raise place.error("<mesh> has no <uri>")
+        file = self.model_path.find(uri, place.path.parent, place.inside("mesh"))
+        own = floats(element.findtext("scale") or "1 1 1", 3, place.inside("<scale>"))
+        if 0.0 in own:
+            raise place.inside("<scale>").error("expected numbers other than 0, got '" + " ".join(map(str, own)) + "'")
+        size = tuple(a * b for a, b in zip(own, scale, strict=True))
+        name = (element.findtext("submesh/name") or "").strip()
+        centred = (element.findtext("submesh/center") or "").strip().lower() in ("true", "1")
+        parts = self._parts(file, name, centred, place)
+        if not apart:
+            key = (file, name, centred)
+            if key not in self._merged:
+                self._merged[key] = (MeshPart(name, *merged(parts)),)
+            parts = self._merged[key]
+        return [(Shape(kind="mesh", size=size, mesh=file, vertices=p.vertices, faces=p.faces), p.rgba) for p in parts]
+
+    def _parts(self, file: Path, submesh: str, centred: bool, place: Place) -> tuple[MeshPart, ...]:
+        if file not in self._meshes:
+            self._meshes[file] = load_parts(file)
+        parts = self._meshes[file]
+        if not submesh:
+            return parts
+        chosen = tuple(part for part in parts if part.name == submesh)
+        if not chosen:
+            there = ", ".join(sorted({f"'{part.name}'" for part in parts}))
+            raise place.inside("<submesh>").error(f"{file} has no part '{submesh}' (there: {there})")
+        if centred:
+            every = np.vstack([part.vertices for part in chosen])
+            middle = (every.min(axis=0) + every.max(axis=0)) / 2.0
+            chosen = tuple(replace(part, vertices=part.vertices - middle) for part in chosen)
+        return chosen
+
+
+def _primitive(element: ET.Element, place: Place) -> Shape:
+    if element.tag == "box":
+        return Shape(kind="box", size=sizes(element, "size", 3, place))
+    radius = sizes(element, "radius", 1, place)
+    if element.tag == "sphere":
+        return Shape(kind="sphere", size=radius)
+    return Shape(kind="cylinder", size=radius + sizes(element, "length", 1, place))
+
+
+def _scaled(shape: Shape, scale: Scale) -> Shape:
+    """A primitive made larger as Gazebo's <state> does it: round ones by the larger of x and y."""
+    if scale == (1.0, 1.0, 1.0):
+        return shape
+    if shape.kind == "box":
+        return replace(shape, size=tuple(a * b for a, b in zip(shape.size, scale, strict=True)))
+    wide = max(scale[:2]) if shape.kind == "cylinder" else max(scale)
+    return replace(shape, size=(shape.size[0] * wide, *(length * scale[2] for length in shape.size[1:])))
