@@ -111,6 +111,28 @@ def load(cls: type[T], tree: Mapping[str, Any], *, name: str = "~", ignore: Iter
     return cls(**values)
 
 
+def unknown_name(name: str, known: Iterable[str]) -> str:
+    """What to say of a name that is none of those known."""
+    names = list(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'?" if near else f"expected one of {', '.join(names)}"
+    return f"'{name}' is not known here, {hint}"
+
+
+def load_strict(cls: type[T], tree: Mapping[str, Any], *, name: str) -> T:
+    """As `load`, but a name that is not declared is an error.
+
+    Raises:
+        ParamError: as of `load`, and for an unknown name, with the nearest known one.
+    """
+    if isinstance(tree, Mapping):
+        known = [key for key, *_ in declared(cls)]
+        for key in tree:
+            if key not in known:
+                raise ParamError(f"{name}{key}", unknown_name(str(key), known))
+    return load(cls, tree, name=name)
+
+
 def declared(cls: type) -> list[tuple[str, str, Any, ParamInfo]]:
     """The parameters of `cls` as (name, type, default, info), for tables; required ones have default MISSING."""
     hints = typing.get_type_hints(cls)

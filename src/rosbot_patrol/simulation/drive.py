@@ -50,6 +50,7 @@ class Drive:
         self._command = STOP
         self._command_time = -math.inf
         self._slip = np.zeros(3)
+        self.stuck: frozenset[str] = frozenset()  # sides whose wheels do not turn: left, right
         self.left = 0.0
         self.right = 0.0
 
@@ -74,6 +75,9 @@ class Drive:
         change = p.wheel_acceleration * dt
         self.left += min(max(wanted_left - self.left, -change), change)
         self.right += min(max(wanted_right - self.right, -change), change)
+        if self.stuck:
+            self.left *= "left" not in self.stuck
+            self.right *= "right" not in self.stuck
         return self._driven(dt)
 
     def stop(self) -> None:

@@ -26,18 +26,14 @@ from rosbot_patrol.simulation.faults import Doorway
 from rosbot_patrol.simulation.imu import Imu, ImuParams, ImuReading
 from rosbot_patrol.simulation.lidar import LidarParams, measure_scan
 from rosbot_patrol.simulation.matrices import Matrix, from_pose2d, to_pose2d
-from rosbot_patrol.simulation.motion_sensors import (
-    MotionSensor,
-    MotionSensorParams,
-    SensorPlace,
-    bearing_in_cone,
-)
+from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace
 from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.odometry import EncoderOdometry, OdometryParams
 from rosbot_patrol.simulation.physics import Physics, Touch
 from rosbot_patrol.simulation.range_sensors import RangeParams, measure_range
 from rosbot_patrol.simulation.robot import RobotDescription
 from rosbot_patrol.simulation.scene import Body, SceneRenderer
+from rosbot_patrol.simulation.sensor_net import SensorNet
 from rosbot_patrol.simulation.slices import Slice, slice_bodies
 from rosbot_patrol.simulation.walkers import Walker, cuts
 from rosbot_patrol.simulation.world import World
@@ -126,16 +122,16 @@ class Engine:
         self._spawned = 0
         self._boxes: dict[str, Body] = {}
         self.faults = FaultBoard(self, doorways)
-        self._restarted: list[int] = []
         self._robot: _Robot | None = None
         self._steps = 0
-        self._motion = {s.id: MotionSensor(self.params.motion) for s in self.sensors}
-        self._told: dict[int, bool] = {}
+        self._motion = SensorNet(self.params.motion, self.sensors, self.faults)
         self._camera = None
         if make_renderer is not None:
             self._camera = Camera(self.params.camera, make_renderer, world.bodies, self.params.seed)
         for actor in world.actors:
             self.spawn_actor(actor.name, actor.model, "", actor.pose)
+            if actor.path:
+                self.move_actor(actor.name, actor.path, actor.speed, actor.loop)
 
     # Time ------------------------------------------------------------------------------------------------------------
 
@@ -168,8 +164,7 @@ class Engine:
         if robot is not None and self._steps % _BATTERY_EVERY == 0:
             robot.battery.step(robot.drive.load, _BATTERY_EVERY * STEP)
         if self._steps % _MOTION_EVERY == 0:
-            for place in self.sensors:
-                self._motion[place.id].update(self.now, self._seen_by(place))
+            self._motion.update(self.now, self._walkers.values(), self._eye_slice)
 
     def reset(self) -> None:
         """Robot back to its start at rest, odometry to zero; time, actors and battery stay as they are."""
@@ -334,23 +329,19 @@ class Engine:
 
     def motion(self) -> dict[int, bool]:
         """Whether each motion sensor's output is high, by id."""
-        return {n: self.faults.level(n, s.is_high, self.now) for n, s in self._motion.items()}
+        return self._motion.levels(self.now)
 
     def motion_changes(self) -> list[tuple[int, bool]]:
         """Id and level of each motion sensor whose output has changed since this was last asked."""
-        changed = [(n, is_high) for n, is_high in self.motion().items() if is_high != self._told.get(n, False)]
-        self._told.update(changed)
-        return changed
+        return self._motion.changes(self.now)
 
     def restart_sensor(self, sensor: int) -> None:
         """Switch a motion sensor off and on: it warms up anew."""
-        self._motion[sensor] = MotionSensor(replace(self.params.motion, prewarmed=False), self.now)
-        self._restarted.append(sensor)
+        self._motion.restart(sensor, self.now)
 
     def restarted_sensors(self) -> list[int]:
         """Ids of the motion sensors that were switched off and on since this was last asked."""
-        restarted, self._restarted = self._restarted, []
-        return restarted
+        return self._motion.restarted()
 
     def warm_up(self) -> None:
         """Take one of each measurement, so that the first that counts does not come late."""
@@ -361,19 +352,6 @@ class Engine:
 
     def _noise(self, sensor: str) -> np.random.Generator:
         return noise_of(self.params.seed, sensor, self._steps)
-
-    def _seen_by(self, place: SensorPlace) -> list[tuple[str, float]]:
-        seen = []
-        for walker in self._walkers.values():
-            if not walker.is_warm:
-                continue
-            bearing = bearing_in_cone(self.params.motion, place, walker.pose)
-            if bearing is None:
-                continue
-            eye = (place.x + 0.1 * math.cos(bearing), place.y + 0.1 * math.sin(bearing))
-            if not self._eye_slice.is_blocked(eye, (walker.pose.x, walker.pose.y)):
-                seen.append((walker.name, bearing))
-        return seen
 
     # What is put there -----------------------------------------------------------------------------------------------
 

@@ -126,12 +126,17 @@ class Physics:
         grip = traction * robot.mass * GRAVITY
         self._limits = (grip, grip, grip * robot.track / 2.0)
         self.set_pose(pose)
-        stuck = self._stands_in()
+        stuck = self.blocker()
         if stuck:
-            pybullet.removeBody(self._robot, physicsClientId=self._client)
-            self._robot = None
+            self.remove_robot()
             place = f"({pose.x:.2f}, {pose.y:.2f})"
             raise WorldError(f"robot '{robot.name}'", f"{place} is no place for it, '{stuck}' is there")
+
+    def remove_robot(self) -> None:
+        """Take the robot out."""
+        if self._robot is not None:
+            pybullet.removeBody(self._robot, physicsClientId=self._client)
+            self._robot = None
 
     @property
     def pose(self) -> Pose2D:
@@ -187,7 +192,10 @@ class Physics:
         states = pybullet.getJointStates(self._robot, _JOINTS, physicsClientId=self._client)
         return [(s[0], s[1]) for s in states]
 
-    def _stands_in(self) -> str | None:
+    def blocker(self) -> str | None:
+        """Name of what the robot stands in, None where it has room (or is not there)."""
+        if self._robot is None:
+            return None
         pybullet.performCollisionDetection(physicsClientId=self._client)
         for contact in pybullet.getContactPoints(bodyA=self._robot, physicsClientId=self._client):
             if contact[8] < -_DEEP and contact[2] in self._bodies:

@@ -1,0 +1,246 @@
+"""Everything that can be broken on command: one declaration for each kind of fault, checked as parameters are.
+
+    fault = read_fault({"kind": "odometry_slip", "factor": 0.3, "duration": 5.0}, source="a service")
+
+A fault says what it does to the readings that pass through it; `fault_board.py` keeps those in force, and the engine
+asks it. Times are of simulated time, but for the delays and drops of a sensor's link, which are real ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.params import param
+
+EVENTS = ("start", "on_guard", "driving", "looking", "returning", "home")
+ALL_SENSORS = -1
+
+
+def _finite(value: float) -> str | None:
+    return None if math.isfinite(value) else f"is {value}, expected a finite number"
+
+
+def _finite_or_none(value: float | None) -> str | None:
+    return None if value is None else _finite(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timed:
+    """Something that happens at a time, counted from an event."""
+
+    at: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="when, counted from the event `after`")
+    after: str = param("", choices=("", *EVENTS), doc="event of the patrol; empty: the scenario's own beginning")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault(Timed):
+    """What all faults have."""
+
+    kind: ClassVar[str] = ""
+    is_instant: ClassVar[bool] = False
+
+    duration: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="how long it lasts, 0: until it is cleared")
+
+    @property
+    def where(self) -> str:
+        """What it befalls, "" where the kind says it."""
+        return str(getattr(self, "target", ""))
+
+    @property
+    def name(self) -> str:
+        """Kind and target; two faults of one name are not in force together."""
+        return f"{self.kind} {self.where}".strip()
+
+    def __str__(self) -> str:
+        own = [f.name for f in self.__dataclass_fields__.values() if f.name not in _COMMON]
+        details = ", ".join(f"{key} {getattr(self, key):g}" for key in own if not isinstance(getattr(self, key), str))
+        return f"{self.name} ({details})" if details else self.name
+
+
+_COMMON = ("at", "after", "duration", "target")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraFrozen(Fault):
+    """The same picture again and again, with new stamps."""
+
+    kind: ClassVar[str] = "camera_frozen"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraBlack(Fault):
+    """Colour 0 everywhere, no depth anywhere, as behind a cover."""
+
+    kind: ClassVar[str] = "camera_black"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraSilent(Fault):
+    """No pictures, and no camera_info."""
+
+    kind: ClassVar[str] = "camera_silent"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarSilent(Fault):
+    """No scans."""
+
+    kind: ClassVar[str] = "lidar_silent"
+
+
+@dataclass(frozen=True, kw_only=True)
+class OdometrySlip(Fault):
+    """The wheels turn as told, and the base follows by a part of it."""
+
+    kind: ClassVar[str] = "odometry_slip"
+    factor: float = param(0.5, lo=0.0, hi=1.0, doc="part of the wheels' way that the base makes")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WheelStuck(Fault):
+    """The wheels of one side do not turn."""
+
+    kind: ClassVar[str] = "wheel_stuck"
+    target: str = param(choices=("left", "right"), doc="which side")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorFault(Fault):
+    """What befalls one motion sensor."""
+
+    target: int = param(lo=0, hi=255, doc="id of the motion sensor")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionStuck(SensorFault):
+    """The output stays high: it calls once, and never again."""
+
+    kind: ClassVar[str] = "motion_stuck"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionSilent(SensorFault):
+    """The device says nothing more, neither motion nor heartbeat, on a link that stays open."""
+
+    kind: ClassVar[str] = "motion_silent"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionFlapping(SensorFault):
+    """The output goes up and down."""
+
+    kind: ClassVar[str] = "motion_flapping"
+    period: float = param(4.0, unit="s", lo=0.2, check=_finite, doc="from one rise to the next")
+
+    def is_high(self, since: float) -> bool:
+        """The output, so long [s] after the beginning: high in the first half of each period."""
+        return math.fmod(since, self.period) < self.period / 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionRebooting(SensorFault):
+    """The device starts anew: its link breaks, and the sensor is blind while it warms up."""
+
+    kind: ClassVar[str] = "motion_rebooting"
+    every: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="again after that long, 0: only once")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkPoor(Fault):
+    """Frames of a sensor's TCP link come late or not at all, and the link breaks; in real time."""
+
+    kind: ClassVar[str] = "link_poor"
+    target: int = param(ALL_SENSORS, lo=ALL_SENSORS, hi=255, doc="id of the motion sensor, -1: all of them")
+    loss: float = param(0.0, lo=0.0, hi=1.0, doc="part of the frames that get lost")
+    delay: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="time that each frame takes")
+    jitter: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="longest time on top of it")
+    drop_every: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="mean time between two breaks, 0: none")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoorwayBlocked(Fault):
+    """A box stands in a doorway: a named one (`target`), or wherever x, y say."""
+
+    kind: ClassVar[str] = "doorway_blocked"
+    target: str = param("", doc="name of the doorway")
+    x: float | None = param(None, unit="m", check=_finite_or_none, doc="middle of the box")
+    y: float | None = param(None, unit="m", check=_finite_or_none, doc="middle of the box")
+    yaw: float | None = param(None, unit="rad", check=_finite_or_none, doc="along its width")
+    width: float | None = param(None, unit="m", lo=0.05, hi=20.0, doc="along the wall (0.9)")
+    height: float = param(1.0, unit="m", lo=0.05, hi=3.0, doc="from the floor")
+    depth: float = param(0.3, unit="m", lo=0.02, hi=5.0, doc="across the wall")
+
+    def __str__(self) -> str:
+        place = "" if self.x is None or self.y is None else f"({self.x:.2f}, {self.y:.2f})"
+        return f"{self.name} {place}".strip()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotCarried(Fault):
+    """The robot is lifted and put down elsewhere at once; its odometry does not notice."""
+
+    kind: ClassVar[str] = "robot_carried"
+    is_instant: ClassVar[bool] = True
+    x: float = param(unit="m", check=_finite, doc="where to, in the frame map")
+    y: float = param(unit="m", check=_finite, doc="where to, in the frame map")
+    yaw: float = param(0.0, unit="rad", check=_finite, doc="direction that it looks in there")
+
+    @property
+    def pose(self) -> Pose2D:
+        """Where it is put."""
+        return Pose2D(self.x, self.y, self.yaw)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doorway:
+    """A place to put a box: its middle [m], the direction of the wall that it is in [rad], its width [m]."""
+
+    x: float = param(unit="m", check=_finite, doc="middle")
+    y: float = param(unit="m", check=_finite, doc="middle")
+    yaw: float = param(0.0, unit="rad", check=_finite, doc="direction of the wall")
+    width: float = param(0.9, unit="m", lo=0.05, hi=20.0, doc="clear width")
+
+
+_CLASSES: tuple[type[Fault], ...] = (
+    CameraFrozen,
+    CameraBlack,
+    CameraSilent,
+    LidarSilent,
+    OdometrySlip,
+    WheelStuck,
+    MotionStuck,
+    MotionSilent,
+    MotionFlapping,
+    MotionRebooting,
+    LinkPoor,
+    DoorwayBlocked,
+    RobotCarried,
+)
+KINDS: dict[str, type[Fault]] = {cls.kind: cls for cls in _CLASSES}
+
+
+def read_fault(tree: Mapping[str, Any], *, source: str) -> Fault:
+    """The fault that a mapping with the key `kind` describes.
+
+    Args:
+        tree: kind, target, duration and the kind's own keys.
+        source: prefix of the names in messages, "FILE: faults[0]/".
+
+    Raises:
+        ParamError: the kind or a key is not known, or a value is wrong; names it.
+    """
+    if not isinstance(tree, Mapping):
+        raise ParamError(source.rstrip("/ "), f"expected the keys of a fault, got {tree!r}")
+    kind = tree.get("kind")
+    if kind not in KINDS:
+        raise ParamError(f"{source}kind", params.unknown_name(str(kind), KINDS) if "kind" in tree else "is missing")
+    fault = params.load_strict(KINDS[kind], {k: v for k, v in tree.items() if k != "kind"}, name=source)
+    if isinstance(fault, DoorwayBlocked) and not fault.target and (fault.x is None or fault.y is None):
+        raise ParamError(f"{source}target", "is missing: name a doorway, or say x and y")
+    return fault
