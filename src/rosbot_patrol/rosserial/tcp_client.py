@@ -3,6 +3,8 @@
 Publishes `motion_trigger` under id 125 (100 + the 25 subscribers that the sketch reserves): a heartbeat
 `{id, move: false}` at 2 Hz, and `{id, move: true}` at once when motion begins.
 
+What it sends may go over a poor link (`set_link`): frames come late or never, in real time, and the link breaks.
+
 Differs: the sketch reports motion with the next heartbeat, up to 0.5 s late, and publishes before it has negotiated.
 """
 
@@ -15,6 +17,7 @@ import threading
 import time
 
 from rosbot_patrol.rosserial.client_session import Configured, DeviceEvent, DeviceSession, Unconfigured
+from rosbot_patrol.rosserial.poor_link import PERFECT, LinkQuality, PoorLink
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, ESP_TRIGGER_TYPES, TopicInfo, pack_esp_trigger
 
 log = logging.getLogger(__name__)
@@ -66,6 +69,8 @@ class EspClient:
         self._in_flight = False  # a motion whose frame is being sent
         self._stopping = False
         self._reboot = False
+        self._quality = PERFECT
+        self._line = PoorLink(PERFECT, time.monotonic())
         self._connected = threading.Event()
         self._wake_read, self._wake_write = socket.socketpair()
         self._wake_read.setblocking(False)
@@ -114,6 +119,11 @@ class EspClient:
         with self._lock:
             self._pending = self._motion = False
         self._reboot = True
+        self._wake()
+
+    def set_link(self, quality: LinkQuality) -> None:
+        """Send over a link of this quality from now on."""
+        self._quality = quality
         self._wake()
 
     def _wake(self) -> None:
@@ -168,19 +178,18 @@ class EspClient:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         link.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         session = DeviceSession([self._info])
+        self._line.begin(time.monotonic())
         heartbeat_due = time.monotonic()
         while not self._stopping and not self._reboot:
             now = time.monotonic()
             events = session.tick(now)
             heartbeat_due = self._publish_due(session, now, heartbeat_due)
-            try:
-                for frame in session.take_output():
-                    link.sendall(frame)
-            except OSError:
-                self._pending = self._pending or self._in_flight
-                raise
-            self._in_flight = False
-            wait = max(heartbeat_due - time.monotonic(), 0.0) if session.configured else 1.0
+            self._send(link, session, now)
+            if self._line.breaks(now):
+                log.debug("sensor %d: the link breaks, as it is told to", self.sensor_id)
+                return
+            due = min(heartbeat_due if session.configured else now + 1.0, self._line.next_event)
+            wait = max(due - time.monotonic(), 0.0)
             ready = _readable(wait, link, self._wake_read)
             if self._wake_read in ready:
                 self._drain_wake()
@@ -190,6 +199,19 @@ class EspClient:
                     return
                 events += session.receive(data, time.monotonic())
             self._note(events)
+
+    def _send(self, link: socket.socket, session: DeviceSession, now: float) -> None:
+        """Send what has come through the line; a motion whose frame could not be sent is reported later."""
+        self._line.change(self._quality, now)
+        try:
+            for frame in session.take_output():
+                self._line.put(frame, now)
+            for frame in self._line.take(now):
+                link.sendall(frame)
+        except OSError:
+            self._pending = self._pending or self._in_flight
+            raise
+        self._in_flight = False
 
     def _publish_due(self, session: DeviceSession, now: float, heartbeat_due: float) -> float:
         """Send what is due; return when the next heartbeat is."""

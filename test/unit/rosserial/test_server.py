@@ -12,6 +12,7 @@ import pytest
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.packet import Parser, encode
 from rosbot_patrol.rosserial.policy import TRUSTED, Policy
+from rosbot_patrol.rosserial.poor_link import LinkQuality
 from rosbot_patrol.rosserial.server import SerialServer
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.rosserial.topics import (
@@ -112,6 +113,30 @@ def test_trigger_raised_before_the_bridge_is_there_arrives():
     server.stop()
     thread.join(3.0)
     server.close()
+
+
+def test_a_poor_link_delays_loses_and_breaks():
+    with serving() as (recorder, _, port):
+        sensor = EspClient("127.0.0.1", port, 6).start()
+        assert sensor.wait_connected(3.0)
+        sensor.set_link(LinkQuality(delay=0.8))
+        sensor.trigger()
+        began = time.monotonic()
+        wait_for(lambda: b"\x06\x01" in recorder.messages)
+        assert time.monotonic() - began > 0.6
+        sensor.set_link(LinkQuality(loss=1.0))
+        time.sleep(1.0)  # what was on its way
+        count = len(recorder.messages)
+        sensor.trigger()
+        time.sleep(1.2)
+        assert len(recorder.messages) == count
+        sensor.set_link(LinkQuality(drop_every=0.2, seed=1))
+        wait_for(lambda: len(recorder.opened) >= 3)
+        sensor.set_link(LinkQuality())
+        wait_for(lambda: sensor.connected, 6.0)
+        sensor.trigger()
+        wait_for(lambda: recorder.messages.count(b"\x06\x01") == 2, 6.0)
+        sensor.stop()
 
 
 def test_many_sensors_on_one_port_with_a_stranger_and_a_stalled_reader_among_them():
