@@ -2,23 +2,25 @@
 
 The base hangs on three joints (x, y, yaw), each driven at a speed with a bounded force: what the tyres can give. So
 it can neither climb, tip over nor tunnel, a wall stops it, and along a wall it slides. The floor is no body here.
+Of what stands still only what is near the robot is in PyBullet's world, whose time grows with all that is in it.
 """
 
 from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pybullet
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
+from rosbot_patrol.simulation.bullet_shapes import bounds_of, shapes_of, single_shape, touchable
 from rosbot_patrol.simulation.matrices import Matrix, to_quaternion
-from rosbot_patrol.simulation.meshes import mesh_of
+from rosbot_patrol.simulation.near_bodies import NearBodies
 from rosbot_patrol.simulation.robot import RobotDescription
-from rosbot_patrol.simulation.scene import Body, Collision, Shape
+from rosbot_patrol.simulation.scene import Body, identity
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +53,9 @@ class Physics:
         if self._client < 0:
             raise WorldError("pybullet", "cannot be started")
         self._bodies: dict[int, Body] = {}
-        self._ids: dict[str, int] = {}
+        self._ids: dict[str, list[int]] = {}
+        self._still: dict[str, Body] = {}
+        self._near = NearBodies()
         self._robot: int | None = None
         self._limits = (0.0, 0.0, 0.0)
         self._height = 0.0
@@ -61,35 +65,67 @@ class Physics:
 
     def add(self, body: Body) -> None:
         """Put a body that nothing pushes away; planes and bodies without shapes are left out."""
-        parts = [c for c in body.collisions if c.shape.kind != "plane"]
-        if body.name in self._ids:
+        if body.name in self._ids or body.name in self._still:
             raise WorldError("world", f"the name '{body.name}' is used twice")
-        if not parts:
-            return
-        number = pybullet.createMultiBody(
-            baseMass=0.0,
-            baseCollisionShapeIndex=self._compound(parts),
-            basePosition=body.pose[:3, 3].tolist(),
-            baseOrientation=to_quaternion(body.pose),
-            physicsClientId=self._client,
-        )
-        self._bodies[number] = body
-        self._ids[body.name] = number
+        if body.static:
+            parts, bounds = touchable(body)
+            if parts:
+                self._still[body.name] = replace(body, collisions=tuple(parts))
+                self._near.add(body.name, bounds)
+                self._refresh()
+        elif any(c.shape.kind != "plane" for c in body.collisions):
+            self._put(body)
 
     def remove(self, name: str) -> None:
         """Take a body out."""
-        number = self._ids.pop(name, None)
-        if number is not None:
-            del self._bodies[number]
-            pybullet.removeBody(number, physicsClientId=self._client)
+        if self._still.pop(name, None) is not None:
+            self._near.remove(name)
+        self._take(name)
 
     def move(self, name: str, world_from_body: Matrix) -> None:
-        """Put a body elsewhere."""
-        number = self._ids.get(name)
-        if number is not None:
+        """Put a body elsewhere; one that stood still is taken for one that moves from now on."""
+        still = self._still.pop(name, None)
+        if still is not None:
+            self._near.remove(name)
+            self._take(name)
+            self._put(replace(still, static=False))
+        for number in self._ids.get(name, ()):
             pybullet.resetBasePositionAndOrientation(
                 number, world_from_body[:3, 3].tolist(), to_quaternion(world_from_body), physicsClientId=self._client
             )
+
+    def _put(self, body: Body) -> None:
+        parts = [c for c in body.collisions if c.shape.kind != "plane"]
+        self._ids[body.name] = []
+        for shape in shapes_of(parts, self._client, body.pose if body.static else None):
+            number = pybullet.createMultiBody(
+                baseMass=0.0,
+                baseCollisionShapeIndex=shape,
+                basePosition=body.pose[:3, 3].tolist(),
+                baseOrientation=to_quaternion(body.pose),
+                useMaximalCoordinates=int(body.static),
+                physicsClientId=self._client,
+            )
+            self._bodies[number] = body
+            self._ids[body.name].append(number)
+
+    def _take(self, name: str) -> None:
+        for number in self._ids.pop(name, ()):
+            del self._bodies[number]
+            pybullet.removeBody(number, physicsClientId=self._client)
+
+    def _refresh(self) -> None:
+        """Bring in what has come near the robot, take out what it has left behind."""
+        if self._robot is not None:
+            (x, _), (y, _), _ = self._joint_states()
+            self._refresh_at(x, y)
+
+    def _refresh_at(self, x: float, y: float) -> None:
+        come, gone = self._near.update(x, y)
+        for name in gone:
+            self._take(name)
+        for name in come:
+            self._put(self._still[name])
 
     def add_robot(self, robot: RobotDescription, pose: Pose2D, traction: float) -> None:
         """Put the robot at a pose.
@@ -102,12 +138,14 @@ class Physics:
             raise WorldError(f"robot '{robot.name}'", "has no collision shape made of box, cylinder or sphere")
         nothing = [0.0, 0.0, 0.0]
         level = [0.0, 0.0, 0.0, 1.0]
-        self._height = robot.axle_height
+        self._height = robot.base_height
+        corners = [np.abs(bounds_of(part, identity())[:, :2]).max(axis=0) for part in parts]
+        self._near.set_reach(max(math.hypot(*corner) for corner in corners))
         self._robot = pybullet.createMultiBody(
             baseMass=0.0,
             basePosition=[0.0, 0.0, self._height],
             linkMasses=[1e-3, 1e-3, robot.mass],
-            linkCollisionShapeIndices=[-1, -1, self._compound(parts)],
+            linkCollisionShapeIndices=[-1, -1, single_shape(parts, self._client)],
             linkVisualShapeIndices=[-1, -1, -1],
             linkPositions=[nothing] * 3,
             linkOrientations=[level] * 3,
@@ -155,11 +193,13 @@ class Physics:
         """Put the robot elsewhere, at rest."""
         for joint, value in zip(_JOINTS, pose, strict=True):
             pybullet.resetJointState(self._robot, joint, value, 0.0, physicsClientId=self._client)
+        self._refresh()
 
     def step(self, wanted: Twist2D) -> None:
         """Advance by one time step, the base driven at a velocity in its own frame."""
         if self._robot is not None:
-            yaw = self._joint_states()[2][0]
+            (x, _), (y, _), (yaw, _) = self._joint_states()
+            self._refresh_at(x, y)
             c, s = math.cos(yaw), math.sin(yaw)
             speeds = (c * wanted.vx - s * wanted.vy, s * wanted.vx + c * wanted.vy, wanted.wz)
             pybullet.setJointMotorControlArray(
@@ -201,64 +241,3 @@ class Physics:
             if contact[8] < -_DEEP and contact[2] in self._bodies:
                 return self._bodies[contact[2]].name
         return None
-
-    def _compound(self, parts: list[Collision]) -> int:
-        if len(parts) == 1 or any(c.shape.kind == "mesh" for c in parts):
-            return self._single_or_mesh(parts)
-        boxes = [[s / 2.0 for s in c.shape.size] if c.shape.kind == "box" else [0.1] * 3 for c in parts]
-        return int(
-            pybullet.createCollisionShapeArray(
-                shapeTypes=[_bullet_kind(c.shape) for c in parts],
-                halfExtents=boxes,
-                radii=[c.shape.size[0] if c.shape.kind != "box" else 0.1 for c in parts],
-                lengths=[c.shape.size[1] if c.shape.kind in ("cylinder", "capsule") else 0.1 for c in parts],
-                collisionFramePositions=[c.pose[:3, 3].tolist() for c in parts],
-                collisionFrameOrientations=[to_quaternion(c.pose) for c in parts],
-                physicsClientId=self._client,
-            )
-        )
-
-    def _single_or_mesh(self, parts: list[Collision]) -> int:
-        place = {
-            "collisionFramePosition": parts[0].pose[:3, 3].tolist(),
-            "collisionFrameOrientation": to_quaternion(parts[0].pose),
-            "physicsClientId": self._client,
-        }
-        shape = parts[0].shape
-        if shape.kind == "box" and len(parts) == 1:
-            half = [s / 2.0 for s in shape.size]
-            return int(pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **place))
-        if shape.kind != "mesh" and len(parts) == 1:
-            length = shape.size[1] if len(shape.size) > 1 else 0.0
-            return int(pybullet.createCollisionShape(_bullet_kind(shape), radius=shape.size[0], height=length, **place))
-        vertices, faces = _merged(parts)
-        return int(
-            pybullet.createCollisionShape(
-                pybullet.GEOM_MESH,
-                vertices=vertices.tolist(),
-                indices=faces.ravel().tolist(),
-                flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-                physicsClientId=self._client,
-            )
-        )
-
-
-def _merged(parts: list[Collision]) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles of all parts in the frame of the body."""
-    vertices, faces, count = [], [], 0
-    for part in parts:
-        mesh = mesh_of(part.shape)
-        vertices.append(mesh.positions @ part.pose[:3, :3].T + part.pose[:3, 3])
-        faces.append(mesh.faces + count)
-        count += len(mesh.positions)
-    return np.vstack(vertices), np.vstack(faces)
-
-
-def _bullet_kind(shape: Shape) -> int:
-    kinds = {
-        "box": pybullet.GEOM_BOX,
-        "cylinder": pybullet.GEOM_CYLINDER,
-        "sphere": pybullet.GEOM_SPHERE,
-        "capsule": pybullet.GEOM_CAPSULE,
-    }
-    return int(kinds[shape.kind])
