@@ -12,8 +12,7 @@ from rosbot_patrol.geometry import Pose2D, Twist2D, compose
 from rosbot_patrol.params import param
 from rosbot_patrol.simulation import picture_kernels as kernels
 from rosbot_patrol.simulation.noise import noise_of
-from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, SceneRenderer
-from rosbot_patrol.simulation.walkers import Walker
+from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, Mover, SceneRenderer
 
 _BANK = 8
 _BLUR_VIEWS = 4  # pictures that a blurred one is the mean of
@@ -77,7 +76,7 @@ class Camera:
     bodies: Iterable[Body]
     seed: int = 0
     _renderer: SceneRenderer | None = None
-    _shown: dict[str, Walker] = field(default_factory=dict)
+    _shown: dict[str, Mover] = field(default_factory=dict)
     _put: dict[str, Body] = field(default_factory=dict)
     _put_shown: dict[str, Body] = field(default_factory=dict)
     _bank: list[NDArray[np.int8]] = field(default_factory=list)
@@ -96,7 +95,7 @@ class Camera:
     def take(
         self,
         world_from_optical: Matrix,
-        walkers: Iterable[Walker],
+        walkers: Iterable[Mover],
         sample: int,
         *,
         colour: bool = True,
@@ -124,7 +123,7 @@ class Camera:
             self._sensed_depth(metres, sample) if depth else metres,
         )
 
-    def view(self, world_from_optical: Matrix, walkers: Iterable[Walker], robot: Body | None) -> NDArray[np.uint8]:
+    def view(self, world_from_optical: Matrix, walkers: Iterable[Mover], robot: Body | None) -> NDArray[np.uint8]:
         """A picture from elsewhere without noise, shape (height, width, 3), with the robot in it."""
         self._show(list(walkers))
         if robot is not None:
@@ -149,7 +148,7 @@ class Camera:
             self._renderer.close()
             self._renderer = None
 
-    def _show(self, walkers: list[Walker]) -> None:
+    def _show(self, walkers: list[Mover]) -> None:
         renderer = self.renderer
         self._show_put()
         present = {w.name: w for w in walkers}

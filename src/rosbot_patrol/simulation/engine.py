@@ -20,28 +20,30 @@ from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.battery import Battery, BatteryParams
 from rosbot_patrol.simulation.boxes import box_body
 from rosbot_patrol.simulation.camera import Camera, CameraParams, Picture, poses_before
-from rosbot_patrol.simulation.drive import Drive, DriveParams
+from rosbot_patrol.simulation.doors import SPEED, Door, DoorPlace
+from rosbot_patrol.simulation.drive import DriveParams
+from rosbot_patrol.simulation.equipment import Equipment
 from rosbot_patrol.simulation.fault_board import FaultBoard
 from rosbot_patrol.simulation.faults import Doorway
-from rosbot_patrol.simulation.imu import Imu, ImuParams, ImuReading
+from rosbot_patrol.simulation.imu import ImuParams, ImuReading
 from rosbot_patrol.simulation.lidar import LidarParams, measure_scan
-from rosbot_patrol.simulation.matrices import Matrix, from_pose2d, to_pose2d
+from rosbot_patrol.simulation.matrices import from_pose2d
 from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace
 from rosbot_patrol.simulation.noise import noise_of
-from rosbot_patrol.simulation.odometry import EncoderOdometry, OdometryParams
+from rosbot_patrol.simulation.odometry import OdometryParams
 from rosbot_patrol.simulation.physics import Physics, Touch
+from rosbot_patrol.simulation.population import Population
 from rosbot_patrol.simulation.range_sensors import RangeParams, measure_range
-from rosbot_patrol.simulation.robot import RobotDescription
+from rosbot_patrol.simulation.robot import FrameParams, RobotDescription
 from rosbot_patrol.simulation.scene import Body, SceneRenderer
 from rosbot_patrol.simulation.sensor_net import SensorNet
-from rosbot_patrol.simulation.slices import Slice, slice_bodies
-from rosbot_patrol.simulation.walkers import Walker, cuts
+from rosbot_patrol.simulation.slices import Slice
+from rosbot_patrol.simulation.walkers import Walker
+from rosbot_patrol.simulation.ways import Ways
 from rosbot_patrol.simulation.world import World
 
 STEP = 0.005  # [s]
-EYE_LEVEL = 1.3  # height at which a motion sensor's line of sight is judged [m]
 HOME = Pose2D()
-RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")
 
 _ODOMETRY_EVERY = 10  # steps
 _MOTION_EVERY = 20
@@ -52,6 +54,7 @@ _BATTERY_EVERY = 20
 class EngineParams:
     """Everything that is simulated, part by part."""
 
+    frames: FrameParams = field(default_factory=FrameParams)
     drive: DriveParams = field(default_factory=DriveParams)
     encoder: OdometryParams = field(default_factory=OdometryParams)
     lidar: LidarParams = field(default_factory=LidarParams)
@@ -61,34 +64,6 @@ class EngineParams:
     camera: CameraParams = field(default_factory=CameraParams)
     motion: MotionSensorParams = field(default_factory=MotionSensorParams)
     seed: int = param(0, lo=0, doc="of all noise")
-
-
-class _Robot:
-    """The robot's own parts, there once a robot has been spawned."""
-
-    def __init__(self, engine: Engine, description: RobotDescription, pose: Pose2D) -> None:
-        p = engine.params
-        self.description = description
-        self.start = pose
-        self.drive = Drive(p.drive, noise_of(p.seed, "slip"))
-        self.odometry = EncoderOdometry(p.encoder, p.drive.wheel_radius, p.drive.effective_track)
-        self.imu = Imu(p.imu)
-        self.battery = Battery(p.battery)
-        self.turned = np.zeros(2)  # wheels, left and right [rad]
-        laser = description.frame("laser")
-        self.base_from_laser = to_pose2d(laser)
-        self.lidar_height = description.axle_height + float(laser[2, 3]) + p.lidar.height_offset
-        self.base_from_ranges = {f: to_pose2d(description.frames[f]) for f in RANGE_FRAMES if f in description.frames}
-        heights = [description.frames[f][2, 3] for f in self.base_from_ranges]
-        self.range_height = description.axle_height + float(np.mean(heights)) if heights else 0.05
-        self.base_from_optical: Matrix | None = description.frames.get("camera_rgb_frame")
-        self.cut(engine.bodies)
-        self.imu.reset(pose.yaw)
-
-    def cut(self, bodies: Sequence[Body]) -> None:
-        """Take the cuts through what stands still."""
-        self.lidar_slice = slice_bodies(bodies, self.lidar_height)
-        self.range_slice = slice_bodies(bodies, self.range_height)
 
 
 class Engine:
@@ -117,21 +92,17 @@ class Engine:
         self._physics = Physics(STEP)
         for body in world.bodies:
             self._physics.add(body)
-        self._eye_slice = slice_bodies(world.bodies, EYE_LEVEL)
-        self._walkers: dict[str, Walker] = {}
-        self._spawned = 0
+        self._ways = Ways(world.bodies)
+        self.population = Population(self._ways, self._physics, self.params.seed)
         self._boxes: dict[str, Body] = {}
         self.faults = FaultBoard(self, doorways)
-        self._robot: _Robot | None = None
+        self._robot: Equipment | None = None
         self._steps = 0
         self._motion = SensorNet(self.params.motion, self.sensors, self.faults)
         self._camera = None
         if make_renderer is not None:
             self._camera = Camera(self.params.camera, make_renderer, world.bodies, self.params.seed)
-        for actor in world.actors:
-            self.spawn_actor(actor.name, actor.model, "", actor.pose)
-            if actor.path:
-                self.move_actor(actor.name, actor.path, actor.speed, actor.loop)
+        self.population.begin(world.actors, world.doors)
 
     # Time ------------------------------------------------------------------------------------------------------------
 
@@ -145,9 +116,7 @@ class Engine:
         self.faults.advance(self.now)
         robot = self._robot
         where = self._physics.pose if robot is not None else None
-        for walker in self._walkers.values():
-            if walker.step(STEP, where):
-                self._physics.move(walker.name, walker.matrix)
+        self.population.step(STEP, where, robot.radius if robot is not None else 0.0)
         if robot is None:
             self._physics.step(Twist2D())
         else:
@@ -158,13 +127,13 @@ class Engine:
         self._steps += 1
         self._slow_parts(robot)
 
-    def _slow_parts(self, robot: _Robot | None) -> None:
+    def _slow_parts(self, robot: Equipment | None) -> None:
         if robot is not None and self._steps % _ODOMETRY_EVERY == 0:
             robot.odometry.update(float(robot.turned[0]), float(robot.turned[1]), self.now)
         if robot is not None and self._steps % _BATTERY_EVERY == 0:
             robot.battery.step(robot.drive.load, _BATTERY_EVERY * STEP)
         if self._steps % _MOTION_EVERY == 0:
-            self._motion.update(self.now, self._walkers.values(), self._eye_slice)
+            self._motion.update(self.now, self.population.walkers, self.population.sight())
 
     def reset(self) -> None:
         """Robot back to its start at rest, odometry to zero; time, actors and battery stay as they are."""
@@ -192,8 +161,8 @@ class Engine:
             raise WorldError(f"robot '{description.name}'", f"'{self._robot.description.name}' is there already")
         if not all(map(math.isfinite, pose)):
             raise WorldError(f"robot '{description.name}'", f"{tuple(pose)} is no pose")
-        robot = _Robot(self, description, pose)
-        self._physics.add_robot(description, pose, self.params.drive.traction)
+        robot = Equipment(self.params, description, self.bodies, pose)
+        self._physics.add_robot(robot.description, pose, self.params.drive.traction)
         self._robot = robot
 
     @property
@@ -263,7 +232,7 @@ class Engine:
         """What the robot touches, the floor apart."""
         return self._physics.touches()
 
-    def _need_robot(self) -> _Robot:
+    def _need_robot(self) -> Equipment:
         if self._robot is None:
             raise WorldError("simulation", "has no robot yet")
         return self._robot
@@ -273,14 +242,17 @@ class Engine:
     def scan(self) -> LaserScan:
         """One sweep of the lidar."""
         robot = self._need_robot()
-        scene = robot.lidar_slice.plus(cuts(self._walkers.values(), robot.lidar_height))
-        place = compose(self.pose, robot.base_from_laser)
-        return measure_scan(self.params.lidar, scene, place, self.now, self._noise("lidar"))
+        scene = robot.lidar_slice.plus(self.population.cut(robot.lidar_height))
+        frame, base_from_laser = robot.laser
+        return measure_scan(
+            self.params.lidar, scene, compose(self.pose, base_from_laser), self.now, self._noise("lidar"),
+            frame=frame, twist=robot.laser_twist(self.twist), flipped=robot.is_laser_flipped,
+        )  # fmt: skip
 
     def ranges(self) -> dict[str, float]:
         """Frame and distance [m] of each range sensor."""
         robot = self._need_robot()
-        scene = robot.range_slice.plus(cuts(self._walkers.values(), robot.range_height))
+        scene = robot.range_slice.plus(self.population.cut(robot.range_height))
         noise = self._noise("range")
         return {
             frame: measure_range(self.params.range, scene, compose(self.pose, place), noise)
@@ -310,10 +282,10 @@ class Engine:
         if self._camera is None or robot.base_from_optical is None:
             raise WorldError("simulation", "has no camera")
         *earlier, pose = (
-            from_pose2d(base, robot.description.axle_height) @ robot.base_from_optical
+            from_pose2d(base, robot.description.base_height) @ robot.base_from_optical
             for base in (*poses_before(self.pose, self.twist, self.params.camera.blur), self.pose)
         )
-        return self._camera.take(pose, self._walkers.values(), self._steps, colour=colour, depth=depth, earlier=earlier)
+        return self._camera.take(pose, self.population, self._steps, colour=colour, depth=depth, earlier=earlier)
 
     def view_from_above(self, height: float = 9.0) -> NDArray[np.uint8]:
         """A picture of the house from a height [m] above the robot, north up; same thread as `picture`."""
@@ -322,10 +294,10 @@ class Engine:
         robot = self._robot
         shown = None
         if robot is not None:
-            shown = replace(robot.description.body, pose=from_pose2d(self.pose, robot.description.axle_height))
+            shown = replace(robot.description.body, pose=from_pose2d(self.pose, robot.description.base_height))
         above = np.diag([1.0, -1.0, -1.0, 1.0])  # x right, y down, z into the picture
         above[:3, 3] = self.pose.x, self.pose.y, height
-        return self._camera.view(above, self._walkers.values(), shown)
+        return self._camera.view(above, self.population, shown)
 
     def motion(self) -> dict[int, bool]:
         """Whether each motion sensor's output is high, by id."""
@@ -345,9 +317,11 @@ class Engine:
 
     def warm_up(self) -> None:
         """Take one of each measurement, so that the first that counts does not come late."""
-        self.scan()
+        robot = self._need_robot()
+        if robot.base_from_laser is not None:
+            self.scan()
         self.ranges()
-        if self._camera is not None and self._need_robot().base_from_optical is not None:
+        if self._camera is not None and robot.base_from_optical is not None:
             self.picture()
 
     def _noise(self, sensor: str) -> np.random.Generator:
@@ -362,7 +336,7 @@ class Engine:
 
     def place_box(self, name: str, pose: Pose2D, size: tuple[float, float, float]) -> None:
         """Put a box of a length, depth and height [m] on the floor; raises WorldError where the robot stands."""
-        if name in {b.name for b in self.bodies} | set(self._walkers):
+        if name in self.population or name in {b.name for b in self.bodies}:
             raise WorldError(f"box '{name}'", "the name is taken")
         body = box_body(name, pose, size)
         free = self._physics.blocker() is None
@@ -386,16 +360,21 @@ class Engine:
         self._cut()
 
     def _cut(self) -> None:
-        self._eye_slice = slice_bodies(self.bodies, EYE_LEVEL)
+        self._ways.stand(self.bodies)
         if self._robot is not None:
             self._robot.cut(self.bodies)
 
-    # Actors ----------------------------------------------------------------------------------------------------------
+    # Who and what moves there ----------------------------------------------------------------------------------------
 
     @property
     def actors(self) -> tuple[Walker, ...]:
         """Who is there."""
-        return tuple(self._walkers.values())
+        return self.population.walkers
+
+    @property
+    def doors(self) -> tuple[Door, ...]:
+        """The doors that open and close."""
+        return self.population.doors
 
     @property
     def slices(self) -> tuple[Slice, Slice]:
@@ -404,38 +383,27 @@ class Engine:
         return robot.lidar_slice, robot.range_slice
 
     def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D, *, posture: str = "") -> str:
-        """Place an actor; returns its name, made up where it is "".
+        """Place an actor; returns its name, made up where it is ""; raises WorldError as `Population` does."""
+        return self.population.spawn_actor(name, model, look, pose, posture=posture)
 
-        Raises:
-            WorldError: the name is taken, the model, look or posture unknown, or the pose not finite.
-        """
-        self._spawned += 1
-        name = name or f"{model}_{self._spawned}"
-        taken = {b.name for b in self.bodies} | set(self._walkers)
-        if name in taken:
-            raise WorldError(f"actor '{name}'", "the name is taken")
-        if not all(map(math.isfinite, pose)):
-            raise WorldError(f"actor '{name}'", f"{tuple(pose)} is no pose")
-        walker = Walker(name, model, look, pose, noise_of(self.params.seed, "look", self._spawned), posture=posture)
-        self._physics.add(walker.body)
-        self._physics.move(name, walker.matrix)
-        self._walkers[name] = walker
-        return name
+    def move_actor(
+        self, name: str, path: Sequence[Pose2D], speed: float, loop: bool = False, *, pause: float = 0.0
+    ) -> None:
+        """Let an actor walk along points, or put it somewhere; raises WorldError, also for a path through a wall."""
+        self.population.move_actor(name, path, speed, loop, pause=pause)
 
-    def move_actor(self, name: str, path: Sequence[Pose2D], speed: float, loop: bool = False) -> None:
-        """Let an actor walk along points, or put it somewhere; raises WorldError."""
-        walker = self._actor(name)
-        walker.walk(path, speed, loop)
-        self._physics.move(name, walker.matrix)
+    def roam_actor(self, name: str, radius: float, speed: float, *, pause: float = 2.0) -> None:
+        """Let an actor wander within a radius [m] of where it is; raises WorldError."""
+        self.population.roam_actor(name, radius, speed, pause=pause)
 
     def remove_actor(self, name: str) -> None:
-        """Take an actor out; raises WorldError where there is none of that name."""
-        self._actor(name)
-        self._physics.remove(name)
-        del self._walkers[name]
+        """Take an actor or a door out; raises WorldError where there is none of that name."""
+        self.population.remove(name)
 
-    def _actor(self, name: str) -> Walker:
-        if name not in self._walkers:
-            there = ", ".join(self._walkers) or "none"
-            raise WorldError(f"actor '{name}'", f"is not there (there: {there})")
-        return self._walkers[name]
+    def spawn_door(self, place: DoorPlace) -> None:
+        """Hang a door, closed; raises WorldError where the name is taken."""
+        self.population.spawn_door(place)
+
+    def set_door(self, name: str, opening: float, speed: float = SPEED) -> None:
+        """Begin to open (1) or close (0) a door at a speed [rad/s], 0 at once; raises WorldError."""
+        self.population.set_door(name, opening, speed)

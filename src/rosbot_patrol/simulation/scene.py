@@ -94,6 +94,25 @@ class Intrinsics:
     far: float = 100.0
 
 
+class Mover(Protocol):
+    """A body that moves by itself: an actor, a door."""
+
+    @property
+    def name(self) -> str:
+        """Unique in the world."""
+
+    @property
+    def body(self) -> Body:
+        """Its shapes and looks."""
+
+    @property
+    def matrix(self) -> Matrix:
+        """world_from_body."""
+
+    def pose_parts(self) -> Matrix | None:
+        """body_from_visuals, shape (number of visuals, 4, 4); None where nothing of it moves against it."""
+
+
 class SceneRenderer(Protocol):
     """Draws a scene of bodies; one per process and thread."""
 

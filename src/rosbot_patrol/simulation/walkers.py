@@ -7,7 +7,7 @@ door's leaf until those have gone. It knows nothing of walls: `ways.Ways` refuse
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,7 +18,7 @@ from rosbot_patrol.geometry import Pose2D, angle_difference, distance, wrap_angl
 from rosbot_patrol.simulation.figures import MODELS, make_figure
 from rosbot_patrol.simulation.matrices import Matrix, from_pose2d
 from rosbot_patrol.simulation.scene import Body
-from rosbot_patrol.simulation.slices import EMPTY, Slice
+from rosbot_patrol.simulation.slices import Slice
 
 __all__ = ["FASTEST", "MODELS", "Obstacle", "Walker"]
 
@@ -282,11 +282,3 @@ class Walker:
             self._path = []
             self._waits = self._pause
         return error != 0.0
-
-
-def cuts(walkers: Iterable[Walker], height: float) -> Slice:
-    """What a plane at a height meets of all of them."""
-    together = EMPTY
-    for walker in walkers:
-        together = together.plus(walker.cut(height))
-    return together

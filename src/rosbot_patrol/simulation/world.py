@@ -4,8 +4,9 @@ Read: models, nested ones too, links, poses and the frames they are relative to,
 <state> that overrides poses and sizes, box, cylinder, sphere, plane and mesh geometry, materials as colours. A model
 whose name, uri or mesh speaks of a person or a fire hydrant becomes an actor, and so does an <actor>.
 
-Differs: every model is static (what Gazebo would push aside stands fast here); joints hold; lights, plugins, sensors
-and physics settings are skipped. What is not read is named once in a warning.
+Differs: every model is static (what Gazebo would push aside stands fast here); joints hold, but for a door's hinge
+(`sdf_doors`), which a service moves; lights, plugins, sensors and physics settings are skipped. What is not read is
+named once in a warning.
 """
 
 from __future__ import annotations
@@ -15,14 +16,16 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, distance
+from rosbot_patrol.simulation.doors import DoorPlace
 from rosbot_patrol.simulation.matrices import to_pose2d
 from rosbot_patrol.simulation.scene import Body, BodyKind, Collision, Material, Matrix, Shape, Visual, identity
+from rosbot_patrol.simulation.sdf_doors import read_hinge
 from rosbot_patrol.simulation.sdf_files import ModelPath, model_file
 from rosbot_patrol.simulation.sdf_frames import Frames
 from rosbot_patrol.simulation.sdf_shapes import PLANE, Scale, ShapeReader
@@ -71,11 +74,12 @@ class ActorPlace:
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """Everything that stands in a world, and the actors it begins with."""
+    """Everything that stands in a world, the actors it begins with, and its doors on hinges."""
 
     name: str = "empty"
     bodies: tuple[Body, ...] = ()
     actors: tuple[ActorPlace, ...] = ()
+    doors: tuple[DoorPlace, ...] = ()
 
 
 def load_world(path: str | Path, model_path: Iterable[str | Path] = ()) -> World:
@@ -142,6 +146,7 @@ class _Reader:
     lights: int = 0
     bodies: list[Body] = field(default_factory=list)
     actors: list[ActorPlace] = field(default_factory=list)
+    doors: list[DoorPlace] = field(default_factory=list)
     state: _State = field(default_factory=_State)
     files: dict[Path, ET.Element] = field(default_factory=dict)
     including: list[Path] = field(default_factory=list)
@@ -161,7 +166,12 @@ class _Reader:
         for child in (*world, *self.state.inserted):
             self._child(child, place, frames, identity(), "")
         self._check_names()
-        return World(name=world.get("name", "world"), bodies=tuple(self.bodies), actors=tuple(self.actors))
+        return World(
+            name=world.get("name", "world"),
+            bodies=tuple(self.bodies),
+            actors=tuple(self.actors),
+            doors=tuple(self.doors),
+        )
 
     def _child(self, child: ET.Element, place: Place, frames: Frames, world_from_outer: Matrix, outer: str) -> None:
         if child.tag == "model":
@@ -176,7 +186,9 @@ class _Reader:
             self._actor(child, place.inside(f"actor '{child.get('name')}'"), world_from_outer)
 
     def _check_names(self) -> None:
-        counted = Counter([b.name for b in self.bodies] + [a.name for a in self.actors])
+        counted = Counter(
+            [b.name for b in self.bodies] + [a.name for a in self.actors] + [d.body.name for d in self.doors]
+        )
         twice = [name for name, count in counted.items() if count > 1]
         if twice:
             raise WorldError(self.path, f"the name '{twice[0]}' is used twice")
@@ -254,9 +266,12 @@ class _Reader:
             body_name = name if len(links) == 1 else f"{name}/{label}"
             body = self._link(link, here, frames, _inverse(model_from_link), self.state.scales.get(name, _ONES))
             kind = _kind_of(name, label, body.collisions)
-            self.bodies.append(
-                Body(name=body_name, kind=kind, pose=pose, visuals=body.visuals, collisions=body.collisions)
-            )
+            hinge = read_hinge(element, label, frames, pose @ _inverse(model_from_link), here)
+            placed = replace(body, name=body_name, kind=kind, pose=pose, static=hinge is None)
+            if hinge is None or not body.collisions:
+                self.bodies.append(placed)
+            else:
+                self.doors.append(DoorPlace(body=replace(placed, kind="door"), axis=hinge.axis, swing=hinge.swing))
         for child in element:
             self._child(child, place, frames, world_from_model, f"{name}::")
 

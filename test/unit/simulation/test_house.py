@@ -10,9 +10,10 @@ import yaml
 
 from rosbot_patrol import params
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.simulation.engine import EYE_LEVEL, Engine
+from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.slices import slice_bodies
+from rosbot_patrol.simulation.ways import EYE_LEVEL
 from rosbot_patrol.simulation.world import load_world
 
 ROOT = Path(__file__).parents[3]

@@ -1,0 +1,180 @@
+"""Everything in a world that moves and is not the robot: actors and doors, kept in step with the physics."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.simulation.doors import SPEED, Door, DoorPlace
+from rosbot_patrol.simulation.noise import noise_of
+from rosbot_patrol.simulation.physics import Physics
+from rosbot_patrol.simulation.slices import Slice
+from rosbot_patrol.simulation.walkers import Walker
+from rosbot_patrol.simulation.ways import EYE_LEVEL, LEVELS, Ways, together
+from rosbot_patrol.simulation.world import ActorPlace
+
+log = logging.getLogger(__name__)
+
+
+class Population:
+    """Actors and doors.
+
+    Args:
+        ways: where actors can walk.
+        physics: in which their bodies stand.
+        seed: of looks and of who wanders where.
+    """
+
+    def __init__(self, ways: Ways, physics: Physics, seed: int) -> None:
+        self._ways = ways
+        self._physics = physics
+        self._seed = seed
+        self._walkers: dict[str, Walker] = {}
+        self._doors: dict[str, Door] = {}
+
+    @property
+    def walkers(self) -> tuple[Walker, ...]:
+        """The actors, in the order in which they came."""
+        return tuple(self._walkers.values())
+
+    @property
+    def doors(self) -> tuple[Door, ...]:
+        """The doors that open and close."""
+        return tuple(self._doors.values())
+
+    def __iter__(self) -> Iterator[Walker | Door]:
+        yield from self._walkers.values()
+        yield from self._doors.values()
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._walkers or name in self._doors
+
+    def begin(self, actors: Iterable[ActorPlace], doors: Iterable[DoorPlace]) -> None:
+        """Place what a world's file names; an actor whose path there leads through a wall walks it, with a warning."""
+        for door in doors:
+            self.spawn_door(door)
+        for actor in actors:
+            self.spawn_actor(actor.name, actor.model, "", actor.pose)
+            if actor.path:
+                try:
+                    self.move_actor(actor.name, actor.path, actor.speed, actor.loop)
+                except WorldError as err:
+                    log.warning("%s; it walks there all the same, as in Gazebo", err)
+                    self._walkers[actor.name].walk(actor.path, actor.speed, actor.loop)
+
+    def step(self, dt: float, robot: Pose2D | None, robot_radius: float = 0.0) -> None:
+        """Advance all by `dt` [s]."""
+        if self._doors:
+            self._step_doors(dt, robot, robot_radius)
+        doors = self.doors
+        for walker in self._walkers.values():
+            if walker.step(dt, robot, doors):
+                self._physics.move(walker.name, walker.matrix)
+
+    def cut(self, height: float) -> Slice:
+        """What a plane at a height [m] meets of all of them."""
+        return together([mover.cut(height) for mover in self])
+
+    def sight(self) -> Slice:
+        """What hides people from a motion sensor."""
+        return self._ways.cut(EYE_LEVEL).plus(self.cut_of_doors(EYE_LEVEL))
+
+    def cut_of_doors(self, height: float) -> Slice:
+        """What a plane at a height [m] meets of the doors."""
+        return together([door.cut(height) for door in self._doors.values()])
+
+    def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D, *, posture: str = "") -> str:
+        """Place an actor; returns its name, made up where it is "".
+
+        Raises:
+            WorldError: the name is taken, the model, look or posture unknown, or the pose not finite.
+        """
+        name = name or self._new_name(model)
+        self._check(f"actor '{name}'", name, pose)
+        walker = Walker(name, model, look, pose, noise_of(self._seed, f"look of {name}"), posture=posture)
+        self._physics.add(walker.body)
+        self._physics.move(name, walker.matrix)
+        self._walkers[name] = walker
+        return name
+
+    def move_actor(
+        self, name: str, path: Sequence[Pose2D], speed: float, loop: bool = False, *, pause: float = 0.0
+    ) -> None:
+        """Let an actor walk along points, or put it somewhere (one point, speed 0).
+
+        Raises:
+            WorldError: there is none of that name, numbers that make no sense, or a wall across the path.
+        """
+        walker = self._actor(name)
+        finite = all(math.isfinite(v) for p in path for v in p)
+        if speed > 0.0 and finite and path:
+            self._ways.check(name, [walker.pose, *path, *(path[:1] if loop else ())])
+        walker.walk(path, speed, loop, pause=pause)
+        self._physics.move(name, walker.matrix)
+
+    def roam_actor(self, name: str, radius: float, speed: float, *, pause: float = 2.0) -> None:
+        """Let an actor wander within a radius [m] of where it is, as name and seed have it; raises WorldError."""
+        walker = self._actor(name)
+
+        def is_free(start: Pose2D, goal: Pose2D) -> bool:
+            doors = [self.cut_of_doors(level) for level in LEVELS] if self._doors else ()
+            return self._ways.is_free(start, goal, walker.radius, doors)
+
+        walker.roam(radius, speed, noise_of(self._seed, f"ways of {name}"), is_free, pause=pause)
+
+    def remove(self, name: str) -> None:
+        """Take an actor or a door out; raises WorldError where there is none of that name."""
+        if self._doors.pop(name, None) is None:
+            self._actor(name)
+            del self._walkers[name]
+        self._physics.remove(name)
+
+    def spawn_door(self, place: DoorPlace) -> None:
+        """Hang a door, closed.
+
+        Raises:
+            WorldError: the name is taken, or the leaf is none.
+        """
+        name = place.body.name
+        self._check(f"door '{name}'", name, Pose2D())
+        door = Door(place)
+        self._physics.add(door.body)
+        self._doors[name] = door
+
+    def set_door(self, name: str, opening: float, speed: float = SPEED) -> None:
+        """Begin to open (1) or close (0) a door at a speed [rad/s], 0 at once; raises WorldError."""
+        if name not in self._doors:
+            raise WorldError(f"door '{name}'", f"is not there (there: {', '.join(self._doors) or 'none'})")
+        door = self._doors[name]
+        door.set(opening, speed)
+        self._physics.move(name, door.matrix)
+
+    def _step_doors(self, dt: float, robot: Pose2D | None, robot_radius: float) -> None:
+        solid = [(w.pose, w.radius) for w in self._walkers.values()]
+        if robot is not None:
+            solid.append((robot, robot_radius))
+        for door in self._doors.values():
+            if door.step(dt, solid):
+                self._physics.move(door.name, door.matrix)
+
+    def _new_name(self, model: str) -> str:
+        number = 1
+        taken = self._ways.names
+        while f"{model}_{number}" in self or f"{model}_{number}" in taken:
+            number += 1
+        return f"{model}_{number}"
+
+    def _check(self, what: str, name: str, pose: Pose2D) -> None:
+        if not name or name in self or name in self._ways.names:
+            raise WorldError(what, "the name is taken" if name else "has no name")
+        if not all(map(math.isfinite, pose)):
+            raise WorldError(what, f"{tuple(pose)} is no pose")
+
+    def _actor(self, name: str) -> Walker:
+        if name not in self._walkers:
+            there = ", ".join(self._walkers) or "none"
+            raise WorldError(f"actor '{name}'", f"is not there (there: {there})")
+        return self._walkers[name]
