@@ -30,10 +30,17 @@ def header(stamp: float, frame: str) -> Header:
 
 
 def odometry_msg(
-    pose: Pose2D, twist: Twist2D, stamp: float, frame: str, *, z: float = 0.0, exact: bool = False
+    pose: Pose2D,
+    twist: Twist2D,
+    stamp: float,
+    frame: str,
+    *,
+    child: str = "base_link",
+    z: float = 0.0,
+    exact: bool = False,
 ) -> Odometry:
-    """Pose and velocity of base_link, with the covariance of Gazebo's drive plug-in (a tenth of it where exact)."""
-    msg = Odometry(header=header(stamp, frame), child_frame_id="base_link")
+    """Pose and velocity of the base, with the covariance of Gazebo's drive plug-in (a tenth of it where exact)."""
+    msg = Odometry(header=header(stamp, frame), child_frame_id=child)
     place = msg.pose.pose
     place.position = Point(pose.x, pose.y, z)
     place.orientation = Quaternion(*quaternion_from_yaw(pose.yaw))
@@ -47,14 +54,14 @@ def odometry_msg(
     return msg
 
 
-def imu_msg(reading: ImuReading, params: ImuParams, stamp: float) -> Imu:
-    """A sample of the inertial unit."""
-    msg = Imu(header=header(stamp, "imu_link"))
+def imu_msg(reading: ImuReading, params: ImuParams, stamp: float, frame: str = "imu_link") -> Imu:
+    """A sample of the inertial unit; roll and pitch of a base on a level floor are as sure as its heading."""
+    msg = Imu(header=header(stamp, frame))
     msg.orientation = Quaternion(*quaternion_from_yaw(reading.yaw))
     msg.angular_velocity = Vector3(*reading.rates)
     msg.linear_acceleration = Vector3(*reading.accelerations)
     for covariance, spread in (
-        (msg.orientation_covariance, 0.01),
+        (msg.orientation_covariance, params.heading_noise),
         (msg.angular_velocity_covariance, params.gyro_noise),
         (msg.linear_acceleration_covariance, params.accel_noise),
     ):
@@ -74,11 +81,11 @@ def range_msg(distance: float, params: RangeParams, stamp: float, frame: str) ->
     )
 
 
-def battery_msg(battery: Battery, stamp: float) -> BatteryState:
+def battery_msg(battery: Battery, stamp: float, frame: str = "base_link") -> BatteryState:
     """Charge and voltage."""
     cells = battery.params.cells
     return BatteryState(
-        header=header(stamp, "base_link"),
+        header=header(stamp, frame),
         voltage=battery.voltage,
         temperature=math.nan,
         current=-battery.current,
@@ -97,13 +104,14 @@ def battery_msg(battery: Battery, stamp: float) -> BatteryState:
 def joints_msg(
     robot: RobotDescription, angles: tuple[float, float], speeds: tuple[float, float], stamp: float
 ) -> JointState:
-    """Angles and speeds of the wheels."""
-    sides = [0 if wheel.y > 0.0 else 1 for wheel in robot.wheels]
+    """Angles and speeds of every joint that moves; those that nothing drives (casters) stay at zero."""
+    turns = {joint: i for i, side in enumerate((robot.left, robot.right)) for joint in side}
+    driven = [(hinge.forward, turns.get(hinge.joint)) for hinge in robot.hinges]
     return JointState(
         header=header(stamp, ""),
-        name=[wheel.joint for wheel in robot.wheels],
-        position=[math.remainder(angles[i], math.tau) for i in sides],
-        velocity=[speeds[i] for i in sides],
+        name=[hinge.joint for hinge in robot.hinges],
+        position=[0.0 if i is None else math.remainder(sign * angles[i], math.tau) for sign, i in driven],
+        velocity=[0.0 if i is None else sign * speeds[i] for sign, i in driven],
     )
 
 

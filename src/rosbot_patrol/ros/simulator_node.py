@@ -28,6 +28,7 @@ from rosbot_patrol.ros.convert import twist_from_msg
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.packages import package_finder
 from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RateParams
 from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
 from rosbot_patrol.ros.simulator_requests import Requests
@@ -166,11 +167,11 @@ def _open_window(engine: Engine) -> Window:
 
 def _description(p: SimulatorParams) -> RobotDescription:
     if p.urdf:
-        return load_robot(p.urdf)
+        return load_robot(p.urdf, package_finder(p.model_path))
     text = rospy.get_param("/robot_description", "")
     if not text:
         raise WorldError("/robot_description", "is missing: give the robot's URDF there, or a file in ~urdf")
-    return parse_robot(text, source="/robot_description")
+    return parse_robot(text, source="/robot_description", find_package=package_finder(p.model_path))
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,15 +17,17 @@ from rosbot_patrol.msg import Contacts
 from rosbot_patrol.params import param
 from rosbot_patrol.ros import simulator_messages as messages
 from rosbot_patrol.ros.convert import scan_to_msg, time_to_msg, transform_to_msg
-from rosbot_patrol.simulation.engine import RANGE_FRAMES, STEP, Engine
+from rosbot_patrol.simulation.engine import STEP, Engine
 
 TICK = 0.01  # of /clock [s]
 STEPS_PER_TICK = round(TICK / STEP)
 
+_RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")  # advertised before a robot is there
+
 
 @dataclass(frozen=True, kw_only=True)
 class RateParams:
-    """How often each thing is published, in simulated time; a whole number of hundredths of a second between two."""
+    """How often each thing is published, in simulated time: on average, each at a whole hundredth of a second."""
 
     odometry: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="/odom and its transform")
     scan: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="/scan (Gazebo: 40)")
@@ -50,14 +53,15 @@ class Outputs:
         self._exact = exact_odometry
         self._odom_start: Pose2D | None = None
         self._touching = False
-        self._camera_frame = "camera_depth_frame"
         publisher = rospy.Publisher
         self._clock = publisher("/clock", Clock, queue_size=1)
         self._odom = publisher("/odom", Odometry, queue_size=1)
         self._tf = publisher("/tf", TFMessage, queue_size=20)
         self._scan = publisher("/scan", LaserScan, queue_size=1)
         self._imu = publisher("/rosbot/imu", Imu, queue_size=1)
-        self._ranges = {f: publisher(f"/range/{f.removeprefix('range_')}", Range, queue_size=1) for f in RANGE_FRAMES}
+        self._ranges: dict[str, rospy.Publisher] = {}
+        for frame in [m.frame for m in engine.description.ranges] if engine.has_robot else _RANGE_FRAMES:
+            self._range_publisher(frame)
         self._joints = publisher("/joint_states", JointState, queue_size=1)
         self._battery = publisher("/battery", BatteryState, queue_size=1)
         self._truth = publisher("/ground_truth/odom", Odometry, queue_size=1)
@@ -67,15 +71,15 @@ class Outputs:
         self._depth = publisher("/camera/depth/image_raw", Image, queue_size=1)
         self._depth_info = publisher("/camera/depth/camera_info", CameraInfo, queue_size=1)
         self._cloud = publisher("/camera/depth/points", PointCloud2, queue_size=1)
-        self._due: list[tuple[int, int, Callable[[float], None]]] = [
-            (_ticks(rates.odometry), 0, self._send_odometry),
-            (_ticks(rates.ground_truth), 0, self._send_truth),
-            (_ticks(rates.scan), 0, self._send_scan),
-            (_ticks(rates.camera), 5, self._send_pictures),
-            (_ticks(rates.imu), 2, self._send_imu),
-            (_ticks(rates.range), 3, self._send_ranges),
-            (_ticks(rates.joints), 1, self._send_joints),
-            (_ticks(rates.battery), 7, self._send_battery),
+        self._due: list[tuple[float, int, Callable[[float], None]]] = [
+            (rates.odometry, 0, self._send_odometry),
+            (rates.ground_truth, 0, self._send_truth),
+            (rates.scan, 0, self._send_scan),
+            (rates.camera, 5, self._send_pictures),
+            (rates.imu, 2, self._send_imu),
+            (rates.range, 3, self._send_ranges),
+            (rates.joints, 1, self._send_joints),
+            (rates.battery, 7, self._send_battery),
         ]
 
     def publish(self, tick: int) -> None:
@@ -85,8 +89,8 @@ class Outputs:
         if not self._engine.has_robot:
             return
         self._send_contacts(now)
-        for every, offset, send in self._due:
-            if tick % every == offset % every:
+        for rate, offset, send in self._due:
+            if is_due(tick - offset, rate):
                 send(now)
 
     def _odometry_now(self) -> tuple[Pose2D, Twist2D]:
@@ -98,16 +102,19 @@ class Outputs:
 
     def _send_odometry(self, now: float) -> None:
         pose, twist = self._odometry_now()
-        transform = transform_to_msg(pose, "odom", "base_link", now)
-        self._tf.publish(TFMessage([transform]))
+        base = self._engine.description.base
+        self._tf.publish(TFMessage([transform_to_msg(pose, "odom", base, now)]))
         if self._odom.get_num_connections():
-            self._odom.publish(messages.odometry_msg(pose, twist, now, "odom", exact=self._exact))
+            self._odom.publish(messages.odometry_msg(pose, twist, now, "odom", child=base, exact=self._exact))
 
     def _send_truth(self, now: float) -> None:
         if self._truth.get_num_connections():
-            height = self._engine.description.axle_height
-            pose, twist = self._engine.pose, self._engine.twist
-            self._truth.publish(messages.odometry_msg(pose, twist, now, "map", z=height, exact=True))
+            robot = self._engine.description
+            self._truth.publish(
+                messages.odometry_msg(
+                    self._engine.pose, self._engine.twist, now, "map", z=robot.base_height, child=robot.base, exact=True
+                )
+            )
 
     def _send_contacts(self, now: float) -> None:
         if not self._contacts.get_num_connections():
@@ -118,18 +125,36 @@ class Outputs:
         self._touching = bool(touches)
 
     def _send_scan(self, now: float) -> None:
-        if self._scan.get_num_connections():
-            self._scan.publish(scan_to_msg(self._engine.scan()))
+        if self._engine.description.laser is None or not self._scan.get_num_connections():
+            return
+        lidar = self._engine.params.lidar
+        message = scan_to_msg(self._engine.scan())
+        message.scan_time = lidar.sweep_time
+        message.time_increment = lidar.sweep_time / lidar.samples
+        self._scan.publish(message)
 
     def _send_imu(self, now: float) -> None:
-        if self._imu.get_num_connections():
-            self._imu.publish(messages.imu_msg(self._engine.imu(), self._engine.params.imu, now))
+        mount = self._engine.description.imu
+        if mount is not None and self._imu.get_num_connections():
+            self._imu.publish(messages.imu_msg(self._engine.imu(), self._engine.params.imu, now, mount.frame))
 
     def _send_ranges(self, now: float) -> None:
-        if not any(p.get_num_connections() for p in self._ranges.values()):
+        wanted = [f for f in self._range_frames() if self._range_publisher(f).get_num_connections()]
+        if not wanted:
             return
-        for frame, distance in self._engine.ranges().items():
-            self._ranges[frame].publish(messages.range_msg(distance, self._engine.params.range, now, frame))
+        distances = self._engine.ranges()
+        for frame in wanted:
+            message = messages.range_msg(distances[frame], self._engine.params.range, now, frame)
+            self._ranges[frame].publish(message)
+
+    def _range_frames(self) -> list[str]:
+        return [mount.frame for mount in self._engine.description.ranges]
+
+    def _range_publisher(self, frame: str) -> rospy.Publisher:
+        if frame not in self._ranges:
+            topic = f"/range/{frame.removeprefix('range_')}"
+            self._ranges[frame] = rospy.Publisher(topic, Range, queue_size=1)
+        return self._ranges[frame]
 
     def _send_joints(self, now: float) -> None:
         if self._joints.get_num_connections():
@@ -138,10 +163,14 @@ class Outputs:
 
     def _send_battery(self, now: float) -> None:
         if self._battery.get_num_connections():
-            self._battery.publish(messages.battery_msg(self._engine.battery, now))
+            base = self._engine.description.base
+            self._battery.publish(messages.battery_msg(self._engine.battery, now, base))
 
     def _send_pictures(self, now: float) -> None:
-        camera, frame = self._engine.params.camera.intrinsics, self._camera_frame
+        mount = self._engine.description.camera
+        if mount is None:
+            return
+        camera, frame = self._engine.params.camera.intrinsics, mount.frame
         for info in (self._rgb_info, self._depth_info):
             if info.get_num_connections():
                 info.publish(messages.camera_info_msg(camera, now, frame))
@@ -157,5 +186,7 @@ class Outputs:
             self._cloud.publish(messages.cloud_msg(picture.colour, picture.depth, camera, now, frame))
 
 
-def _ticks(rate: float) -> int:
-    return max(round(1.0 / (rate * TICK)), 1)
+def is_due(tick: int, rate: float) -> bool:
+    """Whether a thing of a rate [Hz] falls on a tick: the first at or after each whole period."""
+    per_tick = rate * TICK
+    return math.floor(tick * per_tick + 1e-9) > math.floor((tick - 1) * per_tick + 1e-9)

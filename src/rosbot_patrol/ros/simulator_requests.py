@@ -13,6 +13,7 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.ros.packages import package_finder
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.robot import parse_robot
 from rosbot_patrol.srv import (
@@ -107,7 +108,7 @@ class Requests:
 
     def _spawn_robot(self, request: SpawnRobotRequest) -> SpawnRobotResponse:
         try:
-            robot = parse_robot(request.urdf, source=f"robot '{request.name}'")
+            robot = parse_robot(request.urdf, source=f"robot '{request.name}'", find_package=package_finder())
             self._ask(lambda: self._engine.spawn_robot(robot, _pose(request.pose)))
         except PatrolError as err:
             return SpawnRobotResponse(success=False, message=str(err))

@@ -19,6 +19,8 @@ CEILING = 2.0  # what begins higher cannot be touched [m]
 
 _MOST_PARTS = 16  # in one compound shape
 _MOST_FACES = 20000  # in one mesh shape
+_HULL_DIRECTIONS = 500
+_AXES = np.vstack([np.eye(3), -np.eye(3)])
 
 _KINDS = {
     "box": pybullet.GEOM_BOX,
@@ -75,10 +77,10 @@ def shapes_of(parts: Sequence[Collision], client: int, world_from_body: Matrix |
 
 
 def single_shape(parts: Sequence[Collision], client: int) -> int:
-    """One shape for all parts, as the link of a robot needs it."""
+    """One shape for all parts, as the link of a robot needs it; with meshes or many parts the hull about them."""
     if len(parts) <= _MOST_PARTS and all(part.shape.kind != "mesh" for part in parts):
         return _compound(parts, client)
-    return _trimesh(*_merged(parts), client)
+    return _hull(_merged(parts)[0], client)
 
 
 def _half_of(shape: Shape) -> NDArray[np.float64]:
@@ -129,6 +131,18 @@ def _trimesh(vertices: NDArray[np.float64], faces: NDArray[np.int64], client: in
             flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
             physicsClientId=client,
         )
+    )
+
+
+def _hull(vertices: NDArray[np.float64], client: int) -> int:
+    """The convex hull by its outermost points in many directions: of triangles, a moving body feels nothing."""
+    i = np.arange(_HULL_DIRECTIONS)
+    z, turn = 1.0 - (2.0 * i + 1.0) / _HULL_DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
+    across = np.sqrt(1.0 - z * z)
+    directions = np.vstack([np.column_stack((across * np.cos(turn), across * np.sin(turn), z)), _AXES])
+    outermost = np.unique(np.argmax(vertices @ directions.T, axis=0))
+    return int(
+        pybullet.createCollisionShape(pybullet.GEOM_MESH, vertices=vertices[outermost].tolist(), physicsClientId=client)
     )
 
 

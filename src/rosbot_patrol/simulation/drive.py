@@ -4,26 +4,33 @@ A skid-steered base turns by dragging its wheels sideways. Bullet's contact mode
 result depends on the time step more than on the friction), so the base is driven as a planar body whose velocity
 follows the wheels with the force that the tyres can give; contacts with walls stop it while the wheels go on turning.
 The effective track is a figure of the real thing: the distance between the wheels' contact lines, made longer by the
-scrub of turning.
+scrub of turning where a side has several wheels. Geometry comes from the URDF unless it is given.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import STOP, Twist2D
 from rosbot_patrol.params import param
+from rosbot_patrol.simulation.robot import RobotDescription
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveParams:
     """The base: geometry, limits, slip. `legacy_wheel_separation` 0.1 gives the turning rate of the 2019 model."""
 
-    wheel_radius: float = param(0.04, unit="m", lo=0.001, doc="radius of the wheels")
-    effective_track: float = param(0.20, unit="m", lo=0.01, doc="wheel distance by which the base really turns")
+    left_joints: tuple[str, ...] = param((), doc="joints of the left wheels, empty: the URDF's continuous ones there")
+    right_joints: tuple[str, ...] = param((), doc="joints of the right wheels, empty: the URDF's continuous ones there")
+    wheel_radius: float = param(0.0, unit="m", lo=0.0, doc="radius of the wheels, 0: as in the URDF")
+    effective_track: float = param(
+        0.0, unit="m", lo=0.0, doc="wheel distance by which the base really turns, 0: the URDF's, with skid_stretch"
+    )
+    skid_stretch: float = param(0.04, lo=0.0, hi=2.0, doc="how much longer the track of several wheels a side acts")
     legacy_wheel_separation: float = param(
         0.0, unit="m", lo=0.0, doc="wheel distance that the controller assumes, 0: the real one (2019 model: 0.1)"
     )
@@ -40,9 +47,17 @@ class DriveParams:
         """Wheel distance that the controller assumes [m]."""
         return self.legacy_wheel_separation or self.effective_track
 
+    def fitted(self, robot: RobotDescription) -> DriveParams:
+        """The same with a robot's own geometry where none was given; raises WorldError where the URDF tells none."""
+        radius = self.wheel_radius or robot.wheel_radius
+        if radius <= 0.0:
+            raise WorldError(robot.source, "no shape tells the radius of the wheels: give drive.wheel_radius")
+        stretch = 1.0 + self.skid_stretch if robot.is_skid_steered else 1.0
+        return replace(self, wheel_radius=radius, effective_track=self.effective_track or robot.track * stretch)
+
 
 class Drive:
-    """Wheel speeds of the left and right side, and the twist of the base that they ask for."""
+    """Wheel speeds of the left and right side, and the twist of the base that they ask for; `params` fitted."""
 
     def __init__(self, params: DriveParams, rng: np.random.Generator) -> None:
         self._params = params

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +15,16 @@ GRAVITY = 9.8
 
 @dataclass(frozen=True, kw_only=True)
 class ImuParams:
-    """Noise of the unit; zero everywhere is Gazebo's."""
+    """Errors of the unit; zero everywhere is Gazebo's."""
 
     gyro_noise: float = param(0.002, unit="rad/s", lo=0.0, doc="standard deviation of a turning rate")
     gyro_bias: float = param(0.0002, unit="rad/s", doc="constant error of the turning rate about z")
+    gyro_walk: float = param(
+        0.0, unit="rad/s", lo=0.0, doc="spread that the bias of the turning rate gains in a second (in s with its root)"
+    )
     accel_noise: float = param(0.02, unit="m/s^2", lo=0.0, doc="standard deviation of an acceleration")
+    accel_bias: float = param(0.0, unit="m/s^2", doc="constant error of the accelerations along x and y")
+    heading_noise: float = param(0.002, unit="rad", lo=0.0, doc="standard deviation of an orientation")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +39,10 @@ class ImuReading:
 class Imu:
     """Follows the motion step by step; `read` adds the noise."""
 
-    def __init__(self, params: ImuParams) -> None:
+    def __init__(self, params: ImuParams, walk: np.random.Generator | None = None) -> None:
         self._params = params
+        self._walk = walk if params.gyro_walk > 0.0 else None
+        self._bias = params.gyro_bias
         self._yaw = 0.0
         self._before = Twist2D()
         self._acceleration = (0.0, 0.0)
@@ -42,7 +50,9 @@ class Imu:
 
     def step(self, twist: Twist2D, dt: float) -> None:
         """Take the base's velocity in its own frame after `dt` [s]."""
-        self._rate = twist.wz + self._params.gyro_bias
+        if self._walk is not None:
+            self._bias += self._params.gyro_walk * math.sqrt(dt) * float(self._walk.standard_normal())
+        self._rate = twist.wz + self._bias
         self._yaw = wrap_angle(self._yaw + self._rate * dt)
         self._acceleration = (
             0.9 * self._acceleration[0] + 0.1 * ((twist.vx - self._before.vx) / dt - twist.wz * twist.vy),
@@ -56,13 +66,14 @@ class Imu:
 
     def read(self, rng: np.random.Generator) -> ImuReading:
         """One sample."""
-        g = rng.standard_normal(6) * ([self._params.gyro_noise] * 3 + [self._params.accel_noise] * 3)
+        p = self._params
+        g = rng.standard_normal(7) * ([p.gyro_noise] * 3 + [p.accel_noise] * 3 + [p.heading_noise])
         return ImuReading(
-            yaw=self._yaw,
+            yaw=wrap_angle(self._yaw + float(g[6])),
             rates=(float(g[0]), float(g[1]), self._rate + float(g[2])),
             accelerations=(
-                self._acceleration[0] + float(g[3]),
-                self._acceleration[1] + float(g[4]),
+                self._acceleration[0] + p.accel_bias + float(g[3]),
+                self._acceleration[1] + p.accel_bias + float(g[4]),
                 GRAVITY + float(g[5]),
             ),
         )

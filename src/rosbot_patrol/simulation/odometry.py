@@ -15,6 +15,9 @@ class OdometryParams:
 
     ticks_per_turn: float = param(1024.0, lo=1.0, doc="encoder ticks a turn of a wheel")
     radius_error: float = param(0.004, lo=-0.5, hi=0.5, doc="relative error of the wheel radius that odometry believes")
+    radius_difference: float = param(
+        0.0, lo=-0.5, hi=0.5, doc="relative excess of the right wheels' radius over the left ones', unknown to odometry"
+    )
     track_error: float = param(-0.002, lo=-0.5, hi=0.5, doc="relative error of the track that odometry believes")
 
 
@@ -23,7 +26,9 @@ class EncoderOdometry:
 
     def __init__(self, params: OdometryParams, wheel_radius: float, track: float) -> None:
         self._tick = math.tau / params.ticks_per_turn
-        self._radius = wheel_radius * (1.0 + params.radius_error)
+        radius = wheel_radius * (1.0 + params.radius_error)
+        # What odometry believes of each side against the truth: a right wheel that is larger is believed too small.
+        self._radii = radius * (1.0 + params.radius_difference / 2.0), radius * (1.0 - params.radius_difference / 2.0)
         self._track = track * (1.0 + params.track_error)
         self._ticks = (0, 0)
         self._time = 0.0
@@ -33,8 +38,8 @@ class EncoderOdometry:
     def update(self, left: float, right: float, now: float) -> None:
         """Take the angles of the wheels [rad] at a time [s]."""
         ticks = (math.floor(left / self._tick), math.floor(right / self._tick))
-        travel_left = (ticks[0] - self._ticks[0]) * self._tick * self._radius
-        travel_right = (ticks[1] - self._ticks[1]) * self._tick * self._radius
+        travel_left = (ticks[0] - self._ticks[0]) * self._tick * self._radii[0]
+        travel_right = (ticks[1] - self._ticks[1]) * self._tick * self._radii[1]
         forward, turn = (travel_left + travel_right) / 2.0, (travel_right - travel_left) / self._track
         middle = self.pose.yaw + turn / 2.0
         self.pose = Pose2D(

@@ -46,14 +46,14 @@ def exact_room(x: float, y: float, bearings: np.ndarray, width: float = 4.0, dep
 
 @pytest.mark.parametrize("pose", [Pose2D(0, 0, 0), Pose2D(1.2, -0.7, 2.0), Pose2D(-1.9, 1.4, -3.1)])
 def test_a_scan_of_a_box_room_is_exact(pose: Pose2D) -> None:
-    scan = measure_scan(LidarParams(range_min=0.0, noise=0.0), box_room(), pose, 1.0, None)
+    scan = measure_scan(LidarParams(range_min=0.0, noise=0.0, resolution=0.0), box_room(), pose, 1.0, None)
     expected = exact_room(pose.x, pose.y, pose.yaw + scan.angles)
     assert scan.ranges.shape == (720,)
     assert np.allclose(scan.ranges, expected, atol=1e-9)
 
 
 def test_noise_has_the_spread_that_is_configured() -> None:
-    params = LidarParams(noise=0.01)
+    params = LidarParams(noise=0.01, resolution=0.0)
     room = box_room()
     exact = measure_scan(params, room, Pose2D(), 0.0, None).ranges
     errors = [measure_scan(params, room, Pose2D(), 0.0, noise_of(1, "lidar", i)).ranges - exact for i in range(50)]
