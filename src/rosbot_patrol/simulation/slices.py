@@ -7,8 +7,8 @@ sides, a mesh triangle by triangle.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +22,22 @@ from rosbot_patrol.simulation.scene import Body, Shape
 Array = NDArray[np.float64]
 
 _SIDES = 24
+_GROUP = 16  # segments
+_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 _CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _CUBE_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1])
 
 
 @dataclass(frozen=True)
 class Slice:
-    """Segments (x0, y0, x1, y1), shape (S, 4), and circles (x, y, radius), shape (C, 3), in the frame of the world."""
+    """Segments (x0, y0, x1, y1), shape (S, 4), and circles (x, y, radius), shape (C, 3), in the frame of the world.
+
+    `groups` are circles around runs of the segments, shape (G, 4), so that not every ray has to meet every segment.
+    """
 
     segments: Array
     circles: Array
+    groups: Array = field(default_factory=lambda: kernels.NO_GROUPS)
 
     def plus(self, other: Slice) -> Slice:
         """Both cuts together."""
@@ -39,7 +45,7 @@ class Slice:
             return self
         segments = np.vstack((self.segments, other.segments)) if len(other.segments) else self.segments
         circles = np.vstack((self.circles, other.circles)) if len(other.circles) else self.circles
-        return Slice(np.ascontiguousarray(segments), np.ascontiguousarray(circles))
+        return Slice(np.ascontiguousarray(segments), np.ascontiguousarray(circles), self.groups)
 
     def placed(self, pose: Pose2D) -> Slice:
         """The cut through a body that stands at a pose, where this one is in the frame of the body."""
@@ -53,13 +59,14 @@ class Slice:
     def cast(self, x: float, y: float, first: float, step: float, count: int, longest: float) -> Array:
         """Lengths of a fan of beams from a point; `longest` where nothing is met [m], shape (count,)."""
         ranges = np.full(count, float(longest))
-        kernels.cast_fan(float(x), float(y), float(first), float(step), self.segments, self.circles, ranges)
+        place = (float(x), float(y), float(first), float(step))
+        kernels.cast_fan(*place, self.segments, self.circles, self.groups, ranges)
         return ranges
 
     def is_blocked(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
         """Whether something lies between two points."""
         x0, y0, x1, y1 = map(float, (*start, *end))
-        return bool(kernels.is_blocked(x0, y0, x1, y1, self.segments, self.circles))
+        return bool(kernels.is_blocked(x0, y0, x1, y1, self.segments, self.circles, self.groups))
 
 
 EMPTY = Slice(kernels.NO_SEGMENTS, kernels.NO_CIRCLES)
@@ -69,14 +76,58 @@ def slice_bodies(bodies: Iterable[Body], height: float) -> Slice:
     """The cut through the collision shapes of bodies at a height [m]."""
     segments: list[Array] = []
     circles: list[Array] = []
+    boxes: list[tuple[tuple[float, ...], Matrix]] = []
     for body in bodies:
         for collision in body.collisions:
-            cut = slice_shape(collision.shape, body.pose @ collision.pose, height)
+            pose = body.pose @ collision.pose
+            if collision.shape.kind == "box" and is_upright(pose):
+                boxes.append((collision.shape.size, pose))
+                continue
+            cut = slice_shape(collision.shape, pose, height)
             segments.append(cut.segments)
             circles.append(cut.circles)
-    if not segments:
-        return EMPTY
-    return Slice(np.ascontiguousarray(np.vstack(segments)), np.ascontiguousarray(np.vstack(circles)))
+    segments.append(_cut_upright_boxes(boxes, height))
+    every, groups = _grouped(np.vstack(segments))
+    return Slice(every, np.ascontiguousarray(np.vstack([kernels.NO_CIRCLES, *circles])), groups)
+
+
+def _cut_upright_boxes(boxes: Sequence[tuple[tuple[float, ...], Matrix]], height: float) -> Array:
+    """Outlines of boxes of a size and pose whose z axis is that of the world, shape (S, 4)."""
+    if not boxes:
+        return kernels.NO_SEGMENTS
+    sizes, poses = np.array([size for size, _ in boxes]), np.array([pose for _, pose in boxes])
+    met = np.abs(poses[:, 2, 3] - height) < sizes[:, 2] / 2.0
+    sizes, poses = sizes[met], poses[met]
+    corners = _SQUARE * sizes[:, None, :2]
+    placed = np.einsum("nij,nkj->nki", poses[:, :2, :2], corners) + poses[:, None, :2, 3]
+    return np.concatenate([placed, np.roll(placed, -1, axis=1)], axis=2).reshape(-1, 4)
+
+
+def _grouped(segments: Array) -> tuple[Array, Array]:
+    """The segments in an order in which neighbours follow each other, and the groups of them."""
+    if len(segments) < 2 * _GROUP:
+        return np.ascontiguousarray(segments), kernels.NO_GROUPS
+    middles = (segments[:, :2] + segments[:, 2:]) / 2.0
+    runs = [np.arange(len(segments))]
+    while any(len(run) > _GROUP for run in runs):
+        runs = [half for run in runs for half in _halves(middles, run)]
+    ordered = np.ascontiguousarray(segments[np.concatenate(runs)])
+    groups, begin = [], 0
+    for run in runs:
+        ends = ordered[begin : begin + len(run)].reshape(-1, 2)
+        begin += len(run)
+        centre = (ends.min(axis=0) + ends.max(axis=0)) / 2.0
+        radius = float(np.linalg.norm(ends - centre, axis=1).max())
+        groups.append((*centre, radius * (1.0 + 1e-9) + 1e-9, len(run)))
+    return ordered, np.array(groups)
+
+
+def _halves(middles: Array, run: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    if len(run) <= _GROUP:
+        return [run]
+    axis = int(np.argmax(np.ptp(middles[run], axis=0)))
+    run = run[np.argsort(middles[run, axis], kind="stable")]
+    return [run[: len(run) // 2], run[len(run) // 2 :]]
 
 
 def slice_shape(shape: Shape, world_from_shape: Matrix, height: float) -> Slice:
