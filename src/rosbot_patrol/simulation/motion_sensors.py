@@ -92,10 +92,10 @@ class MotionSensor:
         return moves
 
 
-def bearing_in_cone(params: MotionSensorParams, place: SensorPlace, body: Pose2D) -> float | None:
-    """Bearing of a body from the sensor [rad], None where the lens does not reach it."""
+def bearing_in_cone(params: MotionSensorParams, place: SensorPlace, body: Pose2D, warmth: float = 1.0) -> float | None:
+    """Bearing of a body from the sensor [rad], None where the lens does not reach it; `warmth` 1 is a person's."""
     dx, dy = body.x - place.x, body.y - place.y
-    if math.hypot(dx, dy) > params.reach:
+    if math.hypot(dx, dy) > params.reach * warmth:
         return None
     bearing = math.atan2(dy, dx)
     if abs(wrap_angle(bearing - place.yaw)) > math.radians(params.cone_deg) / 2.0:

@@ -59,7 +59,7 @@ class SensorNet:
     def _seen_by(self, place: SensorPlace, warm: Iterable[Walker], scene: Slice) -> list[tuple[str, float]]:
         seen = []
         for walker in warm:
-            bearing = bearing_in_cone(self._params, place, walker.pose)
+            bearing = bearing_in_cone(self._params, place, walker.pose, walker.warmth)
             if bearing is None:
                 continue
             eye = (place.x + 0.1 * math.cos(bearing), place.y + 0.1 * math.sin(bearing))
