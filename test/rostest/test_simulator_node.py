@@ -29,7 +29,7 @@ from rosbot_patrol.srv import MoveActor, SpawnActor
 
 rospy.wait_for_service("/simulator/spawn_actor")
 placed = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)("bob", "person", "", "", Pose2D(3, 7, 0))
-moved = rospy.ServiceProxy("/simulator/move_actor", MoveActor)("bob", [Pose2D(3, 8.2, 0)], 1.0, False)
+moved = rospy.ServiceProxy("/simulator/move_actor", MoveActor)(name="bob", path=[Pose2D(3, 8.2, 0)], speed=1.0)
 print(placed.success, moved.success)
 """
 SPAWN = f"""

@@ -82,7 +82,7 @@ def _body() -> None:
     rospy.loginfo("an intruder walks into room %d", demo.room)
     points = [Pose2D(x, y, 0.0) for x, y in walk.path[1:]]
     if points:
-        moved = rospy.ServiceProxy(move_name, MoveActor)(placed.name, points, walk.speed, False)
+        moved = rospy.ServiceProxy(move_name, MoveActor)(name=placed.name, path=points, speed=walk.speed)
         if not moved.success:
             raise WorldError(move_name, moved.message)
 

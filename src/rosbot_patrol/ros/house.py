@@ -251,7 +251,7 @@ class House:
     def walk(self, name: str, points: list[tuple[float, float]], speed: float = 0.8, loop: bool = False) -> None:
         """Let an actor walk."""
         path = [Pose2DMsg(x, y, 0.0) for x, y in points]
-        answer = rospy.ServiceProxy("/simulator/move_actor", MoveActor)(name, path, speed, loop)
+        answer = rospy.ServiceProxy("/simulator/move_actor", MoveActor)(name=name, path=path, speed=speed, loop=loop)
         if not answer.success:
             raise HouseError(answer.message)
 
