@@ -21,9 +21,10 @@ def depth_from_clip(raw: Floats, near: float, far: float, metres: Floats) -> Non
         far: far clip [m].
         metres: depth on return [m], shape (N,), inf at the far clip.
     """
-    product, span = near * far, far - near
+    a, b = np.float32(near), np.float32(far)
+    product, span = a * b, b - a
     for i in range(raw.shape[0]):
-        metres[i] = product / (far - raw[i] * span) if raw[i] < np.float32(1.0) else np.float32(np.inf)
+        metres[i] = product / (b - raw[i] * span) if raw[i] < np.float32(1.0) else np.float32(np.inf)
 
 
 @kernel("void(uint8[::1], int8[::1], uint8[::1])")
@@ -52,9 +53,10 @@ def sense_depth(depth: Floats, noise: Floats, nearest: float, farthest: float, s
         sensed: depth on return [m], shape (N,).
     """
     noisy = noise.shape[0] > 0
+    low, high = np.float32(nearest), np.float32(farthest)
     for i in range(depth.shape[0]):
         d = depth[i]
-        if d < nearest or d > farthest:
+        if d < low or d > high:
             sensed[i] = np.float32(np.nan)
         elif noisy:
             sensed[i] = d + noise[i] * d * d

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, Twist2D
 from rosbot_patrol.simulation.lidar import LidarParams, measure_scan
 from rosbot_patrol.simulation.matrices import from_xyz_rpy
 from rosbot_patrol.simulation.noise import noise_of
@@ -116,3 +116,44 @@ def test_a_range_sensor_tells_the_nearest_in_its_cone_and_its_limits() -> None:
     assert measure_range(params, box_room(), Pose2D(1.5, 0.0, 0.0), None) == pytest.approx(0.5)
     assert measure_range(params, box_room(), Pose2D(0.0, 0.0, 0.0), None) == 0.9
     assert measure_range(params, box_room(), Pose2D(1.995, 0.0, 0.0), None) == 0.01
+
+
+def test_ranges_are_whole_multiples_of_the_resolution() -> None:
+    ranges = measure_scan(LidarParams(noise=0.01, resolution=0.02), box_room(), Pose2D(), 0.0, noise_of(1, "l")).ranges
+    assert np.abs(ranges / 0.02 - np.rint(ranges / 0.02)).max() < 1e-9
+    assert len(np.unique(ranges)) < 120
+
+
+def test_a_beam_without_return_is_what_the_driver_makes_of_it() -> None:
+    beyond = LidarParams(no_return="beyond", range_max=8.0)
+    assert (measure_scan(beyond, EMPTY, Pose2D(), 0.0, noise_of(1, "l")).ranges == 9.0).all()
+    assert not measure_scan(beyond, EMPTY, Pose2D(), 0.0, None).is_hit.any()
+    lost = LidarParams(dropped=1.0, dropped_as="zero")
+    assert (measure_scan(lost, box_room(), Pose2D(), 0.0, noise_of(1, "l")).ranges == 0.0).all()
+    assert (measure_scan(LidarParams(dropped=0.0), box_room(), Pose2D(), 0.0, noise_of(1, "l")).is_hit).all()
+
+
+def test_a_scanner_of_a_part_of_a_turn_and_one_that_hangs_upside_down() -> None:
+    pose = Pose2D(0.7, 0.3, 0.4)
+    part = LidarParams(samples=270, angle_min=-2.0, angle_max=1.5, noise=0.0, resolution=0.0)
+    scan = measure_scan(part, box_room(), pose, 0.0, None, frame="base_scan")
+    assert scan.frame_id == "base_scan"
+    assert np.allclose(scan.ranges, exact_room(0.7, 0.3, 0.4 + scan.angles), atol=1e-9)
+    assert scan.angles[-1] == pytest.approx(1.5)
+    hanging = measure_scan(part, box_room(), pose, 0.0, None, flipped=True)
+    assert np.allclose(hanging.ranges, exact_room(0.7, 0.3, 0.4 - scan.angles), atol=1e-9)
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_sweep_that_takes_time_is_distorted_by_the_motion_within_it(flipped: bool) -> None:
+    params = LidarParams(noise=0.0, resolution=0.0, range_min=0.0, sweep_time=0.1)
+    twist = Twist2D(0.5, 0.0, 1.0)
+    scan = measure_scan(params, box_room(), Pose2D(0.2, 0.1, 0.3), 7.0, None, twist=twist, flipped=flipped)
+    assert scan.stamp == pytest.approx(6.9)
+    ago = 0.1 * (1.0 - (np.arange(720) + 0.5) / 720)
+    yaw = 0.3 - 1.0 * ago
+    x, y = 0.2 - 0.5 * ago * np.cos(0.3), 0.1 - 0.5 * ago * np.sin(0.3)
+    exact = exact_room(x, y, yaw + (-scan.angles if flipped else scan.angles))
+    assert np.abs(scan.ranges - exact).max() < 0.02
+    still = measure_scan(params, box_room(), Pose2D(0.2, 0.1, 0.3), 7.0, None, twist=Twist2D())
+    assert np.abs(still.ranges - exact).max() > 0.03
