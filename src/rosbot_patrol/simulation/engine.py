@@ -183,15 +183,14 @@ class Engine:
 
     def carry(self, pose: Pose2D) -> None:
         """Carry the robot elsewhere; its odometry does not notice. Raises WorldError where there is no room for it."""
-        robot, before = self._need_robot(), self.pose
+        robot = self._need_robot()
         name = f"robot '{robot.description.name}'"
         if not all(map(math.isfinite, pose)):
             raise WorldError(name, f"{tuple(pose)} is no pose")
-        self._physics.set_pose(pose)
-        stuck = self._physics.blocker()
+        stuck = self._physics.blocker_at(pose)
         if stuck:
-            self._physics.set_pose(before)
             raise WorldError(name, f"({pose.x:.2f}, {pose.y:.2f}) is no place for it, '{stuck}' is there")
+        self._physics.set_pose(pose)
         robot.drive.stop()
 
     set_pose = carry

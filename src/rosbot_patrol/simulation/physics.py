@@ -195,6 +195,16 @@ class Physics:
             pybullet.resetJointState(self._robot, joint, value, 0.0, physicsClientId=self._client)
         self._refresh()
 
+    def blocker_at(self, pose: Pose2D) -> str | None:
+        """Name of what the robot would stand in at a pose, None where it has room; it stays as it is, moving or not."""
+        before = self._joint_states()
+        self.set_pose(pose)
+        stuck = self.blocker()
+        for joint, (value, speed) in zip(_JOINTS, before, strict=True):
+            pybullet.resetJointState(self._robot, joint, value, speed, physicsClientId=self._client)
+        self._refresh()
+        return stuck
+
     def step(self, wanted: Twist2D) -> None:
         """Advance by one time step, the base driven at a velocity in its own frame."""
         if self._robot is not None:
