@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rosbot_patrol.errors import WorldError
-from rosbot_patrol.simulation.actors import LOOKS, person_body, person_pose_parts
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.simulation.actors import LOOKS, hydrant_body, person_body, person_pose_parts
+from rosbot_patrol.simulation.matrices import from_pose2d
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.scene import Body, Intrinsics, Material, SceneRenderer, Shape, Visual
+from rosbot_patrol.simulation.world import load_world
 
 # A robot's camera at the origin that looks along x: optical z is forward, x right, y down.
 CAMERA = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
 VIEW = Intrinsics()
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(params=["egl", "tiny"])
@@ -82,6 +87,15 @@ def test_colour_is_the_material_s(renderer: SceneRenderer) -> None:
     assert right[:2].max() < 10
 
 
+@pytest.mark.parametrize("colour", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.9, 0.8, 0.1), (0.2, 0.2, 0.2), (1, 1, 1)])
+def test_a_colour_keeps_its_hue_and_its_brightness(renderer: SceneRenderer, colour: tuple[float, ...]) -> None:
+    renderer.add(thing("it", "sphere", (0.5,), at(2.5, 0, 0), colour=colour))
+    picture, depth = renderer.render(CAMERA, VIEW)
+    seen = picture[np.isfinite(depth)].mean(axis=0) / 255.0
+    assert seen / seen.max() == pytest.approx(np.array(colour) / max(colour), abs=0.08)
+    assert 0.5 * max(colour) < seen.max() <= max(colour) + 0.02
+
+
 def test_the_nearer_hides_the_farther(renderer: SceneRenderer) -> None:
     renderer.add(thing("far", "box", (1, 8, 8), at(6, 0, 0), colour=(0, 1, 0)))
     renderer.add(thing("near", "box", (1, 1, 1), at(3, 0, 0), static=False))
@@ -119,3 +133,36 @@ def test_mistakes_are_named(renderer: SceneRenderer) -> None:
         renderer.pose_visuals("box", np.zeros((3, 4, 4)))
     with pytest.raises(WorldError, match="cylinder: needs 2 sizes"):
         renderer.add(thing("thin", "cylinder", (1.0,), np.eye(4)))
+
+
+def house_view(prefer: str, place: Pose2D) -> tuple[np.ndarray, np.ndarray]:
+    """Colour and depth of the house with a person and a hydrant in it, from the robot's camera."""
+    renderer = make_renderer(prefer=prefer)
+    for body in load_world(ROOT / "worlds" / "house.world").bodies:
+        renderer.add(body)
+    look = LOOKS["visitor"]
+    renderer.add(person_body("somebody", look))
+    renderer.move("somebody", from_pose2d(Pose2D(2.2, 0.6, 2.0)))
+    renderer.pose_visuals("somebody", person_pose_parts(look, 0.3, True))
+    renderer.add(hydrant_body("hydrant"))
+    renderer.move("hydrant", from_pose2d(Pose2D(1.6, -0.5, 0.0)))
+    picture = renderer.render(from_pose2d(place, 0.22) @ CAMERA, VIEW)
+    renderer.close()
+    return picture
+
+
+@pytest.mark.parametrize("place", [Pose2D(), Pose2D(2.8, -0.2, 2.4), Pose2D(-3.5, 0.3, 1.0), Pose2D(14.7, 11.5, -2.0)])
+def test_both_draw_the_same_house(place: Pose2D) -> None:
+    """Depth but for edges the same, colours of the same hue and, but for textures and light, the same brightness."""
+    (colour, depth), (other_colour, other_depth) = (house_view(prefer, place) for prefer in ("egl", "tiny"))
+    both = np.isfinite(depth) & np.isfinite(other_depth)
+    assert (np.isfinite(depth) != np.isfinite(other_depth)).mean() < 0.005
+    gap = np.abs(depth[both] - other_depth[both])
+    assert np.median(gap) < 0.002
+    assert (gap > 0.02).mean() < 0.01
+    coarse, other_coarse = (
+        p.reshape(12, 40, 16, 40, 3).astype(float).mean(axis=(1, 3)) for p in (colour, other_colour)
+    )
+    solid = both.reshape(12, 40, 16, 40).all(axis=(1, 3))  # the sky's colour is the renderer's own
+    assert np.abs(coarse - other_coarse)[solid].mean() < 15.0
+    assert np.corrcoef(coarse[solid].ravel(), other_coarse[solid].ravel())[0, 1] > 0.9
