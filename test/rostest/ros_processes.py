@@ -91,6 +91,12 @@ class Ros:
         self.processes.append(probe.process)
         return probe
 
+    def script(self, text):
+        """A program of the test's own, which says what it hears as a probe does."""
+        process = Process([sys.executable, "-c", text], self.env, stdin=subprocess.PIPE)
+        self.processes.append(process)
+        return Teller(process)
+
     def stop_nodes(self):
         for process in reversed(self.processes):
             process.stop()
@@ -101,18 +107,12 @@ class Ros:
         self.core.stop()
 
 
-class Probe:
-    """topic_probe.py at the other end of two pipes."""
+class Teller:
+    """A process that says what it hears in lines of JSON, `{"ready": true}` first."""
 
-    def __init__(self, env):
-        self.process = Process([sys.executable, str(HERE / "topic_probe.py")], env, stdin=subprocess.PIPE)
+    def __init__(self, process):
+        self.process = process
         self.expect(lambda said: said.get("ready"), 15.0)
-
-    def tell(self, **command):
-        line = json.dumps(command)
-        self.process.popen.stdin.write(line + "\n")
-        self.process.popen.stdin.flush()
-        self.expect(lambda said: said.get("done") == line)
 
     def heard(self, **fields):
         """Everything said so far that has these fields."""
@@ -122,3 +122,16 @@ class Probe:
     def expect(self, condition, seconds=10.0):
         """The first thing said, from now or before, that meets a condition."""
         return wait_for(lambda: next((s for s in self.heard() if condition(s)), None), seconds, "what the probe awaits")
+
+
+class Probe(Teller):
+    """topic_probe.py at the other end of two pipes."""
+
+    def __init__(self, env):
+        super().__init__(Process([sys.executable, str(HERE / "topic_probe.py")], env, stdin=subprocess.PIPE))
+
+    def tell(self, **command):
+        line = json.dumps(command)
+        self.process.popen.stdin.write(line + "\n")
+        self.process.popen.stdin.flush()
+        self.expect(lambda said: said.get("done") == line)

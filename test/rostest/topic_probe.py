@@ -47,7 +47,10 @@ def call(service, kind, arguments):
     cls = roslib.message.get_service_class(kind)
     try:
         rospy.wait_for_service(service, 5.0)
-        say(called=service, **fields(rospy.ServiceProxy(service, cls)(*arguments)))
+        request = cls._request_class()
+        if arguments:
+            genpy.message.fill_message_args(request, arguments)
+        say(called=service, **fields(rospy.ServiceProxy(service, cls)(request)))
     except (rospy.ServiceException, rospy.ROSException) as err:
         say(called=service, error=str(err))
 

@@ -6,7 +6,9 @@ README), `/clock` and the transform odom -> base_link.
 Differs: /clock at 100 Hz of simulated time, not 1 kHz; /odom at 20 Hz from wheel encoders that drift
 (`odometry: ground_truth` gives Gazebo's); the lidar turns at 10 Hz; the base stops 0.5 s after the last command; all
 sensors carry a little noise; ranges below the lidar's minimum are -inf (REP 117). In addition /range, /battery, ground
-truth on /ground_truth/odom and /ground_truth/contacts, and services for actors.
+truth on /ground_truth/odom and /ground_truth/contacts, services for actors, faults and control, and scenarios. Of
+Gazebo's services /gazebo/pause_physics, unpause_physics, reset_simulation and reset_world are there; a reset puts the
+robot back to its start and leaves the time as it is.
 """
 
 from __future__ import annotations
@@ -29,13 +31,17 @@ from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import load_params, run_node
 from rosbot_patrol.ros.packages import package_finder
+from rosbot_patrol.ros.simulator_doors import DoorServices
+from rosbot_patrol.ros.simulator_faults import FaultServices
 from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RateParams
 from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
 from rosbot_patrol.ros.simulator_requests import Requests
+from rosbot_patrol.ros.simulator_scenario import ScenarioRunner
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.robot import RobotDescription, load_robot, parse_robot
+from rosbot_patrol.simulation.scenario import Scenario, Start, read_scenario
 from rosbot_patrol.simulation.sensor_places import read_sensors
 from rosbot_patrol.simulation.world import World, load_world
 
@@ -67,6 +73,7 @@ class SimulatorParams(EngineParams):
     motion_sensors: str = param("", doc="file of the motion sensors, empty: none")
     prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
     bridge_host: str = param("localhost", doc="where the bridge of the motion sensors runs")
+    scenario: str = param("", doc="file of a scenario to play; what it says of world, sensors, seed and start counts")
     rates: RateParams = field(default_factory=RateParams)
     lockstep: LockstepParams = field(default_factory=LockstepParams)
 
@@ -82,6 +89,9 @@ class Simulator:
     """Runs the engine on one thread, in step with the wall or with the nodes that listen."""
 
     def __init__(self, p: SimulatorParams) -> None:
+        scenario = read_scenario(p.scenario) if p.scenario else None
+        if scenario is not None:
+            p = _set_by(scenario, p)
         folders = [*p.model_path, *filter(None, os.environ.get("GAZEBO_MODEL_PATH", "").split(":"))]
         world = load_world(p.world, folders) if p.world else World()
         places = read_sensors(p.motion_sensors)
@@ -94,11 +104,18 @@ class Simulator:
         self._command: Latest[Twist] = Latest()
         self._pace = Pace(p.rate)
         self._outputs = Outputs(self._engine, p.rates, exact_odometry=p.odometry == "ground_truth")
-        self._requests = Requests(self._engine, self._set_paused)
-        self._lockstep = Lockstep(p.lockstep, lambda: self._engine.now) if p.rate == 0.0 else None
-        self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id).start() for s in places}
+        self._requests = Requests(self._engine, self._set_paused, self._step_ticks)
+        self._lockstep = Lockstep(p.lockstep, lambda: self._engine.now)
+        if p.rate == 0.0:
+            self._lockstep.subscribe()
+        self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id) for s in places}
+        self._scenario = ScenarioRunner(scenario, self._engine, self._clients) if scenario is not None else None
+        for client in self._clients.values():
+            client.start()
         self._window = _open_window(self._engine) if p.gui else None
         self._health = Health("simulation")
+        self._doors = DoorServices(self._engine, self._requests.ask)
+        self._faults = FaultServices(self._engine, self._clients, self._requests.ask, self._health, p.seed)
         rospy.Subscriber("/cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
         log.info("world '%s': %d bodies, %d motion sensors", world.name, len(world.bodies), len(places))
 
@@ -111,10 +128,13 @@ class Simulator:
         while not rospy.is_shutdown():
             self._requests.serve()
             if self._paused:
+                self._faults.follow()
                 time.sleep(_PAUSED_PERIOD)
                 self._pace.restart(self._engine.now)
             else:
                 self._advance()
+                self._lockstep.wait()
+                self._pace.wait(self._engine.now)
             if self._window is not None:
                 self._window.show()
             wall = time.monotonic()
@@ -134,14 +154,20 @@ class Simulator:
         if command is not None:
             self._engine.command(twist_from_msg(command))
         for _ in range(STEPS_PER_TICK):
+            if self._scenario is not None:
+                self._scenario.advance()
             self._engine.step()
         self._tick += 1
         self._outputs.publish(self._tick)
+        self._faults.follow()
         for sensor, is_high in self._engine.motion_changes():
             self._clients[sensor].set_motion(is_high)
-        if self._lockstep is not None:
-            self._lockstep.wait()
-        self._pace.wait(self._engine.now)
+
+    def _step_ticks(self, ticks: int) -> None:
+        if not self._paused:
+            raise WorldError("simulation", "runs: pause it before you step it")
+        for _ in range(ticks):
+            self._advance()
 
     def _set_paused(self, paused: bool) -> None:
         self._paused = paused
@@ -157,6 +183,31 @@ class Simulator:
             "motion sensors linked": sum(c.connected for c in self._clients.values()),
         }
         self._health.set("", WARN if slow else OK, text, values)
+        if self._params.rate == 0.0:
+            self._report_lockstep()
+
+    def _report_lockstep(self) -> None:
+        waited = {name: f"{seconds:.2f} s of the last second" for name, seconds in self._lockstep.take_waited().items()}
+        idle = self._lockstep.idle
+        if idle:
+            text = f"goes on without {', '.join(idle)}"
+        else:
+            text = f"waits for {', '.join(waited)}" if waited else "waits for nobody"
+        self._health.set("lockstep", WARN if idle else OK, text, waited)
+
+
+def _set_by(scenario: Scenario, p: SimulatorParams) -> SimulatorParams:
+    """The parameters with what a scenario says in their place."""
+    setting, start = scenario.setting, scenario.robot or Start(x=p.x, y=p.y, yaw=p.yaw)
+    return dataclasses.replace(
+        p,
+        world=setting.world or p.world,
+        motion_sensors=setting.motion_sensors or p.motion_sensors,
+        seed=p.seed if setting.seed is None else setting.seed,
+        x=start.x,
+        y=start.y,
+        yaw=start.yaw,
+    )
 
 
 def _open_window(engine: Engine) -> Window:

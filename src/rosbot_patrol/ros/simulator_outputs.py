@@ -127,6 +127,8 @@ class Outputs:
     def _send_scan(self, now: float) -> None:
         if self._engine.description.laser is None or not self._scan.get_num_connections():
             return
+        if self._engine.faults.is_silent("lidar"):
+            return
         lidar = self._engine.params.lidar
         message = scan_to_msg(self._engine.scan())
         message.scan_time = lidar.sweep_time
@@ -168,7 +170,7 @@ class Outputs:
 
     def _send_pictures(self, now: float) -> None:
         mount = self._engine.description.camera
-        if mount is None:
+        if mount is None or self._engine.faults.is_silent("camera"):
             return
         camera, frame = self._engine.params.camera.intrinsics, mount.frame
         for info in (self._rgb_info, self._depth_info):

@@ -17,6 +17,7 @@ log = logging.getLogger(__name__)
 _BEHIND = 0.25  # what the clock has lost beyond this is not caught up [s]
 _REPORT = 10.0
 _TF = "tf:"
+_LOOK = 0.0005
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,41 +54,100 @@ class Pace:
 
 
 class Lockstep:
-    """Waits for topics that speak steadily, so that the clock does not outrun who publishes them."""
+    """Waits for topics that speak steadily, so that the clock does not outrun who publishes them.
 
-    def __init__(self, params: LockstepParams, now: Callable[[], float]) -> None:
+    A topic is waited for from its first message on. One that stays silent holds the clock up once, for the patience;
+    then it is idle until it speaks again.
+
+    Args:
+        params: which topics, and how long.
+        now: simulated time [s].
+        clock: wall time [s]; sleep: waits on it.
+    """
+
+    def __init__(
+        self,
+        params: LockstepParams,
+        now: Callable[[], float],
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         self._params = params
         self._now = now
+        self._clock = clock
+        self._sleep = sleep
         self._heard: dict[str, float] = {}
-        self._said = 0.0
-        for topic in params.topics:
+        self._nodes: dict[str, str] = {}
+        self._idle: set[str] = set()
+        self._said: dict[str, float] = {}
+        self._waited: dict[str, float] = {}
+
+    def subscribe(self) -> None:
+        """Listen to the topics."""
+        for topic in self._params.topics:
             if topic.startswith(_TF):
-                rospy.Subscriber("/tf", TFMessage, self._note_frame, callback_args=topic, tcp_nodelay=True)
+                rospy.Subscriber("/tf", TFMessage, self._hear_frame, callback_args=topic, tcp_nodelay=True)
             else:
-                rospy.Subscriber(topic, rospy.AnyMsg, self._note, callback_args=topic, queue_size=1, tcp_nodelay=True)
+                rospy.Subscriber(topic, rospy.AnyMsg, self._hear, callback_args=topic, queue_size=1, tcp_nodelay=True)
 
-    def _note(self, _: object, topic: str) -> None:
+    def note(self, topic: str, node: str) -> None:
+        """A topic has spoken; from any thread."""
+        self._nodes[topic] = node
+        self._idle.discard(topic)
         self._heard[topic] = self._now()
-
-    def _note_frame(self, message: TFMessage, topic: str) -> None:
-        if any(t.child_frame_id.lstrip("/") == topic.removeprefix(_TF) for t in message.transforms):
-            self._heard[topic] = self._now()
 
     def wait(self) -> None:
         """Return when every topic that is not idle has spoken within the slack; a silent one is idle from then on."""
-        until = time.monotonic() + self._params.patience
-        while True:
-            late = [t for t, at in list(self._heard.items()) if self._now() - at > self._params.slack]
-            if not late or rospy.is_shutdown():
+        late = self._late()
+        if not late:
+            return
+        began = at = self._clock()
+        while late and not rospy.is_shutdown():
+            if at - began >= self._params.patience:
+                self._give_up(late)
                 return
-            if time.monotonic() >= until:
-                for topic in late:
-                    self._heard.pop(topic, None)
-                self._say(late)
-                return
-            time.sleep(0.0005)
+            self._sleep(_LOOK)
+            before, at = at, self._clock()
+            for topic in late:
+                self._waited[topic] = self._waited.get(topic, 0.0) + at - before
+            late = self._late()
 
-    def _say(self, late: list[str]) -> None:
-        if time.monotonic() - self._said > _REPORT:
-            self._said = time.monotonic()
-            log.info("the clock waited %.1f s for %s, and goes on without", self._params.patience, ", ".join(late))
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Topics that have spoken once, and that the clock goes on without, each with its node."""
+        return tuple(map(self._name, sorted(self._idle)))
+
+    def take_waited(self) -> dict[str, float]:
+        """Wall time that the clock waited for each topic since this was last asked [s], by topic and node."""
+        waited, self._waited = self._waited, {}
+        return {self._name(topic): seconds for topic, seconds in waited.items()}
+
+    def _hear(self, message: rospy.AnyMsg, topic: str) -> None:
+        self.note(topic, _sender(message))
+
+    def _hear_frame(self, message: TFMessage, topic: str) -> None:
+        if any(t.child_frame_id.lstrip("/") == topic.removeprefix(_TF) for t in message.transforms):
+            self.note(topic, _sender(message))
+
+    def _late(self) -> list[str]:
+        now = self._now()
+        return [t for t, at in list(self._heard.items()) if now - at > self._params.slack]
+
+    def _name(self, topic: str) -> str:
+        return f"{topic} of {self._nodes[topic]}"
+
+    def _give_up(self, late: list[str]) -> None:
+        wall = self._clock()
+        for topic in late:
+            self._heard.pop(topic, None)
+            self._idle.add(topic)
+            if wall - self._said.get(topic, -_REPORT) >= _REPORT:
+                self._said[topic] = wall
+                text = "the clock waited %.1f s for %s, and goes on without"
+                log.info(text, self._params.patience, self._name(topic))
+
+
+def _sender(message: object) -> str:
+    header = getattr(message, "_connection_header", None) or {}
+    return str(header.get("callerid", "an unknown node"))

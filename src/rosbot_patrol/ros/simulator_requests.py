@@ -9,9 +9,9 @@ from concurrent.futures import TimeoutError as FutureTimeout
 from typing import Any
 
 import rospy
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty, EmptyResponse, Trigger, TriggerResponse
 
-from rosbot_patrol.errors import PatrolError
+from rosbot_patrol.errors import PatrolError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.ros.packages import package_finder
 from rosbot_patrol.simulation.engine import Engine
@@ -23,15 +23,22 @@ from rosbot_patrol.srv import (
     RemoveActor,
     RemoveActorRequest,
     RemoveActorResponse,
+    SetPose,
+    SetPoseRequest,
+    SetPoseResponse,
     SpawnActor,
     SpawnActorRequest,
     SpawnActorResponse,
     SpawnRobot,
     SpawnRobotRequest,
     SpawnRobotResponse,
+    StepSimulation,
+    StepSimulationRequest,
+    StepSimulationResponse,
 )
 
 _PATIENCE = 10.0  # wall time that a request waits for the simulation [s]
+_MOST_TICKS = 1000
 
 
 class Requests:
@@ -40,11 +47,13 @@ class Requests:
     Args:
         engine: what is asked to change.
         set_paused: pauses or goes on.
+        advance: lets a paused simulation go on for some ticks; raises PatrolError where it is not paused.
     """
 
-    def __init__(self, engine: Engine, set_paused: Callable[[bool], None]) -> None:
+    def __init__(self, engine: Engine, set_paused: Callable[[bool], None], advance: Callable[[int], None]) -> None:
         self._engine = engine
         self._set_paused = set_paused
+        self._advance = advance
         self._queue: queue.Queue[tuple[Callable[[], Any], Future[Any]]] = queue.Queue()
         rospy.Service("~spawn_actor", SpawnActor, self._spawn_actor)
         rospy.Service("~move_actor", MoveActor, self._move_actor)
@@ -53,6 +62,13 @@ class Requests:
         rospy.Service("~pause", Empty, lambda _: self._empty(lambda: self._set_paused(True)))
         rospy.Service("~unpause", Empty, lambda _: self._empty(lambda: self._set_paused(False)))
         rospy.Service("~reset", Empty, lambda _: self._empty(self._engine.reset))
+        rospy.Service("~step", StepSimulation, self._step)
+        rospy.Service("~set_pose", SetPose, self._set_pose)
+        rospy.Service("~remove_robot", Trigger, self._remove_robot)
+        for name in ("reset_simulation", "reset_world"):
+            rospy.Service(f"/gazebo/{name}", Empty, lambda _: self._empty(self._engine.reset))
+        rospy.Service("/gazebo/pause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(True)))
+        rospy.Service("/gazebo/unpause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(False)))
 
     def serve(self) -> None:
         """Do what has been asked for."""
@@ -65,7 +81,8 @@ class Requests:
             except PatrolError as err:
                 future.set_exception(err)
 
-    def _ask(self, action: Callable[[], Any]) -> Any:
+    def ask(self, action: Callable[[], Any]) -> Any:
+        """The result of an action that the simulation's thread does; raises the PatrolError that it raises."""
         future: Future[Any] = Future()
         self._queue.put((action, future))
         try:
@@ -75,12 +92,49 @@ class Requests:
             raise PatrolError(f"the simulation did not answer within {_PATIENCE:.0f} s") from err
 
     def _empty(self, action: Callable[[], None]) -> EmptyResponse:
-        self._ask(action)
+        try:
+            self.ask(action)
+        except PatrolError as err:
+            raise rospy.ServiceException(str(err)) from err
         return EmptyResponse()
+
+    def _step(self, request: StepSimulationRequest) -> StepSimulationResponse:
+        if not 0 < request.ticks <= _MOST_TICKS:
+            problem = f"cannot step {request.ticks} ticks, expected 1 to {_MOST_TICKS}"
+            return StepSimulationResponse(success=False, message=problem)
+        try:
+            self.ask(lambda: self._advance(request.ticks))
+        except PatrolError as err:
+            return StepSimulationResponse(success=False, now=self._engine.now, message=str(err))
+        return StepSimulationResponse(success=True, now=self._engine.now, message="")
+
+    def _set_pose(self, request: SetPoseRequest) -> SetPoseResponse:
+        try:
+            self.ask(lambda: self._put(request.name, _pose(request.pose)))
+        except PatrolError as err:
+            return SetPoseResponse(success=False, message=str(err))
+        name, place = request.name or "the robot", f"({request.pose.x:.2f}, {request.pose.y:.2f})"
+        rospy.loginfo("%s was put at %s", name, place)
+        return SetPoseResponse(success=True, message="")
+
+    def _put(self, name: str, pose: Pose2D) -> None:
+        engine = self._engine
+        if not name or (engine.has_robot and name == engine.description.name):
+            engine.carry(pose)
+        else:
+            engine.move_actor(name, [pose], 0.0)
+
+    def _remove_robot(self, _: object) -> TriggerResponse:
+        try:
+            self.ask(self._engine.remove_robot)
+        except PatrolError as err:
+            return TriggerResponse(success=False, message=str(err))
+        rospy.loginfo("the robot is gone")
+        return TriggerResponse(success=True, message="")
 
     def _spawn_actor(self, request: SpawnActorRequest) -> SpawnActorResponse:
         try:
-            name = self._ask(
+            name = self.ask(
                 lambda: self._engine.spawn_actor(
                     request.name, request.model, request.look, _pose(request.pose), posture=request.posture
                 )
@@ -91,16 +145,24 @@ class Requests:
         return SpawnActorResponse(success=True, name=name, message="")
 
     def _move_actor(self, request: MoveActorRequest) -> MoveActorResponse:
-        path = [_pose(p) for p in request.path]
         try:
-            self._ask(lambda: self._engine.move_actor(request.name, path, request.speed, request.loop))
+            self.ask(lambda: self._walk(request))
         except PatrolError as err:
             return MoveActorResponse(success=False, message=str(err))
         return MoveActorResponse(success=True, message="")
 
+    def _walk(self, request: MoveActorRequest) -> None:
+        if request.roam:
+            if request.path:
+                raise WorldError(f"actor '{request.name}'", "walks along a path or wanders, not both")
+            self._engine.roam_actor(request.name, request.roam, request.speed, pause=request.pause)
+            return
+        path = [_pose(p) for p in request.path]
+        self._engine.move_actor(request.name, path, request.speed, request.loop, pause=request.pause)
+
     def _remove_actor(self, request: RemoveActorRequest) -> RemoveActorResponse:
         try:
-            self._ask(lambda: self._engine.remove_actor(request.name))
+            self.ask(lambda: self._engine.remove_actor(request.name))
         except PatrolError as err:
             return RemoveActorResponse(success=False, message=str(err))
         rospy.loginfo("'%s' is gone", request.name)
@@ -109,7 +171,7 @@ class Requests:
     def _spawn_robot(self, request: SpawnRobotRequest) -> SpawnRobotResponse:
         try:
             robot = parse_robot(request.urdf, source=f"robot '{request.name}'", find_package=package_finder())
-            self._ask(lambda: self._engine.spawn_robot(robot, _pose(request.pose)))
+            self.ask(lambda: self._engine.spawn_robot(robot, _pose(request.pose)))
         except PatrolError as err:
             return SpawnRobotResponse(success=False, message=str(err))
         rospy.loginfo("robot '%s' stands at (%.2f, %.2f)", request.name, request.pose.x, request.pose.y)

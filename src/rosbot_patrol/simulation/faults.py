@@ -8,6 +8,7 @@ asks it. Times are of simulated time, but for the delays and drops of a sensor's
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,19 +23,20 @@ EVENTS = ("start", "on_guard", "driving", "looking", "returning", "home")
 ALL_SENSORS = -1
 
 
-def _finite(value: float) -> str | None:
+def finite(value: float) -> str | None:
+    """What is wrong with a number that is not finite, for `param(check=...)`."""
     return None if math.isfinite(value) else f"is {value}, expected a finite number"
 
 
 def _finite_or_none(value: float | None) -> str | None:
-    return None if value is None else _finite(value)
+    return None if value is None else finite(value)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Timed:
     """Something that happens at a time, counted from an event."""
 
-    at: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="when, counted from the event `after`")
+    at: float = param(0.0, unit="s", lo=0.0, check=finite, doc="when, counted from the event `after`")
     after: str = param("", choices=("", *EVENTS), doc="event of the patrol; empty: the scenario's own beginning")
 
 
@@ -45,12 +47,13 @@ class Fault(Timed):
     kind: ClassVar[str] = ""
     is_instant: ClassVar[bool] = False
 
-    duration: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="how long it lasts, 0: until it is cleared")
+    duration: float = param(0.0, unit="s", lo=0.0, check=finite, doc="how long it lasts, 0: until it is cleared")
 
     @property
     def where(self) -> str:
         """What it befalls, "" where the kind says it."""
-        return str(getattr(self, "target", ""))
+        target = getattr(self, "target", "")
+        return "" if target == ALL_SENSORS else str(target)
 
     @property
     def name(self) -> str:
@@ -58,8 +61,8 @@ class Fault(Timed):
         return f"{self.kind} {self.where}".strip()
 
     def __str__(self) -> str:
-        own = [f.name for f in self.__dataclass_fields__.values() if f.name not in _COMMON]
-        details = ", ".join(f"{key} {getattr(self, key):g}" for key in own if not isinstance(getattr(self, key), str))
+        own = [f.name for f in dataclasses.fields(self) if f.name not in _COMMON]
+        details = ", ".join(f"{key} {getattr(self, key):g}" for key in own)
         return f"{self.name} ({details})" if details else self.name
 
 
@@ -136,7 +139,7 @@ class MotionFlapping(SensorFault):
     """The output goes up and down."""
 
     kind: ClassVar[str] = "motion_flapping"
-    period: float = param(4.0, unit="s", lo=0.2, check=_finite, doc="from one rise to the next")
+    period: float = param(4.0, unit="s", lo=0.2, check=finite, doc="from one rise to the next")
 
     def is_high(self, since: float) -> bool:
         """The output, so long [s] after the beginning: high in the first half of each period."""
@@ -148,7 +151,7 @@ class MotionRebooting(SensorFault):
     """The device starts anew: its link breaks, and the sensor is blind while it warms up."""
 
     kind: ClassVar[str] = "motion_rebooting"
-    every: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="again after that long, 0: only once")
+    every: float = param(0.0, unit="s", lo=0.0, check=finite, doc="again after that long, 0: only once")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,7 +163,7 @@ class LinkPoor(Fault):
     loss: float = param(0.0, lo=0.0, hi=1.0, doc="part of the frames that get lost")
     delay: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="time that each frame takes")
     jitter: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="longest time on top of it")
-    drop_every: float = param(0.0, unit="s", lo=0.0, check=_finite, doc="mean time between two breaks, 0: none")
+    drop_every: float = param(0.0, unit="s", lo=0.0, check=finite, doc="mean time between two breaks, 0: none")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,9 +190,9 @@ class RobotCarried(Fault):
 
     kind: ClassVar[str] = "robot_carried"
     is_instant: ClassVar[bool] = True
-    x: float = param(unit="m", check=_finite, doc="where to, in the frame map")
-    y: float = param(unit="m", check=_finite, doc="where to, in the frame map")
-    yaw: float = param(0.0, unit="rad", check=_finite, doc="direction that it looks in there")
+    x: float = param(unit="m", check=finite, doc="where to, in the frame map")
+    y: float = param(unit="m", check=finite, doc="where to, in the frame map")
+    yaw: float = param(0.0, unit="rad", check=finite, doc="direction that it looks in there")
 
     @property
     def pose(self) -> Pose2D:
@@ -201,9 +204,9 @@ class RobotCarried(Fault):
 class Doorway:
     """A place to put a box: its middle [m], the direction of the wall that it is in [rad], its width [m]."""
 
-    x: float = param(unit="m", check=_finite, doc="middle")
-    y: float = param(unit="m", check=_finite, doc="middle")
-    yaw: float = param(0.0, unit="rad", check=_finite, doc="direction of the wall")
+    x: float = param(unit="m", check=finite, doc="middle")
+    y: float = param(unit="m", check=finite, doc="middle")
+    yaw: float = param(0.0, unit="rad", check=finite, doc="direction of the wall")
     width: float = param(0.9, unit="m", lo=0.05, hi=20.0, doc="clear width")
 
 

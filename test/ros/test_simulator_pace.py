@@ -1,0 +1,89 @@
+"""The clock in lockstep with who has to keep up, on a wall clock of the test's own."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+
+import pytest
+
+pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
+
+from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams
+
+TICK = 0.01
+
+
+class Wall:
+    """A wall clock, and a consumer on it that answers each so many seconds of its own while it lives."""
+
+    def __init__(self, topic: str, every: float, *, tick_cost: float = 0.001) -> None:
+        self.now = 0.0
+        self.sim = 0.0
+        self.topic = topic
+        self.every = every
+        self.dies_at = float("inf")
+        self.answers: list[float] = []
+        self._next = 0.0
+        self._tick_cost = tick_cost
+        params = LockstepParams(topics=(topic,), slack=0.3, patience=0.4)
+        self.lockstep = Lockstep(params, lambda: self.sim, clock=lambda: self.now, sleep=self.pass_by)
+
+    def pass_by(self, seconds: float) -> None:
+        until = self.now + seconds
+        while self._next <= until:
+            self.now, self._next = self._next, self._next + self.every
+            if self.now < self.dies_at:
+                self.answers.append(self.sim)
+                self.lockstep.note(self.topic, "/consumer")
+        self.now = until
+
+    def run(self, sim_seconds: float) -> None:
+        for _ in range(round(sim_seconds / TICK)):
+            self.sim += TICK
+            self.pass_by(self._tick_cost)
+            self.lockstep.wait()
+
+
+@pytest.mark.parametrize("every", [0.05, 0.1, 0.3])
+def test_a_slow_consumer_slows_the_clock_and_misses_nothing(every: float) -> None:
+    wall = Wall("/looks", every)
+    wall.run(30.0)
+    assert 30.0 / wall.now == pytest.approx(0.3 / every, rel=0.1)
+    gaps = [b - a for a, b in itertools.pairwise(wall.answers)]
+    assert max(gaps) <= 0.3 + 2 * TICK
+    assert sum(wall.lockstep.take_waited().values()) == pytest.approx(wall.now - 3.0, rel=0.15)
+    assert wall.lockstep.take_waited() == {}
+    assert wall.lockstep.idle == ()
+
+
+def test_how_busy_the_machine_is_changes_how_long_it_takes_and_not_how_often_a_consumer_looks() -> None:
+    looks = []
+    for cost in (0.0001, 0.002, 0.004):
+        wall = Wall("/looks", 0.2 + 10 * cost, tick_cost=cost)
+        wall.run(60.0)
+        looks.append(len(wall.answers))
+        assert max(b - a for a, b in itertools.pairwise(wall.answers)) <= 0.3 + 2 * TICK
+    assert max(looks) - min(looks) <= 0.05 * max(looks)
+
+
+def test_a_dead_one_holds_the_clock_up_once_for_the_patience_and_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    wall = Wall("/looks", 0.1, tick_cost=0.0)
+    wall.run(3.0)
+    wall.dies_at, died = wall.now, wall.now
+    with caplog.at_level(logging.INFO):
+        wall.run(10.0)
+    assert wall.now - died == pytest.approx(0.4, abs=0.11)
+    assert wall.lockstep.idle == ("/looks of /consumer",)
+    said = [r.message for r in caplog.records]
+    assert said == ["the clock waited 0.4 s for /looks of /consumer, and goes on without"]
+    wall.lockstep.note("/looks", "/consumer")  # it is back
+    assert wall.lockstep.idle == ()
+
+
+def test_who_has_never_spoken_is_not_waited_for() -> None:
+    wall = Wall("/looks", 0.1, tick_cost=0.001)
+    wall.dies_at = -1.0
+    wall.run(5.0)
+    assert wall.now == pytest.approx(0.5, abs=0.01)
+    assert wall.lockstep.idle == ()
