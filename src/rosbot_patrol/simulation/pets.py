@@ -44,7 +44,6 @@ class PetLook:
     belly: Colour = (0.8, 0.75, 0.7)
     ears: str = "hanging"
     muzzle: float = 0.20
-    texture: str = ""
 
     @property
     def leg_radius(self) -> float:
@@ -57,10 +56,10 @@ class PetLook:
         return 0.75 * self.height
 
 
-def _cat(name: str, fur: Colour, belly: Colour, texture: str = "") -> PetLook:
+def _cat(name: str, fur: Colour, belly: Colour) -> PetLook:
     return PetLook(
-        name=name, model="cat", height=0.26, length=1.25, depth=0.46, width=0.42, fur=fur, belly=belly,
-        ears="pricked", muzzle=0.10, texture=texture,
+        name=name, model="cat", height=0.25, length=1.30, depth=0.54, width=0.46, fur=fur, belly=belly,
+        ears="pricked", muzzle=0.08,
     )  # fmt: skip
 
 
@@ -68,9 +67,9 @@ PETS: dict[str, dict[str, PetLook]] = {
     "cat": {
         pet.name: pet
         for pet in (
-            _cat("tabby", (0.55, 0.47, 0.38), (0.80, 0.74, 0.65), "stripes"),
+            _cat("tabby", (0.55, 0.47, 0.38), (0.80, 0.74, 0.65)),
             _cat("black", (0.07, 0.07, 0.08), (0.09, 0.09, 0.10)),
-            _cat("ginger", (0.80, 0.45, 0.18), (0.92, 0.80, 0.66), "stripes"),
+            _cat("ginger", (0.80, 0.45, 0.18), (0.92, 0.80, 0.66)),
             _cat("white", (0.90, 0.89, 0.86), (0.95, 0.94, 0.92)),
         )
     },
@@ -109,8 +108,8 @@ def draw_pet(model: str, rng: np.random.Generator) -> PetLook:
 def pet_body(name: str, look: PetLook) -> Body:
     """A pet that stands at the world's origin; its visuals are moved by `pet_pose_parts`."""
     visuals = tuple(
-        Visual(shape=shape, pose=pose, material=Material(rgba=(*colour, 1.0), texture=texture))
-        for (_, shape, colour, texture), pose in zip(_figure(look), pet_pose_parts(look), strict=True)
+        Visual(shape=shape, pose=pose, material=Material(rgba=(*colour, 1.0)))
+        for (_, shape, colour), pose in zip(_figure(look), pet_pose_parts(look), strict=True)
     )
     return Body(name=name, kind="pet", static=False, visuals=visuals, collisions=_collisions(look))
 
@@ -173,7 +172,7 @@ def _skeleton(look: PetLook, phase: float, gait: float) -> dict[str, Matrix]:
     middle = h * (1.0 - 0.5 * look.depth)
     trunk = from_xyz_rpy((0.0, 0.0, middle), (0.0, math.pi / 2.0, 0.0))  # a loft's z is forward, its x down
     chest = 0.5 * look.length * h
-    raised = 0.5 if look.model == "dog" else 0.75
+    raised = 0.5 if look.model == "dog" else 0.95
     nod = 0.05 * gait * math.sin(2.0 * turn)
     neck = from_xyz_rpy((0.88 * chest, 0.0, middle + 0.10 * h), (0.0, raised + nod, 0.0))
     head = neck @ from_xyz_rpy((0.0, 0.0, 0.28 * h), (0.0, -raised - 0.8 * nod, 0.0))
@@ -210,15 +209,15 @@ def _leg(look: PetLook, leg: str, paw: tuple[float, float, float]) -> dict[str, 
     }
 
 
-def _figure(look: PetLook) -> list[tuple[str, Shape, Colour, str]]:
-    """(joint, shape, colour, texture) of each visual."""
+def _figure(look: PetLook) -> list[tuple[str, Shape, Colour]]:
+    """(joint, shape, colour) of each visual."""
     h, fur, belly = look.height, look.fur, look.belly
     parts = [
-        ("trunk", _trunk(look), fur, look.texture),
-        ("neck", loft([(0.32 * h, 0.11 * h, 0.10 * h, 0.0), (-0.12 * h, 0.19 * h, 0.15 * h, 0.0)]), fur, ""),
+        ("trunk", _trunk(look), fur),
+        ("neck", loft([(0.32 * h, 0.11 * h, 0.10 * h, 0.0), (-0.12 * h, 0.19 * h, 0.15 * h, 0.0)]), fur),
         *_head(look),
-        ("tail", loft(_taper(0.32 * h, 0.040 * h, 0.032 * h)), fur, look.texture),
-        ("tip", loft(_taper(0.28 * h, 0.032 * h, 0.014 * h)), belly if look.model == "dog" else fur, look.texture),
+        ("tail", loft(_taper(0.32 * h, 0.040 * h, 0.032 * h)), fur),
+        ("tip", loft(_taper(0.28 * h, 0.032 * h, 0.014 * h)), belly if look.model == "dog" else fur),
     ]
     upper, lower = _bones(look)
     r = look.leg_radius
@@ -229,7 +228,7 @@ def _figure(look: PetLook) -> list[tuple[str, Shape, Colour, str]]:
         )
         shin = loft([(0.01 * h, r, 0.8 * r, 0), (-0.5 * lower, 0.75 * r, 0.65 * r, 0), (-lower, 0.7 * r, 0.7 * r, 0)])
         paw = loft([(0.0, 0.75 * r, 0.7 * r, 0), (-0.025 * h, 1.2 * r, r, 0.5 * r), (-0.05 * h, 1.25 * r, r, 0.6 * r)])
-        parts += [(f"{leg}_upper", thigh, fur, ""), (f"{leg}_lower", shin, fur, ""), (f"{leg}_paw", paw, belly, "")]
+        parts += [(f"{leg}_upper", thigh, fur), (f"{leg}_lower", shin, fur), (f"{leg}_paw", paw, belly)]
     return parts
 
 
@@ -250,7 +249,7 @@ def _trunk(look: PetLook) -> Shape:
     )
 
 
-def _head(look: PetLook) -> list[tuple[str, Shape, Colour, str]]:
+def _head(look: PetLook) -> list[tuple[str, Shape, Colour]]:
     h, long = look.height, look.muzzle * look.height
     r = (0.17 if look.model == "dog" else 0.20) * h
     wide = 0.8 * r
@@ -268,18 +267,18 @@ def _head(look: PetLook) -> list[tuple[str, Shape, Colour, str]]:
             )
         else:
             shape = ellipsoid(0.32 * r, 0.10 * r, 0.75 * r, at=(-0.15 * r, side * 1.02 * wide, 0.05 * r))
-        ears.append(("head", shape, _darker(look.fur, 0.75), ""))
+        ears.append(("head", shape, _darker(look.fur, 0.75)))
     eye = 0.13 * r
     eyes = [
-        ("head", ellipsoid(eye, eye, eye, at=(0.78 * r, side * 0.42 * r, 0.28 * r), rings=5), _DARK, "")
+        ("head", ellipsoid(eye, eye, eye, at=(0.78 * r, side * 0.42 * r, 0.28 * r), rings=5), _DARK)
         for side in (1.0, -1.0)
     ]
     tip = 0.7 * r + long
     snout = ellipsoid(0.5 * long + 0.3 * r, 0.45 * r, 0.40 * r, at=(0.55 * r + 0.5 * long, 0.0, -0.22 * r))
     return [
-        ("head", ellipsoid(1.05 * r, wide, 0.9 * r), look.fur, ""),
-        ("head", snout, look.belly, ""),
-        ("head", ellipsoid(0.12 * r, 0.16 * r, 0.12 * r, at=(tip + 0.1 * r, 0.0, -0.12 * r), rings=5), _DARK, ""),
+        ("head", ellipsoid(1.05 * r, wide, 0.9 * r), look.fur),
+        ("head", snout, look.belly),
+        ("head", ellipsoid(0.12 * r, 0.16 * r, 0.12 * r, at=(tip + 0.1 * r, 0.0, -0.12 * r), rings=5), _DARK),
         *ears,
         *eyes,
     ]  # fmt: skip
