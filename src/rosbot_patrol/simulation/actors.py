@@ -6,6 +6,7 @@ A person's frame is on the floor between the feet, x forward. One posture is res
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -52,7 +53,7 @@ def person_pose_parts(look: Look, phase: float = 0.0, walking: bool = False, pos
         posture: how the person holds itself; "creeping" is reserved for tests.
     """
     frames = _skeleton(look, _angles(phase % 1.0, walking, posture))
-    return np.array([frames[joint] for joint, *_ in _figure(look)])
+    return np.array([frames[joint] for joint in _joints(look)])
 
 
 def hydrant_body(
@@ -214,6 +215,12 @@ def _figure(look: Look) -> list[tuple[str, Shape, Colour, str]]:
             (f"forearm_{side}", parts.hand(_FOREARM * h), look.skin, ""),
         ]
     return figure + _extras(look, hip, skull)
+
+
+@functools.lru_cache(maxsize=256)
+def _joints(look: Look) -> tuple[str, ...]:
+    """The joint of each visual."""
+    return tuple(joint for joint, *_ in _figure(look))
 
 
 def _extras(look: Look, hip: float, skull: float) -> list[tuple[str, Shape, Colour, str]]:
