@@ -6,6 +6,7 @@ A pet's frame is on the floor under the middle of its trunk, x forward. Sizes ar
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -123,7 +124,7 @@ def pet_pose_parts(look: PetLook, phase: float = 0.0, gait: float = 0.0) -> Matr
         gait: 0 stands, 1 takes full steps.
     """
     frames = _skeleton(look, phase, gait)
-    return np.array([frames[joint] for joint, *_ in _figure(look)])
+    return np.array([frames[joint] for joint in _joints(look)])
 
 
 def paws(look: PetLook, phase: float, gait: float) -> dict[str, tuple[float, float, float]]:
@@ -230,6 +231,12 @@ def _figure(look: PetLook) -> list[tuple[str, Shape, Colour]]:
         paw = loft([(0.0, 0.75 * r, 0.7 * r, 0), (-0.025 * h, 1.2 * r, r, 0.5 * r), (-0.05 * h, 1.25 * r, r, 0.6 * r)])
         parts += [(f"{leg}_upper", thigh, fur), (f"{leg}_lower", shin, fur), (f"{leg}_paw", paw, belly)]
     return parts
+
+
+@functools.lru_cache(maxsize=64)
+def _joints(look: PetLook) -> tuple[str, ...]:
+    """The joint of each visual."""
+    return tuple(joint for joint, *_ in _figure(look))
 
 
 def _trunk(look: PetLook) -> Shape:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, distance
 from rosbot_patrol.simulation.scene import Body
@@ -82,7 +84,9 @@ class Ways:
 
 def together(cuts: Sequence[Slice]) -> Slice:
     """Several cuts as one."""
-    joined = EMPTY
-    for cut in cuts:
-        joined = joined.plus(cut)
-    return joined
+    segments = [cut.segments for cut in cuts if len(cut.segments)]
+    circles = [cut.circles for cut in cuts if len(cut.circles)]
+    return Slice(
+        np.concatenate(segments) if segments else EMPTY.segments,
+        np.concatenate(circles) if circles else EMPTY.circles,
+    )

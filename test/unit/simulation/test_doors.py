@@ -27,6 +27,7 @@ WALLS = tuple(
          collisions=(Collision(shape=Shape(kind="box", size=(0.1, 4.0, 2.5))),))
     for y in (-2.5, 2.5)
 )  # fmt: skip
+DOOR = plain_door("door", HINGE, width=1.0, swing=-math.pi / 2.0)
 
 WORLD = """<sdf version="1.6"><world name="w">
 <model name="front_door"><pose>2 -0.5 0 0 0 1.5707963</pose>
@@ -49,7 +50,7 @@ def build() -> Iterator[object]:
         engine = Engine(world or World(bodies=WALLS), params, sensors=sensors)
         engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
         if world is None:
-            engine.spawn_door(plain_door("door", HINGE, width=1.0, swing=-math.pi / 2.0))
+            engine.spawn_door(DOOR)
         engines.append(engine)
         return engine
 
@@ -122,8 +123,13 @@ def test_something_in_the_way_holds_a_leaf_up_until_it_goes_or_the_leaf_turns_ba
     assert door.opening == 1.0
 
 
-def test_the_lidar_meets_the_leaf_where_it_stands(build) -> None:
-    engine = build()
+@pytest.mark.parametrize("crowd", [0, 60])  # many segments are searched in groups
+def test_the_lidar_meets_the_leaf_where_it_stands(build, crowd: int) -> None:
+    boxes = [from_xyz_rpy((-5.0, 0.5 * i - 15.0, 0.5)) for i in range(crowd)]
+    cube = Collision(shape=Shape(kind="box", size=(0.3, 0.3, 1.0)))
+    far = (Body(name=f"box_{i}", pose=pose, collisions=(cube,)) for i, pose in enumerate(boxes))
+    engine = build(world=World(bodies=(*WALLS, *far)))
+    engine.spawn_door(DOOR)
     assert ahead(engine) == pytest.approx(2.0 - 0.02, abs=0.012)
     engine.set_door("door", 1.0)
     run(engine, 1.0)
