@@ -83,7 +83,14 @@ class Outputs:
         ]
 
     def publish(self, tick: int) -> None:
-        """Send the time and what is due at a tick."""
+        """Send the time and what is due at a tick; nothing more once the node is told to end."""
+        try:
+            self._publish(tick)
+        except rospy.ROSException:  # a topic is closed
+            if not rospy.is_shutdown():
+                raise
+
+    def _publish(self, tick: int) -> None:
         now = self._engine.now
         self._clock.publish(Clock(time_to_msg(now)))
         if not self._engine.has_robot:
