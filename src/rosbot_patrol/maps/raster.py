@@ -74,23 +74,25 @@ def outline_points(polygon: Points, step: float) -> Points:
 def surface_cells(info: GridInfo, polygons: Sequence[Points]) -> tuple[Mask, Mask]:
     """What convex obstacles leave on a grid: cells that their common surface passes, and cells that they fill.
 
+    An obstacle of two points is a line: it is passed and fills only the cells that it goes through.
+
     A cell is passed where a part of an outline in it lies in no other obstacle: those are the cells that beams end in.
     """
     passed, filled = np.zeros(info.shape, dtype=bool), np.zeros(info.shape, dtype=bool)
+    lows = np.array([polygon.min(axis=0) for polygon in polygons]).reshape(-1, 2)
+    highs = np.array([polygon.max(axis=0) for polygon in polygons]).reshape(-1, 2)
+    solid = np.array([len(polygon) > 2 for polygon in polygons], dtype=bool)
     for i, polygon in enumerate(polygons):
         points = outline_points(polygon, info.resolution / 10.0)
         outer = np.ones(len(points), dtype=bool)
-        for k, other in enumerate(polygons):
-            if k != i and _boxes_meet(polygon, other):
-                outer &= ~is_inside(points, other, 1e-6)
+        meets = solid & np.all(lows <= highs[i], axis=1) & np.all(lows[i] <= highs, axis=1)
+        for k in np.flatnonzero(meets):
+            if k != i:
+                outer &= ~is_inside(points, polygons[k], 1e-6)
         _mark(passed, info, points[outer])
         _mark(filled, info, points)
         _fill(filled, info, polygon)
     return passed, filled
-
-
-def _boxes_meet(a: Points, b: Points) -> bool:
-    return bool(np.all(a.min(axis=0) <= b.max(axis=0)) and np.all(b.min(axis=0) <= a.max(axis=0)))
 
 
 def _mark(mask: Mask, info: GridInfo, points: Points) -> None:

@@ -12,6 +12,7 @@ from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.raster import seen_map, slice_hull, surface_cells
 from rosbot_patrol.simulation.scene import Body, Shape
+from rosbot_patrol.simulation.slices import slice_shape
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +43,9 @@ def floor_plan(bodies: Iterable[Body], info: GridInfo, *, height: float, start: 
 def _slices(body: Body, height: float) -> list[NDArray[np.float64]]:
     cuts = []
     for collision in body.collisions:
+        if collision.shape.kind == "mesh":
+            cuts += list(slice_shape(collision.shape, body.pose @ collision.pose, height).segments.reshape(-1, 2, 2))
+            continue
         points = _hull_points(collision.shape)
         if points is None:
             if collision.shape.kind != "plane":
@@ -67,8 +71,6 @@ def _hull_points(shape: Shape) -> NDArray[np.float64] | None:
     if shape.kind == "capsule":
         radius, length = shape.size
         return np.concatenate([_ball(radius, -length / 2.0), _ball(radius, length / 2.0)])
-    if shape.vertices is not None:
-        return shape.vertices * np.array(shape.size if len(shape.size) == 3 else (1.0, 1.0, 1.0))
     return None
 
 

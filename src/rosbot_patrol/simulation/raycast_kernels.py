@@ -72,6 +72,7 @@ def cast_fan(
                 width -= turn
             elif width <= -math.pi:
                 width += turn
+            long = math.hypot(dx, dy)
             low = a0 if width >= 0.0 else a0 + width
             offset = (low - first) % turn - 1e-9
             for lap in range(2):
@@ -79,10 +80,14 @@ def cast_fan(
                 k1 = math.floor((offset - lap * turn + abs(width) + 2e-9) / step)
                 for k in range(max(k0, 0), min(k1, n - 1) + 1):
                     below = cosines[k] * dy - sines[k] * dx
-                    if below != 0.0:
+                    if abs(below) > 1e-9 * long:
                         length = cross / below
-                        if 0.0 <= length < ranges[k]:
-                            ranges[k] = length
+                    elif abs(cross) <= 1e-9 * long:  # seen from its end
+                        length = min(math.hypot(ax, ay), math.hypot(ax + dx, ay + dy))
+                    else:
+                        continue
+                    if 0.0 <= length < ranges[k]:
+                        ranges[k] = length
     for c in range(circles.shape[0]):
         cx, cy, radius = circles[c, 0] - px, circles[c, 1] - py, circles[c, 2]
         away = math.hypot(cx, cy)

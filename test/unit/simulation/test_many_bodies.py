@@ -65,6 +65,13 @@ def test_a_cut_with_something_added_keeps_its_groups() -> None:
     assert beams[0] == pytest.approx(0.5)
 
 
+def test_a_wall_seen_from_its_end_is_as_far_as_its_end() -> None:
+    wall = Slice(np.array([[3.0, 1.5, 3.0, 2.5], [5.0, 0.0, 4.0, 0.0]]), np.zeros((0, 3)))
+    assert wall.cast(3.0, 0.5, math.pi / 2, 0.1, 1, 50.0)[0] == pytest.approx(1.0)
+    assert wall.cast(3.0, 0.0, 0.0, 0.1, 1, 50.0)[0] == pytest.approx(1.0)
+    assert wall.cast(3.0, 0.0, math.pi, 0.1, 1, 50.0)[0] == 50.0
+
+
 def test_turned_and_upside_down_boxes_are_cut_alike() -> None:
     upright = slice_bodies([box("a", (1.0, 2.0, 0.5), (0.4, 0.8, 1.0), 0.3)], 0.2)
     over = Body(
