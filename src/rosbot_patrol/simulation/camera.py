@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -15,7 +16,8 @@ from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, Mover, SceneRenderer
 
 _BANK = 8
-_BLUR_VIEWS = 4  # pictures that a blurred one is the mean of
+_BLUR_VIEWS = 4, 16  # pictures that a blurred one is the mean of: least, most
+_BLUR_TURN = 0.006  # between two of them where the camera turns [rad]
 _BRIGHT = 115.0  # mean colour that the automatic exposure aims at, of 255
 _GAINS = (0.4, 2.5)
 _NO_DEPTH_NOISE = np.zeros(0, np.float32)
@@ -217,5 +219,6 @@ def poses_before(pose: Pose2D, twist: Twist2D, seconds: float) -> list[Pose2D]:
     """Where a base that moves at a velocity [in its own frame] was while a shutter was open, its end left out."""
     if seconds <= 0.0 or (twist.vx == twist.vy == twist.wz == 0.0):
         return []
-    steps = [-seconds * k / _BLUR_VIEWS for k in range(_BLUR_VIEWS - 1, 0, -1)]
+    views = min(max(math.ceil(abs(twist.wz) * seconds / _BLUR_TURN), _BLUR_VIEWS[0]), _BLUR_VIEWS[1])
+    steps = [-seconds * k / views for k in range(views - 1, 0, -1)]
     return [compose(pose, Pose2D(twist.vx * t, twist.vy * t, twist.wz * t)) for t in steps]

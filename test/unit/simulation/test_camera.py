@@ -92,9 +92,11 @@ def test_blur_is_the_mean_of_where_the_camera_was_while_the_shutter_was_open() -
 def test_poses_before_lie_on_the_way_that_was_driven() -> None:
     assert poses_before(Pose2D(1.0, 0.0, 0.0), Twist2D(), 0.05) == []
     assert poses_before(Pose2D(1.0, 0.0, 0.0), Twist2D(1.0, 0.0, 0.0), 0.0) == []
-    poses = poses_before(Pose2D(0.0, 0.0, math.pi / 2), Twist2D(0.4, 0.0, 0.8), 0.04)
+    poses = poses_before(Pose2D(0.0, 0.0, math.pi / 2), Twist2D(0.4, 0.0, 0.2), 0.04)
     assert [p.y for p in poses] == pytest.approx([-0.012, -0.008, -0.004])
-    assert [p.yaw - math.pi / 2 for p in poses] == pytest.approx([-0.024, -0.016, -0.008])
+    assert [p.yaw - math.pi / 2 for p in poses] == pytest.approx([-0.006, -0.004, -0.002])
+    fast = poses_before(Pose2D(), Twist2D(0.0, 0.0, 1.2), 0.05)
+    assert np.diff([p.yaw for p in fast]) == pytest.approx([0.006] * 8)
 
 
 def test_depth_of_the_clip_planes() -> None:
