@@ -79,7 +79,7 @@ class Population:
         return together([mover.cut(height) for mover in self])
 
     def sight(self) -> Slice:
-        """What hides people from a motion sensor."""
+        """What hides people from a motion sensor: walls and doors; furniture below eye level hides not even a pet."""
         return self._ways.cut(EYE_LEVEL).plus(self.cut_of_doors(EYE_LEVEL))
 
     def cut_of_doors(self, height: float) -> Slice:
@@ -90,13 +90,16 @@ class Population:
         """Place an actor; returns its name, made up where it is "".
 
         Raises:
-            WorldError: the name is taken, the model, look or posture unknown, or the pose not finite.
+            WorldError: the name is taken, the model, look or posture unknown, or the robot stands there.
         """
         name = name or self._new_name(model)
         self._check(f"actor '{name}'", name, pose)
         walker = Walker(name, model, look, pose, noise_of(self._seed, f"look of {name}"), posture=posture)
         self._physics.add(walker.body)
         self._physics.move(name, walker.matrix)
+        if self._physics.blocker() == name:
+            self._physics.remove(name)
+            raise _robot_is_there(f"actor '{name}'")
         self._walkers[name] = walker
         return name
 
@@ -106,14 +109,22 @@ class Population:
         """Let an actor walk along points, or put it somewhere (one point, speed 0).
 
         Raises:
-            WorldError: there is none of that name, numbers that make no sense, or a wall across the path.
+            WorldError: there is none of that name, numbers that make no sense, a wall across the path, or the robot
+                where it was to be put.
         """
         walker = self._actor(name)
+        before = walker.pose
         finite = all(math.isfinite(v) for p in path for v in p)
         if speed > 0.0 and finite and path:
             self._ways.check(name, [walker.pose, *path, *(path[:1] if loop else ())])
         walker.walk(path, speed, loop, pause=pause)
+        if walker.pose == before:
+            return
         self._physics.move(name, walker.matrix)
+        if self._physics.blocker() == name:
+            walker.walk([before], 0.0)
+            self._physics.move(name, walker.matrix)
+            raise _robot_is_there(f"actor '{name}'")
 
     def roam_actor(self, name: str, radius: float, speed: float, *, pause: float = 2.0) -> None:
         """Let an actor wander within a radius [m] of where it is, as name and seed have it; raises WorldError."""
@@ -136,12 +147,15 @@ class Population:
         """Hang a door, closed.
 
         Raises:
-            WorldError: the name is taken, or the leaf is none.
+            WorldError: the name is taken, the leaf is none, or the robot stands there.
         """
         name = place.body.name
         self._check(f"door '{name}'", name, Pose2D())
         door = Door(place)
         self._physics.add(door.body)
+        if self._physics.blocker() == name:
+            self._physics.remove(name)
+            raise _robot_is_there(f"door '{name}'")
         self._doors[name] = door
 
     def set_door(self, name: str, opening: float, speed: float = SPEED) -> None:
@@ -149,8 +163,15 @@ class Population:
         if name not in self._doors:
             raise WorldError(f"door '{name}'", f"is not there (there: {', '.join(self._doors) or 'none'})")
         door = self._doors[name]
+        before = door.opening
         door.set(opening, speed)
+        if door.opening == before:
+            return
         self._physics.move(name, door.matrix)
+        if self._physics.blocker() == name:
+            door.set(before, 0.0)
+            self._physics.move(name, door.matrix)
+            raise _robot_is_there(f"door '{name}'")
 
     def _step_doors(self, dt: float, robot: Pose2D | None, robot_radius: float) -> None:
         solid = [(w.pose, w.radius) for w in self._walkers.values()]
@@ -178,3 +199,7 @@ class Population:
             there = ", ".join(self._walkers) or "none"
             raise WorldError(f"actor '{name}'", f"is not there (there: {there})")
         return self._walkers[name]
+
+
+def _robot_is_there(what: str) -> WorldError:
+    return WorldError(what, "cannot stand where the robot is")

@@ -101,3 +101,25 @@ def test_a_hydrant_is_as_high_as_said_and_has_something_to_bump_into() -> None:
         v.pose[2, 3] + (v.shape.size[1] / 2 if v.shape.kind == "cylinder" else v.shape.size[0]) for v in body.visuals
     ]
     assert max(tops) == pytest.approx(0.9, abs=0.02)
+
+
+def limb(look: Look, phase: float, side: float, below: float) -> float:
+    """How far forward the middle of the foot (below 0.2 m) or hand (above) of a side (1 left, -1 right) is."""
+    places = []
+    for visual, pose in zip(person_body("p", look).visuals, person_pose_parts(look, phase, True), strict=True):
+        assert visual.shape.vertices is not None
+        places.append((visual.shape.vertices @ pose[:3, :3].T + pose[:3, 3]).mean(axis=0))
+    sided = [p for p in places if side * p[1] > (0.03 if below < 0.2 else 0.2) and (p[2] < 0.2) == (below < 0.2)]
+    return float(min(sided, key=lambda p: p[2])[0])
+
+
+@pytest.mark.parametrize("name", ["visitor", "woman", "jogger"])
+def test_feet_swing_against_each_other_and_arms_against_the_feet(name: str) -> None:
+    look = look_named(name)
+    for phase in (0.25, 0.75):
+        left, right = limb(look, phase, 1.0, 0.1), limb(look, phase, -1.0, 0.1)
+        hand_left, hand_right = limb(look, phase, 1.0, 0.9), limb(look, phase, -1.0, 0.9)
+        assert (left - right) * (hand_left - hand_right) < -0.05
+        assert (left - right) * (1.0 if phase < 0.5 else -1.0) > 0.3
+    step = limb(look, 0.25, 1.0, 0.1) - limb(look, 0.75, 1.0, 0.1)
+    assert step == pytest.approx(0.65, abs=0.2)  # half the cycle of 1.3 m that the walker counts

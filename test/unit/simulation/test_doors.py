@@ -232,6 +232,26 @@ def test_a_door_is_taken_out_and_its_name_is_free_again(build) -> None:
     engine.spawn_actor("door", "person", "", Pose2D(1.0, 1.0))
 
 
+def test_neither_a_door_nor_an_actor_is_put_where_the_robot_stands(build) -> None:
+    engine = build()
+    engine.set_door("door", 1.0, 0.0)
+    engine.set_pose(Pose2D(2.0, 0.1, 0.0))
+    engine.spawn_actor("p", "person", "", Pose2D(4.0, 0.0))
+    for call in (
+        lambda: engine.set_door("door", 0.0, 0.0),
+        lambda: engine.spawn_door(plain_door("second", Pose2D(1.6, 0.1, 0.0))),
+        lambda: engine.spawn_actor("q", "dog", "", Pose2D(2.1, 0.0)),
+        lambda: engine.move_actor("p", [Pose2D(2.0, 0.05)], 0.0),
+    ):
+        with pytest.raises(WorldError, match="cannot stand where the robot is"):
+            call()
+    assert [a.name for a in engine.actors] == ["p"]
+    assert engine.actors[0].pose == Pose2D(4.0, 0.0)
+    assert [d.opening for d in engine.doors] == [1.0]
+    run(engine, 0.5)
+    assert engine.pose == pytest.approx((2.0, 0.1, 0.0), abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
