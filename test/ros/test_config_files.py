@@ -27,6 +27,7 @@ from rosbot_patrol.ros.parameter_tables import document
 from rosbot_patrol.ros.patrol_node import NodeParams, load_flat
 from rosbot_patrol.ros.simulator_node import SimulatorParams
 from rosbot_patrol.ros.twist_mux_node import TwistMuxParams
+from rosbot_patrol.simulation.scenario import read_scenario
 from rosbot_patrol.simulation.sensor_places import read_sensors
 
 ROOT = Path(__file__).parents[2]
@@ -116,3 +117,13 @@ def test_rooms_sensors_and_walks_agree() -> None:
 def test_the_page_of_parameters_is_up_to_date() -> None:
     page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
     assert page == document(), "run scripts/parameter_tables"
+
+
+@pytest.mark.parametrize("scenario", sorted(p.name for p in (ROOT / "scenarios").glob("*.yaml")))
+def test_every_scenario_can_be_played_where_it_says(scenario: str) -> None:
+    play = read_scenario(ROOT / "scenarios" / scenario)
+    tree = given("scenario.launch", "simulator", f"scenario:={play.file}")
+    assert load(SimulatorParams, tree).scenario == play.file
+    sensors = {place.id for place in read_sensors(play.setting.motion_sensors)}
+    assert {t.sensor for t in play.triggers} <= sensors
+    assert set(play.expect.verdicts if play.expect else ()) <= sensors

@@ -1,7 +1,8 @@
 """narrator: prints one plain sentence for each step of the patrol; with ~exit_after_mission it ends with the mission.
 
 Exit status: 0, or 3 where the verdict is not ~expect_verdict, 4 where ~time_limit passed, 5 where a confirmed
-intruder's mail was not delivered within ~delivery_wait, 6 where the robot did not come home.
+intruder's mail was not delivered within ~delivery_wait, 6 where the robot did not come home. With ~scenario it ends
+with the scenario instead, with 7 where what the scenario expects does not hold.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from rosbot_patrol.msg import Alert, EspTrigger, PatrolState
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.narration import AlertTelling, Narrator, Telling
 from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.scenario_watch import ScenarioWatch
 
 VERDICTS = ("", "confirmed", "clear", "unreachable", "unverified")
 
@@ -35,6 +37,8 @@ class NarratorParams:
     delivery_wait: float = param(30.0, unit="s", lo=0.0, doc="wait this long for the mail of a confirmed intruder")
     time_limit: float = param(0.0, unit="s", lo=0.0, doc="exit status 4 after this time; 0: none")
     summary_file: str = param("", doc="JSON file for all that was seen; empty: none")
+    scenario: str = param("", doc="file of the scenario that is played; empty: none")
+    simulator: str = param("/simulator", doc="node name of the simulator that plays it")
     on_guard_hint: str = param("", doc="line printed when the patrol is on guard for the first time")
 
 
@@ -48,6 +52,8 @@ class NarratorNode:
         self._began = time.monotonic()
         self._ended_at: float | None = None
         self._hinted = False
+        file = self.params.scenario
+        self._scenario = ScenarioWatch(file, self.params.simulator, self._tell) if file else None
         rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100)
         rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=100)
         rospy.Subscriber("/patrol/alerts", Alert, self._on_alert, queue_size=100)
@@ -69,6 +75,10 @@ class NarratorNode:
     def _print(self, lines: list[str]) -> None:
         for line in lines:
             print(f"[{self._clock():6.1f} s] {line}", flush=True)
+
+    def _tell(self, line: str) -> None:
+        with self._lock:
+            self._print([line])
 
     def _on_trigger(self, message: EspTrigger) -> None:
         if message.move:
@@ -104,6 +114,8 @@ class NarratorNode:
             self._print(self._narrator.alert(told))
 
     def _status(self) -> int | None:
+        if self._scenario is not None:
+            return self._status_of(self._scenario)
         if not self.params.exit_after_mission:
             return None
         with self._lock:
@@ -121,6 +133,21 @@ class NarratorNode:
                 return 3
             return 0 if narrator.is_home else 6
 
+    def _status_of(self, scenario: ScenarioWatch) -> int | None:
+        with self._lock:
+            narrator, limit = self._narrator, self.params.time_limit
+            if limit and self._clock() > limit:
+                return 4
+            if not scenario.is_over(narrator):
+                return None
+            self._ended_at = self._ended_at or self._clock()
+            if not all(map(narrator.is_told, narrator.missions)):
+                late = self._clock() - self._ended_at > self.params.delivery_wait
+                return 5 if late else None
+            found = scenario.judge(narrator)
+            self._print(found or ["Everything came as the scenario expects."])
+            return 7 if found else 0
+
     def _finish(self, status: int) -> None:
         with self._lock:
             self._print([_ENDS[status].format(p=self.params)] if status else [])
@@ -137,6 +164,7 @@ _ENDS = {
     3: "The verdict is not the one that was expected, {p.expect_verdict}.",
     4: "The mission did not end within {p.time_limit:.0f} s.",
     6: "The robot did not come home.",
+    7: "That is not what the scenario expects.",
     5: "The mail was not delivered within {p.delivery_wait:.0f} s; it stays in the outbox.",
 }
 
