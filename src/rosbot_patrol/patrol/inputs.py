@@ -90,7 +90,9 @@ class Inputs:
         pose: of base_link in map, None where it is not known now.
         clearance: from the robot's centre to the nearest thing that the lidar sees [m], None where it is silent.
         link: the navigation.
-        detector_at: when the detector was last heard [s]; camera_at: when a picture came last [s].
+        detector_at: when the detector was last heard [s].
+        camera_at: when a picture came last that was not black [s].
+        camera_changed_at: when one came last that differs from the one before [s], inf where nobody compares.
     """
 
     wall: float = 0.0
@@ -102,3 +104,4 @@ class Inputs:
     link: GoalLink = GoalLink()
     detector_at: float = -math.inf
     camera_at: float = -math.inf
+    camera_changed_at: float = math.inf

@@ -62,6 +62,7 @@ class Look:
         self._needs_camera = needs_camera
         self._began: float | None = None
         self._turning = False
+        self._turning_since = math.inf
         self._correction: Spin | None = None
         self._spin_params = spin
         self._map_yaw: float | None = None
@@ -87,7 +88,7 @@ class Look:
             blind = self._blind(now, inputs)
             if blind and now - self._began < self.params.detector_wait:
                 return LookStep(why=f"waiting before the turn: {blind}")
-            self._turning = True
+            self._turning, self._turning_since = True, now
         self._note_blindness(now, inputs)
         self._measure_in_map(inputs.pose)
         spin = self._correction or self.spin
@@ -138,7 +139,12 @@ class Look:
         if silent:
             return f"the detector {silent}"
         silent = _silent(now, inputs.camera_at, self.params.camera_timeout) if self._needs_camera else ""
-        return f"the camera {silent}" if silent else ""
+        if silent:
+            return f"the camera {silent.replace('was silent', 'has shown nothing')}"
+        same = max(inputs.camera_changed_at, self._turning_since)
+        if self._needs_camera and now - same > self.params.camera_timeout:
+            return f"the camera showed the same picture for more than {self.params.camera_timeout:g} s of turning"
+        return ""
 
     def _hold(self, now: float, candidate: bool) -> bool:
         if not candidate or now < self._held_out_until:

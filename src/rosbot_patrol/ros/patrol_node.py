@@ -215,6 +215,7 @@ class PatrolNode:
             link=self.move_base.link(),
             detector_at=self._detector.stamp,
             camera_at=self.pictures.seen_at,
+            camera_changed_at=self.pictures.changed_at,
         )
 
     def _take_triggers(self) -> tuple[int, ...]:

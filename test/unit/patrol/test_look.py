@@ -71,3 +71,29 @@ def test_a_hold_ends_by_itself():
         speeds.append(look.step(now, inputs, candidate=True).speed)
     still = speeds.count(0.0) * 0.04
     assert 3.0 < still < 6.0
+
+
+@pytest.mark.parametrize(
+    ("seen_until", "changed_until", "problem"),
+    [
+        (math.inf, math.inf, ""),
+        (4.0, math.inf, "the camera has shown nothing for more than 3 s"),
+        (math.inf, 4.0, "the camera showed the same picture for more than 3 s of turning"),
+        (math.inf, -math.inf, "the camera showed the same picture for more than 3 s of turning"),
+    ],
+)
+def test_a_camera_that_goes_black_or_freezes_has_not_looked(seen_until, changed_until, problem):
+    look = Look(LookParams(), SpinParams())
+    yaw = now = 0.0
+    step = look.step(now, Inputs(yaw=yaw, detector_at=now, camera_at=now), candidate=False)
+    while not step.done:
+        now += 0.04
+        yaw += step.speed * 0.04
+        inputs = Inputs(
+            yaw=wrap_angle(yaw),
+            detector_at=now,
+            camera_at=min(now, seen_until),
+            camera_changed_at=min(now, changed_until),
+        )
+        step = look.step(now, inputs, candidate=False)
+    assert step.problem == problem
