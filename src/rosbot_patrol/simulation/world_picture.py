@@ -67,12 +67,10 @@ def draw_world(world: World, renderer: SceneRenderer, *, width: int = 1200) -> W
 
 
 def _extent(world: World) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    bounds = [
-        bounds_of(Collision(shape=part.shape, pose=part.pose), body.pose)
-        for body in world.bodies
-        for part in (*body.visuals, *body.collisions)
-        if part.shape.kind != "plane"
-    ]
+    bounds = []
+    for body in world.bodies:
+        parts = [*body.collisions, *(Collision(shape=v.shape, pose=v.pose) for v in body.visuals)]
+        bounds += [bounds_of(part, body.pose) for part in parts if part.shape.kind != "plane"]
     around = np.array([[-0.5], [0.5]])
     bounds += [around + np.array([actor.pose.x, actor.pose.y, 1.0]) for actor in world.actors]
     if not bounds:
