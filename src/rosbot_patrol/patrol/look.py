@@ -138,12 +138,14 @@ class Look:
         silent = _silent(now, inputs.detector_at, self.params.detector_timeout)
         if silent:
             return f"the detector {silent}"
-        silent = _silent(now, inputs.camera_at, self.params.camera_timeout) if self._needs_camera else ""
-        if silent:
-            return f"the camera {silent.replace('was silent', 'has shown nothing')}"
+        timeout = self.params.camera_timeout
+        if self._needs_camera and inputs.camera_at == -math.inf:
+            return "the camera has not shown anything"
+        if self._needs_camera and now - inputs.camera_at > timeout:
+            return f"the camera has shown nothing for more than {timeout:g} s"
         same = max(inputs.camera_changed_at, self._turning_since)
-        if self._needs_camera and now - same > self.params.camera_timeout:
-            return f"the camera showed the same picture for more than {self.params.camera_timeout:g} s of turning"
+        if self._needs_camera and now - same > timeout:
+            return f"the camera showed the same picture for more than {timeout:g} s of turning"
         return ""
 
     def _hold(self, now: float, candidate: bool) -> bool:
