@@ -56,7 +56,7 @@ def plain_door(
     box = Shape(kind="box", size=(width, thickness, height - _GAP))
     middle = from_xyz_rpy((width / 2.0, 0.0, (height + _GAP) / 2.0))
     wood = Material(rgba=(0.62, 0.45, 0.28, 1.0), texture="wood")
-    panel, steel = Material(rgba=(0.50, 0.35, 0.21, 1.0)), Material(rgba=(0.75, 0.75, 0.72, 1.0))
+    panel, steel = Material(rgba=(0.34, 0.22, 0.13, 1.0)), Material(rgba=(0.75, 0.75, 0.72, 1.0))
     visuals = [Visual(shape=box, pose=middle, material=wood)]
     for low, high in ((0.08, 0.46), (0.54, 0.93)):
         size = (0.66 * width, 1.3 * thickness, (high - low) * height)

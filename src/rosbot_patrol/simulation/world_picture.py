@@ -47,7 +47,7 @@ def draw_world(world: World, renderer: SceneRenderer, *, width: int = 1200) -> W
         WorldError: the world has nothing to look at but its floor.
     """
     low, high = _extent(world)
-    for body in world.bodies:
+    for body in (*world.bodies, *(door.body for door in world.doors)):
         renderer.add(_without_ceiling(body))
     for i, actor in enumerate(world.actors):
         walker = Walker(actor.name, actor.model, "", actor.pose, noise_of(0, "look", i))
@@ -68,7 +68,7 @@ def draw_world(world: World, renderer: SceneRenderer, *, width: int = 1200) -> W
 
 def _extent(world: World) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     bounds = []
-    for body in world.bodies:
+    for body in (*world.bodies, *(door.body for door in world.doors)):
         parts = [*body.collisions, *(Collision(shape=v.shape, pose=v.pose) for v in body.visuals)]
         bounds += [bounds_of(part, body.pose) for part in parts if part.shape.kind != "plane"]
     around = np.array([[-0.5], [0.5]])
