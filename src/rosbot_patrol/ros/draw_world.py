@@ -8,15 +8,14 @@ from __future__ import annotations
 import argparse
 import logging
 import math
-import os
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
 from PIL import Image, ImageDraw
 
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.ros.packages import model_folders, package_finder
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.sensor_places import read_sensors
 from rosbot_patrol.simulation.world import load_world
@@ -25,12 +24,6 @@ from rosbot_patrol.simulation.world_picture import WorldPicture, draw_world
 _FINER = 2  # drawn that many times larger, for smooth edges
 _ROOM = (20, 60, 160)
 _SENSOR = (190, 40, 30)
-
-
-def model_folders(more: Iterable[str] = ()) -> list[str]:
-    """Where Gazebo looks for model://: folders given here, those of GAZEBO_MODEL_PATH, and its own."""
-    folders = [*more, *filter(None, os.environ.get("GAZEBO_MODEL_PATH", "").split(":"))]
-    return [*folders, os.path.expanduser("~/.gazebo/models")]
 
 
 def main() -> None:
@@ -47,7 +40,9 @@ def main() -> None:
         sys.exit(f"draw_world: --width {options.width}: expected 16 to 8192 pixels")
     try:
         renderer = make_renderer()
-        picture = draw_world(load_world(options.world, model_folders()), renderer, width=_FINER * options.width)
+        picture = draw_world(
+            load_world(options.world, model_folders(), package_finder()), renderer, width=_FINER * options.width
+        )
         renderer.close()
         image = Image.fromarray(picture.pixels)
         _mark(image, picture, options.rooms, options.sensors)

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import os
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -30,7 +29,7 @@ from rosbot_patrol.ros.convert import twist_from_msg
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import load_params, run_node
-from rosbot_patrol.ros.packages import package_finder
+from rosbot_patrol.ros.packages import model_folders, package_finder
 from rosbot_patrol.ros.simulator_doors import DoorServices
 from rosbot_patrol.ros.simulator_faults import FaultServices
 from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RateParams
@@ -59,7 +58,7 @@ class SimulatorParams(EngineParams):
     """Parameters of the node simulator: its own, and those of the engine's parts."""
 
     world: str = param("", doc="SDF file of the world, empty: a floor without walls")
-    model_path: tuple[str, ...] = param((), doc="folders of model://, beside those of GAZEBO_MODEL_PATH")
+    model_path: tuple[str, ...] = param((), doc="folders of model://, before GAZEBO_MODEL_PATH and ~/.gazebo/models")
     robot: bool = param(True, doc="place the robot at the start; false waits for ~spawn_robot")
     urdf: str = param("", doc="URDF file of the robot, empty: the parameter /robot_description")
     x: float = param(0.0, unit="m", doc="where the robot starts")
@@ -92,8 +91,8 @@ class Simulator:
         scenario = read_scenario(p.scenario) if p.scenario else None
         if scenario is not None:
             p = _set_by(scenario, p)
-        folders = [*p.model_path, *filter(None, os.environ.get("GAZEBO_MODEL_PATH", "").split(":"))]
-        world = load_world(p.world, folders) if p.world else World()
+        folders, packages = model_folders(p.model_path), package_finder(p.model_path)
+        world = load_world(p.world, folders, packages) if p.world else World()
         places = read_sensors(p.motion_sensors)
         self._params = p
         self._engine = Engine(world, p.engine, sensors=places, make_renderer=lambda: make_renderer(p.camera.renderer))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -15,9 +15,15 @@ _SCHEMES = ("model://", "package://")  # gazebo_ros writes the one for the other
 
 @dataclass(frozen=True)
 class ModelPath:
-    """Folders in which `model://NAME/...` is looked up, in this order."""
+    """Where `model://NAME/...` is looked up.
+
+    Attributes:
+        folders: in this order.
+        find_package: the folder of a ROS package, looked in last.
+    """
 
     folders: tuple[Path, ...] = ()
+    find_package: Callable[[str], Path | None] | None = None
 
     def find(self, uri: str, base: Path, place: Place) -> Path:
         """The file or folder that a uri means.
@@ -41,7 +47,10 @@ class ModelPath:
         for scheme in _SCHEMES:
             if uri.startswith(scheme):
                 inner = uri.removeprefix(scheme).strip("/")
-                return [folder / inner for folder in self.folders]
+                places = [folder / inner for folder in self.folders]
+                name, _, rest = inner.partition("/")
+                package = self.find_package(name) if self.find_package is not None else None
+                return places if package is None else [*places, package / rest]
         plain = Path(uri.removeprefix("file://"))
         return [base / plain, *(folder / plain for folder in self.folders if not plain.is_absolute())]
 

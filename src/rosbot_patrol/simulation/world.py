@@ -15,7 +15,7 @@ import itertools
 import logging
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -82,19 +82,24 @@ class World:
     doors: tuple[DoorPlace, ...] = ()
 
 
-def load_world(path: str | Path, model_path: Iterable[str | Path] = ()) -> World:
+def load_world(
+    path: str | Path,
+    model_path: Iterable[str | Path] = (),
+    find_package: Callable[[str], Path | None] | None = None,
+) -> World:
     """Read an SDF world.
 
     Args:
         path: the file.
         model_path: folders in which `model://NAME` is looked up, before `models` beside the file or its folder.
+        find_package: the folder of a ROS package by name, where no folder has it.
 
     Raises:
         WorldError: the file cannot be read, is not SDF, or an element makes no sense; names file and element.
     """
     path = Path(path)
     folders = [*map(Path, model_path), path.parent / "models", path.parent.parent / "models"]
-    reader = _Reader(path, ModelPath(tuple(folders)))
+    reader = _Reader(path, ModelPath(tuple(folders), find_package))
     world = reader.read()
     if reader.lights:
         log.info("%s: %d lights are not simulated, the camera has its own", path, reader.lights)
