@@ -34,6 +34,8 @@ from rosbot_patrol.ros.republish_node import RepublishParams
 from rosbot_patrol.ros.simulator_node import SimulatorParams
 from rosbot_patrol.ros.twist_mux_node import TwistMuxParams
 from rosbot_patrol.rosserial.settings import SerialNodeParams
+from rosbot_patrol.simulation import scenario
+from rosbot_patrol.simulation.faults import KINDS, Doorway, Fault
 
 # Title, namespace below the node's own, declaration.
 SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
@@ -68,6 +70,20 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("demo_intruder", [("", DemoParams)]),
 ]
 
+# The same for the keys of a scenario's file.
+SCENARIO: list[tuple[str, type]] = [
+    ("", scenario.Setting),
+    ("robot", scenario.Start),
+    ("actors[]", scenario.ActorEntry),
+    ("walks[]", scenario.WalkEntry),
+    ("doors[]", scenario.DoorEntry),
+    ("door_moves[]", scenario.DoorMove),
+    ("doorways/<name>", Doorway),
+    ("triggers[]", scenario.Trigger),
+    ("expect", scenario.Expect),
+    ("faults[]", Fault),
+]
+
 
 def _groups(prefix: str, cls: type) -> list[tuple[str, type]]:
     """A declaration and the ones nested in it, with their namespaces."""
@@ -94,6 +110,14 @@ def document() -> str:
                 rows = table(group)
                 if rows.count("\n") > 1:
                     lines += ["", *([f"`~{namespace}`", ""] if namespace else []), rows]
+    lines += ["", "## scenario file"]
+    for place, cls in SCENARIO:
+        lines += ["", *([f"`{place}`", ""] if place else []), table(cls)]
+    common = table(Fault).splitlines()[2:]
+    for kind, cls in KINDS.items():
+        rows = [row for row in table(cls).splitlines() if row not in common]
+        lines += ["", f"`kind: {kind}`: {cls.__doc__}"]
+        lines += ["", *rows] if len(rows) > 2 else []
     return "\n".join(lines) + "\n"
 
 
