@@ -71,7 +71,8 @@ class Population:
             self._step_doors(dt, robot, robot_radius)
         doors = self.doors
         for walker in self._walkers.values():
-            if walker.step(dt, robot, doors):
+            others = [w for w in self._walkers.values() if w is not walker] if walker.is_roaming else ()
+            if walker.step(dt, robot, (*doors, *others)):
                 self._physics.move(walker.name, walker.matrix)
 
     def cut(self, height: float) -> Slice:

@@ -1,7 +1,8 @@
 """Actors that stand, walk along points, wander and stop: people, pets and fire hydrants, in the plane.
 
 A walker gathers speed and loses it as legs can, turns before it sets off, and stops before the robot and before a
-door's leaf until those have gone. It knows nothing of walls: `ways.Ways` refuses a path through one.
+door's leaf until those have gone. It knows nothing of walls: `ways.Ways` refuses a path through one. Who wanders stops
+before others too, and goes elsewhere; those who have a path to follow walk through each other.
 """
 
 from __future__ import annotations
@@ -97,6 +98,15 @@ class Walker:
         return self._pace
 
     @property
+    def is_roaming(self) -> bool:
+        """Whether it wanders about."""
+        return self._roaming is not None
+
+    def distance_to(self, x: float, y: float) -> float:
+        """From a point to its cylinder [m], 0 inside."""
+        return max(math.hypot(x - self.pose.x, y - self.pose.y) - self.radius, 0.0)
+
+    @property
     def is_warm(self) -> bool:
         """Whether a motion sensor can notice it."""
         return self._figure.warmth > 0.0
@@ -174,8 +184,8 @@ class Walker:
         self._path, self._loop, self._speed, self._pause = [], False, speed, pause
         self._waits = self._held_up = self._pace = 0.0
 
-    def step(self, dt: float, robot: Pose2D | None, doors: Sequence[Obstacle] = ()) -> bool:
-        """Advance by `dt` [s]; returns whether it moved. It stops before robot and doors until those have gone."""
+    def step(self, dt: float, robot: Pose2D | None, obstacles: Sequence[Obstacle] = ()) -> bool:
+        """Advance by `dt` [s]; returns whether it moved. It stops before robot and obstacles until those have gone."""
         if self._waits > 0.0:
             self._waits -= dt
             self._pace = 0.0
@@ -193,7 +203,7 @@ class Walker:
         stride = min(self._pace * dt, gap)
         yaw = self._turned(error, dt, heading)
         moved = Pose2D(self.pose.x + stride * math.cos(yaw), self.pose.y + stride * math.sin(yaw), yaw)
-        if self._is_in_the_way(moved, robot, doors):
+        if self._is_in_the_way(moved, robot, obstacles):
             self._pace = 0.0
             self._give_up_later(dt)
             return False
@@ -239,13 +249,13 @@ class Walker:
         most = self._figure.turn_rate * dt
         return heading if abs(error) <= most else wrap_angle(self.pose.yaw + math.copysign(most, error))
 
-    def _is_in_the_way(self, moved: Pose2D, robot: Pose2D | None, doors: Sequence[Obstacle]) -> bool:
+    def _is_in_the_way(self, moved: Pose2D, robot: Pose2D | None, obstacles: Sequence[Obstacle]) -> bool:
         """Whether a move would bring it nearer to something that it is near to already; turning is always free."""
         if robot is not None and distance(moved, robot) < min(self.radius + _ROOM, distance(self.pose, robot)):
             return True
-        for door in doors:
-            after = door.distance_to(moved.x, moved.y)
-            if after < self.radius and after < door.distance_to(self.pose.x, self.pose.y):
+        for thing in obstacles:
+            after = thing.distance_to(moved.x, moved.y)
+            if after < self.radius and after < thing.distance_to(self.pose.x, self.pose.y):
                 return True
         return False
 

@@ -79,6 +79,21 @@ def test_one_who_wanders_meets_neither_walls_nor_furniture(build) -> None:
     assert not any(abs(p.x) < 0.5 and 1.1 < p.y < 1.9 for p in seen)
 
 
+def test_one_who_wanders_goes_round_who_stands_there(build) -> None:
+    engine = build()
+    engine.spawn_actor("joe", "person", "visitor", Pose2D(0.8, 0.0))
+    engine.spawn_actor("ann", "person", "woman", Pose2D(-0.8, 0.0))
+    engine.spawn_actor("rex", "dog", "terrier", Pose2D())
+    engine.roam_actor("rex", 1.6, 0.8, pause=0.1)
+    rex, gaps, xs = engine.actors[2], [], []
+    for _ in range(600):
+        run(engine, 0.1)
+        gaps += [math.hypot(rex.pose.x - x, rex.pose.y) for x in (0.8, -0.8)]
+        xs.append(rex.pose.x)
+    assert min(gaps) > 0.25 + rex.radius - 0.01
+    assert max(xs) - min(xs) > 1.5
+
+
 def test_who_wanders_depends_on_seed_and_name_alone(build) -> None:
     def track(seed: int, *others: str) -> list[Pose2D]:
         engine = build(seed=seed)
