@@ -37,13 +37,17 @@ def cast_fan(
         cosines[k], sines[k] = math.cos(first + k * step), math.sin(first + k * step)
     count = groups.shape[0]
     starts = np.zeros(count + 1, np.int64)
-    gaps = np.empty(count)
+    gaps, near = np.empty(count), np.empty(count, np.int64)
+    farthest, found = ranges.max(), 0
     for g in range(count):
         starts[g + 1] = starts[g] + int(groups[g, 3])
         gaps[g] = math.hypot(groups[g, 0] - px, groups[g, 1] - py) - groups[g, 2]
-    order = np.argsort(gaps)
-    for i in range(count + 1):
-        if i < count:
+        if gaps[g] < farthest:
+            near[found] = g
+            found += 1
+    order = near[:found][np.argsort(gaps[near[:found]])]
+    for i in range(found + 1):
+        if i < found:
             g = order[i]
             begin, end = starts[g], starts[g + 1]
             if gaps[g] > 0.0:
