@@ -371,8 +371,8 @@ def report(wanted: argparse.Namespace) -> None:
         every = " | ".join(f"{found[part]:.2f}" for part in PARTS)
         print(f"| {label} | {every} | {sum(found.values()):.2f} |")
         if node in figures:
-            more = 1e3 / figures[node] - sum(found.values())
-            print(f"| the node | {'|'.join('  ' * len(PARTS))} | {1e3 / figures[node]:.2f}, of which ROS {more:.2f} |")
+            whole = 1e3 / figures[node]
+            print(f"| the node: the same and ROS {whole - sum(found.values()):.2f} |{' |' * len(PARTS)} {whole:.2f} |")
     if wanted.json:
         kept = {name: round(figures[name], 3) for name in AIMS if name in figures}
         wanted.json.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
