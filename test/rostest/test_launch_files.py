@@ -121,3 +121,37 @@ def test_respawn_has_a_delay() -> None:
     for node in parse(ROOT / "launch" / "rosbot_patrol.launch").nodes:
         if node.respawn:
             assert node.respawn_delay >= 1.0, node.name
+
+
+@pytest.mark.parametrize(
+    ("house", "map_name", "points"),
+    [
+        ("house", "rosbot_map", "room_points"),
+        ("flat", "flat_map", "flat_room_points"),
+        ("office", "office_map", "office_room_points"),
+    ],
+)
+def test_a_house_brings_its_world_map_points_and_sensors(house: str, map_name: str, points: str) -> None:
+    config = parse(ROOT / "launch" / "demo.launch", f"house:={house}", "rviz:=true")
+    given = {name: Path(str(value.value)) for name, value in config.params.items()}
+    arguments = next(node.args for node in config.nodes if node.name == "map_server")
+    for path, folder, name in (
+        (given["/simulator/world"], "worlds", f"{house}.world"),
+        (given["/simulator/motion_sensors"], "config", f"{house}_sensors.yaml"),
+        (given["/patrolling_node/path_to_params"], "params", f"{points}.yaml"),
+        (given["/house_markers/path_to_params"], "params", f"{points}.yaml"),
+        (given["/demo_intruder/walks"], "config", f"{house}_demo.yaml"),
+        (Path(arguments), "maps", f"{map_name}.yaml"),
+    ):
+        assert (path.parent.name, path.name) == (folder, name)
+        assert path.is_file()
+
+
+def test_what_is_given_wins_over_the_house() -> None:
+    mine = ["house:=flat", "world:=/w", "map_file:=/m", "path_to_params:=/p", "motion_sensors:=/s"]
+    config = parse(ROOT / "launch" / "rosbot_patrol.launch", *mine)
+    given = {name: value.value for name, value in config.params.items()}
+    assert given["/simulator/world"] == "/w"
+    assert given["/simulator/motion_sensors"] == "/s"
+    assert given["/patrolling_node/path_to_params"] == "/p"
+    assert next(node.args for node in config.nodes if node.name == "map_server") == "/m"
