@@ -16,7 +16,7 @@ import numpy as np
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.params import param
-from rosbot_patrol.simulation.meshes import mesh_of
+from rosbot_patrol.simulation.meshes import triangles_of
 from rosbot_patrol.simulation.scene import Body, Collision, Matrix, Visual
 from rosbot_patrol.simulation.urdf import FindPackage, Joint, Urdf, lateral, read_urdf
 
@@ -126,12 +126,6 @@ class RobotDescription:
     def is_skid_steered(self) -> bool:
         """Whether a side has several wheels, which turning drags sideways."""
         return max(len(self.left), len(self.right)) > 1
-
-    def frame(self, name: str) -> Matrix:
-        """base_from_frame; raises WorldError where the robot has no such frame."""
-        if name not in self.frames:
-            raise WorldError(self.source, f"robot '{self.name}' has no link '{name}', which a sensor needs")
-        return self.frames[name]
 
     def fitted(self, left: Sequence[str], right: Sequence[str], frames: FrameParams) -> RobotDescription:
         """The same robot with wheels and sensors as named; what is not named stays as it was found.
@@ -263,7 +257,7 @@ def _wheel(parts: Iterable[Collision | Visual], axis: tuple[float, ...] | None, 
             return part.shape.size[0], float((pose[:3, :3] @ part.pose[:3, 3])[1])
     if not parts:
         return 0.0, 0.0
-    points = np.vstack([mesh_of(p.shape).positions @ p.pose[:3, :3].T + p.pose[:3, 3] for p in parts])
+    points = np.vstack([triangles_of(p.shape)[0] @ p.pose[:3, :3].T + p.pose[:3, 3] for p in parts])
     axle = pose[:3, :3].T @ [0.0, 1.0, 0.0] if axis is None else np.asarray(axis, float)
     axle = axle / max(float(np.linalg.norm(axle)), 1e-9)
     across = points - np.outer(points @ axle, axle)
