@@ -20,7 +20,7 @@ STEP, POSE = ("/simulator/step", "rosbot_patrol/StepSimulation"), ("/simulator/s
 WATCH = """
 import hashlib, json, rospy, sys, threading
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import CameraInfo, Image, LaserScan
+from sensor_msgs.msg import Image, JointState, LaserScan
 
 lock = threading.Lock()
 
@@ -33,7 +33,11 @@ def picture(m):
 
 rospy.init_node("watch", anonymous=True, disable_signals=True)
 rospy.Subscriber("/camera/rgb/image_raw", Image, picture, queue_size=1, buff_size=2**24)
-rospy.Subscriber("/scan", LaserScan, lambda m: say(scan=m.header.stamp.to_sec()), queue_size=1)
+def scan(m):
+    say(scan=m.header.stamp.to_sec(), nearest=min(r for r in m.ranges if r > 0.0))
+
+rospy.Subscriber("/scan", LaserScan, scan, queue_size=1)
+rospy.Subscriber("/joint_states", JointState, lambda m: say(wheels=dict(zip(m.name, m.velocity))), queue_size=1)
 for topic in ("/odom", "/ground_truth/odom"):
     rospy.Subscriber(topic, Odometry, lambda m, topic=topic: say(topic=topic, x=m.pose.pose.position.x), queue_size=1)
 say(ready=True)
@@ -131,6 +135,37 @@ def test_camera_lidar_and_wheels_break_and_are_whole_again(ros):
     wait_for(drives, 15.0, "odometry that goes on")
     assert abs(x("/ground_truth/odom")) < 0.03
     assert not ask(CLEAR, "camera_frozen", "")["success"]
+
+
+def test_a_doorway_a_wheel_and_a_robot_that_is_carried(ros):
+    probe = ros.probe()
+    ask = asker(probe)
+    ros.node("simulator", URDF, WORLD).says("motion sensors", 20.0)
+    watch = ros.script(WATCH)
+
+    def last(key, **fields):
+        said = [s[key] for s in watch.heard(**fields) if key in s]
+        return said[-1] if said else None
+
+    wait_for(lambda: last("nearest"), 20.0, "a scan")
+    assert last("nearest") > 0.85
+    ask(FAULT, "doorway_blocked", "", "{x: 0.0, y: 0.7}", 1.0)
+    wait_for(lambda: last("nearest") < 0.6, 10.0, "the box in the scan")
+    wait_for(lambda: last("nearest") > 0.85, 10.0, "the box gone")
+    ask(FAULT, "robot_carried", "", "{x: 1.0, y: 0.5}", 0.0)
+    wait_for(lambda: last("x", topic="/ground_truth/odom") == pytest.approx(1.0, abs=1e-3), 10.0, "the robot elsewhere")
+    assert abs(last("x", topic="/odom")) < 0.01
+    probe.tell(advertise=["/cmd_vel", "geometry_msgs/Twist"])
+    ask(FAULT, "wheel_stuck", "left", "", 0.0)
+
+    def pivots():
+        probe.tell(publish=["/cmd_vel", {"linear": {"x": 0.1}}])
+        time.sleep(0.1)
+        speeds = last("wheels") or {}
+        left = [speed for name, speed in speeds.items() if "left" in name]
+        return left == [0.0, 0.0] and max(speeds.values()) > 1.0
+
+    wait_for(pivots, 10.0, "wheels of one side that turn alone")
 
 
 def test_a_motion_sensor_flaps_reboots_and_falls_silent_over_tcp(ros, tmp_path):
