@@ -55,6 +55,7 @@ class Physics:
         self._bodies: dict[int, Body] = {}
         self._ids: dict[str, list[int]] = {}
         self._still: dict[str, Body] = {}
+        self._shapes: dict[str, list[int]] = {}  # PyBullet keeps them to its end: made once
         self._near = NearBodies()
         self._robot: int | None = None
         self._limits = (0.0, 0.0, 0.0)
@@ -81,6 +82,7 @@ class Physics:
         if self._still.pop(name, None) is not None:
             self._near.remove(name)
         self._take(name)
+        self._shapes.pop(name, None)
 
     def move(self, name: str, world_from_body: Matrix) -> None:
         """Put a body elsewhere; one that stood still is taken for one that moves from now on."""
@@ -88,6 +90,7 @@ class Physics:
         if still is not None:
             self._near.remove(name)
             self._take(name)
+            self._shapes.pop(name, None)
             self._put(replace(still, static=False))
         for number in self._ids.get(name, ()):
             pybullet.resetBasePositionAndOrientation(
@@ -95,9 +98,11 @@ class Physics:
             )
 
     def _put(self, body: Body) -> None:
-        parts = [c for c in body.collisions if c.shape.kind != "plane"]
+        if body.name not in self._shapes:
+            parts = [c for c in body.collisions if c.shape.kind != "plane"]
+            self._shapes[body.name] = shapes_of(parts, self._client, body.pose if body.static else None)
         self._ids[body.name] = []
-        for shape in shapes_of(parts, self._client, body.pose if body.static else None):
+        for shape in self._shapes[body.name]:
             number = pybullet.createMultiBody(
                 baseMass=0.0,
                 baseCollisionShapeIndex=shape,
