@@ -1,8 +1,9 @@
 """The robot as its URDF describes it: shapes, wheels, mass, and where each frame and sensor sits on the base.
 
-The base is the link that no joint carries. Driven wheels are named by their joints, or else found: continuous joints
-whose axis lies across the robot, left and right of its middle, carried by no other moving joint (so the swivel and the
-wheel of a caster are none). Places are taken with all joints at zero.
+The base is the link that no joint carries. Driven wheels are named by their joints, by parameter or by the plug-in of a
+drive in the file, or else found: continuous joints whose axis lies across the robot, left and right of its middle,
+carried by no other moving joint (so the swivel and the wheel of a caster are none). Places are taken with all joints at
+zero.
 """
 
 from __future__ import annotations
@@ -217,6 +218,8 @@ def _moves(joint: Joint) -> bool:
 
 
 def _sides(urdf: Urdf, frames: dict[str, Matrix]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    if all(urdf.drive):
+        return urdf.drive
     carrier = {j.child: j for j in urdf.joints}
 
     def is_carried(link: str) -> bool:

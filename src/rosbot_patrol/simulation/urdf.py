@@ -1,7 +1,7 @@
 """Read a URDF: links with their shapes, joints with their axes, and the tree that they form.
 
 Meshes are looked up as ROS and Gazebo name them (package://, model://, file://, or a path beside the file). Of the
-<gazebo> extensions only the places of the sensors are read.
+<gazebo> extensions only the places of the sensors and the joints of a differential or skid-steer drive are read.
 """
 
 from __future__ import annotations
@@ -64,13 +64,14 @@ class SensorTag:
 
 @dataclass(frozen=True, kw_only=True)
 class Urdf:
-    """A robot's links and joints; `root` is the link that no joint carries."""
+    """A robot's links and joints; `root` is the link that no joint carries, `drive` the joints of a drive plug-in."""
 
     name: str
     root: str
     links: dict[str, Link]
     joints: tuple[Joint, ...]
     sensors: tuple[SensorTag, ...]
+    drive: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def frames(self) -> dict[str, Matrix]:
         """root_from_link of every link, with all joints at zero."""
@@ -130,6 +131,7 @@ class _Reader:
             links=links,
             joints=joints,
             sensors=tuple(self._sensors(links)),
+            drive=(self._driven("left", joints), self._driven("right", joints)),
         )
         lost = set(links) - set(urdf.frames())
         if lost:
@@ -265,6 +267,16 @@ class _Reader:
                     )
                 )
         return found
+
+    def _driven(self, side: str, joints: tuple[Joint, ...]) -> tuple[str, ...]:
+        """Joints that the plug-in of a drive names for a side (leftJoint, leftFrontJoint, left_joint, ...)."""
+        known = {joint.name for joint in joints}
+        named = [
+            (e.text or "").strip()
+            for e in self.root.iterfind("gazebo/plugin/*")
+            if e.tag.lower().startswith(side) and e.tag.lower().endswith("joint")
+        ]
+        return tuple(dict.fromkeys(name for name in named if name in known))
 
 
 def lateral(frame: Matrix, axis: tuple[float, ...] | None) -> float:

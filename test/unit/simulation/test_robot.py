@@ -167,6 +167,16 @@ def test_what_the_gazebo_part_says_of_the_sensors_goes_first() -> None:
     assert robot.laser.pose[:3, 3] == pytest.approx((0.1, 0.0, 0.25))
 
 
+def test_a_drive_s_plug_in_tells_which_wheels_are_driven() -> None:
+    plugin = "<gazebo><plugin name='d' filename='x.so'><{0}>{1}</{0}><{2}>{3}</{2}></plugin></gazebo>"
+    text = URDF.read_text(encoding="utf-8")
+    front = plugin.format("leftJoint", "front_left_wheel_hinge", "rightJoint", "front_right_wheel_hinge")
+    robot = parse_robot(text.replace("</robot>", f"{front}</robot>"))
+    assert [w.joint for w in robot.wheels] == ["front_left_wheel_hinge", "front_right_wheel_hinge"]
+    gone = plugin.format("leftJoint", "gone", "rightJoint", "front_right_wheel_hinge")
+    assert len(parse_robot(text.replace("</robot>", f"{gone}</robot>")).wheels) == 4
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
