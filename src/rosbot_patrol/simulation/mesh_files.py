@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.picture_colours import Rgba, worn_colour
 
 log = logging.getLogger(__name__)
 
 Triangles = tuple[NDArray[np.float64], NDArray[np.int64]]
-Rgba = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def _read_obj(path: Path) -> list[MeshPart]:
 
 
 def _read_mtl(path: Path) -> dict[str, Rgba]:
-    """Diffuse colour by material; a library that is missing or broken costs the colours only, with a warning."""
+    """Colour by material, of its texture where it has one; where the library is no good only the colours are lost."""
     colours: dict[str, Rgba] = {}
     name = ""
     try:
@@ -141,7 +141,10 @@ def _read_mtl(path: Path) -> dict[str, Rgba]:
                 name = " ".join(words[1:])
             elif words[:1] == ["Kd"]:
                 r, g, b = (min(max(float(w), 0.0), 1.0) for w in words[1:4])
-                colours[name] = (r, g, b, 1.0)
+                colours.setdefault(name, (r, g, b, 1.0))
+            elif words[:1] == ["map_Kd"]:
+                worn = worn_colour([words[-1]], path.parent)
+                colours |= {name: worn} if worn is not None else {}
     except OSError as err:
         log.warning("%s: the colours of the mesh cannot be read: %s", path, err.strerror)
     except ValueError as err:
@@ -166,7 +169,7 @@ def _read_dae(path: Path) -> list[MeshPart]:
         metres = float(document.assetInfo.unitmeter or 1.0)
         nodes = document.scene.nodes if document.scene is not None else []
         bound = [found for node in nodes for found in _bound(node, np.eye(4), "")]
-        parts = [part for name, geometry in bound for part in _dae_parts(name, geometry)]
+        parts = [part for name, geometry in bound for part in _dae_parts(name, geometry, path.parent)]
     except Exception as err:  # pycollada lets what it stumbles over through: of lxml, of numpy, its own
         raise ValueError(str(err) or type(err).__name__) from err
     return [MeshPart(part.name, part.vertices * metres, part.faces, part.rgba) for part in parts]
@@ -189,7 +192,7 @@ def _bound(node: Any, world_from_parent: NDArray[np.float64], name: str) -> Iter
             yield name, controller
 
 
-def _dae_parts(name: str, geometry: Any) -> Iterator[MeshPart]:
+def _dae_parts(name: str, geometry: Any, folder: Path) -> Iterator[MeshPart]:
     for primitive in geometry.primitives():
         if not hasattr(primitive, "triangleset") and not hasattr(primitive, "vertex_index"):
             continue
@@ -197,13 +200,18 @@ def _dae_parts(name: str, geometry: Any) -> Iterator[MeshPart]:
         if triangles.vertex_index is None or triangles.vertex_index.ndim != 2 or triangles.vertex_index.shape[1] != 3:
             continue  # lines and points
         vertices = np.asarray(triangles.vertex, float).reshape(-1, 3)
-        yield MeshPart(name, *_compact(vertices, np.asarray(triangles.vertex_index, np.int64)), _dae_colour(primitive))
+        yield MeshPart(
+            name, *_compact(vertices, np.asarray(triangles.vertex_index, np.int64)), _dae_colour(primitive, folder)
+        )
 
 
-def _dae_colour(primitive: Any) -> Rgba | None:
+def _dae_colour(primitive: Any, folder: Path) -> Rgba | None:
     effect = getattr(getattr(primitive, "material", None), "effect", None)
     colour = getattr(effect, "diffuse", None)
+    picture = getattr(getattr(getattr(colour, "sampler", None), "surface", None), "image", None)
+    if picture is not None:
+        return worn_colour([str(picture.path)], folder)
     if not isinstance(colour, tuple | list) or len(colour) < 3:
-        return None  # a picture, or no colour at all
+        return None
     r, g, b = (float(min(max(v, 0.0), 1.0)) for v in colour[:3])
     return (r, g, b, 1.0)

@@ -36,12 +36,15 @@ class ModelPath:
         Raises:
             WorldError: it is nowhere; names where it was looked for.
         """
-        tried = list(self._candidates(uri, base))
-        found = next((path for path in tried if path.exists()), None)
+        found = self.look(uri, base)
         if found is None:
-            looked = ", ".join(map(str, tried)) or "no folder for model:// is given"
+            looked = ", ".join(map(str, self._candidates(uri, base))) or "no folder for model:// is given"
             raise place.error(f"'{uri}' is missing (looked for {looked})")
         return found
+
+    def look(self, uri: str, base: Path) -> Path | None:
+        """As `find`, None where it is nowhere."""
+        return next((path for path in self._candidates(uri, base) if path.exists()), None)
 
     def _candidates(self, uri: str, base: Path) -> Iterable[Path]:
         for scheme in _SCHEMES:

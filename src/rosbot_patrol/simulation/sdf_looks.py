@@ -1,14 +1,17 @@
-"""Colours of SDF materials: written out, or by the name of one of Gazebo's scripts."""
+"""Colours of SDF materials: written out, or by the name of a script, of Gazebo's own or of a model."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 from xml.etree import ElementTree as ET
 
+from rosbot_patrol.simulation.ogre_scripts import MaterialScripts
+from rosbot_patrol.simulation.picture_colours import Rgba
 from rosbot_patrol.simulation.scene import Material
+from rosbot_patrol.simulation.sdf_files import ModelPath
 from rosbot_patrol.simulation.sdf_values import Place
 
-Rgba = tuple[float, float, float, float]
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)
 
 # Gazebo's own scripts by name: the colour that each shows, textures by their mean.
@@ -32,35 +35,51 @@ _SCRIPTS = {
 }  # fmt: skip
 
 
-def material_of(visual: ET.Element, own: Rgba | None, place: Place, skipped: set[str]) -> Material:
-    """The material of a <visual>.
+@dataclass
+class Looks:
+    """Reads materials.
 
-    Args:
-        visual: the element.
-        own: the colour that its mesh brings, taken where the element names none.
-        place: of the element.
-        skipped: takes the name of a script that is not known.
-
-    Raises:
-        WorldError: a colour is no colour.
+    Attributes:
+        model_path: where the scripts of models are.
+        skipped: takes the names of scripts that are not known.
     """
-    material = visual.find("material")
-    if material is None:
-        return Material(rgba=own or GREY)
-    for tag in ("diffuse", "ambient", "emissive"):
-        text = material.findtext(tag)
-        if text and text.strip():
-            colour = _colour(text, place.inside(f"<{tag}>"))
-            if tag != "emissive" or max(colour[:3]) > 0.0:
-                return Material(rgba=colour)
-    script = (material.findtext("script/name") or "").strip()
-    if not script:
-        return Material(rgba=own or GREY)
-    known = _SCRIPTS.get(script.removeprefix("Gazebo/"))
-    if known is None:
-        skipped.add(f"the material script '{script}'")
-        return Material(rgba=own or GREY)
-    return Material(rgba=(*known, 1.0))
+
+    model_path: ModelPath
+    skipped: set[str]
+    _scripts: MaterialScripts = field(default_factory=MaterialScripts)
+
+    def material(self, visual: ET.Element, own: Rgba | None, place: Place) -> Material:
+        """The material of a <visual>; `own` is the colour that its mesh brings, taken where the element names none.
+
+        Raises:
+            WorldError: a colour is no colour.
+        """
+        material = visual.find("material")
+        if material is None:
+            return Material(rgba=own or GREY)
+        for tag in ("diffuse", "ambient", "emissive"):
+            text = material.findtext(tag)
+            if text and text.strip():
+                colour = _colour(text, place.inside(f"<{tag}>"))
+                if tag != "emissive" or max(colour[:3]) > 0.0:
+                    return Material(rgba=colour)
+        script = material.find("script")
+        name = (script.findtext("name") or "").strip() if script is not None else ""
+        if script is None or not name:
+            return Material(rgba=own or GREY)
+        known = _SCRIPTS.get(name.removeprefix("Gazebo/"))
+        found = (*known, 1.0) if known is not None else self._of_model(script, name, place)
+        if found is None:
+            self.skipped.add(f"the material script '{name}'")
+        return Material(rgba=found or own or GREY)
+
+    def _of_model(self, script: ET.Element, name: str, place: Place) -> Rgba | None:
+        places = []
+        for uri in script.findall("uri"):
+            found = self.model_path.look((uri.text or "").strip(), place.path.parent)
+            if found is not None:
+                places.append(found)
+        return self._scripts.colour(name, places)
 
 
 def is_unseen(visual: ET.Element, place: Place) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from rosbot_patrol.simulation.mesh_files import MeshPart, load_parts, merged
 from rosbot_patrol.simulation.scene import Collision, Matrix, Shape, Visual
 from rosbot_patrol.simulation.sdf_files import ModelPath
-from rosbot_patrol.simulation.sdf_looks import is_unseen, material_of
+from rosbot_patrol.simulation.sdf_looks import Looks, is_unseen
 from rosbot_patrol.simulation.sdf_values import Place, floats, sizes, turned_to
 
 log = logging.getLogger(__name__)
@@ -39,8 +39,12 @@ class ShapeReader:
 
     model_path: ModelPath
     skipped: set[str]
+    _looks: Looks = field(init=False)
     _meshes: dict[Path, tuple[MeshPart, ...]] = field(default_factory=dict)
     _merged: dict[tuple[Path, str, bool], tuple[MeshPart, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._looks = Looks(self.model_path, self.skipped)
 
     def visuals(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Visual]:
         """What a <visual> shows: one for each colour of its mesh, none where it is transparent or of no known shape.
@@ -53,7 +57,7 @@ class ShapeReader:
             return []
         visuals = []
         for shape, own, turn in self._shapes(element, place, scale, apart=True):
-            material = material_of(element, own, place, self.skipped)
+            material = self._looks.material(element, own, place)
             visuals.append(Visual(shape=shape, pose=pose @ turn, material=material))
         return visuals
 
