@@ -16,7 +16,7 @@ from rosbot_patrol.maps.raster import flood
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.floor_plan import floor_plan
-from rosbot_patrol.simulation.motion_sensors import SensorPlace
+from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace, bearing_in_cone
 from rosbot_patrol.simulation.robot import load_robot
 from rosbot_patrol.simulation.sensor_places import read_sensors
 from rosbot_patrol.simulation.slices import slice_bodies
@@ -141,6 +141,22 @@ def test_a_sensor_looks_at_the_point_of_its_own_room(house: str, sensor: SensorP
     eye = (sensor.x + 0.1 * math.cos(sensor.yaw), sensor.y + 0.1 * math.sin(sensor.yaw))
     seen = [room for room, point in rooms_of(house).items() if not scene.is_blocked(eye, (point.x, point.y))]
     assert sensor.room in seen
+
+
+@pytest.mark.parametrize(("house", "sensor"), EACH_SENSOR, ids=lambda v: f"sensor{getattr(v, 'id', v)}")
+def test_a_sensor_notices_nobody_who_walks_in_another_room(house: str, sensor: SensorPlace) -> None:
+    scene = slice_bodies(world_of(house).bodies, EYES)
+    walks = yaml.safe_load((ROOT / "config" / f"{house}_demo.yaml").read_text())["walks"]
+    for room, walk in walks.items():
+        begin, end = np.array(walk["path"][0]), np.array(walk["path"][-1])
+        seen = 0
+        for share in np.linspace(0.0, 1.0, 30):
+            place = Pose2D(*(begin + share * (end - begin)))
+            bearing = bearing_in_cone(MotionSensorParams(), sensor, place)
+            if bearing is not None:
+                eye = (sensor.x + 0.1 * math.cos(bearing), sensor.y + 0.1 * math.sin(bearing))
+                seen += not scene.is_blocked(eye, (place.x, place.y))
+        assert (seen >= 20) if room == sensor.room else (seen == 0), f"{seen} of 30 places in room {room}"
 
 
 def test_the_furniture_is_of_other_kinds_than_the_first_house_s() -> None:
