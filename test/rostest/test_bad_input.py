@@ -352,7 +352,10 @@ def test_worlds_sensors_and_configuration_that_make_no_sense(ros, tmp_path):
     house = ROOT / "worlds" / "house.world"
     cases = [
         (start(ros, "simulator", world="/nowhere.world"), "/nowhere.world: cannot be read: No such file"),
-        (start(ros, "simulator", world=tmp_path / "cut.world"), "cut.world: is not XML, or not all of it: no element found: line"),
+        (
+            start(ros, "simulator", world=tmp_path / "cut.world"),
+            "cut.world: is not XML, or not all of it: no element found: line",
+        ),
         (
             start(ros, "demo_intruder", walks=tmp_path / "walks.yaml"),
             "walks.yaml: walks: expected a walk for each room, got 5",

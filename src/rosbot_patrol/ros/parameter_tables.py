@@ -115,9 +115,9 @@ def document() -> str:
         lines += ["", *([f"`{place}`", ""] if place else []), table(cls)]
     common = table(Fault).splitlines()[2:]
     for kind, cls in KINDS.items():
-        rows = [row for row in table(cls).splitlines() if row not in common]
+        own = [row for row in table(cls).splitlines() if row not in common]
         lines += ["", f"`kind: {kind}`: {cls.__doc__}"]
-        lines += ["", *rows] if len(rows) > 2 else []
+        lines += ["", *own] if len(own) > 2 else []
     return "\n".join(lines) + "\n"
 
 
