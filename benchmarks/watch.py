@@ -62,8 +62,8 @@ def is_inside(engine: Engine, place: Pose2D) -> bool:
 
 def draw_places(engine: Engine, rng: np.random.Generator, count: int) -> Iterator[Pose2D]:
     """Places by chance."""
-    middles = np.array([body.pose[:2, 3] for body in engine.world.bodies if body.kind == "wall"])
-    low, high = middles.min(axis=0), middles.max(axis=0)
+    segments = engine.slices[0].segments.reshape(-1, 2)
+    low, high = segments.min(axis=0), segments.max(axis=0)
     while count:
         x, y = rng.uniform(low, high)
         place = Pose2D(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))

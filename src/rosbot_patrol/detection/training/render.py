@@ -45,7 +45,14 @@ class Studio:
         self.world = world
 
     def shard(
-        self, seed: list[int], count: int, *, test: bool, house_share: float = 0.3, plain: bool = False
+        self,
+        seed: list[int],
+        count: int,
+        *,
+        test: bool,
+        house_share: float = 0.3,
+        plain: bool = False,
+        pets: float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
         """`count` pictures and the rows of their labels; a share of them is taken in the house, if there is one.
 
@@ -55,6 +62,7 @@ class Studio:
             test: draw people whom training never draws.
             house_share: share of scenes in the house.
             plain: leave the house's colours, light and furniture as they are.
+            pets: share of the pictures with cats or dogs.
         """
         rng = np.random.default_rng(seed)
         pictures, rows = [], []
@@ -68,7 +76,7 @@ class Studio:
                 camera = scenes.draw_camera(scene, rng)
                 if camera is None or len(pictures) == count:
                     break
-                picture, labels = self._view(scene, camera, rng, test)
+                picture, labels = self._view(scene, camera, rng, test, pets)
                 rows += [[len(pictures), *label] for label in labels]
                 pictures.append(picture)
         return np.array(pictures), np.array(rows, np.float32).reshape(-1, len(COLUMNS))
@@ -78,8 +86,10 @@ class Studio:
             return scenes.draw_house(rng, self.world, plain=plain)
         return scenes.draw_room(rng)
 
-    def _view(self, scene: scenes.Scene, camera: tuple[float, float, float], rng: np.random.Generator, test: bool):
-        actors = scenes.draw_actors(scene, camera, rng, reserved=test)
+    def _view(
+        self, scene: scenes.Scene, camera: tuple[float, float, float], rng: np.random.Generator, test: bool, pets: float
+    ):
+        actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets)
         for i, actor in enumerate(actors):
             self.renderer.add(actor.body, label=i + 1)
             self.renderer.move(actor.body.name, actor.pose)
@@ -94,6 +104,7 @@ class Studio:
         labels = [
             _label(actor, seen == i + 1, optical, intrinsics, camera, float(picture.mean()), test)
             for i, actor in enumerate(actors)
+            if actor.body.kind != "pet"
         ]
         for actor in actors:
             for body in (actor.body, *actor.extra):
@@ -217,6 +228,7 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
         test=options.test,
         house_share=options.house_share,
         plain=options.plain,
+        pets=options.pets,
     )
     np.savez_compressed(target.with_suffix(".npz"), boxes=boxes)
     part = target.with_suffix(".part.npy")
@@ -238,6 +250,7 @@ def main() -> None:
     parser.add_argument("--house", type=Path, help="a world in which a share of the pictures is taken")
     parser.add_argument("--house-share", type=float, default=0.3)
     parser.add_argument("--plain", action="store_true", help="leave the house as it is")
+    parser.add_argument("--pets", type=float, default=0.0, help="share of the pictures with cats or dogs")
     parser.add_argument("--test", action="store_true", help="people whom training never draws")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()

@@ -21,6 +21,8 @@ from rosbot_patrol.detection.training.furniture import (
 )
 from rosbot_patrol.simulation.actors import POSTURES, hydrant_body, person_body, person_pose_parts
 from rosbot_patrol.simulation.looks import HEIGHTS, LOOKS, RESERVED_HEIGHTS, Look, draw_look
+from rosbot_patrol.simulation.meshes import mesh_of
+from rosbot_patrol.simulation.pets import PETS, draw_pet, pet_body, pet_pose_parts
 from rosbot_patrol.simulation.renderer import Light
 from rosbot_patrol.simulation.scene import Body, Material, Matrix, Shape, Visual
 from rosbot_patrol.simulation.world import World
@@ -134,7 +136,9 @@ def draw_camera(scene: Scene, rng: Rng) -> tuple[float, float, float] | None:
     return None
 
 
-def draw_actors(scene: Scene, camera: tuple[float, float, float], rng: Rng, *, reserved: bool = False) -> list[Actor]:
+def draw_actors(
+    scene: Scene, camera: tuple[float, float, float], rng: Rng, *, reserved: bool = False, pets: float = 0.0
+) -> list[Actor]:
     """People and hydrants before a camera, where there is room for them; often none at all.
 
     Args:
@@ -142,6 +146,7 @@ def draw_actors(scene: Scene, camera: tuple[float, float, float], rng: Rng, *, r
         camera: x, y, yaw.
         rng: chance.
         reserved: draw people that training never sees.
+        pets: share of the views with a cat or a dog, or two, as well; they come last and are nothing to be found.
     """
     people = int(rng.choice([0, 1, 2, 3, 4], p=[0.30, 0.47, 0.14, 0.06, 0.03]))
     hydrants = int(rng.choice([0, 1, 2], p=[0.76, 0.20, 0.04]))
@@ -159,6 +164,9 @@ def draw_actors(scene: Scene, camera: tuple[float, float, float], rng: Rng, *, r
     for _ in actors:
         if scene.places and scene.places[-1].half_x == 0.15:
             scene.places.pop()
+    if pets and rng.random() < pets:
+        spots = [_spot(scene, camera, rng) for _ in range(int(rng.integers(1, 3)))]
+        actors += [_draw_pet(rng, f"pet{i}", spot) for i, spot in enumerate(spots) if spot is not None]
     return actors
 
 
@@ -207,6 +215,14 @@ def _draw_hydrant(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
     return Actor(hydrant_body(name, colour, caps=caps, height=float(rng.uniform(0.6, 0.95))), pose, None, [])
 
 
+def _draw_pet(rng: Rng, name: str, spot: tuple[float, float]) -> Actor:
+    look = draw_pet(str(rng.choice(sorted(PETS))), rng)
+    if rng.random() < 0.4:
+        look = replace(look, fur=wood_colour(rng), height=look.height * float(rng.uniform(0.8, 1.25)))
+    parts = pet_pose_parts(look, float(rng.random()), float(rng.integers(2)))
+    return Actor(pet_body(name, look), placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi))), parts, [])
+
+
 def _spot(scene: Scene, camera: tuple[float, float, float], rng: Rng) -> tuple[float, float] | None:
     x, y, yaw = camera
     near = float(np.exp(rng.uniform(np.log(0.7), np.log(8.5))))
@@ -246,7 +262,9 @@ def _near(place: Place, x: float, y: float, margin: float) -> bool:
 
 
 def _footprints(body: Body) -> list[Place]:
-    places = []
+    places: list[Place] = []
+    if body.kind == "floor":
+        return places
     for visual in body.visuals:
         shape, size = visual.shape, visual.shape.size
         if shape.kind == "plane":
@@ -256,6 +274,8 @@ def _footprints(body: Body) -> list[Place]:
             continue
         if shape.kind == "box":
             half = (size[0] / 2, size[1] / 2)
+        elif shape.kind == "mesh":
+            half = tuple(np.abs(mesh_of(shape).positions[:, :2]).max(axis=0))  # type: ignore[assignment]
         elif shape.vertices is not None:
             half = tuple(np.abs(shape.vertices[:, :2]).max(axis=0))  # type: ignore[assignment]
         else:

@@ -138,7 +138,6 @@ class Trainer:
         self.step, self.epoch = state["step"], state["epoch"]
         sys.stdout.write(f"going on after epoch {self.epoch}\n")
 
-
     def _start_from(self, file: Path) -> None:
         """Begin with the weights of a checkpoint, or of a file in darknet's format."""
         if file.suffix == ".weights":
