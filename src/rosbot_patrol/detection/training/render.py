@@ -87,7 +87,12 @@ class Studio:
         return scenes.draw_room(rng)
 
     def _view(
-        self, scene: scenes.Scene, camera: tuple[float, float, float], rng: np.random.Generator, test: bool, pets: float
+        self,
+        scene: scenes.Scene,
+        camera: tuple[float, float, float],
+        rng: np.random.Generator,
+        test: bool,
+        pets: float = 0.0,
     ):
         actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets)
         for i, actor in enumerate(actors):
