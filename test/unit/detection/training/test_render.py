@@ -11,6 +11,7 @@ from rosbot_patrol.detection.training.labels import COLUMNS, column
 from rosbot_patrol.detection.training.scenes import Actor, Scene
 from rosbot_patrol.simulation.actors import person_body, person_pose_parts
 from rosbot_patrol.simulation.looks import Look
+from rosbot_patrol.simulation.pets import draw_pet, pet_body, pet_pose_parts
 from rosbot_patrol.simulation.renderer import EglRenderer, Light
 
 
@@ -58,6 +59,20 @@ def test_who_is_half_hidden_is_said_to_be(studio: render.Studio, monkeypatch: py
 def test_who_is_behind_a_wall_is_not_labelled(studio: render.Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     wall = build("wall", [(box(0.2, 9.0, 9.0), (0, 0, 1), (1, 1, 1), "")], placed(4.0, 0))
     assert len(look_at(studio, monkeypatch, 5.0, wall)) == 0
+
+
+def test_a_pet_is_seen_and_is_nothing_to_be_found(studio: render.Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    look = draw_pet("dog", rng)
+    dog = Actor(pet_body("pet0", look), placed(2.0, 0), pet_pose_parts(look), [])
+    seen = {}
+    for there in (True, False):
+        monkeypatch.setattr(render.scenes, "draw_actors", lambda *a, there=there, **k: [dog] if there else [])
+        studio.renderer.clear()
+        scene = Scene([], Light(), (-9, 9, -9, 9))
+        seen[there] = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), False, 1.0)
+    assert seen[True][1] == []
+    assert (seen[True][0] != seen[False][0]).any()
 
 
 def test_a_shard_repeats_with_its_seed(studio: render.Studio) -> None:
