@@ -9,7 +9,6 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Ros
 
 ROOT = Path(__file__).resolve().parents[2]
 URDF = f"_urdf:={ROOT}/urdf/rosbot.urdf"
@@ -56,11 +55,8 @@ print(json.dumps(said))
 
 
 @pytest.fixture
-def ros():
-    made = Ros()
-    subprocess.run(["rosparam", "set", "/use_sim_time", "true"], env=made.env, check=True)
-    yield made
-    made.stop()
+def ros(sim_ros):
+    return sim_ros
 
 
 def test_doors_and_pets_come_by_service_and_the_lidar_sees_them(ros):

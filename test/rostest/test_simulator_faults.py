@@ -1,6 +1,5 @@
 """simulator before a real master: faults, control and scenarios by service and file, seen on their topics."""
 
-import subprocess
 import time
 from pathlib import Path
 
@@ -8,7 +7,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Ros, free_port, wait_for
+from ros_processes import free_port, wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 URDF, WORLD = f"_urdf:={ROOT}/urdf/rosbot.urdf", f"_world:={ROOT}/worlds/house.world"
@@ -45,19 +44,9 @@ sys.stdin.read()
 """
 
 
-@pytest.fixture(scope="module")
-def master():
-    ros = Ros()
-    subprocess.run(["rosparam", "set", "/use_sim_time", "true"], env=ros.env, check=True)
-    yield ros
-    ros.stop()
-
-
 @pytest.fixture
-def ros(master):
-    yield master
-    master.stop_nodes()
-    subprocess.run(["rosparam", "delete", "/simulator"], env=master.env, stderr=subprocess.DEVNULL)
+def ros(sim_ros):
+    return sim_ros
 
 
 def asker(probe):

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Ros, free_port, wait_for
+from ros_processes import free_port, wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 URDF, WORLD = f"_urdf:={ROOT}/urdf/rosbot.urdf", f"_world:={ROOT}/worlds/house.world"
@@ -45,19 +45,9 @@ print(*(a.success for a in answers), *(a.message for a in answers), sep="|")
 """
 
 
-@pytest.fixture(scope="module")
-def master():
-    ros = Ros()
-    subprocess.run(["rosparam", "set", "/use_sim_time", "true"], env=ros.env, check=True)
-    yield ros
-    ros.stop()
-
-
 @pytest.fixture
-def ros(master):
-    yield master
-    master.stop_nodes()
-    subprocess.run(["rosparam", "delete", "/simulator"], env=master.env, stderr=subprocess.DEVNULL)
+def ros(sim_ros):
+    return sim_ros
 
 
 def test_topics_frames_and_driving_into_a_wall(ros):

@@ -1,13 +1,12 @@
 """simulator before a real master with a robot that is no ROSbot: its frames and joints, and a mesh that is gone."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Ros, wait_for
+from ros_processes import wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 URDF = ROOT / "test/unit/simulation/data/two_wheeler_description/urdf/two_wheeler.urdf"
@@ -19,13 +18,9 @@ FRAMES = {
 }
 
 
-@pytest.fixture(scope="module")
-def ros():
-    master = Ros()
-    subprocess.run(["rosparam", "set", "/use_sim_time", "true"], env=master.env, check=True)
-    yield master
-    master.stop_nodes()
-    master.stop()
+@pytest.fixture
+def ros(sim_ros):
+    return sim_ros
 
 
 def test_a_robot_on_two_wheels_drives_and_speaks_of_its_own_frames(ros):

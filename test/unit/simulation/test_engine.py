@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.odometry import OdometryParams
 from rosbot_patrol.simulation.robot import load_robot
 from rosbot_patrol.simulation.scene import Body, Collision, Shape
-from rosbot_patrol.simulation.world import World, load_world
+from rosbot_patrol.simulation.world import load_world
 
 ROOT = Path(__file__).parents[3]
 NO_SLIP = DriveParams(slip=0.0, scrub=0.0)
@@ -27,22 +26,6 @@ NO_SLIP = DriveParams(slip=0.0, scrub=0.0)
 def wall(x: float, y: float, *, size: tuple[float, float] = (0.2, 4.0), name: str = "wall") -> Body:
     shape = Shape(kind="box", size=(*size, 2.0))
     return Body(name=name, kind="wall", pose=from_xyz_rpy((x, y, 1.0)), collisions=(Collision(shape=shape),))
-
-
-@pytest.fixture
-def build() -> Iterator[object]:
-    engines: list[Engine] = []
-
-    def make(*bodies: Body, robot: bool = True, sensors: tuple[SensorPlace, ...] = (), **parts: object) -> Engine:
-        engine = Engine(World(bodies=bodies), EngineParams(**parts), sensors=sensors)  # type: ignore[arg-type]
-        if robot:
-            engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
-        engines.append(engine)
-        return engine
-
-    yield make
-    for engine in engines:
-        engine.close()
 
 
 def drive(engine: Engine, vx: float, wz: float, seconds: float) -> float:

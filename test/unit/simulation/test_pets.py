@@ -3,38 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rosbot_patrol.geometry import Pose2D, Twist2D
-from rosbot_patrol.simulation.engine import STEP, Engine
+from rosbot_patrol.simulation.engine import STEP
 from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.pets import PETS, PetLook, draw_pet, legs_at, paws, pet_body, pet_pose_parts
-from rosbot_patrol.simulation.robot import load_robot
 from rosbot_patrol.simulation.walkers import Walker
-from rosbot_patrol.simulation.world import World
 
 ROOT = Path(__file__).parents[3]
 ALL = [look for looks in PETS.values() for look in looks.values()]
 LIDAR = 0.158  # height of its plane [m]
-
-
-@pytest.fixture
-def build() -> Iterator[object]:
-    engines: list[Engine] = []
-
-    def make(*, sensors: tuple[SensorPlace, ...] = ()) -> Engine:
-        engine = Engine(World(), sensors=sensors)
-        engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
-        engines.append(engine)
-        return engine
-
-    yield make
-    for engine in engines:
-        engine.close()
 
 
 def corners(look: PetLook, phase: float, gait: float) -> list[np.ndarray]:
