@@ -133,7 +133,7 @@ class Engine:
         if robot is not None and self._steps % _BATTERY_EVERY == 0:
             robot.battery.step(robot.drive.load, _BATTERY_EVERY * STEP)
         if self._steps % _MOTION_EVERY == 0:
-            self._motion.update(self.now, self.population.walkers, self.population.sight())
+            self._motion.update(self.now, self.population.walkers, self.population.sight)
 
     def reset(self) -> None:
         """Robot back to its start at rest, odometry to zero; time, actors and battery stay as they are."""

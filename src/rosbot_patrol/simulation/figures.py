@@ -30,6 +30,7 @@ MODELS = ("person", "fire_hydrant", *PETS)
 _PACE_OF_FULL_STEPS = 0.25  # a pet that walks slower takes smaller ones [m/s]
 _CYCLE = 1.3  # length of two steps of a person [m]
 _SWING = 0.22  # how far a person's foot goes before and behind the body [m]
+_WARM_SHARES = (0.2, 0.5, 0.75, 0.92)  # shins, hips, chest, head of a person, in heights
 _KNEE = 0.8  # a cut below meets legs that swing [m]
 
 
@@ -40,6 +41,7 @@ class Figure(Protocol):
         body: shapes and looks; placed by who owns it.
         look: name of the look, "" of what has none.
         warmth: how far a motion sensor notices it, 1 as a person, 0 not at all.
+        warm_heights: of the points that stand for its warm surface, above the floor [m].
         radius: of the upright cylinder that holds it, limbs apart [m].
         cycle: way walked while each leg takes one step [m].
         turn_rate: of a walking one [rad/s].
@@ -48,6 +50,7 @@ class Figure(Protocol):
     body: Body
     look: str
     warmth: float
+    warm_heights: tuple[float, ...]
     radius: float
     cycle: float
     turn_rate: float
@@ -70,6 +73,7 @@ class PersonFigure:
     def __init__(self, name: str, look: Look, posture: Posture) -> None:
         self.body = person_body(name, look)
         self.look = look.name
+        self.warm_heights: tuple[float, ...] = tuple(share * look.height for share in _WARM_SHARES)
         self._look = look
         self._posture = posture
         self._cuts = _Cuts(self.body)
@@ -92,6 +96,7 @@ class HydrantFigure:
     """A fire hydrant."""
 
     warmth = 0.0
+    warm_heights: tuple[float, ...] = ()
     radius = 0.15
     cycle = 1.0
     turn_rate = 2.5
@@ -118,6 +123,7 @@ class PetFigure:
         self.body = pet_body(name, look)
         self.look = look.name
         self.warmth = 0.5 if look.model == "cat" else 0.8
+        self.warm_heights: tuple[float, ...] = (0.75 * look.height,)
         self.radius = 0.5 * look.length * look.height
         self.cycle = look.cycle
         self._look = look

@@ -13,7 +13,7 @@ from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.physics import Physics
 from rosbot_patrol.simulation.slices import Slice
 from rosbot_patrol.simulation.walkers import Walker
-from rosbot_patrol.simulation.ways import EYE_LEVEL, LEVELS, Ways, together
+from rosbot_patrol.simulation.ways import LEVELS, Ways, together
 from rosbot_patrol.simulation.world import ActorPlace
 
 log = logging.getLogger(__name__)
@@ -79,9 +79,9 @@ class Population:
         """What a plane at a height [m] meets of all of them."""
         return together([mover.cut(height) for mover in self])
 
-    def sight(self) -> Slice:
-        """What hides people from a motion sensor: walls and doors; furniture below eye level hides not even a pet."""
-        return self._ways.cut(EYE_LEVEL).plus(self.cut_of_doors(EYE_LEVEL))
+    def sight(self, eye: Sequence[float], points: Sequence[Sequence[float]]) -> float:
+        """How many of some points are seen from another, 0 none to 1 all; each x, y, z [m]. Actors hide nothing."""
+        return self._ways.sight.share(eye, points, self._doors.values())
 
     def cut_of_doors(self, height: float) -> Slice:
         """What a plane at a height [m] meets of the doors."""

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from rosbot_patrol.simulation.fault_board import FaultBoard
 from rosbot_patrol.simulation.motion_sensors import MotionSensor, MotionSensorParams, SensorPlace, bearing_in_cone
-from rosbot_patrol.simulation.slices import Slice
 from rosbot_patrol.simulation.walkers import Walker
+
+Point = Sequence[float]
+Sight = Callable[[Point, Sequence[Point]], float]
+
+_OFF_THE_WALL = 0.1  # [m]
 
 
 class SensorNet:
@@ -29,11 +33,11 @@ class SensorNet:
         self._told: dict[int, bool] = {}
         self._restarted: list[int] = []
 
-    def update(self, now: float, walkers: Iterable[Walker], scene: Slice) -> None:
-        """Let each of them look; `scene` is the cut at the height of a line of sight."""
+    def update(self, now: float, walkers: Iterable[Walker], sight: Sight) -> None:
+        """Let each of them look; `sight` tells what share of some points (x, y, z) is seen from another [m]."""
         warm = [w for w in walkers if w.is_warm]
         for place in self._places:
-            self._sensors[place.id].update(now, self._seen_by(place, warm, scene))
+            self._sensors[place.id].update(now, self._seen_by(place, warm, sight))
 
     def levels(self, now: float) -> dict[int, bool]:
         """Whether each one's output is high, by id."""
@@ -56,13 +60,17 @@ class SensorNet:
         restarted, self._restarted = self._restarted, []
         return restarted
 
-    def _seen_by(self, place: SensorPlace, warm: Iterable[Walker], scene: Slice) -> list[tuple[str, float]]:
+    def _seen_by(self, place: SensorPlace, warm: Iterable[Walker], sight: Sight) -> list[tuple[str, float]]:
         seen = []
         for walker in warm:
+            x, y, _ = walker.pose
             bearing = bearing_in_cone(self._params, place, walker.pose, walker.warmth)
             if bearing is None:
                 continue
-            eye = (place.x + 0.1 * math.cos(bearing), place.y + 0.1 * math.sin(bearing))
-            if not scene.is_blocked(eye, (walker.pose.x, walker.pose.y)):
+            eye = (place.x + _OFF_THE_WALL * math.cos(bearing), place.y + _OFF_THE_WALL * math.sin(bearing), place.z)
+            share = sight(eye, [(x, y, height) for height in walker.warm_heights])
+            # What reaches the lens goes with the surface in sight over the square of the distance.
+            part = walker.warmth * math.sqrt(share)
+            if share > 0.0 and bearing_in_cone(self._params, place, walker.pose, part) is not None:
                 seen.append((walker.name, bearing))
         return seen

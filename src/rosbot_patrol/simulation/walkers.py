@@ -117,6 +117,11 @@ class Walker:
         return self._figure.warmth
 
     @property
+    def warm_heights(self) -> tuple[float, ...]:
+        """Of the points that stand for its warm surface, above the floor [m]."""
+        return self._figure.warm_heights
+
+    @property
     def radius(self) -> float:
         """Of the upright cylinder that holds it, limbs apart [m]."""
         return self._figure.radius

@@ -11,6 +11,7 @@ import numpy as np
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, distance
 from rosbot_patrol.simulation.scene import Body
+from rosbot_patrol.simulation.sight import Sight
 from rosbot_patrol.simulation.slices import EMPTY, Slice, slice_bodies
 
 EYE_LEVEL = 1.3  # a wall is what is as high as this [m]
@@ -31,6 +32,7 @@ class Ways:
         """Take what stands there anew."""
         self._bodies = tuple(bodies)
         self._cuts: dict[float, Slice] = {}
+        self.sight = Sight(bodies)
 
     @property
     def names(self) -> set[str]:
