@@ -59,3 +59,41 @@ def test_a_node_that_ends_by_itself_needs_no_signal(ros):
         stdin=subprocess.DEVNULL,
     )
     assert node.popen.wait(20.0) == 0, node.output
+
+
+# One thread of a node fails while its main thread goes on.
+HALF_DEAD = """
+import time
+import rospy
+from rosbot_patrol.ros.node import Loop, Worker, run_node
+
+def fail(*_):
+    raise {error}
+
+def body():
+    {start}
+    while not rospy.is_shutdown():
+        time.sleep(0.05)
+
+run_node("half_dead", body)
+"""
+
+
+@pytest.mark.parametrize("start", ["Worker(fail, name='digger').start()", "Loop(10.0, fail, name='digger').start()"])
+@pytest.mark.parametrize("error", ["ZeroDivisionError('of the worker')", "rospy.ROSException('of the worker')"])
+def test_a_node_ends_loudly_with_any_of_its_workers(ros, start, error):
+    code = HALF_DEAD.format(start=start, error=error)
+    node = Process([sys.executable, "-c", code], ros.env, stdin=subprocess.DEVNULL)
+    ros.processes.append(node)
+    assert node.popen.wait(20.0) == 1, node.output
+    assert "'digger' failed, the node ends" in node.output
+    assert "of the worker" in node.output
+
+
+def test_a_node_ends_in_peace_when_a_worker_meets_its_shutdown(ros):
+    start = "Worker(lambda: (rospy.sleep(0.5), rospy.signal_shutdown('enough'), rospy.sleep(0.1)), name='d').start()"
+    code = HALF_DEAD.format(start=start, error="ValueError")
+    node = Process([sys.executable, "-c", code], ros.env, stdin=subprocess.DEVNULL)
+    ros.processes.append(node)
+    assert node.popen.wait(20.0) == 0, node.output
+    assert "failed" not in node.output

@@ -44,7 +44,7 @@ from rosbot_patrol.ros.convert import (
 )
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.grids import GetMapFast, GridMsg, SetMapFast
-from rosbot_patrol.ros.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.node import Loop, Worker, load_params, now, run_node
 from rosbot_patrol.ros.pose_arrays import pose_array_to_msg
 from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
 from rosbot_patrol.ros.transforms import Transforms
@@ -97,7 +97,7 @@ class AmclNode:
         if self._params.use_map_topic:
             self._map_subscriber = rospy.Subscriber("map", GridMsg, self._map_message, queue_size=1)
         else:
-            threading.Thread(target=self._ask_for_map, name="map", daemon=True).start()
+            Worker(self._ask_for_map, name="map").start()
         Loop(1.0, self._tell_health, name="health").start()
         if self._params.save_pose_rate > 0.0:
             Loop(self._params.save_pose_rate, lambda _: self._save_pose(), name="save").start()

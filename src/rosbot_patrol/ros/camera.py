@@ -17,6 +17,7 @@ from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.images.stream import Stream, StreamWatch
 from rosbot_patrol.ros import diagnostics
 from rosbot_patrol.ros.convert_images import picture_from_msg
+from rosbot_patrol.ros.node import Worker
 
 log = logging.getLogger(__name__)
 
@@ -68,7 +69,7 @@ class Camera:
         self._subscriber = rospy.Subscriber(
             self._topic, self._kind, self._on_picture, queue_size=1, buff_size=BUFFER_SIZE, tcp_nodelay=True
         )
-        threading.Thread(target=self._run, name="camera watch", daemon=True).start()
+        Worker(self._run, name="camera watch").start()
 
     @property
     def pending(self) -> bool:

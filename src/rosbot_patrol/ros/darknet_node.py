@@ -39,7 +39,7 @@ from rosbot_patrol.ros.camera import Camera
 from rosbot_patrol.ros.check_for_objects import CheckForObjects
 from rosbot_patrol.ros.convert_images import picture_to_msg
 from rosbot_patrol.ros.display import display_problem
-from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.node import Worker, load_params, run_node
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ class DarknetNode:
 
     def run(self) -> None:
         """Look at pictures until shutdown; the window needs the main thread."""
-        worker = threading.Thread(target=self._work, name="detection", daemon=True)
+        worker = Worker(self._work, name="detection")
         worker.start()
         if self._window is not None:
             self._window.run()
@@ -143,17 +143,7 @@ class DarknetNode:
     def _work(self) -> None:
         due = 0.0
         while not rospy.is_shutdown():
-            try:
-                busy = self.step()
-            except rospy.ROSException:
-                if rospy.is_shutdown():
-                    return
-                raise
-            except Exception:
-                log.critical("%s: looking at a picture failed, the node ends", rospy.get_name(), exc_info=True)
-                time.sleep(0.3)  # /rosout is sent by another thread
-                os._exit(1)
-            if not busy:
+            if not self.step():
                 self._wait()
             elif self._params.max_rate > 0.0:
                 due = max(due + 1.0 / self._params.max_rate, time.monotonic())

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from rosbot_patrol.ros.node import Worker
+
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
     DiagnosticStatus.WARN,
@@ -30,7 +32,7 @@ class Health:
         self._parts: dict[str, DiagnosticStatus] = {}
         self._changed = threading.Event()
         self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
-        threading.Thread(target=self._run, name="diagnostics", daemon=True).start()
+        Worker(self._run, name="diagnostics").start()
 
     def set(self, part: str, level: int, message: str, values: Mapping[str, object] | None = None) -> None:
         """State the health of one part ("" for the node itself)."""

@@ -10,7 +10,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.navigation.navigator import PlanResult
 from rosbot_patrol.planning.interfaces import Array, GlobalPlanner
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
-from rosbot_patrol.ros.node import now
+from rosbot_patrol.ros.node import Worker, now
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ class ThreadedPlans:
         self._ticket = 0
         self._result: PlanResult | None = None
         self._busy = False
-        threading.Thread(target=self._run, name="planner", daemon=True).start()
+        Worker(self._run, name="planner").start()
 
     def request(self, goal: Pose2D) -> None:
         """Begin to plan; the result of an earlier request is forgotten."""

@@ -32,6 +32,7 @@ def run_node(name: str, body: Callable[[], None], **init_options: Any) -> None:
     """
     rospy.init_node(name, **init_options)
     logs.install()
+    threading.excepthook = _end_with_worker
     ending = _Ending()
     try:
         body()
@@ -95,15 +96,36 @@ def now() -> float:
     return float(rospy.get_time())
 
 
-class Loop(threading.Thread):
+class Worker(threading.Thread):
+    """A thread that a node cannot do without: whatever exception leaves it is logged and ends the node.
+
+    So that no node looks alive with half of it dead; the launch file's respawn brings it back whole. `run_node` sees
+    to it.
+    """
+
+    def __init__(self, target: Callable[[], None] | None = None, *, name: str) -> None:
+        super().__init__(target=target, name=name, daemon=True)
+
+
+def _end_with_worker(args: threading.ExceptHookArgs) -> None:
+    if args.exc_type is not SystemExit and isinstance(args.thread, Worker):
+        if rospy.is_shutdown() and issubclass(args.exc_type, rospy.ROSException):
+            return
+        what = (args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback)
+        log.critical("%s: '%s' failed, the node ends", rospy.get_name(), args.thread.name, exc_info=what)
+        time.sleep(0.3)  # /rosout is sent by another thread
+        os._exit(1)
+    threading.__excepthook__(args)
+
+
+class Loop(Worker):
     """Calls `step(now)` at a rate of ROS time on its own thread, without hanging when simulated time stops.
 
-    A step that takes too long is followed by the next at once; the loop does not catch up. A PatrolError or any other
-    exception of the step ends the node loudly: the launch file's respawn brings it back.
+    A step that takes too long is followed by the next at once; the loop does not catch up.
     """
 
     def __init__(self, rate: float, step: Callable[[float], None], *, name: str = "loop") -> None:
-        super().__init__(name=name, daemon=True)
+        super().__init__(name=name)
         self._period = 1.0 / rate
         self._step = step
 
@@ -118,16 +140,7 @@ class Loop(threading.Thread):
                 self._wait(due - current)
                 continue
             due = max(due + self._period, current)
-            try:
-                self._step(current)
-            except rospy.ROSException:
-                if rospy.is_shutdown():
-                    return
-                raise
-            except Exception:
-                log.critical("%s: step failed, the node ends", rospy.get_name(), exc_info=True)
-                time.sleep(0.3)
-                os._exit(1)
+            self._step(current)
 
     def _wait(self, seconds: float) -> None:
         # Under simulated time the clock may run faster or slower than the wall: look often, never block for good.

@@ -27,7 +27,7 @@ import rospy
 
 from rosbot_patrol.errors import ParamError, ProtocolError
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
-from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.node import Worker, load_params, run_node
 from rosbot_patrol.ros.serial_channels import DeviceService, Publishers, ServiceCaller, Subscription, message_class
 from rosbot_patrol.rosserial.client import Client
 from rosbot_patrol.rosserial.policy import Policy
@@ -231,7 +231,7 @@ def body() -> None:
         server.attach(params.port, params.baud)
         what = params.port
     rospy.on_shutdown(server.stop)
-    threading.Thread(target=Report(ros_side, server, what).run, name="report", daemon=True).start()
+    Worker(Report(ros_side, server, what).run, name="report").start()
     server.run()
     server.close()
 

@@ -24,7 +24,7 @@ import rospy
 from geometry_msgs.msg import Twist, TwistStamped
 
 from rosbot_patrol.control.teleop import CTRL_C, HELP, KeyTeleop, TeleopParams, Velocity
-from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.node import Worker, load_params, run_node
 
 
 class Sender:
@@ -37,7 +37,7 @@ class Sender:
         self._lock = threading.Lock()
         self._velocity: Velocity | None = None
         if params.repeat_rate > 0.0:
-            threading.Thread(target=self._repeat, name="repeat", daemon=True).start()
+            Worker(self._repeat, name="repeat").start()
 
     @property
     def has_listener(self) -> bool:
