@@ -17,15 +17,20 @@ class MaterialScripts:
 
     _files: dict[Path, dict[str, list[list[str]]]] = field(default_factory=dict)
 
-    def colour(self, name: str, places: list[Path]) -> Rgba | None:
-        """Colour of a named material in some folders or files of scripts, None where it is in none of them."""
+    def look(self, name: str, places: list[Path]) -> tuple[Rgba, bool] | None:
+        """Colour of a named material, and whether that is of a picture, None where it is in none of the places.
+
+        Args:
+            name: of the material.
+            places: folders or files of scripts.
+        """
         for place in places:
             for file in sorted(place.glob("*.material")) if place.is_dir() else [place]:
                 if file not in self._files:
                     self._files[file] = _read(file)
                 lines = self._files[file].get(name)
                 if lines is not None:
-                    return _colour(lines, [file.parent, *(p for p in places if p.is_dir())])
+                    return _look(lines, [file.parent, *(p for p in places if p.is_dir())])
         return None
 
 
@@ -47,12 +52,12 @@ def _read(file: Path) -> dict[str, list[list[str]]]:
     return found
 
 
-def _colour(lines: list[list[str]], folders: list[Path]) -> Rgba | None:
+def _look(lines: list[list[str]], folders: list[Path]) -> tuple[Rgba, bool] | None:
     textures = [words[1] for words in lines if words[0] == "texture" and len(words) > 1]
     for folder in folders:
         worn = worn_colour(textures, folder)
         if worn is not None:
-            return worn
+            return worn, True
     for key in ("diffuse", "ambient", "emissive"):
         for words in lines:
             if words[0] == key and len(words) > 3:
@@ -60,5 +65,5 @@ def _colour(lines: list[list[str]], folders: list[Path]) -> Rgba | None:
                     r, g, b = (min(max(float(word), 0.0), 1.0) for word in words[1:4])
                 except ValueError:
                     continue
-                return (r, g, b, 1.0)
+                return (r, g, b, 1.0), False
     return None

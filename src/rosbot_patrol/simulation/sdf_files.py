@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -34,28 +34,50 @@ class ModelPath:
             place: for messages.
 
         Raises:
-            WorldError: it is nowhere; names where it was looked for.
+            WorldError: it is nowhere; names where it was looked for, and what helps.
         """
         found = self.look(uri, base)
         if found is None:
-            looked = ", ".join(map(str, self._candidates(uri, base))) or "no folder for model:// is given"
-            raise place.error(f"'{uri}' is missing (looked for {looked})")
+            places = [str(path) for path in self._candidates(uri, base)]
+            places = places[:1] if uri.startswith(("/", "file:///")) else list(dict.fromkeys(places))
+            looked = ", ".join(places) or "no folder for model:// is given"
+            raise place.error(f"'{uri}' is missing (looked for {looked}){advice(uri)}")
         return found
 
     def look(self, uri: str, base: Path) -> Path | None:
         """As `find`, None where it is nowhere."""
         return next((path for path in self._candidates(uri, base) if path.exists()), None)
 
-    def _candidates(self, uri: str, base: Path) -> Iterable[Path]:
+    def _candidates(self, uri: str, base: Path) -> Iterator[Path]:
         for scheme in _SCHEMES:
             if uri.startswith(scheme):
                 inner = uri.removeprefix(scheme).strip("/")
-                places = [folder / inner for folder in self.folders]
+                yield from (folder / inner for folder in self.folders)
                 name, _, rest = inner.partition("/")
                 package = self.find_package(name) if self.find_package is not None else None
-                return places if package is None else [*places, package / rest]
+                if package is not None:
+                    yield package / rest
+                return
         plain = Path(uri.removeprefix("file://"))
-        return [base / plain, *(folder / plain for folder in self.folders if not plain.is_absolute())]
+        yield base / plain
+        if not plain.is_absolute():  # Gazebo starts from each folder of models and of media
+            yield from (place / plain for folder in self.folders for place in (folder, folder.parent))
+            return
+        # of another's home: whatever of it is here
+        tails = (plain.relative_to(plain.parents[-1 - i]) for i in range(1, len(plain.parts) - 2))
+        yield from (folder / tail for tail in tails for folder in self.folders)
+
+
+def advice(uri: str) -> str:
+    """What helps where a uri means nothing, to follow a sentence that says so."""
+    if uri.startswith("http"):
+        return "; models of the web are not fetched: download it, and name its folder's folder in GAZEBO_MODEL_PATH"
+    if uri.startswith(_SCHEMES):
+        return (
+            "; name the folder that holds it in GAZEBO_MODEL_PATH or the parameter model_path"
+            " (Gazebo's own models: github.com/osrf/gazebo_models)"
+        )
+    return ""
 
 
 def model_file(found: Path, place: Place) -> Path:

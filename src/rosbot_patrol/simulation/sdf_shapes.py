@@ -8,24 +8,32 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.mesh_files import MeshPart, load_parts, merged
-from rosbot_patrol.simulation.scene import Collision, Matrix, Shape, Visual
+from rosbot_patrol.simulation.meshes import sphere
+from rosbot_patrol.simulation.picture_colours import Rgba
+from rosbot_patrol.simulation.scene import Collision, Matrix, Shape, ShapeKind, Visual
 from rosbot_patrol.simulation.sdf_files import ModelPath
 from rosbot_patrol.simulation.sdf_looks import Looks, is_unseen
-from rosbot_patrol.simulation.sdf_values import Place, floats, sizes, turned_to
+from rosbot_patrol.simulation.sdf_polylines import polyline_triangles
+from rosbot_patrol.simulation.sdf_state import Scale
+from rosbot_patrol.simulation.sdf_values import Place, box_sizes, floats, is_true, sizes, turned_to
 
 log = logging.getLogger(__name__)
 
 PLANE = (100.0, 100.0)  # size of a plane that names none [m]
 
-_READ = {"box", "cylinder", "sphere", "plane", "mesh"}
+_READ = {"box", "cylinder", "sphere", "capsule", "ellipsoid", "plane", "polyline", "mesh"}
 _KNOWN = {
     "visual": {"pose", "geometry", "material", "transparency", "cast_shadows", "meta", "laser_retro"},
     "collision": {"pose", "geometry", "surface", "laser_retro", "max_contacts", "bounce", "friction"},
 }
 
-Scale = tuple[float, float, float]
+_INSTEAD = {"heightmap": " (make it a mesh)", "image": " (make it boxes or a mesh)"}
+
+_Found = tuple[Shape, Rgba | None, Matrix]
 
 
 @dataclass
@@ -35,10 +43,12 @@ class ShapeReader:
     Attributes:
         model_path: where model:// is.
         skipped: takes the names of what is not read.
+        lost: takes a sentence for each mesh that should be seen and cannot be read.
     """
 
     model_path: ModelPath
     skipped: set[str]
+    lost: list[str] = field(default_factory=list)
     _looks: Looks = field(init=False)
     _meshes: dict[Path, tuple[MeshPart, ...]] = field(default_factory=dict)
     _merged: dict[tuple[Path, str, bool], tuple[MeshPart, ...]] = field(default_factory=dict)
@@ -46,20 +56,30 @@ class ShapeReader:
     def __post_init__(self) -> None:
         self._looks = Looks(self.model_path, self.skipped)
 
-    def visuals(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Visual]:
+    def visuals(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Visual] | None:
         """What a <visual> shows: one for each colour of its mesh, none where it is transparent or of no known shape.
 
+        Returns:
+            None where its mesh is missing or broken, which is noted in `lost`.
+
         Raises:
-            WorldError: an element makes no sense, or a mesh is missing or broken.
+            WorldError: an element makes no sense.
         """
         self._note(element)
         if is_unseen(element, place):
             return []
-        visuals = []
-        for shape, own, turn in self._shapes(element, place, scale, apart=True):
-            material = self._looks.material(element, own, place)
-            visuals.append(Visual(shape=shape, pose=pose @ turn, material=material))
-        return visuals
+        if element.find("geometry/mesh") is None:
+            found = self._shapes(element, place, scale, apart=True)
+        else:
+            try:
+                found = self._shapes(element, place, scale, apart=True)
+            except WorldError as err:
+                self.lost.append(str(err))
+                return None
+        return [
+            Visual(shape=shape, pose=pose @ turn, material=self._looks.material(element, own, place))
+            for shape, own, turn in found
+        ]
 
     def collisions(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Collision]:
         """The shape of a <collision>, none where it is of no known shape. Raises WorldError."""
@@ -70,9 +90,7 @@ class ShapeReader:
     def _note(self, element: ET.Element) -> None:
         self.skipped.update(f"<{c.tag}> of a {element.tag}" for c in element if c.tag not in _KNOWN[element.tag])
 
-    def _shapes(
-        self, element: ET.Element, place: Place, scale: Scale, *, apart: bool
-    ) -> list[tuple[Shape, tuple[float, float, float, float] | None, Matrix]]:
+    def _shapes(self, element: ET.Element, place: Place, scale: Scale, *, apart: bool) -> list[_Found]:
         """(shape, colour of its file, turn) of an element; the parts of a mesh apart or as one."""
         geometry = element.find("geometry")
         children = list(geometry) if geometry is not None else []
@@ -81,24 +99,32 @@ class ShapeReader:
         found = next((c for c in children if c.tag in _READ), None)
         if found is None:
             if children[0].tag != "empty":
-                self.skipped.add(f"<{children[0].tag}> geometry")
+                self.skipped.add(f"<{children[0].tag}> geometry{_INSTEAD.get(children[0].tag, '')}")
             return []
         if found.tag == "mesh":
             return [(shape, own, np.eye(4)) for shape, own in self._mesh(found, place, scale, apart=apart)]
         if found.tag == "plane":
-            size = sizes(found, "size", 2, place) if found.find("size") is not None else PLANE
-            normal = floats(found.findtext("normal") or "0 0 1", 3, place.inside("<normal>"))
-            if max(map(abs, normal)) == 0.0:
-                raise place.inside("<normal>").error("expected a direction, got '0 0 0'")
-            if element.tag == "collision" and abs(turned_to(normal)[2, 2]) < 0.99:
-                self.skipped.add("<collision> with a <plane> that does not lie flat")
-            turn = turned_to(normal) if normal[:2] != (0.0, 0.0) else np.eye(4)
-            return [(Shape(kind="plane", size=(size[0] * scale[0], size[1] * scale[1])), None, turn)]
+            return self._plane(found, place, scale, is_solid=element.tag == "collision")
+        if found.tag == "polyline":
+            vertices, faces = polyline_triangles([c for c in children if c.tag == "polyline"], place)
+            return [(_free(vertices, faces, scale, place), None, np.eye(4))]
+        if found.tag == "ellipsoid":
+            ball = sphere(1.0, 0.0)
+            size = floats(found.findtext("radii") or "1 1 1", 3, place.inside("<radii>"))
+            return [(_free(ball.positions * size, ball.faces, scale, place), None, np.eye(4))]
         return [(_scaled(_primitive(found, place), scale), None, np.eye(4))]
 
-    def _mesh(
-        self, element: ET.Element, place: Place, scale: Scale, *, apart: bool
-    ) -> list[tuple[Shape, tuple[float, float, float, float] | None]]:
+    def _plane(self, element: ET.Element, place: Place, scale: Scale, *, is_solid: bool) -> list[_Found]:
+        size = sizes(element, "size", 2, place) if element.find("size") is not None else PLANE
+        normal = floats(element.findtext("normal") or "0 0 1", 3, place.inside("<normal>"))
+        if max(map(abs, normal)) == 0.0:
+            raise place.inside("<normal>").error("expected a direction, got '0 0 0'")
+        if is_solid and abs(turned_to(normal)[2, 2]) < 0.99:
+            self.skipped.add("<collision> with a <plane> that does not lie flat")
+        turn = turned_to(normal) if normal[:2] != (0.0, 0.0) else np.eye(4)
+        return [(Shape(kind="plane", size=(size[0] * scale[0], size[1] * scale[1])), None, turn)]
+
+    def _mesh(self, element: ET.Element, place: Place, scale: Scale, *, apart: bool) -> list[tuple[Shape, Rgba | None]]:
         uri = (element.findtext("uri") or "").strip()
         if not uri:
             raise place.error("<mesh> has no <uri>")
@@ -108,7 +134,7 @@ class ShapeReader:
             raise place.inside("<scale>").error("expected numbers other than 0, got '" + " ".join(map(str, own)) + "'")
         size = tuple(a * b for a, b in zip(own, scale, strict=True))
         name = (element.findtext("submesh/name") or "").strip()
-        centred = (element.findtext("submesh/center") or "").strip().lower() in ("true", "1")
+        centred = is_true(element.findtext("submesh/center"))
         parts = self._parts(file, name, centred, place)
         if not apart:
             key = (file, name, centred)
@@ -136,11 +162,17 @@ class ShapeReader:
 
 def _primitive(element: ET.Element, place: Place) -> Shape:
     if element.tag == "box":
-        return Shape(kind="box", size=sizes(element, "size", 3, place))
+        return Shape(kind="box", size=box_sizes(element, place))
     radius = sizes(element, "radius", 1, place)
     if element.tag == "sphere":
         return Shape(kind="sphere", size=radius)
-    return Shape(kind="cylinder", size=radius + sizes(element, "length", 1, place))
+    kind: ShapeKind = "capsule" if element.tag == "capsule" else "cylinder"
+    return Shape(kind=kind, size=radius + sizes(element, "length", 1, place))
+
+
+def _free(vertices: NDArray[np.float64], faces: NDArray[np.int64], scale: Scale, place: Place) -> Shape:
+    """Triangles as a mesh of the file that spells them out, so with sharp edges."""
+    return Shape(kind="mesh", size=scale, mesh=place.path, vertices=vertices, faces=faces)
 
 
 def _scaled(shape: Shape, scale: Scale) -> Shape:
@@ -149,5 +181,5 @@ def _scaled(shape: Shape, scale: Scale) -> Shape:
         return shape
     if shape.kind == "box":
         return replace(shape, size=tuple(a * b for a, b in zip(shape.size, scale, strict=True)))
-    wide = max(scale[:2]) if shape.kind == "cylinder" else max(scale)
+    wide = max(scale) if shape.kind == "sphere" else max(scale[:2])
     return replace(shape, size=(shape.size[0] * wide, *(length * scale[2] for length in shape.size[1:])))

@@ -14,6 +14,9 @@ from rosbot_patrol.simulation.matrices import from_xyz_rpy
 from rosbot_patrol.simulation.scene import Matrix, identity
 
 VERSIONS = ("1.4", "1.5", "1.6", "1.7")
+TRUE = ("true", "1")
+
+_THIN = 1e-3  # of a box that names 0, as pictures on walls do [m]
 
 
 @dataclass(frozen=True)
@@ -32,21 +35,9 @@ class Place:
         return WorldError(self.path, f"{self.where}: {problem}" if self.where else problem)
 
 
-def read_sdf(path: Path) -> ET.Element:
-    """The root of an SDF file.
-
-    Raises:
-        WorldError: the file cannot be read, is not XML or no SDF.
-    """
-    try:
-        root = ET.fromstring(path.read_bytes())
-    except OSError as err:
-        raise WorldError(path, f"cannot be read: {err.strerror}") from err
-    except (ET.ParseError, LookupError, ValueError) as err:
-        raise WorldError(path, f"is not XML, or not all of it: {err}") from err
-    if root.tag != "sdf":
-        raise WorldError(path, f"is no SDF file, its first element is <{root.tag}>")
-    return root
+def is_true(text: str | None) -> bool:
+    """Whether an element's text or an attribute says yes."""
+    return (text or "").strip().lower() in TRUE
 
 
 def floats(text: str, count: int, place: Place) -> tuple[float, ...]:
@@ -72,13 +63,30 @@ def sizes(shape: ET.Element, tag: str, count: int, place: Place) -> tuple[float,
     return values
 
 
+def box_sizes(box: ET.Element, place: Place) -> tuple[float, ...]:
+    """x, y, z of a box, of which one may be 0: a sheet. Raises WorldError."""
+    values = floats(box.findtext("size") or "", 3, place.inside("<size>")) if box.find("size") is not None else ()
+    if sum(value == 0.0 for value in values) == 1 and min(values) == 0.0:
+        return tuple(max(value, _THIN) for value in values)
+    return sizes(box, "size", 3, place)
+
+
 def pose_of(element: ET.Element, place: Place) -> Matrix:
-    """The element's <pose> against what it is relative to; no pose is the identity. Raises WorldError."""
+    """The element's <pose> against what it is relative to; no pose is the identity. Raises WorldError.
+
+    Three numbers are a position; `degrees` and a quaternion (`rotation_format`) are read as later SDF has them.
+    """
     pose = element.find("pose")
     if pose is None or not (pose.text or "").strip():
         return identity()
-    v = floats(pose.text or "", 6, place.inside("<pose>"))
-    return from_xyz_rpy(v[:3], v[3:])
+    text, here = pose.text or "", place.inside("<pose>")
+    if pose.get("rotation_format") == "quat_xyzw":
+        return _from_quaternion(floats(text, 7, here), here)
+    if len(text.split()) == 3:
+        return from_xyz_rpy(floats(text, 3, here))
+    v = floats(text, 6, here)
+    turn = [math.radians(angle) for angle in v[3:]] if is_true(pose.get("degrees")) else v[3:]
+    return from_xyz_rpy(v[:3], turn)
 
 
 def turned_to(normal: tuple[float, ...]) -> Matrix:
@@ -90,3 +98,18 @@ def turned_to(normal: tuple[float, ...]) -> Matrix:
     turn = identity()
     turn[:3, :3] = np.column_stack((np.cross(y, z), y, z))
     return turn
+
+
+def _from_quaternion(v: tuple[float, ...], place: Place) -> Matrix:
+    length = math.hypot(*v[3:])
+    if length == 0.0:
+        raise place.error("expected a quaternion, got one of length 0")
+    x, y, z, w = (value / length for value in v[3:])
+    pose = identity()
+    pose[:3, :3] = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    pose[:3, 3] = v[:3]
+    return pose

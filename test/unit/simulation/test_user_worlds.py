@@ -96,7 +96,7 @@ def test_an_obj_brings_its_colours() -> None:
 
 def test_an_stl_is_scaled_and_takes_the_colour_of_the_sdf() -> None:
     (visual,) = body_of("stool_left", world("dining")).visuals
-    assert visual.material.rgba[:3] == pytest.approx((0.13, 0.44, 0.70))
+    assert visual.material.rgba[:3] == pytest.approx((0.05, 0.18, 1.0))
     assert visual.shape.size == pytest.approx((0.001,) * 3)
     high = slice_bodies(world("dining").bodies, 0.2).cast(1.2, -2.0, math.pi / 2, 0.1, 1, 50.0)[0]
     assert high == pytest.approx(1.1 - 0.2, abs=1e-3)
@@ -169,7 +169,7 @@ def test_an_actor_walks_its_waypoints() -> None:
         ("building", (3.2, 1.2), (0, 0, 1)),
         ("building", (2.0 - 3.0 * math.cos(0.5), 1.0 - 3.0 * math.sin(0.5)), (1.0, 0.94, 0.8)),
         ("dining", (1.0, 0.0), (0.8, 0.68, 0.48)),
-        ("dining", (1.2, -0.9), (0.13, 0.44, 0.70)),
+        ("dining", (1.2, -0.9), (0.05, 0.18, 1.0)),
         ("dining", (2.4, 0.6), (0.9, 0.85, 0.6)),
         ("dining", (2.2, -1.4), (0.57, 0.41, 0.26)),
         ("old", (1.0, 1.0), (0.8, 0.2, 0.2)),

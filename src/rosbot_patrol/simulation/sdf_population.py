@@ -1,0 +1,96 @@
+"""The <population> of a world: many copies of one model, spread over a box or a cylinder.
+
+Written as SDF 1.5 has it (<box>, <cylinder>, <distribution><type>) or as 1.4 had it (<region>). Where Gazebo draws
+places by chance, here the same ones are drawn each time: the name is the seed. "uniform" is an even, but not a
+regular spread.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.simulation.matrices import from_xyz_rpy
+from rosbot_patrol.simulation.scene import Matrix
+from rosbot_patrol.simulation.sdf_values import Place, floats, pose_of, sizes
+
+_MOST = 5000  # copies
+_STEPS = np.array([0.7548776662466927, 0.5698402909980532])  # of the plastic number: points that avoid each other
+_AXES = {"linear-x": 0, "linear-y": 1, "linear-z": 2}
+
+
+def places_of(element: ET.Element, place: Place) -> list[Matrix]:
+    """Where the copies stand, shapes (4, 4).
+
+    Raises:
+        WorldError: no region, a distribution that is not known, or numbers that make no sense.
+    """
+    outer = pose_of(element, place)
+    spread = element.find("distribution")
+    kind = ((spread.findtext("type") or spread.text or "") if spread is not None else "random").strip()
+    if kind == "grid":
+        offsets = _grid(element, place)
+    else:
+        count = floats(element.findtext("model_count") or "1", 1, place.inside("<model_count>"))[0]
+        if not 0 <= count <= _MOST:
+            raise place.inside("<model_count>").error(f"expected 0 to {_MOST}, got {count:g}")
+        offsets = _spread(element, place, kind, int(count))
+    return [outer @ from_xyz_rpy(offset.tolist()) for offset in offsets]
+
+
+def _grid(element: ET.Element, place: Place) -> NDArray[np.float64]:
+    form = element.find("region/cuboid")
+    form = element.find("distribution") if form is None else form
+    if form is None or form.find("rows") is None:
+        raise place.error("a grid has no <rows>")
+    rows, columns = (int(floats(form.findtext(tag) or "1", 1, place.inside(f"<{tag}>"))[0]) for tag in ("rows", "cols"))
+    if not 0 <= rows * columns <= _MOST:
+        raise place.error(f"expected at most {_MOST} copies, got {rows} x {columns}")
+    step = floats(form.findtext("step") or "1 1 0", 3, place.inside("<step>"))
+    first = floats(form.findtext("min") or "0 0 0", 3, place.inside("<min>"))
+    row, column = np.divmod(np.arange(rows * columns), max(columns, 1))
+    return np.column_stack((column, row, np.zeros(rows * columns))) * step + first
+
+
+def _spread(element: ET.Element, place: Place, kind: str, count: int) -> NDArray[np.float64]:
+    middle, size, radius = _region(element, place)
+    if kind in _AXES:
+        axis = _AXES[kind]
+        share = np.full((count, 3), 0.5)
+        share[:, axis] = np.arange(count) / max(count - 1, 1)
+    elif kind in ("random", "uniform"):
+        rng = np.random.default_rng(zlib.crc32((element.get("name") or "").encode()))
+        share = rng.random((count, 3))
+        if kind == "uniform":
+            share[:, :2] = (0.5 + np.arange(1, count + 1)[:, None] * _STEPS) % 1.0
+    else:
+        raise place.error(f"the distribution '{kind}' is not known")
+    if radius and kind in ("random", "uniform"):
+        far, bearing = radius * np.sqrt(share[:, 0]), math.tau * share[:, 1]
+        across = np.column_stack((far * np.cos(bearing), far * np.sin(bearing)))
+        return middle + np.column_stack((across, (share[:, 2] - 0.5) * size[2]))
+    return middle + (share - 0.5) * size
+
+
+def _region(element: ET.Element, place: Place) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Middle and size of the region [m], and the radius of a cylinder, 0 of a box."""
+    old = element.find("region/cuboid")
+    if old is not None:
+        low, high = (floats(old.findtext(tag) or "0 0 0", 3, place.inside(f"<{tag}>")) for tag in ("min", "max"))
+        return (np.array(low) + high) / 2.0, np.array(high) - low, 0.0
+    box = element.find("box")
+    if box is not None:
+        return np.zeros(3), np.array(sizes(box, "size", 3, place)), 0.0
+    round_one = element.find("cylinder")
+    round_one = element.find("region/cylinder") if round_one is None else round_one
+    if round_one is None:
+        raise place.error("has neither <box> nor <cylinder>")
+    radius = sizes(round_one, "radius", 1, place)[0]
+    tag = "length" if round_one.find("length") is not None else "height"
+    length = sizes(round_one, tag, 1, place)[0]
+    middle = floats(round_one.findtext("center") or "0 0 0", 3, place.inside("<center>"))
+    return np.array(middle), np.array([2.0 * radius, 2.0 * radius, length]), radius
