@@ -1,43 +1,23 @@
-"""Read triangles from mesh files: STL (binary or text), Wavefront OBJ with its colours, and COLLADA (pycollada).
+"""Read triangles from mesh files: STL (binary or text), Wavefront OBJ with its colours, and COLLADA (`mesh_collada`).
 
-Units and axes are taken as Gazebo classic takes them: metres and z up in STL and OBJ; a COLLADA file's <unit> scales
-it, its <up_axis> is not looked at (gazebo-classic issue 1305), so that what stands right in Gazebo stands right here.
+Units and axes are taken as Gazebo classic takes them: metres and z up in STL and OBJ.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.mesh_collada import read_dae
+from rosbot_patrol.simulation.mesh_parts import MeshPart, Triangles, compact, merged
 from rosbot_patrol.simulation.picture_colours import Rgba, worn_colour
 
+__all__ = ["MeshPart", "load_mesh", "load_parts", "merged"]
+
 log = logging.getLogger(__name__)
-
-Triangles = tuple[NDArray[np.float64], NDArray[np.int64]]
-
-
-@dataclass(frozen=True)
-class MeshPart:
-    """Triangles of one name and one colour.
-
-    Attributes:
-        name: of the object or node in the file, "" where it has none.
-        vertices: shape (V, 3) [m].
-        faces: shape (F, 3), F > 0.
-        rgba: the file's own colour, None where it has none.
-    """
-
-    name: str
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
-    rgba: Rgba | None = None
 
 
 def load_mesh(path: Path) -> Triangles:
@@ -55,7 +35,7 @@ def load_parts(path: Path) -> tuple[MeshPart, ...]:
     Raises:
         WorldError: the file is missing, of another kind, broken, or holds no triangles.
     """
-    readers = {".stl": _read_stl, ".obj": _read_obj, ".dae": _read_dae}
+    readers = {".stl": _read_stl, ".obj": _read_obj, ".dae": read_dae}
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise WorldError(path, "is no mesh that can be read here (stl, obj and dae are)")
@@ -75,13 +55,6 @@ def load_parts(path: Path) -> tuple[MeshPart, ...]:
         if not np.isfinite(part.vertices).all():
             raise WorldError(path, "the mesh is broken: a vertex is not finite")
     return parts
-
-
-def merged(parts: tuple[MeshPart, ...]) -> Triangles:
-    """Vertices and triangles of several parts as one."""
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
-    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-    return np.vstack([part.vertices for part in parts]), np.vstack(faces)
 
 
 def _read_stl(path: Path) -> list[MeshPart]:
@@ -125,7 +98,7 @@ def _read_obj(path: Path) -> list[MeshPart]:
             colours |= _read_mtl(path.parent / " ".join(words[1:]))
     points = np.array(vertices, float).reshape(-1, 3)
     return [
-        MeshPart(name, *_compact(points, np.array(some, np.int64).reshape(-1, 3)), colours.get(material))
+        MeshPart(name, *compact(points, np.array(some, np.int64).reshape(-1, 3)), colours.get(material))
         for (name, material), some in faces.items()
     ]
 
@@ -150,68 +123,3 @@ def _read_mtl(path: Path) -> dict[str, Rgba]:
     except ValueError as err:
         log.warning("%s: the colours of the mesh are broken: %s", path, err)
     return colours
-
-
-def _compact(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
-    """Only the vertices that the faces use; indices that are out of range stay so."""
-    if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
-        return vertices, faces
-    used, places = np.unique(faces, return_inverse=True)
-    return vertices[used], places.reshape(-1, 3)
-
-
-def _read_dae(path: Path) -> list[MeshPart]:
-    import collada  # 7 MB and 0.1 s, for the worlds that need it
-
-    try:
-        bearable = [collada.common.DaeUnsupportedError, collada.common.DaeBrokenRefError]  # as a missing texture
-        document = collada.Collada(str(path), ignore=bearable)
-        metres = float(document.assetInfo.unitmeter or 1.0)
-        nodes = document.scene.nodes if document.scene is not None else []
-        bound = [found for node in nodes for found in _bound(node, np.eye(4), "")]
-        parts = [part for name, geometry in bound for part in _dae_parts(name, geometry, path.parent)]
-    except Exception as err:  # pycollada lets what it stumbles over through: of lxml, of numpy, its own
-        raise ValueError(str(err) or type(err).__name__) from err
-    return [MeshPart(part.name, part.vertices * metres, part.faces, part.rgba) for part in parts]
-
-
-def _bound(node: Any, world_from_parent: NDArray[np.float64], name: str) -> Iterator[tuple[str, Any]]:
-    """(name of the node, geometry in the scene) below a node of a COLLADA scene."""
-    import collada.scene as scene
-
-    if isinstance(node, scene.Node | scene.NodeNode):
-        own = node.node if isinstance(node, scene.NodeNode) else node
-        label = (own.xmlnode.get("name") or own.id or name) if own.xmlnode is not None else name
-        for child in own.children:
-            yield from _bound(child, world_from_parent @ own.matrix, label)
-    elif isinstance(node, scene.GeometryNode):
-        for geometry in node.objects("geometry", world_from_parent):
-            yield name, geometry
-    elif isinstance(node, scene.ControllerNode):
-        for controller in node.objects("controller", world_from_parent):
-            yield name, controller
-
-
-def _dae_parts(name: str, geometry: Any, folder: Path) -> Iterator[MeshPart]:
-    for primitive in geometry.primitives():
-        if not hasattr(primitive, "triangleset") and not hasattr(primitive, "vertex_index"):
-            continue
-        triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
-        if triangles.vertex_index is None or triangles.vertex_index.ndim != 2 or triangles.vertex_index.shape[1] != 3:
-            continue  # lines and points
-        vertices = np.asarray(triangles.vertex, float).reshape(-1, 3)
-        yield MeshPart(
-            name, *_compact(vertices, np.asarray(triangles.vertex_index, np.int64)), _dae_colour(primitive, folder)
-        )
-
-
-def _dae_colour(primitive: Any, folder: Path) -> Rgba | None:
-    effect = getattr(getattr(primitive, "material", None), "effect", None)
-    colour = getattr(effect, "diffuse", None)
-    picture = getattr(getattr(getattr(colour, "sampler", None), "surface", None), "image", None)
-    if picture is not None:
-        return worn_colour([str(picture.path)], folder)
-    if not isinstance(colour, tuple | list) or len(colour) < 3:
-        return None
-    r, g, b = (float(min(max(v, 0.0), 1.0)) for v in colour[:3])
-    return (r, g, b, 1.0)
