@@ -7,6 +7,7 @@ fill it once.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,8 @@ from rosbot_patrol.simulation.scene import Shape
 
 _SIDES = 20
 _RINGS = 12
-_SHARP = 0.766  # cosine
+_SHARP = 0.643  # cosine
+_MOST_MEETING = 64  # corners at one place; where more meet, as at the tip of a cone, each stays flat
 
 
 @dataclass(frozen=True)
@@ -150,14 +152,29 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
 def sharp_normals(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of the triangles, shape (3 F, 3), and their normals: smooth but where an edge is sharper than 40 deg."""
+    """Corners of the triangles, shape (3 F, 3), and their normals: smooth but across edges sharper than 50 deg."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    flat = np.cross(b - a, c - a)
-    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
-    flat = np.repeat(flat, 3, axis=0)
-    smooth = smooth_normals(vertices, faces)[faces.ravel()]
-    is_sharp = np.einsum("ij,ij->i", flat, smooth) < _SHARP
-    return vertices[faces.ravel()], np.where(is_sharp[:, None], flat, smooth)
+    weighted = np.cross(b - a, c - a)
+    flat = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-12)
+    _, place = np.unique(np.round(vertices, 5), axis=0, return_inverse=True)
+    sums = np.repeat(weighted, 3, axis=0)
+    for meeting in _meetings(place.reshape(-1)[faces.ravel()]):
+        own, theirs = flat[meeting // 3], weighted[meeting // 3]
+        is_near = np.einsum("gik,gjk->gij", own, own) >= _SHARP
+        sums[meeting] = np.einsum("gij,gjk->gik", is_near, theirs)
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    up = np.array([0.0, 0.0, 1.0])  # of a triangle without area
+    return vertices[faces.ravel()], np.where(lengths > 0.0, sums / np.maximum(lengths, 1e-300), up)
+
+
+def _meetings(place: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """Indices of the corners that are at one place, all places of N corners at once: shapes (places, N)."""
+    order = np.argsort(place, kind="stable")
+    begins = np.flatnonzero(np.diff(place[order], prepend=-1))
+    counts = np.diff(begins, append=len(order))
+    for count in np.unique(counts):
+        if 1 < count <= _MOST_MEETING:
+            yield order[begins[counts == count][:, None] + np.arange(count)]
 
 
 def triangles_of(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -51,7 +51,7 @@ class Reader:
         path: the world's file.
         model_path: where models are.
         skipped: what was met and is not read.
-        lost: a sentence for each mesh that should be seen and cannot be read.
+        lost: uri of each mesh that should be seen and cannot be read, and a sentence about the first place.
         renamed: "name_1" for what shares its name with another.
         lights: how many there are.
         bodies, actors, doors: what was found.
@@ -60,7 +60,7 @@ class Reader:
     path: Path
     model_path: ModelPath
     skipped: set[str] = field(default_factory=set)
-    lost: list[str] = field(default_factory=list)
+    lost: dict[str, str] = field(default_factory=dict)
     renamed: list[str] = field(default_factory=list)
     lights: int = 0
     bodies: list[Body] = field(default_factory=list)
@@ -251,7 +251,7 @@ class Reader:
             is_lost |= seen is None
             visuals += seen or []
         if is_lost and not visuals:
-            visuals = [Visual(shape=c.shape, pose=c.pose) for c in collisions if c.shape.kind != "plane"]
+            visuals = [_instead(part) for part in collisions if part.shape.kind != "plane"]
         return Body(name="", visuals=tuple(visuals), collisions=tuple(collisions))
 
     def _fresh(self, name: str) -> str:
@@ -294,6 +294,13 @@ def _part_pose(part: ET.Element, place: Place, frames: Frames, link_from_model: 
     if element is not None and (element.get("relative_to") or element.get("frame")):
         return link_from_model @ frames.pose(part, place, link)
     return pose_of(part, place)
+
+
+def _instead(part: Collision) -> Visual:
+    """What a collision shape is shown as where nothing else is: floors darker than what stands on them."""
+    is_floor = part.shape.kind == "box" and min(part.shape.size[:2]) > 2.0 > part.shape.size[2]
+    shade = (0.50, 0.48, 0.45, 1.0) if is_floor else (0.74, 0.71, 0.66, 1.0)
+    return Visual(shape=part.shape, pose=part.pose, material=Material(rgba=shade))
 
 
 def _together(body: Body, parts: Iterable[Body]) -> Body:

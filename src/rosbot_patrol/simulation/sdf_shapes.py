@@ -43,12 +43,12 @@ class ShapeReader:
     Attributes:
         model_path: where model:// is.
         skipped: takes the names of what is not read.
-        lost: takes a sentence for each mesh that should be seen and cannot be read.
+        lost: takes the uri of each mesh that should be seen and cannot be read, and a sentence about the first such.
     """
 
     model_path: ModelPath
     skipped: set[str]
-    lost: list[str] = field(default_factory=list)
+    lost: dict[str, str] = field(default_factory=dict)
     _looks: Looks = field(init=False)
     _meshes: dict[Path, tuple[MeshPart, ...]] = field(default_factory=dict)
     _merged: dict[tuple[Path, str, bool], tuple[MeshPart, ...]] = field(default_factory=dict)
@@ -74,7 +74,8 @@ class ShapeReader:
             try:
                 found = self._shapes(element, place, scale, apart=True)
             except WorldError as err:
-                self.lost.append(str(err))
+                uri = (element.findtext("geometry/mesh/uri") or "a mesh without <uri>").strip()
+                self.lost.setdefault(uri, str(err))
                 return None
         return [
             Visual(shape=shape, pose=pose @ turn, material=self._looks.material(element, own, place))

@@ -14,7 +14,7 @@ is seen as its collision shapes. A world on a raised floor is let down onto the 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,8 +28,6 @@ from rosbot_patrol.simulation.sdf_reader import Reader
 __all__ = ["ActorPlace", "World", "load_world"]
 
 log = logging.getLogger(__name__)
-
-_TOLD = 5  # lost meshes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,9 +77,6 @@ def _tell(reader: Reader) -> None:
     if reader.renamed:
         log.warning("%s: names used twice, the later one is called: %s", reader.path, ", ".join(reader.renamed))
     if reader.lost:
-        log.warning("%s: shown as their collision shapes, %s", reader.path, _listed(list(dict.fromkeys(reader.lost))))
-
-
-def _listed(sentences: Sequence[str]) -> str:
-    more = f" (and {len(sentences) - _TOLD} more)" if len(sentences) > _TOLD else ""
-    return f"for want of {len(sentences)} meshes: " + "; ".join(sentences[:_TOLD]) + more
+        uris = ", ".join(f"'{uri}'" for uri in reader.lost)
+        first = next(iter(reader.lost.values()))
+        log.warning("%s: shown as their collision shapes, for want of the meshes %s: %s", reader.path, uris, first)

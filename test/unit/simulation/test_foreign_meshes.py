@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.simulation.mesh_files import load_mesh, load_parts
+from rosbot_patrol.simulation.meshes import sharp_normals
 
 QUADS = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 INPUTS = (
@@ -223,3 +224,21 @@ def test_a_skin_stands_as_it_was_bound_to_its_bones(tmp_path: Path) -> None:
         "<node name='body'><instance_controller url='#K'><skeleton>#Hip</skeleton></instance_controller></node>"
     )
     assert_cube(write(tmp_path, nodes=nodes, more=skin), (-0.5, -0.5, 3.0), (0.5, 0.5, 4.0))
+
+
+def test_a_prism_shows_its_edges_and_a_cylinder_does_not() -> None:
+    def sides(count: int) -> tuple[np.ndarray, np.ndarray]:
+        angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        low = np.column_stack((np.cos(angles), np.sin(angles), np.zeros(count)))
+        i = np.arange(count)
+        j = (i + 1) % count
+        walls = np.vstack([np.column_stack((i, j, count + j)), np.column_stack((i, count + j, count + i))])
+        lid = np.column_stack((np.full(count - 2, count), count + i[1:-1], count + i[2:]))
+        return np.vstack((low, np.add(low, (0.0, 0.0, 2.0)))), np.vstack((walls, lid))
+
+    for count, is_round in ((6, False), (12, True)):
+        corners, normals = sharp_normals(*sides(count))
+        lid = np.all(corners.reshape(-1, 3, 3)[:, :, 2] == 2.0, axis=1).repeat(3)
+        assert normals[lid] == pytest.approx(np.tile([0.0, 0.0, 1.0], (lid.sum(), 1)))
+        outwards = np.einsum("ij,ij->i", normals[~lid, :2], corners[~lid, :2])
+        assert np.all(outwards > 0.95) if is_round else outwards == pytest.approx(np.cos(np.pi / count))
