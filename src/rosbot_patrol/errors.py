@@ -69,10 +69,10 @@ class PlanningError(PatrolError):
 
 
 class _AtPoint(PlanningError):
-    _sentence = "({x:.2f}, {y:.2f})"
+    _what = ""
 
-    def __init__(self, x: float, y: float) -> None:
-        super().__init__(self._sentence.format(x=x, y=y))
+    def __init__(self, x: float, y: float, reason: str = "is occupied") -> None:
+        super().__init__(f"the {self._what} ({x:.2f}, {y:.2f}) {reason}")
         self.x = x
         self.y = y
 
@@ -80,13 +80,13 @@ class _AtPoint(PlanningError):
 class StartOccupied(_AtPoint):
     """The robot stands where the costmap says that it cannot."""
 
-    _sentence = "the start ({x:.2f}, {y:.2f}) is occupied"
+    _what = "start"
 
 
 class GoalOccupied(_AtPoint):
     """The goal lies in an obstacle."""
 
-    _sentence = "the goal ({x:.2f}, {y:.2f}) is occupied"
+    _what = "goal"
 
 
 class OutOfBounds(PlanningError):
@@ -104,10 +104,11 @@ class OutOfBounds(PlanningError):
 
 
 class NoPath(PlanningError):
-    """Start and goal are free, but nothing connects them."""
+    """Start and goal are free, but nothing connects them; the reason says what is in the way."""
 
-    def __init__(self, start: tuple[float, float], goal: tuple[float, float]) -> None:
-        super().__init__(f"no way from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})")
+    def __init__(self, start: tuple[float, float], goal: tuple[float, float], reason: str = "") -> None:
+        ends = f"no way from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})"
+        super().__init__(f"{ends}: {reason}" if reason else ends)
         self.start = start
         self.goal = goal
 

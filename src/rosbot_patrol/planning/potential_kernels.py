@@ -1,8 +1,11 @@
-"""Arrival times over a cost grid, and the way back down.
+"""Arrival times over a cost grid, on the whole grid or within chosen blocks of it.
 
 The field solves |grad T| = cost (the Eikonal equation; Sethian 1996) with first-order upwind differences, by a
-label-correcting queue of buckets (Yatziv, Bartesaghi, Sapiro 2006), ordered by T + heuristic (A*) where a target is
-given. Paths descend its interpolated gradient, so they are not bound to eight directions.
+label-correcting queue of buckets (Yatziv, Bartesaghi, Sapiro 2006).
+
+Grids are divided into blocks of BLOCK x BLOCK cells. `limits[by, bx]` is the latest arrival worth keeping in a block:
+inf where all is wanted, negative where nothing is. Times of blocks without a limit are never written, so a search that
+needs a small part of a large grid touches only that part of its memory.
 """
 
 from __future__ import annotations
@@ -14,23 +17,64 @@ import numpy as np
 from rosbot_patrol.kernels import kernel
 
 BUCKETS = 256
+BLOCK = 8
+_SHIFT = 3
+
+
+@kernel("void(float32[:, ::1], float32[:, ::1])")
+def open_blocks(limits, times):
+    """Set `times` to inf in all blocks that have a limit, and in those around them."""
+    height, width = times.shape
+    rows, columns = limits.shape
+    for by in range(rows):
+        for bx in range(columns):
+            wanted = False
+            for ny in range(max(by - 1, 0), min(by + 2, rows)):
+                for nx in range(max(bx - 1, 0), min(bx + 2, columns)):
+                    wanted = wanted or limits[ny, nx] >= 0.0
+            if wanted:
+                for iy in range(by * BLOCK, min(by * BLOCK + BLOCK, height)):
+                    for ix in range(bx * BLOCK, min(bx * BLOCK + BLOCK, width)):
+                        times[iy, ix] = np.inf
+
+
+@kernel("uint8[:, ::1](uint8[:, ::1], uint8[::1])")
+def cheapest_of_blocks(costs, rank):
+    """Least rank of each block's cells, shape (ceil(height / BLOCK), ceil(width / BLOCK)); rank has shape (256,)."""
+    height, width = costs.shape
+    columns = (width + BLOCK - 1) // BLOCK
+    out = np.full(((height + BLOCK - 1) // BLOCK, columns), 255, np.uint8)
+    whole = width // BLOCK
+    for iy in range(height):
+        row = out[iy >> _SHIFT]
+        for bx in range(columns):
+            low = row[bx]
+            first = bx * BLOCK
+            if bx < whole:
+                for k in range(BLOCK):
+                    low = min(low, rank[costs[iy, first + k]])
+            else:
+                for ix in range(first, width):
+                    low = min(low, rank[costs[iy, ix]])
+            row[bx] = low
+    return out
 
 
 @kernel(
-    "int64(uint8[:, ::1], float32[::1], int64[:, ::1], float32[::1], int64, int64, float64, float32[:, ::1])",
+    "int64(uint8[:, ::1], float32[::1], int64[:, ::1], float32[::1], int64, int64, float32[:, ::1], float32[:, ::1])",
 )
-def propagate(costs, table, sources, source_times, target_x, target_y, heuristic, times):
+def propagate(costs, table, sources, source_times, target_x, target_y, limits, times):
     """Fill `times` from the sources until the target is settled, or everywhere where `target_x` is negative.
 
     Args:
         costs: cost of each cell.
         table: cost of crossing a cell by its cost, inf where it cannot be crossed; shape (256,).
-        sources: cells (ix, iy) to start from, shape (N, 2).
+        sources: cells (ix, iy) to start from, shape (N, 2), in blocks that have a limit.
         source_times: their times, shape (N,).
         target_x: cell to reach, column.
         target_y: its row.
-        heuristic: least cost of a cell, 0 for no guidance.
-        times: to be filled, inf everywhere at call; shape of `costs`.
+        limits: latest times worth keeping, by block.
+        times: to be filled; inf at call wherever `limits` opens a block, and around (`open_blocks`).
 
     Returns:
         1 if the target was settled (or there was none), else 0.
@@ -42,32 +86,24 @@ def propagate(costs, table, sources, source_times, target_x, target_y, heuristic
         if math.isfinite(table[i]):
             largest = max(largest, table[i])
             smallest = min(smallest, table[i])
-    span = max(float(smallest) * 0.5, (2.0 * float(largest) + heuristic + 1.0) * 2.0 / (BUCKETS - 4))
+    span = max(float(smallest) * 0.5, (largest + 1.0) * 2.0 / (BUCKETS - 4))
+    per_span = 1.0 / span
     head = np.full(BUCKETS, -1, np.int64)
     node = np.empty(4096, np.int64)
     link = np.empty(4096, np.int64)
     key = np.empty(4096, np.float32)
     free, used, queued = np.int64(-1), np.int64(0), np.int64(0)
-    guided = target_x >= 0 and heuristic > 0.0
     level = np.int64(-1)
     for i in range(sources.shape[0]):
         ix, iy = sources[i, 0], sources[i, 1]
-        t = source_times[i]
-        if t < times[iy, ix]:
-            times[iy, ix] = t
-            f = float(t)
-            if guided:
-                f += heuristic * math.sqrt(float((ix - target_x) ** 2 + (iy - target_y) ** 2))
-            b = np.int64(f / span)
-            if level < 0 or b < level:
-                level = b
+        times[iy, ix] = min(times[iy, ix], source_times[i])
+        b = np.int64(times[iy, ix] * per_span)
+        if level < 0 or b < level:
+            level = b
     # the sources must lie within the ring of buckets: late ones are put in the last bucket of the ring
     for i in range(sources.shape[0]):
         ix, iy = sources[i, 0], sources[i, 1]
-        f = float(times[iy, ix])
-        if guided:
-            f += heuristic * math.sqrt(float((ix - target_x) ** 2 + (iy - target_y) ** 2))
-        b = min(np.int64(f / span), level + BUCKETS - 2)
+        b = min(np.int64(times[iy, ix] * per_span), level + BUCKETS - 2)
         if used == node.shape[0]:
             node = np.concatenate((node, np.empty_like(node)))
             link = np.concatenate((link, np.empty_like(link)))
@@ -101,9 +137,14 @@ def propagate(costs, table, sources, source_times, target_x, target_y, heuristic
             ny = cy + (1 if k == 2 else (-1 if k == 3 else 0))
             if nx < 0 or ny < 0 or nx >= width or ny >= height:
                 continue
-            c = table[costs[ny, nx]]
+            limit = limits[ny >> _SHIFT, nx >> _SHIFT]
+            if limit <= here:
+                continue
             old = times[ny, nx]
-            if not math.isfinite(c) or old <= here:
+            if old <= here:
+                continue
+            c = table[costs[ny, nx]]
+            if not math.isfinite(c):
                 continue
             a = np.float32(np.inf)
             if nx > 0:
@@ -120,14 +161,11 @@ def propagate(costs, table, sources, source_times, target_x, target_y, heuristic
                 t = low + c
             else:
                 diff = high - low
-                t = np.float32(0.5) * (low + high + np.float32(math.sqrt(2.0 * c * c - diff * diff)))
-            if t >= old - np.float32(1e-3) * c:
+                t = np.float32(0.5) * (low + high + np.float32(math.sqrt(np.float32(2.0) * c * c - diff * diff)))
+            if t >= old - np.float32(1e-3) * c or t > limit:
                 continue
             times[ny, nx] = t
-            f = float(t)
-            if guided:
-                f += heuristic * math.sqrt(float((nx - target_x) ** 2 + (ny - target_y) ** 2))
-            b = min(max(np.int64(f / span), level), level + BUCKETS - 2)
+            b = min(max(np.int64(t * per_span), level), level + BUCKETS - 2)
             if free >= 0:
                 slot = free
                 free = link[slot]
@@ -146,91 +184,3 @@ def propagate(costs, table, sources, source_times, target_x, target_y, heuristic
     if target_x < 0 or math.isfinite(times[target_y, target_x]):
         return 1
     return 0
-
-
-@kernel("UniTuple(float64, 2)(float32[:, ::1], int64, int64)")
-def slope(times, ix, iy):
-    """Gradient (uphill) at a cell's centre, upwind as the field was built."""
-    height, width = times.shape
-    here = times[iy, ix]
-    left = times[iy, ix - 1] if ix > 0 else np.float32(np.inf)
-    right = times[iy, ix + 1] if ix + 1 < width else np.float32(np.inf)
-    down = times[iy - 1, ix] if iy > 0 else np.float32(np.inf)
-    up = times[iy + 1, ix] if iy + 1 < height else np.float32(np.inf)
-    gx, gy = 0.0, 0.0
-    if min(left, right) < here:
-        gx = float(here - left) if left < right else float(right - here)
-    if min(down, up) < here:
-        gy = float(here - down) if down < up else float(up - here)
-    return gx, gy
-
-
-@kernel("Tuple((float64[:, ::1], int64))(float32[:, ::1], float64, float64, float64, float64, float64)")
-def descend(times, from_x, from_y, to_x, to_y, step):
-    """Follow the fall of `times` from a point to (about) a source, in cells with centres at whole numbers.
-
-    Returns:
-        Points (x, y), shape (N, 2), ending at (to_x, to_y); and 1 if that was reached, else 0.
-    """
-    height, width = times.shape
-    out = np.empty((1024, 2), np.float64)
-    n = 0
-    x, y = from_x, from_y
-    stay = 0
-    reached = 0
-    lowest = times[round(y), round(x)]
-    for _ in range(8 * width * height + 64):
-        if n == out.shape[0]:
-            out = np.concatenate((out, np.empty_like(out)))
-        out[n, 0], out[n, 1] = x, y
-        n += 1
-        if abs(x - to_x) < 1.0 and abs(y - to_y) < 1.0:
-            reached = 1
-            break
-        ix, iy = round(x), round(y)
-        # gradient, interpolated between the four centres around, those without a way left out
-        x0, y0 = math.floor(x), math.floor(y)
-        fx, fy = x - x0, y - y0
-        gx, gy, weight = 0.0, 0.0, 0.0
-        for k in range(4):
-            jx, jy = x0 + (k & 1), y0 + (k >> 1)
-            if jx < 0 or jy < 0 or jx >= width or jy >= height or not math.isfinite(times[jy, jx]):
-                continue
-            w = (fx if k & 1 else 1.0 - fx) * (fy if k >> 1 else 1.0 - fy)
-            sx, sy = slope(times, jx, jy)
-            norm = math.sqrt(sx * sx + sy * sy)
-            if norm > 0.0:
-                gx += w * sx / norm
-                gy += w * sy / norm
-                weight += w
-        norm = math.sqrt(gx * gx + gy * gy)
-        moved = False
-        if norm > 1e-3 and stay < 8:
-            nx, ny = x - step * gx / norm, y - step * gy / norm
-            jx, jy = round(nx), round(ny)
-            if 0 <= jx < width and 0 <= jy < height:
-                same = jx == ix and jy == iy
-                corner_free = jx == ix or jy == iy or (math.isfinite(times[iy, jx]) and math.isfinite(times[jy, ix]))
-                if same or (times[jy, jx] < lowest and corner_free):
-                    stay = stay + 1 if same else 0
-                    x, y = nx, ny
-                    lowest = times[jy, jx]
-                    moved = True
-        if not moved:
-            best, bx, by = times[iy, ix], -1, -1
-            for k in range(4):
-                jx = ix + (1 if k == 0 else (-1 if k == 1 else 0))
-                jy = iy + (1 if k == 2 else (-1 if k == 3 else 0))
-                if 0 <= jx < width and 0 <= jy < height and times[jy, jx] < best:
-                    best, bx, by = times[jy, jx], jx, jy
-            if bx < 0:
-                break
-            x, y = float(bx), float(by)
-            lowest = best
-            stay = 0
-    if reached:
-        if n == out.shape[0]:
-            out = np.concatenate((out, np.empty((1, 2))))
-        out[n, 0], out[n, 1] = to_x, to_y
-        n += 1
-    return out[:n].copy(), reached

@@ -20,5 +20,6 @@ def distance_field(info: GridInfo, cells: CostCells, sources: NDArray[np.int64])
     starts = np.ascontiguousarray(sources[inside])
     if len(starts):
         zeros = np.zeros(len(starts), np.float32)
-        potential_kernels.propagate(cells, _CROSSING, starts, zeros, -1, -1, 0.0, field)
+        limits = np.full([-(-n // potential_kernels.BLOCK) for n in info.shape], np.inf, np.float32)
+        potential_kernels.propagate(cells, _CROSSING, starts, zeros, -1, -1, limits, field)
     return field

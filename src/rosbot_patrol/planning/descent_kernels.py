@@ -1,0 +1,100 @@
+"""The way back down a field of arrival times.
+
+Paths descend the interpolated gradient of the field, so they are not bound to eight directions.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rosbot_patrol.kernels import kernel
+
+
+@kernel("UniTuple(float64, 2)(float32[:, ::1], int64, int64)")
+def slope(times, ix, iy):
+    """Gradient (uphill) at a cell's centre, upwind as the field was built."""
+    height, width = times.shape
+    here = times[iy, ix]
+    left = times[iy, ix - 1] if ix > 0 else np.float32(np.inf)
+    right = times[iy, ix + 1] if ix + 1 < width else np.float32(np.inf)
+    down = times[iy - 1, ix] if iy > 0 else np.float32(np.inf)
+    up = times[iy + 1, ix] if iy + 1 < height else np.float32(np.inf)
+    gx, gy = 0.0, 0.0
+    if min(left, right) < here:
+        gx = float(here - left) if left < right else float(right - here)
+    if min(down, up) < here:
+        gy = float(here - down) if down < up else float(up - here)
+    return gx, gy
+
+
+@kernel("Tuple((float64[:, ::1], int64))(float32[:, ::1], float64, float64, float64, float64, float64)")
+def descend(times, from_x, from_y, to_x, to_y, step):
+    """Follow the fall of `times` from a point to (about) a source, in cells with centres at whole numbers.
+
+    Returns:
+        Points (x, y), shape (N, 2), ending at (to_x, to_y); and 1 if that was reached, else 0.
+    """
+    height, width = times.shape
+    out = np.empty((1024, 2), np.float64)
+    n = 0
+    x, y = from_x, from_y
+    stay = 0
+    reached = 0
+    lowest = times[round(y), round(x)]
+    for _ in range(8 * width * height + 64):
+        if n == out.shape[0]:
+            out = np.concatenate((out, np.empty_like(out)))
+        out[n, 0], out[n, 1] = x, y
+        n += 1
+        if abs(x - to_x) < 1.0 and abs(y - to_y) < 1.0:
+            reached = 1
+            break
+        ix, iy = round(x), round(y)
+        # gradient, interpolated between the four centres around, those without a way left out
+        x0, y0 = math.floor(x), math.floor(y)
+        fx, fy = x - x0, y - y0
+        gx, gy, weight = 0.0, 0.0, 0.0
+        for k in range(4):
+            jx, jy = x0 + (k & 1), y0 + (k >> 1)
+            if jx < 0 or jy < 0 or jx >= width or jy >= height or not math.isfinite(times[jy, jx]):
+                continue
+            w = (fx if k & 1 else 1.0 - fx) * (fy if k >> 1 else 1.0 - fy)
+            sx, sy = slope(times, jx, jy)
+            norm = math.sqrt(sx * sx + sy * sy)
+            if norm > 0.0:
+                gx += w * sx / norm
+                gy += w * sy / norm
+                weight += w
+        norm = math.sqrt(gx * gx + gy * gy)
+        moved = False
+        if norm > 1e-3 and stay < 8:
+            nx, ny = x - step * gx / norm, y - step * gy / norm
+            jx, jy = round(nx), round(ny)
+            if 0 <= jx < width and 0 <= jy < height:
+                same = jx == ix and jy == iy
+                corner_free = jx == ix or jy == iy or (math.isfinite(times[iy, jx]) and math.isfinite(times[jy, ix]))
+                if same or (times[jy, jx] < lowest and corner_free):
+                    stay = stay + 1 if same else 0
+                    x, y = nx, ny
+                    lowest = times[jy, jx]
+                    moved = True
+        if not moved:
+            best, bx, by = times[iy, ix], -1, -1
+            for k in range(4):
+                jx = ix + (1 if k == 0 else (-1 if k == 1 else 0))
+                jy = iy + (1 if k == 2 else (-1 if k == 3 else 0))
+                if 0 <= jx < width and 0 <= jy < height and times[jy, jx] < best:
+                    best, bx, by = times[jy, jx], jx, jy
+            if bx < 0:
+                break
+            x, y = float(bx), float(by)
+            lowest = best
+            stay = 0
+    if reached:
+        if n == out.shape[0]:
+            out = np.concatenate((out, np.empty((1, 2))))
+        out[n, 0], out[n, 1] = to_x, to_y
+        n += 1
+    return out[:n].copy(), reached

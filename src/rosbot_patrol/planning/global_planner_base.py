@@ -1,0 +1,148 @@
+"""What the planners on arrival times have in common: from poses to cells, and from a way in cells to poses.
+
+A start or goal that cannot be used raises the error that says why. The robot's own cell is taken as free, as upstream
+takes it, and a goal that cannot be reached is replaced by the nearest point within the tolerance.
+
+Differs from upstream:
+    - A robot that stands within the inscribed radius of an obstacle (localisation is not exact) still gets a plan
+      that leads out of it; upstream finds none and the robot stays stuck.
+    - Where there is no plan, the error says what is in the way and where.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.costmap.costs import FREE, LETHAL, CostCells
+from rosbot_patrol.errors import GoalOccupied, NoPath, OutOfBounds, PlanningError, StartOccupied
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.planning.global_planner_obstacles import (
+    WHY_OCCUPIED,
+    Cell,
+    Kind,
+    kinds_of_costs,
+    nearest_reachable,
+    why_no_way,
+)
+from rosbot_patrol.planning.global_planner_search import Descend, descend_smoothly, find_way
+from rosbot_patrol.planning.interfaces import Array, GlobalPlanner
+
+
+class PotentialPlanner(GlobalPlanner):
+    """Cheapest ways over the costs.
+
+    Args:
+        prices: what crossing a cell costs, by its cost, inf where it cannot be crossed; shape (256,).
+        tolerance: how far from the goal a plan may end [m], where a request does not say.
+        escape_radius: how far a start near an obstacle may lead out [m].
+        outline: take the outermost cells of the costmap for obstacles.
+        descend: makes a way of a field of arrival times.
+    """
+
+    def __init__(
+        self,
+        prices: NDArray[np.float32],
+        *,
+        tolerance: float,
+        escape_radius: float,
+        outline: bool = False,
+        descend: Descend = descend_smoothly,
+    ) -> None:
+        self._prices = prices
+        self._kinds = kinds_of_costs(prices)
+        self._tolerance = tolerance
+        self._escape_radius = escape_radius
+        self._outline = outline
+        self._descend = descend
+
+    @abstractmethod
+    def _poses(self, points: Array, start: Pose2D, goal: Pose2D) -> Array:
+        """Headings for points of shape (N, 2), N > 1, as poses of shape (N, 3); the last is the goal's."""
+
+    def plan(self, costmap: Grid, start: Pose2D, goal: Pose2D, *, tolerance: float | None = None) -> Array:
+        """As `GlobalPlanner.plan`; `tolerance` replaces the planner's own."""
+        info, cells = costmap.info, costmap.cells
+        reach = self._tolerance if tolerance is None else tolerance
+        start_cell = _cell_of("start", start, info)
+        goal_cell = _cell_of("goal", goal, info, margin=reach)
+        if cells[start_cell[1], start_cell[0]] == LETHAL:
+            raise StartOccupied(start.x, start.y, WHY_OCCUPIED[Kind.OBSTACLE])
+        if self._outline:
+            cells[[0, -1], :] = LETHAL
+            cells[:, [0, -1]] = LETHAL
+        self._open_start(cells, start_cell, info)
+        failure = self._occupied(cells, info, goal, goal_cell)
+        if failure is None:
+            points = self._way(info, cells, start, goal_cell)
+            if points is not None:
+                return self._finished(points, start, goal)
+        near = None
+        if reach > 0.0:
+            near = nearest_reachable(cells, self._kinds, start_cell, goal_cell, int(reach / info.resolution))
+        points = None if near is None else self._way(info, cells, start, near)
+        if points is not None and near is not None:
+            return self._finished(points, start, Pose2D(*info.centre_of(*near), goal.yaw))
+        if failure is None:
+            reason = why_no_way(info, cells, self._kinds, start_cell, goal_cell)
+            failure = NoPath((start.x, start.y), (goal.x, goal.y), reason)
+        raise failure
+
+    def _occupied(self, cells: CostCells, info: GridInfo, goal: Pose2D, cell: Cell) -> PlanningError | None:
+        if not info.contains_cell(*cell):
+            return OutOfBounds("goal", goal.x, goal.y)
+        kind = Kind(int(self._kinds[cells[cell[1], cell[0]]]))
+        return GoalOccupied(goal.x, goal.y, WHY_OCCUPIED[kind]) if kind else None
+
+    def _open_start(self, cells: CostCells, start: Cell, info: GridInfo) -> None:
+        """Free the robot's cell; where it stands too near to an obstacle, let it out at the highest cost."""
+        ix, iy = start
+        if self._kinds[cells[iy, ix]] == Kind.NARROW:
+            r = math.ceil(self._escape_radius / info.resolution)
+            y0, x0 = max(iy - r, 0), max(ix - r, 0)
+            area = cells[y0 : iy + r + 1, x0 : ix + r + 1]
+            dy, dx = np.ogrid[y0 - iy : y0 - iy + area.shape[0], x0 - ix : x0 - ix + area.shape[1]]
+            dearest = int(np.flatnonzero(self._kinds[:LETHAL] == Kind.OPEN)[-1])
+            area[(self._kinds[area] == Kind.NARROW) & (dx * dx + dy * dy <= r * r)] = dearest
+        cells[iy, ix] = FREE
+
+    def _way(self, info: GridInfo, cells: CostCells, start: Pose2D, goal_cell: Cell) -> Array | None:
+        """Points from the start to the middle of a cell [m], shape (N, 2)."""
+        here = (
+            (start.x - info.origin_x) / info.resolution - 0.5,
+            (start.y - info.origin_y) / info.resolution - 0.5,
+        )
+        there = (float(goal_cell[0]), float(goal_cell[1]))
+        points = find_way(cells, self._prices, here, there, self._descend)
+        return None if points is None else (points + 0.5) * info.resolution + (info.origin_x, info.origin_y)
+
+    def _finished(self, points: Array, start: Pose2D, goal: Pose2D) -> Array:
+        points[-1] = goal.x, goal.y
+        if len(points) == 1:
+            points = np.array([[start.x, start.y], [goal.x, goal.y]])
+        return self._poses(points, start, goal)
+
+
+def with_headings(points: Array, last_yaw: float) -> Array:
+    """Points of shape (N, 2) as poses that look along the path; the last has the heading given."""
+    poses = np.empty((len(points), 3))
+    poses[:, :2] = points
+    steps = np.diff(points, axis=0)
+    poses[:-1, 2] = np.arctan2(steps[:, 1], steps[:, 0])
+    poses[-1, 2] = last_yaw
+    return poses
+
+
+def _cell_of(what: str, pose: Pose2D, info: GridInfo, *, margin: float = 0.0) -> Cell:
+    """The cell of a pose, which may lie off the grid by a margin [m]."""
+    if not (math.isfinite(pose.x) and math.isfinite(pose.y)):
+        raise OutOfBounds(what, pose.x, pose.y)
+    cell = info.cell_of(pose.x, pose.y)
+    gaps = [max(-i, i - n + 1, 0) * info.resolution for i, n in zip(cell, (info.width, info.height), strict=True)]
+    if math.hypot(*gaps) > margin:
+        raise OutOfBounds(what, pose.x, pose.y)
+    return cell
