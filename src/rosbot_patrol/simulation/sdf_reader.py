@@ -13,13 +13,14 @@ from xml.etree import ElementTree as ET
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.doors import DoorPlace
 from rosbot_patrol.simulation.matrices import to_pose2d
-from rosbot_patrol.simulation.scene import Body, BodyKind, Collision, Material, Matrix, Shape, Visual, identity
+from rosbot_patrol.simulation.scene import Body, Collision, Matrix, Visual, identity
 from rosbot_patrol.simulation.sdf_actors import ActorPlace, actor_kind, read_actor
+from rosbot_patrol.simulation.sdf_bodies import floor, instead, inverse, kind_of, together
 from rosbot_patrol.simulation.sdf_doors import Hinge, carried_by, read_hinge
 from rosbot_patrol.simulation.sdf_files import ModelPath, advice, model_file
 from rosbot_patrol.simulation.sdf_frames import Frames
 from rosbot_patrol.simulation.sdf_population import places_of
-from rosbot_patrol.simulation.sdf_shapes import PLANE, ShapeReader
+from rosbot_patrol.simulation.sdf_shapes import ShapeReader
 from rosbot_patrol.simulation.sdf_state import Scale, State
 from rosbot_patrol.simulation.sdf_text import read_sdf
 from rosbot_patrol.simulation.sdf_values import VERSIONS, Place, pose_of
@@ -27,7 +28,7 @@ from rosbot_patrol.simulation.sdf_values import VERSIONS, Place, pose_of
 log = logging.getLogger(__name__)
 
 _KNOWN = {
-    "world": {"model", "include", "state", "actor", "frame", "population"},
+    "world": {"model", "include", "state", "actor", "frame", "population", "road"},
     "model": {"link", "model", "include", "frame", "joint", "pose", "static", "placement_frame"},
     "link": {"pose", "collision", "visual"},
     "include": {"uri", "name", "pose", "static", "placement_frame"},
@@ -53,6 +54,7 @@ class Reader:
         skipped: what was met and is not read.
         lost: uri of each mesh that should be seen and cannot be read, and a sentence about the first place.
         renamed: "name_1" for what shares its name with another.
+        versions: of SDF that are read as if they were others, and a file of each.
         lights: how many there are.
         bodies, actors, doors: what was found.
     """
@@ -62,6 +64,7 @@ class Reader:
     skipped: set[str] = field(default_factory=set)
     lost: dict[str, str] = field(default_factory=dict)
     renamed: list[str] = field(default_factory=list)
+    versions: dict[str, Path] = field(default_factory=dict)
     lights: int = 0
     bodies: list[Body] = field(default_factory=list)
     actors: list[ActorPlace] = field(default_factory=list)
@@ -108,12 +111,15 @@ class Reader:
             self._actor(child, here, outer + (child.get("name") or "actor"), world_from_outer @ pose_of(child, here))
         elif child.tag == "population":
             self._population(child, place.inside(f"population '{child.get('name')}'"), world_from_outer, outer)
+        elif child.tag == "road":
+            here = place.inside(f"road '{child.get('name')}'")
+            self.bodies.append(self._shapes.road(child, here, self._fresh(outer + (child.get("name") or "road"))))
 
     def _parse(self, path: Path) -> ET.Element:
         if path not in self._files:
             root = self._files[path] = read_sdf(path)
             if root.get("version") not in VERSIONS:
-                log.warning("%s: SDF version %s, read as 1.7", path, root.get("version", "is not named"))
+                self.versions.setdefault(root.get("version", "not named"), path)
         return self._files[path]
 
     def _include(self, element: ET.Element, place: Place, frames: Frames, world_from_outer: Matrix, outer: str) -> None:
@@ -134,7 +140,7 @@ class Reader:
             file = model_file(self.model_path.find(uri, place.path.parent, here), here)
         except WorldError as err:
             if short == "ground_plane":
-                self.bodies.append(_floor(self._fresh(outer + (given or short))))
+                self.bodies.append(floor(self._fresh(outer + (given or short))))
                 return
             if self.model_path.look(uri, place.path.parent) is not None:
                 raise
@@ -159,7 +165,7 @@ class Reader:
         inside = Place(file, f"{found.tag} '{name}'")
         placement = element.findtext("placement_frame")
         if placement:
-            world_from_model = world_from_model @ _inverse(Frames(found, inside).frame(placement.strip(), inside))
+            world_from_model = world_from_model @ inverse(Frames(found, inside).frame(placement.strip(), inside))
         elif element.find("pose") is None:
             world_from_model = world_from_model @ pose_of(found, inside)
         if found.tag == "actor":
@@ -197,7 +203,7 @@ class Reader:
         if name in self._state.deleted:
             return
         meshes = {Path(uri.text or "").parts[1:2] for uri in element.iterfind("link/visual/geometry/mesh/uri")}
-        words = (name, *(part for parts in meshes for part in parts))
+        words = (name, *(part for parts in meshes for part in parts)) if len(meshes) == 1 else (name,)
         if self._is_actor(name, words, self._state.poses.get(name, world_from_model)):
             return
         name = self._fresh(name)
@@ -217,9 +223,9 @@ class Reader:
             here = place.inside(f"link '{label}'")
             model_from_link = frames.pose(link, here)
             pose = self._state.poses.get(f"{name}/{label}", world_from_model @ model_from_link)
-            body = self._link(link, here, frames, _inverse(model_from_link), self._state.scales.get(name, _ONES))
-            kind = _kind_of(name, label, body.collisions)
-            hinge = read_hinge(model, label, frames, pose @ _inverse(model_from_link), here)
+            body = self._link(link, here, frames, inverse(model_from_link), self._state.scales.get(name, _ONES))
+            kind = kind_of(name, label, body.collisions)
+            hinge = read_hinge(model, label, frames, pose @ inverse(model_from_link), here)
             hinge = hinge if body.collisions else None
             body_name = name if len(links) == 1 else f"{name}/{label}"
             built.append((label, replace(body, name=body_name, kind=kind, pose=pose, static=hinge is None), hinge))
@@ -229,7 +235,7 @@ class Reader:
                 hangs = set(carried_by(model, label)) - carried
                 parts = [other for name_, other, own in built if name_ in hangs and own is None]
                 carried |= hangs
-                leaf = replace(_together(body, parts), kind="door")
+                leaf = replace(together(body, parts), kind="door")
                 self.doors.append(DoorPlace(body=leaf, axis=hinge.axis, swing=hinge.swing))
         self.bodies += [body for label, body, hinge in built if hinge is None and label not in carried]
 
@@ -251,7 +257,7 @@ class Reader:
             is_lost |= seen is None
             visuals += seen or []
         if is_lost and not visuals:
-            visuals = [_instead(part) for part in collisions if part.shape.kind != "plane"]
+            visuals = [instead(part) for part in collisions if part.shape.kind != "plane"]
         return Body(name="", visuals=tuple(visuals), collisions=tuple(collisions))
 
     def _fresh(self, name: str) -> str:
@@ -294,48 +300,3 @@ def _part_pose(part: ET.Element, place: Place, frames: Frames, link_from_model: 
     if element is not None and (element.get("relative_to") or element.get("frame")):
         return link_from_model @ frames.pose(part, place, link)
     return pose_of(part, place)
-
-
-def _instead(part: Collision) -> Visual:
-    """What a collision shape is shown as where nothing else is: floors darker than what stands on them."""
-    is_floor = part.shape.kind == "box" and min(part.shape.size[:2]) > 2.0 > part.shape.size[2]
-    shade = (0.50, 0.48, 0.45, 1.0) if is_floor else (0.74, 0.71, 0.66, 1.0)
-    return Visual(shape=part.shape, pose=part.pose, material=Material(rgba=shade))
-
-
-def _together(body: Body, parts: Iterable[Body]) -> Body:
-    """A body with what stands fast on it."""
-    for part in parts:
-        pose = _inverse(body.pose) @ part.pose
-        body = replace(
-            body,
-            visuals=(*body.visuals, *(replace(v, pose=pose @ v.pose) for v in part.visuals)),
-            collisions=(*body.collisions, *(replace(c, pose=pose @ c.pose) for c in part.collisions)),
-        )
-    return body
-
-
-def _inverse(pose: Matrix) -> Matrix:
-    turn = pose[:3, :3].T
-    inverse = identity()
-    inverse[:3, :3], inverse[:3, 3] = turn, -turn @ pose[:3, 3]
-    return inverse
-
-
-def _kind_of(model: str, link: str, collisions: Iterable[Collision]) -> BodyKind:
-    text = f"{model} {link}".lower()
-    if "ground_plane" in text or any(c.shape.kind == "plane" for c in collisions):
-        return "floor"
-    if "wall" in text:
-        return "wall"
-    if "door" in text:
-        return "door"
-    return "furniture"
-
-
-def _floor(name: str) -> Body:
-    shape = Shape(kind="plane", size=PLANE)
-    look = Material(rgba=(0.55, 0.55, 0.55, 1.0))
-    return Body(
-        name=name, kind="floor", visuals=(Visual(shape=shape, material=look),), collisions=(Collision(shape=shape),)
-    )

@@ -14,10 +14,11 @@ from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.mesh_files import MeshPart, load_parts, merged
 from rosbot_patrol.simulation.meshes import sphere
 from rosbot_patrol.simulation.picture_colours import Rgba
-from rosbot_patrol.simulation.scene import Collision, Matrix, Shape, ShapeKind, Visual
+from rosbot_patrol.simulation.scene import Body, Collision, Matrix, Shape, ShapeKind, Visual
 from rosbot_patrol.simulation.sdf_files import ModelPath
 from rosbot_patrol.simulation.sdf_looks import Looks, is_unseen
 from rosbot_patrol.simulation.sdf_polylines import polyline_triangles
+from rosbot_patrol.simulation.sdf_roads import read_road
 from rosbot_patrol.simulation.sdf_state import Scale
 from rosbot_patrol.simulation.sdf_values import Place, box_sizes, floats, is_true, sizes, turned_to
 
@@ -88,6 +89,11 @@ class ShapeReader:
         shapes = self._shapes(element, place, scale, apart=False)
         return [Collision(shape=shape, pose=pose @ turn) for shape, _, turn in shapes]
 
+    def road(self, element: ET.Element, place: Place, name: str) -> Body:
+        """A <road> in the look that it names. Raises WorldError."""
+        named = element.find("material") is not None
+        return read_road(element, place, name, self._looks.material(element, None, place) if named else None)
+
     def _note(self, element: ET.Element) -> None:
         self.skipped.update(f"<{c.tag}> of a {element.tag}" for c in element if c.tag not in _KNOWN[element.tag])
 
@@ -126,11 +132,12 @@ class ShapeReader:
         return [(Shape(kind="plane", size=(size[0] * scale[0], size[1] * scale[1])), None, turn)]
 
     def _mesh(self, element: ET.Element, place: Place, scale: Scale, *, apart: bool) -> list[tuple[Shape, Rgba | None]]:
-        uri = (element.findtext("uri") or "").strip()
+        uri = (element.findtext("uri") or element.findtext("filename") or "").strip()
         if not uri:
             raise place.error("<mesh> has no <uri>")
         file = self.model_path.find(uri, place.path.parent, place.inside("mesh"))
-        own = floats(element.findtext("scale") or "1 1 1", 3, place.inside("<scale>"))
+        text = element.findtext("scale") or "1 1 1"
+        own = floats(text if len(text.split()) != 1 else " ".join([text] * 3), 3, place.inside("<scale>"))
         if 0.0 in own:
             raise place.inside("<scale>").error("expected numbers other than 0, got '" + " ".join(map(str, own)) + "'")
         size = tuple(a * b for a, b in zip(own, scale, strict=True))

@@ -36,7 +36,7 @@ class State:
         self.deleted |= {(name.text or "").strip() for name in element.findall("deletions/name")}
 
     def _model(self, element: ET.Element, outer: str, place: Place) -> None:
-        name = outer + element.get("name", "")
+        name = outer + element.get("name", "").removeprefix(outer)
         here = place.inside(f"state of model '{name}'")
         if element.find("pose") is not None:
             self.poses[name] = pose_of(element, here)

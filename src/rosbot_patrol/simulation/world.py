@@ -24,6 +24,7 @@ from rosbot_patrol.simulation.sdf_actors import ActorPlace
 from rosbot_patrol.simulation.sdf_files import ModelPath
 from rosbot_patrol.simulation.sdf_floors import let_down, raised_floor
 from rosbot_patrol.simulation.sdf_reader import Reader
+from rosbot_patrol.simulation.sdf_values import VERSIONS
 
 __all__ = ["ActorPlace", "World", "load_world"]
 
@@ -72,6 +73,8 @@ def _tell(reader: Reader) -> None:
     """What was left out, in one line of each kind."""
     if reader.lights:
         log.info("%s: %d lights are not simulated, the camera has its own", reader.path, reader.lights)
+    for version, file in reader.versions.items():
+        log.warning("%s: SDF version %s, read as %s", file, version, VERSIONS[-1])
     if reader.skipped:
         log.warning("%s: skipped, not simulated here: %s", reader.path, ", ".join(sorted(reader.skipped)))
     if reader.renamed:

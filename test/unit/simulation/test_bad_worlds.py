@@ -216,7 +216,7 @@ def test_a_frame_that_is_not_known_is_told_and_taken_as_the_parent(
 
 def test_what_is_unknown_is_named_once_for_the_whole_world(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     inside = (
-        "<road name='r'/><population name='p'/>"
+        "<blimp name='r'/><population name='p'/>"
         + model("<link name='l'><projector name='x'/><inertial/></link><gripper name='g'/>", name="a")
         + model(
             "<link name='l'><projector name='x'/><visual name='v'><geometry><heightmap/></geometry></visual>"
@@ -228,7 +228,7 @@ def test_what_is_unknown_is_named_once_for_the_whole_world(tmp_path: Path, caplo
     with caplog.at_level(logging.WARNING):
         read(tmp_path, sdf(inside))
     (record,) = caplog.records
-    named = "<gripper> of a model, <heightmap> geometry (make it a mesh), <population>, <projector> of a link, <road>"
+    named = "<blimp>, <gripper> of a model, <heightmap> geometry (make it a mesh), <population>, <projector> of a link"
     assert record.getMessage().endswith(f"skipped, not simulated here: {named}, the material script 'My/Own'")
 
 

@@ -144,6 +144,61 @@ def test_links_of_a_state_may_bear_the_name_of_their_model(tmp_path: Path) -> No
     assert to_pose2d(world.bodies[0].pose)[:2] == (1.0, 3.0)
 
 
+def test_inner_models_of_a_state_may_bear_their_whole_names(tmp_path: Path) -> None:
+    inner = f"<model name='b'><link name='l'><collision name='c'>{BOX}</collision></link></model>"
+    for name in ("b", "a::b"):
+        state = f"<state><model name='a'><pose>1 0 0 0 0 0</pose><model name='{name}'><pose>7 0 0 0 0 0</pose></model>"
+        world = read(tmp_path, sdf(f"<model name='a'>{inner}</model>{state}</model></state>"))
+        assert body_of(world, "a::b").pose[0, 3] == 7.0
+
+
+def test_versions_that_are_read_as_another_are_told_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    include = ""
+    for name in ("crate", "barrel"):
+        thing = model(f"<collision name='c'>{BOX}</collision>", name=name)
+        put(tmp_path, name, f"<sdf version='1.3'>{thing}</sdf>")
+        include += f"<include><uri>model://{name}</uri></include>"
+    with caplog.at_level(logging.WARNING):
+        read(tmp_path, sdf(include))
+    (record,) = caplog.records
+    assert record.getMessage().endswith("crate/model.sdf: SDF version 1.3, read as 1.7")
+
+
+def test_meshes_as_sdf_1_2_named_and_scaled_them(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_bytes(STL)
+    geometry = "<mesh><filename>a.stl</filename><scale>0.5</scale></mesh>"
+    shape = read(tmp_path, sdf(model(both(geometry)))).bodies[0].collisions[0].shape
+    assert shape.size == (0.5, 0.5, 0.5)
+
+
+def test_a_room_with_a_person_in_it_is_no_person(tmp_path: Path) -> None:
+    put(tmp_path, "person_standing_x", "<sdf/>", mesh=STL)
+    put(tmp_path, "sofa", "<sdf/>", mesh=STL)
+    meshes = "".join(
+        f"<visual name='{name}'><geometry><mesh><uri>model://{name}/meshes/{name}.STL</uri></mesh></geometry></visual>"
+        for name in ("person_standing_x", "sofa")
+    )
+    world = read(tmp_path, sdf(model(meshes, name="parlour")))
+    assert not world.actors
+    assert [body.name for body in world.bodies] == ["parlour"]
+
+
+def test_a_road_lies_on_the_ground_and_stops_nobody(tmp_path: Path) -> None:
+    points = "<point>-5 0 0</point><point>5 0 0</point><point>5 5 0</point>"
+    look = "<material><script><name>Gazebo/Motorway</name></script></material>"
+    world = read(tmp_path, sdf(f"<road name='drive'><width>2</width>{points}{look}</road>"))
+    (road,) = world.bodies
+    assert [visual.shape.kind for visual in road.visuals] == ["box", "box", "cylinder"]
+    assert not road.collisions
+    engine = Engine(world)
+    engine.spawn_robot(load_robot(ROBOT))
+    engine.step()
+    assert not engine.touches()
+    engine.close()
+    with pytest.raises(WorldError, match="road 'drive': expected a width and at least 2 points, got 2 m and 1"):
+        read(tmp_path, sdf("<road name='drive'><width>2</width><point>0 0 0</point></road>"))
+
+
 def test_file_uris_start_from_the_folders_of_models_and_of_media(tmp_path: Path) -> None:
     for form in ("file://shelf/meshes/shelf.STL", "file://models/shelf/meshes/shelf.STL", "meshes/shelf.STL"):
         folder = tmp_path / form.replace("/", "_")

@@ -114,11 +114,11 @@ def test_a_person_becomes_an_actor(tmp_path: Path, text: str) -> None:
 
 
 def test_unknown_elements_are_named_in_one_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    text = "<light name='l'/><gravity>0 0 -9.8</gravity><road name='r'/>" + model(link("<sensor name='s'/>"))
+    text = "<light name='l'/><gravity>0 0 -9.8</gravity><blimp name='r'/>" + model(link("<sensor name='s'/>"))
     with caplog.at_level(logging.WARNING):
         read(tmp_path, sdf(text))
     (record,) = caplog.records
-    assert "<road>" in record.getMessage()
+    assert "<blimp>" in record.getMessage()
     assert "<sensor> of a link" in record.getMessage()
     assert "light" not in record.getMessage()
 
