@@ -12,9 +12,9 @@ from rosbot_patrol.simulation.urdf import FindPackage
 
 
 def model_folders(more: Iterable[str] = ()) -> list[str]:
-    """Where Gazebo looks for model://: folders given here, then GAZEBO_MODEL_PATH, then its own in the home folder."""
-    folders = [*more, *filter(None, os.environ.get("GAZEBO_MODEL_PATH", "").split(":"))]
-    return [*folders, os.path.expanduser("~/.gazebo/models")]
+    """Where Gazebo looks for models and their files: folders given here, GAZEBO_MODEL_PATH, its own, its resources."""
+    given, resources = (os.environ.get(f"GAZEBO_{what}_PATH", "").split(":") for what in ("MODEL", "RESOURCE"))
+    return [*more, *filter(None, given), os.path.expanduser("~/.gazebo/models"), *filter(None, resources)]
 
 
 def package_finder(folders: Sequence[str] = ()) -> FindPackage:
