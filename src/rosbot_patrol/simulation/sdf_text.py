@@ -16,6 +16,7 @@ from rosbot_patrol.errors import WorldError
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _DECLARATION = re.compile(rb"<\?xml\s.*?\?>", re.DOTALL)
 _ROOTS = ("sdf", "gazebo")
+_OLD_POSES = (("world/", ""), ("world/", "link/"), ("", ""), ("", "link/"))  # of <origin>, in and below a model
 
 
 def read_sdf(path: Path) -> ET.Element:
@@ -28,7 +29,7 @@ def read_sdf(path: Path) -> ET.Element:
         data = path.read_bytes()
     except OSError as err:
         raise WorldError(path, f"cannot be read: {err.strerror}") from err
-    if b"<xacro:" in data:
+    if b"<xacro:" in data and b"<xacro:" in _COMMENT.sub(b"", data):
         raise WorldError(path, "holds xacro macros, expand it first: rosrun xacro xacro FILE > WORLD")
     try:
         root = ET.fromstring(data)
@@ -36,7 +37,7 @@ def read_sdf(path: Path) -> ET.Element:
         root = _forgiven(path, data, err)
     if root.tag not in _ROOTS:
         raise WorldError(path, f"is no SDF file, its first element is <{root.tag}>")
-    if root.find(".//origin[@pose]") is not None:
+    if any(root.find(f"{outer}model/{inner}origin[@pose]") is not None for outer, inner in _OLD_POSES):
         version = root.get("version", "1.0")
         raise WorldError(path, f"is of SDF {version}, with poses in <origin>: convert it with 'gz sdf -c' of Gazebo")
     if _number(root.get("version", "")) < (1, 5):

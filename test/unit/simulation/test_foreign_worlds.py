@@ -75,9 +75,14 @@ WORLD = sdf(model(f"<collision name='c'>{BOX}</collision>"))
         WORLD.replace("<world name='default'>", "<world name='default'><gz:thing a='1'/>`"),
         WORLD.replace("<sdf", "<gazebo").replace("</sdf", "</gazebo"),
         WORLD + "\n<!-- the end -->\n",
+        WORLD.replace("<world", "<!-- was <xacro:include filename='a'/> --><world"),
+        WORLD.replace("</model>", "<plugin name='p'><origin pose='0 0 0 0 0 0'/></plugin></model>"),
     ],
-    ids=["comment first", "empty lines first", "byte order mark", "utf-16", "dashes", "prefix", "gazebo", "trailing"],
-)
+    ids=[
+        "comment first", "empty lines first", "byte order mark", "utf-16", "dashes", "prefix", "gazebo", "trailing",
+        "macro in a comment", "origin of a plugin",
+    ],
+)  # fmt: skip
 def test_xml_that_gazebo_reads_is_read(tmp_path: Path, text: str | bytes) -> None:
     assert [body.name for body in read(tmp_path, text).bodies] == ["thing"]
 
@@ -480,6 +485,21 @@ def test_a_door_s_axis_may_be_of_another_frame(tmp_path: Path) -> None:
     text = (HINGED % "").replace("<xyz>0 0 1<", "<xyz expressed_in='__model__'>0 0 1<")
     (door,) = read(tmp_path, sdf(text, version="1.7")).doors
     assert door.swing == pytest.approx(1.2)
+
+
+def test_a_leaf_may_be_a_mesh(tmp_path: Path) -> None:
+    points = [(x, y, z) for z in (0.0, 2.0) for x, y in ((-0.02, 0.0), (0.02, 0.0), (0.02, -0.8), (-0.02, -0.8))]
+    faces = "".join(f"f {i} {j} {j + 4}\nf {i} {j + 4} {i + 4}\n" for i, j in ((1, 2), (2, 3), (3, 4), (4, 1)))
+    (tmp_path / "leaf.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in points) + faces)
+    leaf = "<collision name='c'><geometry><mesh><uri>leaf.obj</uri></mesh></geometry></collision>"
+    text = (HINGED % "").replace("<pose>0 0 2 3.14159265 0 0</pose>", "")
+    begin = text.index("<collision name='c'><pose>0 -0.4")
+    text = text[:begin] + leaf + text[text.index("</link>", begin) :]
+    engine = Engine(read(tmp_path, sdf(text)))
+    engine.set_door("side_door/door", 1.0, 0.0)
+    engine.step()
+    assert engine.doors[0].opening == 1.0
+    engine.close()
 
 
 def test_a_locked_joint_is_no_door(tmp_path: Path) -> None:
