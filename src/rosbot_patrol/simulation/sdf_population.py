@@ -39,7 +39,7 @@ def places_of(element: ET.Element, place: Place) -> list[Matrix]:
         if not 0 <= count <= _MOST:
             raise place.inside("<model_count>").error(f"expected 0 to {_MOST}, got {count:g}")
         offsets = _spread(element, place, kind, int(count))
-    return [outer @ from_xyz_rpy(offset.tolist()) for offset in offsets]
+    return [from_xyz_rpy((outer @ (*offset, 1.0))[:3].tolist()) for offset in offsets]  # none of them is turned
 
 
 def _grid(element: ET.Element, place: Place) -> NDArray[np.float64]:
@@ -51,9 +51,11 @@ def _grid(element: ET.Element, place: Place) -> NDArray[np.float64]:
     if not 0 <= rows * columns <= _MOST:
         raise place.error(f"expected at most {_MOST} copies, got {rows} x {columns}")
     step = floats(form.findtext("step") or "1 1 0", 3, place.inside("<step>"))
-    first = floats(form.findtext("min") or "0 0 0", 3, place.inside("<min>"))
     row, column = np.divmod(np.arange(rows * columns), max(columns, 1))
-    return np.column_stack((column, row, np.zeros(rows * columns))) * step + first
+    offsets = np.column_stack((column, row, np.zeros(rows * columns))) * step
+    if form.find("min") is not None:
+        return offsets + floats(form.findtext("min") or "", 3, place.inside("<min>"))
+    return offsets - np.array([(columns - 1) / 2.0, (rows - 1) / 2.0, 0.0]) * step
 
 
 def _spread(element: ET.Element, place: Place, kind: str, count: int) -> NDArray[np.float64]:
@@ -61,7 +63,7 @@ def _spread(element: ET.Element, place: Place, kind: str, count: int) -> NDArray
     if kind in _AXES:
         axis = _AXES[kind]
         share = np.full((count, 3), 0.5)
-        share[:, axis] = np.arange(count) / max(count - 1, 1)
+        share[:, axis] = np.arange(count) / max(count, 1)
     elif kind in ("random", "uniform"):
         rng = np.random.default_rng(zlib.crc32((element.get("name") or "").encode()))
         share = rng.random((count, 3))
@@ -84,7 +86,7 @@ def _region(element: ET.Element, place: Place) -> tuple[NDArray[np.float64], NDA
         return (np.array(low) + high) / 2.0, np.array(high) - low, 0.0
     box = element.find("box")
     if box is not None:
-        return np.zeros(3), np.array(sizes(box, "size", 3, place)), 0.0
+        return np.zeros(3), np.abs(floats(box.findtext("size") or "", 3, place.inside("<size>"))), 0.0
     round_one = element.find("cylinder")
     round_one = element.find("region/cylinder") if round_one is None else round_one
     if round_one is None:

@@ -183,8 +183,7 @@ class Reader:
         name = model.get("name") or "model"
         here = place.inside(f"model '{name}'")
         for i, outer_from_copy in enumerate(places_of(element, place)):
-            pose = world_from_outer @ outer_from_copy @ pose_of(model, here)
-            self._model(model, here, pose, f"{outer}{name}_clone_{i}")
+            self._model(model, here, world_from_outer @ outer_from_copy, f"{outer}{name}_clone_{i}")
 
     def _is_actor(self, name: str, words: Iterable[str], pose: Matrix) -> bool:
         kind = actor_kind(words)

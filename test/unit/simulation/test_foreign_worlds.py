@@ -12,10 +12,12 @@ import pytest
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.matrices import to_pose2d
+from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.robot import load_robot
 from rosbot_patrol.simulation.scene import Body
 from rosbot_patrol.simulation.slices import slice_bodies
 from rosbot_patrol.simulation.world import World, load_world
+from rosbot_patrol.simulation.world_picture import draw_world
 
 DATA = Path(__file__).parent / "data"
 ROBOT = Path(__file__).parents[3] / "urdf" / "rosbot.urdf"
@@ -147,6 +149,24 @@ def test_links_of_a_state_may_bear_the_name_of_their_model(tmp_path: Path) -> No
     )
     world = read(tmp_path, sdf(model(f"<collision name='c'>{BOX}</collision>") + state))
     assert to_pose2d(world.bodies[0].pose)[:2] == (1.0, 3.0)
+
+
+def test_what_fell_out_of_the_world_is_gone_and_harms_nothing(tmp_path: Path) -> None:
+    fallen = model(both("<box><size>1 1 1</size></box>"), name="bed", more="<pose>4 -4 -7.54989e+08 0 -1e-06 0</pose>")
+    wall = model(both("<box><size>0.1 8 2</size></box>"), name="wall", more="<pose>3 0 1 0 0 0</pose>")
+    world = read(tmp_path, sdf(fallen + wall))
+    engine = Engine(world)
+    engine.spawn_robot(load_robot(ROBOT))
+    for _ in range(50):
+        engine.step()
+    assert not engine.touches()
+    assert np.isfinite(engine.scan().ranges).any()
+    engine.close()
+    renderer = make_renderer()
+    picture = draw_world(world, renderer, width=300)
+    renderer.close()
+    column, row = picture.pixel_of(3.0, 0.0)
+    assert picture.pixels[round(row), round(column)] == pytest.approx(picture.pixels[round(row) + 5, round(column)])
 
 
 def test_inner_models_of_a_state_may_bear_their_whole_names(tmp_path: Path) -> None:
@@ -369,8 +389,10 @@ CAN = model(both("<cylinder><radius>0.03</radius><length>0.12</length></cylinder
          "<model_count>9</model_count><distribution>uniform</distribution>", 9),
         ("<pose>3.5 3.5 0 0 0 0</pose><cylinder><radius>0.5</radius><length>0.1</length></cylinder>"
          "<model_count>6</model_count><distribution><type>linear-x</type></distribution>", 6),
-        ("<pose>3 3 0 0 0 0</pose><distribution><type>grid</type><rows>2</rows><cols>3</cols><step>.25 .25 0</step>"
-         "</distribution>", 6),
+        ("<pose>3.5 3.5 0 0 0 0</pose><distribution><type>grid</type><rows>4</rows><cols>5</cols><step>.25 .25 0</step>"
+         "</distribution>", 20),
+        ("<pose>3.5 3.5 0 0 0 1.5708</pose><box><size>1 1 0</size></box><model_count>3</model_count>"
+         "<distribution><type>linear-y</type></distribution>", 3),
         ("<region><cuboid><min>3 3 0</min><rows>2</rows><cols>3</cols><step>.25 .25 0</step></cuboid></region>"
          "<distribution>grid</distribution>", 6),
     ],
@@ -383,6 +405,7 @@ def test_a_population_stands_in_its_region(tmp_path: Path, region: str, count: i
     assert places.min() >= 3.0 - 1e-9
     assert places.max() <= 4.0 + 1e-9
     assert len(np.unique(places.round(6), axis=0)) == count
+    assert all(np.array_equal(body.pose[:3, :3], np.eye(3)) for body in world.bodies)
     again = read(tmp_path, text)
     assert all(np.array_equal(a.pose, b.pose) for a, b in zip(world.bodies, again.bodies, strict=True))
 
