@@ -247,6 +247,22 @@ def test_a_scenario_wins_over_parameters_and_follows_the_patrol(ros, tmp_path):
     probe.expect(lambda s: s.get("data") == "Everything in the scenario has happened.")
 
 
+def test_a_scenario_that_is_watched_waits_for_its_watch(ros, tmp_path):
+    play = tmp_path / "play.yaml"
+    play.write_text(
+        f"world: {ROOT}/worlds/house.world\n"
+        "actors: [{name: cat_1, model: cat, after: start, at: 0.5, start: [2, 0]}]\n"
+    )
+    node = ros.node("simulator", URDF, f"_scenario:={play}", "_scenario_watched:=true")
+    node.says("motion sensors", 25.0)
+    time.sleep(2.0)
+    assert "cat_1" not in node.output
+    probe = ros.probe()
+    probe.tell(subscribe=["/simulator/scenario", "std_msgs/String"])
+    probe.expect(lambda s: s.get("data") == "cat_1 (cat) appears at (2.0, 0.0)")
+    probe.expect(lambda s: s.get("data") == "Everything in the scenario has happened.")
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

@@ -54,12 +54,18 @@ class NarratorNode:
         self._hinted = False
         file = self.params.scenario
         self._scenario = ScenarioWatch(file, self.params.simulator, self._tell) if file else None
-        rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100)
-        rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=100)
-        rospy.Subscriber("/patrol/alerts", Alert, self._on_alert, queue_size=100)
+        self._subscribers = [
+            rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100),
+            rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=100),
+            rospy.Subscriber("/patrol/alerts", Alert, self._on_alert, queue_size=100),
+        ]
 
     def run(self) -> int:
         """Tell until the end; the exit status."""
+        if self._scenario is not None:
+            while not rospy.is_shutdown() and not all(s.get_num_connections() for s in self._subscribers[1:]):
+                time.sleep(0.05)
+            self._scenario.start()
         while not rospy.is_shutdown():
             time.sleep(0.1)
             status = self._status()

@@ -28,7 +28,11 @@ class ScenarioWatch:
         self._tell = tell
         self._is_played = False
         self._on_guard_at: float | None = None
-        rospy.Subscriber(f"{simulator}/scenario", String, self._on_act, queue_size=100)
+        self._topic = f"{simulator}/scenario"
+
+    def start(self) -> None:
+        """Listen to what is played: it may begin."""
+        rospy.Subscriber(self._topic, String, self._on_act, queue_size=100)
 
     def is_over(self, narrator: Narrator) -> bool:
         """Whether nothing more is to come, or its time has passed."""

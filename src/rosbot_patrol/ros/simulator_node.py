@@ -73,6 +73,7 @@ class SimulatorParams(EngineParams):
     prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
     bridge_host: str = param("localhost", doc="where the bridge of the motion sensors runs")
     scenario: str = param("", doc="file of a scenario to play; what it says of world, sensors, seed and start counts")
+    scenario_watched: bool = param(False, doc="begin it only when somebody listens to ~scenario")
     rates: RateParams = field(default_factory=RateParams)
     lockstep: LockstepParams = field(default_factory=LockstepParams)
 
@@ -108,7 +109,9 @@ class Simulator:
         if p.rate == 0.0:
             self._lockstep.subscribe()
         self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id) for s in places}
-        self._scenario = ScenarioRunner(scenario, self._engine, self._clients) if scenario is not None else None
+        self._scenario = None
+        if scenario is not None:
+            self._scenario = ScenarioRunner(scenario, self._engine, self._clients, is_watched=p.scenario_watched)
         for client in self._clients.values():
             client.start()
         self._window = _open_window(self._engine) if p.gui else None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import queue
+import time
 from collections.abc import Mapping
 
 import rospy
@@ -14,6 +16,9 @@ from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.scenario import Scenario
 from rosbot_patrol.simulation.scenario_player import ScenarioPlayer
 
+log = logging.getLogger(__name__)
+
+WATCH_WAIT = 120.0  # wall time
 PLAYED = "Everything in the scenario has happened."
 
 _EVENTS = {
@@ -30,9 +35,14 @@ class ScenarioRunner:
         scenario: what is to happen.
         engine: where.
         clients: the sensors' links, by id.
+        is_watched: begin only when somebody listens to what is played, so that a watch that starts late on a busy
+            machine misses nothing; for so long nothing that happens counts.
     """
 
-    def __init__(self, scenario: Scenario, engine: Engine, clients: Mapping[int, EspClient]) -> None:
+    def __init__(
+        self, scenario: Scenario, engine: Engine, clients: Mapping[int, EspClient], *, is_watched: bool = False
+    ) -> None:
+        self._watch_until = time.monotonic() + WATCH_WAIT if is_watched else None
         self._events: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._was = ""
         self._told = rospy.Publisher("~scenario", String, queue_size=100, latch=True)
@@ -47,12 +57,23 @@ class ScenarioRunner:
 
     def advance(self) -> None:
         """Do what is due; before each step of the engine."""
+        if self._watch_until is not None and self._waits_for_its_watch(self._watch_until):
+            return
         while not self._events.empty():
             self._player.event(self._events.get())
         self._player.advance()
         if not self._is_played and not self._player.waiting:
             self._is_played = True
             self._tell(PLAYED)
+
+    def _waits_for_its_watch(self, until: float) -> bool:
+        is_late = time.monotonic() > until
+        if self._told.get_num_connections() == 0 and not is_late:
+            return True
+        if is_late:
+            log.warning("nobody watches the scenario after %.0f s: it is played all the same", WATCH_WAIT)
+        self._watch_until = None
+        return False
 
     def _tell(self, text: str) -> None:
         self._told.publish(String(text))

@@ -227,6 +227,11 @@ class Engine:
         """The robot's battery."""
         return self._need_robot().battery
 
+    @property
+    def laser_mount(self) -> Pose2D:
+        """base_from_laser; raises WorldError where the robot has no lidar."""
+        return self._need_robot().laser[1]
+
     def touches(self) -> list[Touch]:
         """What the robot touches, the floor apart."""
         return self._physics.touches()
@@ -386,10 +391,17 @@ class Engine:
         return self.population.spawn_actor(name, model, look, pose, posture=posture)
 
     def move_actor(
-        self, name: str, path: Sequence[Pose2D], speed: float, loop: bool = False, *, pause: float = 0.0
+        self,
+        name: str,
+        path: Sequence[Pose2D],
+        speed: float,
+        loop: bool = False,
+        *,
+        pause: float = 0.0,
+        yields: bool = True,
     ) -> None:
         """Let an actor walk along points, or put it somewhere; raises WorldError, also for a path through a wall."""
-        self.population.move_actor(name, path, speed, loop, pause=pause)
+        self.population.move_actor(name, path, speed, loop, pause=pause, yields=yields)
 
     def roam_actor(self, name: str, radius: float, speed: float, *, pause: float = 2.0) -> None:
         """Let an actor wander within a radius [m] of where it is; raises WorldError."""

@@ -57,6 +57,7 @@ class Physics:
         self._still: dict[str, Body] = {}
         self._shapes: dict[str, list[int]] = {}  # PyBullet keeps them to its end: made once
         self._near = NearBodies()
+        self._stepping_over: set[str] = set()
         self._robot: int | None = None
         self._limits = (0.0, 0.0, 0.0)
         self._height = 0.0
@@ -83,6 +84,7 @@ class Physics:
             self._near.remove(name)
         self._take(name)
         self._shapes.pop(name, None)
+        self._stepping_over.discard(name)
 
     def move(self, name: str, world_from_body: Matrix) -> None:
         """Put a body elsewhere; one that stood still is taken for one that moves from now on."""
@@ -96,6 +98,19 @@ class Physics:
             pybullet.resetBasePositionAndOrientation(
                 number, world_from_body[:3, 3].tolist(), to_quaternion(world_from_body), physicsClientId=self._client
             )
+
+    def let_step_over(self, name: str, is_so: bool = True) -> None:
+        """Say whether a body that is moved steps over the robot: both touch, but neither stops or pushes the other."""
+        (self._stepping_over.add if is_so else self._stepping_over.discard)(name)
+        self._let_touch(name)
+
+    def _let_touch(self, name: str) -> None:
+        if self._robot is None:
+            return
+        pushes = int(name not in self._stepping_over)
+        for number in self._ids.get(name, ()):
+            for link in (-1, *_JOINTS):
+                pybullet.setCollisionFilterPair(number, self._robot, -1, link, pushes, physicsClientId=self._client)
 
     def _put(self, body: Body) -> None:
         if body.name not in self._shapes:
@@ -113,6 +128,7 @@ class Physics:
             )
             self._bodies[number] = body
             self._ids[body.name].append(number)
+        self._let_touch(body.name)
 
     def _take(self, name: str) -> None:
         for number in self._ids.pop(name, ()):
@@ -168,6 +184,8 @@ class Physics:
             )  # fmt: skip
         grip = traction * robot.mass * GRAVITY
         self._limits = (grip, grip, grip * robot.track / 2.0)
+        for name in self._stepping_over:
+            self._let_touch(name)
         self.set_pose(pose)
         stuck = self.blocker()
         if stuck:
@@ -228,9 +246,13 @@ class Physics:
         if self._robot is None:
             return []
         found = []
-        for contact in pybullet.getContactPoints(bodyA=self._robot, physicsClientId=self._client):
+        contacts = list(pybullet.getContactPoints(bodyA=self._robot, physicsClientId=self._client))
+        contacts = [c for c in contacts if c[8] <= 1e-3 and c[9] > 0.0]
+        for number in (n for name in sorted(self._stepping_over) for n in self._ids.get(name, ())):
+            contacts += pybullet.getClosestPoints(self._robot, number, 0.0, physicsClientId=self._client)
+        for contact in contacts:
             body = self._bodies.get(contact[2])
-            if body is None or contact[8] > 1e-3 or contact[9] <= 0.0:
+            if body is None:
                 continue
             found.append(
                 Touch(other=body.name, kind=body.kind, position=contact[5], normal=contact[7], force=contact[9])

@@ -105,7 +105,14 @@ class Population:
         return name
 
     def move_actor(
-        self, name: str, path: Sequence[Pose2D], speed: float, loop: bool = False, *, pause: float = 0.0
+        self,
+        name: str,
+        path: Sequence[Pose2D],
+        speed: float,
+        loop: bool = False,
+        *,
+        pause: float = 0.0,
+        yields: bool = True,
     ) -> None:
         """Let an actor walk along points, or put it somewhere (one point, speed 0).
 
@@ -118,7 +125,8 @@ class Population:
         finite = all(math.isfinite(v) for p in path for v in p)
         if speed > 0.0 and finite and path:
             self._ways.check(name, [walker.pose, *path, *(path[:1] if loop else ())])
-        walker.walk(path, speed, loop, pause=pause)
+        walker.walk(path, speed, loop, pause=pause, yields=yields)
+        self._physics.let_step_over(name, not yields)
         if walker.pose == before:
             return
         self._physics.move(name, walker.matrix)
@@ -135,6 +143,7 @@ class Population:
             doors = [self.cut_of_doors(level) for level in LEVELS] if self._doors else ()
             return self._ways.is_free(start, goal, walker.radius, doors)
 
+        self._physics.let_step_over(name, False)
         walker.roam(radius, speed, noise_of(self._seed, f"ways of {name}"), is_free, pause=pause)
 
     def remove(self, name: str) -> None:

@@ -53,6 +53,7 @@ class Way(Timed):
     speed: float = param(0.8, unit="m/s", lo=0.05, hi=8.0, doc="how fast")
     loop: bool = param(False, doc="again and again")
     pause: float = param(0.0, unit="s", lo=0.0, check=finite, doc="stands that long at each point")
+    yields: bool = param(True, doc="stops before the robot; else it walks on, over it if need be")
     roam: float = param(0.0, unit="m", lo=0.0, hi=50.0, doc="instead of a path: wanders within that radius")
 
 

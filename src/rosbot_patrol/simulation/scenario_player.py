@@ -59,7 +59,6 @@ class ScenarioPlayer:
         self._check()
         self._waiting = self._acts()
         self._next = -math.inf
-        self.event("start")
 
     @property
     def waiting(self) -> tuple[str, ...]:
@@ -73,11 +72,12 @@ class ScenarioPlayer:
             self._next = -math.inf
 
     def advance(self) -> None:
-        """Do what is due.
+        """Do what is due; the first call is the event `start`.
 
         Raises:
             WorldError: it cannot be done, such as a box where the robot stands.
         """
+        self.event("start")
         now = self._engine.now
         if now < self._next - _CLOSE:
             return
@@ -125,7 +125,8 @@ class ScenarioPlayer:
         if way.roam:
             self._engine.roam_actor(name, way.roam, way.speed, pause=way.pause)
         elif way.path:
-            self._engine.move_actor(name, [pose_of(p) for p in way.path], way.speed, way.loop, pause=way.pause)
+            path = [pose_of(p) for p in way.path]
+            self._engine.move_actor(name, path, way.speed, way.loop, pause=way.pause, yields=way.yields)
 
     def _check(self) -> None:
         """That what is named is there."""

@@ -78,6 +78,7 @@ class Walker:
         self._speed = 0.0
         self._loop = False
         self._pause = 0.0
+        self.yields = True
         self._waits = 0.0
         self._held_up = 0.0
         self._roaming: _Roaming | None = None
@@ -91,6 +92,11 @@ class Walker:
     def is_walking(self) -> bool:
         """Whether it moves on now."""
         return self._pace > 0.0
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether it stands at the end of its way, or was given none."""
+        return not self._path and self._roaming is None
 
     @property
     def speed(self) -> float:
@@ -136,7 +142,9 @@ class Walker:
         """world_from_body."""
         return from_pose2d(self.pose)
 
-    def walk(self, path: Sequence[Pose2D], speed: float, loop: bool = False, *, pause: float = 0.0) -> None:
+    def walk(
+        self, path: Sequence[Pose2D], speed: float, loop: bool = False, *, pause: float = 0.0, yields: bool = True
+    ) -> None:
         """Walk along points; a single point with speed 0 puts it there.
 
         Args:
@@ -144,6 +152,7 @@ class Walker:
             speed: a person strolls at 0.4 and hurries at 1.4 [m/s].
             loop: begin again after the last point.
             pause: stand that long at each point [s].
+            yields: stop before the robot; else it walks on, over it if need be.
 
         Raises:
             WorldError: no points, a number that is not finite, a path without speed, or one that nobody runs at.
@@ -157,6 +166,7 @@ class Walker:
         self._roaming = None
         self._waits = self._pace = 0.0
         self._next, self._speed, self._loop, self._pause = 0, speed, loop, pause
+        self.yields = yields
         self._path = list(path) if speed > 0.0 else []
         if speed == 0.0:
             self.pose = path[0]
@@ -185,6 +195,7 @@ class Walker:
         if not (math.isfinite(radius) and radius > 0.0 and speed > 0.0):
             raise WorldError(f"actor '{self.name}'", f"cannot wander within {radius} m at {speed} m/s")
         self._check(speed, pause)
+        self.yields = True
         self._roaming = _Roaming(self.pose, radius, rng, is_free)
         self._path, self._loop, self._speed, self._pause = [], False, speed, pause
         self._waits = self._held_up = self._pace = 0.0
@@ -256,7 +267,11 @@ class Walker:
 
     def _is_in_the_way(self, moved: Pose2D, robot: Pose2D | None, obstacles: Sequence[Obstacle]) -> bool:
         """Whether a move would bring it nearer to something that it is near to already; turning is always free."""
-        if robot is not None and distance(moved, robot) < min(self.radius + _ROOM, distance(self.pose, robot)):
+        if (
+            self.yields
+            and robot is not None
+            and distance(moved, robot) < min(self.radius + _ROOM, distance(self.pose, robot))
+        ):
             return True
         for thing in obstacles:
             after = thing.distance_to(moved.x, moved.y)

@@ -214,6 +214,20 @@ def test_moves_that_cannot_be(build) -> None:
         engine.move_actor("joe", [Pose2D()], -1.0)
 
 
+@pytest.mark.parametrize("yields", [True, False])
+def test_who_does_not_yield_steps_over_the_robot_and_touches_it(build, yields: bool) -> None:
+    engine = build()
+    engine.spawn_actor("joe", "person", "", Pose2D(1.5, 0.0, math.pi))
+    engine.move_actor("joe", [Pose2D(-1.5, 0.0, 0.0)], 1.0, yields=yields)
+    touched = set()
+    for _ in range(round(5.0 / STEP)):
+        engine.step()
+        touched |= {touch.other for touch in engine.touches()}
+    assert engine.pose.x == pytest.approx(0.0, abs=1e-3)
+    assert touched == (set() if yields else {"joe"})
+    assert (engine.actors[0].pose.x < -1.4) == (not yields)
+
+
 def test_a_motion_sensor_sees_no_one_behind_a_wall(build) -> None:
     place = SensorPlace(id=4, room=4, x=0.0, y=5.0, yaw=-math.pi / 2)
 
