@@ -18,6 +18,11 @@ class Bounds(NamedTuple):
         """Whether no cell is inside."""
         return self.x1 <= self.x0 or self.y1 <= self.y0
 
+    @property
+    def size(self) -> int:
+        """How many cells are inside."""
+        return 0 if self.is_empty else (self.x1 - self.x0) * (self.y1 - self.y0)
+
     def union(self, other: Bounds) -> Bounds:
         """The smallest rectangle around both."""
         if self.is_empty:
@@ -40,21 +45,36 @@ class Bounds(NamedTuple):
         """Whether the two share a cell."""
         return self.x0 < other.x1 and other.x0 < self.x1 and self.y0 < other.y1 and other.y0 < self.y1
 
+    def without(self, other: Bounds) -> list[Bounds]:
+        """What is left of it where `other`, which overlaps it, is cut out: at most four rectangles."""
+        y0, y1 = max(self.y0, other.y0), min(self.y1, other.y1)
+        pieces = (
+            Bounds(self.x0, self.y0, self.x1, y0),
+            Bounds(self.x0, y1, self.x1, self.y1),
+            Bounds(self.x0, y0, other.x0, y1),
+            Bounds(other.x1, y0, self.x1, y1),
+        )
+        return [piece for piece in pieces if not piece.is_empty]
+
 
 NOTHING = Bounds(0, 0, 0, 0)
 
 
 def merged(areas: list[Bounds]) -> list[Bounds]:
-    """The same cells (and perhaps more) as rectangles that do not overlap."""
+    """The same cells (and perhaps a few more) as rectangles without a common cell.
+
+    Two that overlap become one where that adds little; else the common part is cut off one of them.
+    """
     todo = [a for a in areas if not a.is_empty]
     done: list[Bounds] = []
     while todo:
         area = todo.pop()
-        for other in done:
-            if area.overlaps(other):
-                done.remove(other)
-                todo.append(area.union(other))
-                break
-        else:
+        other = next((o for o in done if area.overlaps(o)), None)
+        if other is None:
             done.append(area)
+        elif area.union(other).size <= 1.3 * (area.size + other.size):
+            done.remove(other)
+            todo.append(area.union(other))
+        else:
+            todo += area.without(other)
     return done

@@ -1,145 +1,96 @@
-"""Inner loops of the costmap: exact bounded distances, ray tracing, merging of layers, polygons."""
+"""Inner loops of the layers: ray tracing, marking, merging into the master, maps that lie differently, polygons."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from rosbot_patrol.kernels import kernel
 
+CLEARED = 1  # a lethal cell that a ray has cleared in this update and that nothing has marked again yet
 
-@kernel("void(uint8[:, ::1], int64, int64, int64, int64, int64, uint8[::1], boolean)")
-def inflate(cells, x0, y0, x1, y1, radius, table, inflate_unknown):
-    """Raise the costs of cells [y0:y1, x0:x1] by their distance to the nearest lethal cell.
 
-    Exact Euclidean distances in two passes (Meijster, Roerdink, Hesselink 2000), bounded by `radius` cells; lethal
-    cells up to `radius` outside the rectangle count. `table[d2]` is the cost at the squared distance d2 in cells.
+@kernel("void(int64[::1], int64, int64)")
+def _touch(changes, x, y):
+    changes[0], changes[1] = min(changes[0], x), min(changes[1], y)
+    changes[2], changes[3] = max(changes[2], x + 1), max(changes[3], y + 1)
+
+
+@kernel(
+    "void(uint8[:, ::1], float64, float64, float64, float64, float64, float64[:, ::1], int64, int32[::1], int64[::1])"
+)
+def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, reach, cleared, changes):
+    """Free the cells from the sensor to each end [m], at most `reach` cells far.
+
+    Lines are costmap_2d's: cut at the window's edge, then Bresenham's, both ends included. A lethal cell becomes
+    CLEARED and is noted, so that `settle` can tell which really went.
+
+    Args:
+        cells: the layer's costs.
+        resolution: edge of a cell [m].
+        origin_x: left edge of the window [m].
+        origin_y: lower edge [m].
+        sensor_x: where the rays start [m]; outside the window nothing is cleared.
+        sensor_y: the same.
+        ends: shape (N, 2) [m].
+        reach: [cells].
+        cleared: flat indices of lethal cells that were cleared; changes[4] counts them, also those without room.
+        changes: x0, y0, x1, y1 around the cells that changed, grown here, and the count.
     """
-    height, width = cells.shape
-    rx0, rx1 = max(x0 - radius, 0), min(x1 + radius, width)
-    ry0, ry1 = max(y0 - radius, 0), min(y1 + radius, height)
-    w, h = rx1 - rx0, ry1 - ry0
-    cap = radius + 1
-    down = np.empty((h, w), np.uint16)
-    # vertical distance to the nearest lethal cell above (lower index), then below
-    for x in range(w):
-        down[0, x] = 0 if cells[ry0, rx0 + x] == 254 else cap
-    for y in range(1, h):
-        for x in range(w):
-            d = min(down[y - 1, x] + 1, cap)
-            down[y, x] = 0 if cells[ry0 + y, rx0 + x] == 254 else d
-    for y in range(h - 2, -1, -1):
-        for x in range(w):
-            d = down[y + 1, x] + 1
-            down[y, x] = min(d, down[y, x])
-    site = np.empty(w, np.int32)
-    site_d2 = np.empty(w, np.int32)
-    start = np.empty(w, np.int32)
-    r2 = radius * radius
-    for iy in range(y0, y1):
-        row = down[iy - ry0]
-        n = 0
-        for u in range(w):
-            g = np.int32(row[u])
-            if g > radius:
-                continue
-            g2 = g * g
-            begin = 0
-            while n > 0:
-                v = site[n - 1]
-                # first column at which u is nearer than v
-                sep = (np.float64(u) * u - np.float64(v) * v + g2 - site_d2[n - 1]) / (2.0 * (u - v))
-                begin = math.floor(sep) + 1
-                if begin > start[n - 1]:
-                    break
-                n -= 1
-            if n == 0:
-                begin = 0
-            if begin < w:
-                site[n], site_d2[n], start[n] = u, g2, max(begin, 0)
-                n += 1
-        if n == 0:
-            continue
-        k = 0
-        out = cells[iy]
-        for u in range(x0 - rx0, x1 - rx0):
-            while k + 1 < n and start[k + 1] <= u:
-                k += 1
-            dx = np.int64(u - site[k])
-            d2 = dx * dx + site_d2[k]
-            if d2 > r2 or d2 == 0:
-                continue
-            cost = table[d2]
-            old = out[rx0 + u]
-            if old == 255:
-                if (inflate_unknown and cost > 0) or cost >= 253:
-                    out[rx0 + u] = cost
-            elif cost > old:
-                out[rx0 + u] = cost
-
-
-@kernel("void(uint8[:, ::1], int64, int64, int64, int64, float64, uint8)", inline="never")
-def draw_ray(cells, x0, y0, x1, y1, max_cells, value):
-    """Set the cells of a line (Bresenham), at most `max_cells` long, both ends included; those inside the grid."""
-    height, width = cells.shape
-    dx, dy = abs(x1 - x0), abs(y1 - y0)
-    length = math.sqrt(float(dx * dx + dy * dy))
-    steps = max(dx, dy)
-    if length > max_cells:
-        steps = int(steps * max_cells / length)
-    sx = 1 if x1 > x0 else -1
-    sy = 1 if y1 > y0 else -1
-    x, y = x0, y0
-    error = max(dx, dy) // 2
-    for _ in range(steps + 1):
-        if x < 0 or y < 0 or x >= width or y >= height:
-            return
-        cells[y, x] = value
-        if dx >= dy:
-            x += sx
-            error -= dy
-            if error < 0:
-                y += sy
-                error += dx
-        else:
-            y += sy
-            error -= dx
-            if error < 0:
-                x += sx
-                error += dy
-
-
-@kernel("int64[::1](uint8[:, ::1], float64, float64, float64, float64, float64, float64[:, ::1], float64)")
-def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, raytrace_range):
-    """Set the cells from the sensor to each end [m] free, up to `raytrace_range`; returns the bounds touched."""
     height, width = cells.shape
     cx = math.floor((sensor_x - origin_x) / resolution)
     cy = math.floor((sensor_y - origin_y) / resolution)
-    bounds = np.array([width, height, 0, 0], dtype=np.int64)
     if cx < 0 or cy < 0 or cx >= width or cy >= height:
-        bounds[0] = bounds[1] = 0
-        return bounds
-    reach = raytrace_range / resolution
+        return
+    end_x, end_y = origin_x + width * resolution, origin_y + height * resolution
     for i in range(ends.shape[0]):
-        ex = math.floor((ends[i, 0] - origin_x) / resolution)
-        ey = math.floor((ends[i, 1] - origin_y) / resolution)
-        draw_ray(cells, cx, cy, ex, ey, reach, 0)
-        length = math.sqrt(float((ex - cx) * (ex - cx) + (ey - cy) * (ey - cy)))
+        wx, wy = ends[i, 0], ends[i, 1]
+        a, b = wx - sensor_x, wy - sensor_y
+        if wx < origin_x:
+            wx, wy = origin_x, sensor_y + b * (origin_x - sensor_x) / a
+        if wy < origin_y:
+            wx, wy = sensor_x + a * (origin_y - sensor_y) / b, origin_y
+        if wx > end_x:
+            wx, wy = end_x - 0.001, sensor_y + b * (end_x - sensor_x) / a
+        if wy > end_y:
+            wx, wy = sensor_x + a * (end_y - sensor_y) / b, end_y - 0.001
+        ex, ey = math.floor((wx - origin_x) / resolution), math.floor((wy - origin_y) / resolution)
+        if ex < 0 or ey < 0 or ex >= width or ey >= height:
+            continue
+        dx, dy = abs(ex - cx), abs(ey - cy)
+        length = math.sqrt(float(dx * dx + dy * dy))
+        long, short = max(dx, dy), min(dx, dy)
+        steps = long
         if length > reach:
-            ex = cx + int((ex - cx) * reach / length)
-            ey = cy + int((ey - cy) * reach / length)
-        ex, ey = min(max(ex, 0), width - 1), min(max(ey, 0), height - 1)
-        bounds[0], bounds[1] = min(bounds[0], ex, cx), min(bounds[1], ey, cy)
-        bounds[2], bounds[3] = max(bounds[2], ex + 1, cx + 1), max(bounds[3], ey + 1, cy + 1)
-    return bounds
+            steps = int(reach / length * long)
+        sx, sy = (1 if ex > cx else -1), (1 if ey > cy else -1)
+        x, y = cx, cy
+        error = long // 2
+        for _ in range(steps + 1):
+            old = cells[y, x]
+            if old == 254:
+                cells[y, x] = CLEARED
+                if changes[4] < len(cleared):
+                    cleared[changes[4]] = y * width + x
+                changes[4] += 1
+            elif old > CLEARED:
+                cells[y, x] = 0
+                _touch(changes, x, y)
+            error += short
+            turns = error >= long
+            if turns:
+                error -= long
+            if dx >= dy:
+                x += sx
+                y += sy if turns else 0
+            else:
+                y += sy
+                x += sx if turns else 0
 
 
-@kernel("int64[::1](uint8[:, ::1], float64, float64, float64, float64, float64, float64[:, ::1], float64)")
-def mark_points(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, points, obstacle_range):
-    """Make the cells of points [m] nearer to the sensor than `obstacle_range` lethal; returns the bounds touched."""
+@kernel("void(uint8[:, ::1], float64, float64, float64, float64, float64, float64[:, ::1], float64, int64[::1])")
+def mark_points(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, points, obstacle_range, changes):
+    """Make the cells of points [m] nearer to the sensor than `obstacle_range` lethal; see `clear_rays`."""
     height, width = cells.shape
-    bounds = np.array([width, height, 0, 0], dtype=np.int64)
     reach = obstacle_range * obstacle_range
     for i in range(points.shape[0]):
         dx, dy = points[i, 0] - sensor_x, points[i, 1] - sensor_y
@@ -149,32 +100,49 @@ def mark_points(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, point
         iy = math.floor((points[i, 1] - origin_y) / resolution)
         if ix < 0 or iy < 0 or ix >= width or iy >= height:
             continue
+        old = cells[iy, ix]
         cells[iy, ix] = 254
-        bounds[0], bounds[1] = min(bounds[0], ix), min(bounds[1], iy)
-        bounds[2], bounds[3] = max(bounds[2], ix + 1), max(bounds[3], iy + 1)
-    if bounds[2] == 0:
-        bounds[0] = bounds[1] = 0
-    return bounds
+        if old != CLEARED and old != 254:
+            _touch(changes, ix, iy)
+
+
+@kernel("void(uint8[:, ::1], int32[::1], int64[::1])")
+def settle(cells, cleared, changes):
+    """Free the cells that were cleared and not marked again; see `clear_rays`."""
+    height, width = cells.shape
+    if changes[4] > len(cleared):  # more than could be noted
+        for y in range(height):
+            for x in range(width):
+                if cells[y, x] == CLEARED:
+                    cells[y, x] = 0
+                    _touch(changes, x, y)
+    else:
+        for i in range(changes[4]):
+            y, x = cleared[i] // width, cleared[i] % width
+            if cells[y, x] == CLEARED:
+                cells[y, x] = 0
+                _touch(changes, x, y)
+    changes[4] = 0
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)")
 def merge_max(master, layer, x0, y0, x1, y1):
     """Upstream's combination by maximum: unknown cells of the layer say nothing, unknown ones of the master yield."""
     for y in range(y0, y1):
-        for x in range(x0, x1):
-            new, old = layer[y, x], master[y, x]
-            if new != 255 and (old == 255 or old < new):
-                master[y, x] = new
+        old, new = master[y, x0:x1], layer[y, x0:x1]
+        for x in range(len(old)):
+            was, says = old[x], new[x]
+            higher = says if was == 255 else max(was, says)
+            old[x] = was if says == 255 else higher
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)")
 def merge_over(master, layer, x0, y0, x1, y1):
     """Upstream's combination by overwriting: all but the layer's unknown cells."""
     for y in range(y0, y1):
-        for x in range(x0, x1):
-            new = layer[y, x]
-            if new != 255:
-                master[y, x] = new
+        old, new = master[y, x0:x1], layer[y, x0:x1]
+        for x in range(len(old)):
+            old[x] = old[x] if new[x] == 255 else new[x]
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64, float64[::1], boolean)")
@@ -197,15 +165,25 @@ def sample_map(master, source, x0, y0, x1, y1, affine, use_maximum):
                 master[y, x] = new
 
 
-@kernel("void(uint8[:, ::1], float64[:, ::1], uint8)")
-def fill_polygon(cells, corners, value):
-    """Set the cells whose centres lie in a polygon; corners in cells (x, y), shape (N, 2)."""
-    height, width = cells.shape
+@kernel("void(uint8[:, ::1], float64[:, ::1], uint8, int64, int64, int64, int64, int64[::1])")
+def fill_polygon(cells, corners, value, left, low, right, high, changes):
+    """Set the cells whose centres lie in a polygon and in a rectangle; `changes` as in `clear_rays`.
+
+    Args:
+        cells: costs.
+        corners: in cells (x, y), shape (N, 2).
+        value: what they are set to.
+        left: of the rectangle [cells].
+        low: its lower edge.
+        right: not included.
+        high: not included.
+        changes: grown around the cells that had another value.
+    """
     n = corners.shape[0]
-    y0 = max(math.floor(corners[:, 1].min()), 0)
-    y1 = min(math.ceil(corners[:, 1].max()), height)
-    x0 = max(math.floor(corners[:, 0].min()), 0)
-    x1 = min(math.ceil(corners[:, 0].max()), width)
+    y0 = max(math.floor(corners[:, 1].min()), low)
+    y1 = min(math.ceil(corners[:, 1].max()), high)
+    x0 = max(math.floor(corners[:, 0].min()), left)
+    x1 = min(math.ceil(corners[:, 0].max()), right)
     for y in range(y0, y1):
         py = y + 0.5
         for x in range(x0, x1):
@@ -218,5 +196,6 @@ def fill_polygon(cells, corners, value):
                     if px < corners[i, 0] + slope * (py - corners[i, 1]):
                         inside = not inside
                 j = i
-            if inside:
+            if inside and cells[y, x] != value:
                 cells[y, x] = value
+                _touch(changes, x, y)

@@ -1,28 +1,33 @@
 """A costmap of layers (matches costmap_2d 1.17's LayeredCostmap and the grid side of Costmap2DROS).
 
-Differs: an update of a rolling window also recomputes the strips that came in, so that inflation reaches into them
-at once; upstream leaves them free until a beam touches them. Distances of the inflation are exact.
+An update computes only what can have changed: the cells that layers say have another cost, those in reach of them
+through the inflation, and what came into a rolling window. The result is, cell for cell, that of computing the whole
+window anew; the window slides over its memory, so that moving it copies nothing.
+
+Differs: what came into a rolling window is inflated at once, and the inflation of what has left it goes; upstream
+leaves both as they are until a beam touches the cells. Distances of the inflation are exact.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds, merged
-from rosbot_patrol.costmap.costs import FREE, UNKNOWN, CostCells
+from rosbot_patrol.costmap.costs import FREE, LETHAL, UNKNOWN, CostCells
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.costmap.inflation import InflationLayer
+from rosbot_patrol.costmap.keepout import KeepoutLayer
 from rosbot_patrol.costmap.layer import Layer
-from rosbot_patrol.costmap.obstacle import ObstacleLayer, shift_cells
+from rosbot_patrol.costmap.obstacle import ObstacleLayer
 from rosbot_patrol.costmap.params import (
     CostmapConfig,
     InflationParams,
+    KeepoutParams,
     LayerConfig,
     ObstacleParams,
     StaticParams,
 )
+from rosbot_patrol.costmap.scrolling import ScrollingCells, strips
 from rosbot_patrol.costmap.static import StaticLayer
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
@@ -31,6 +36,8 @@ from rosbot_patrol.grid import Grid, GridInfo
 def make_layer(config: LayerConfig) -> Layer:
     """The layer that a configuration describes."""
     params = config.params
+    if isinstance(params, KeepoutParams):
+        return KeepoutLayer(params, name=config.name)
     if isinstance(params, StaticParams):
         return StaticLayer(params, name=config.name)
     if isinstance(params, ObstacleParams):
@@ -54,19 +61,37 @@ class LayeredCostmap:
             name=f"{config.name}/footprint",
         )
         self._default = UNKNOWN if p.track_unknown_space else FREE
+        self._arrange()
         self._fresh = True
+        self._enabled: list[bool] = []
         self.pose = Pose2D()
-        size = max(1, math.ceil(p.width / p.resolution - 1e-9)), max(1, math.ceil(p.height / p.resolution - 1e-9))
+        # as upstream's cast to a whole number, but for what a division leaves below one
+        size = max(1, int(p.width / p.resolution + 1e-9)), max(1, int(p.height / p.resolution + 1e-9))
         self._resize(
             GridInfo(resolution=p.resolution, width=size[0], height=size[1], origin_x=p.origin_x, origin_y=p.origin_y)
         )
 
+    def _arrange(self) -> None:
+        """Tell the layers what else there is."""
+        for i, layer in enumerate(self.layers):
+            others = [o for o in self.layers if o is not layer and not isinstance(o, InflationLayer)]
+            if isinstance(layer, InflationLayer):
+                layer.keeps_source = any(not isinstance(o, InflationLayer) for o in self.layers[i + 1 :])
+            elif isinstance(layer, ObstacleLayer):
+                layer.has_others = bool(others)
+
     def _resize(self, info: GridInfo) -> None:
         self.info = info
-        self.cells: CostCells = np.full(info.shape, self._default, np.uint8)
+        moves = self.params.rolling_window
+        self._window = ScrollingCells(info.height, info.width, self._default, moves=moves)
         for layer in self.layers:
             layer.match(info, self.footprint)
         self._fresh = True
+
+    @property
+    def cells(self) -> CostCells:
+        """Costs now, shape (height, width); stale after the next update of a rolling window."""
+        return self._window.cells
 
     @property
     def grid(self) -> Grid:
@@ -92,44 +117,67 @@ class LayeredCostmap:
         return max(costs, default=FREE) if is_last else FREE
 
     def update(self, now: float, pose: Pose2D) -> list[Bounds]:
-        """Take in what the layers know, the robot standing at `pose`; returns the areas written."""
+        """Take in what the layers know, the robot standing at `pose`; returns the areas written, none twice."""
         self.pose = pose
         areas = self._follow(pose) if self.params.rolling_window else self._match_map()
-        if self._fresh:
-            areas, self._fresh = [Bounds(0, 0, self.info.width, self.info.height)], False
+        enabled = [layer.enabled for layer in self.layers]
+        self._fresh |= enabled != self._enabled
+        self._enabled = enabled
         bounds = NOTHING
         for layer in self.layers:
             if layer.enabled:
                 bounds = layer.update_bounds(now, pose, bounds)
-        reach = max((layer.radius_cells for layer in self.layers if isinstance(layer, InflationLayer)), default=0)
-        grown = [bounds, *(area.grown(reach) for area in areas)]
-        written = merged([area.clipped(self.info.width, self.info.height) for area in grown])
+        width, height = self.info.width, self.info.height
+        if self._fresh:
+            areas, bounds, self._fresh = [], Bounds(0, 0, width, height), False
+        written = merged([area.clipped(width, height) for area in (bounds, *areas)])
         for area in written:
             self.cells[area.y0 : area.y1, area.x0 : area.x1] = self._default
         for layer in self.layers:
             if layer.enabled:
+                if isinstance(layer, InflationLayer):
+                    layer.take_sources(self.cells, written)
                 for area in written:
                     layer.update_costs(self.cells, area)
         return written
 
+    @property
+    def _reach(self) -> int:
+        return max((layer.reach for layer in self.layers if isinstance(layer, InflationLayer)), default=0)
+
     def _match_map(self) -> list[Bounds]:
         for layer in self.static_layers:
-            if layer.map_info is not None and layer.enabled and layer.map_info != self.info:
+            if layer.sets_size and layer.map_info is not None and layer.enabled and layer.map_info != self.info:
                 self._resize(layer.map_info)
         return []
 
     def _follow(self, pose: Pose2D) -> list[Bounds]:
+        """Move the window to the robot; returns what has to be computed anew for that."""
         info = self.info
-        width, height = info.size
+        # upstream's size ends at the centre of the last cell (Costmap2D::getSizeInMetersX)
+        width, height = (info.width - 0.5) * info.resolution, (info.height - 0.5) * info.resolution
         dx = int((pose.x - width / 2.0 - info.origin_x) / info.resolution)
         dy = int((pose.y - height / 2.0 - info.origin_y) / info.resolution)
         if dx == 0 and dy == 0:
             return []
         self.info = info.moved_to(info.origin_x + dx * info.resolution, info.origin_y + dy * info.resolution)
-        shift_cells(self.cells, dx, dy, self._default)
+        left = self._lethal_leaving(dx, dy)
+        self._window.shift(dx, dy)
         for layer in self.layers:
             layer.move(self.info, dx, dy)
-        return _strips(info.width, info.height, dx, dy)
+        brings = any(isinstance(layer, StaticLayer) and layer.enabled for layer in self.layers)
+        came = [area.grown(self._reach if brings else 0) for area in strips(info.width, info.height, dx, dy)]
+        return [*came, *(area.grown(self._reach) for area in left)]
+
+    def _lethal_leaving(self, dx: int, dy: int) -> list[Bounds]:
+        """Where lethal cells will lie, outside the window, when it has moved."""
+        found = []
+        for strip in strips(self.info.width, self.info.height, -dx, -dy):
+            ys, xs = np.nonzero(self.cells[strip.y0 : strip.y1, strip.x0 : strip.x1] == LETHAL)
+            if len(ys):
+                x, y = strip.x0 - dx, strip.y0 - dy
+                found.append(Bounds(x + int(xs.min()), y + int(ys.min()), x + int(xs.max()) + 1, y + int(ys.max()) + 1))
+        return found
 
     def is_current(self, now: float) -> bool:
         """Whether all inputs are fresh enough to drive by."""
@@ -148,13 +196,3 @@ class LayeredCostmap:
         for layer in self.layers:
             layer.clear_outside(Bounds(x0, y0, x1 + 1, y1 + 1))
         self._fresh = True
-
-
-def _strips(width: int, height: int, dx: int, dy: int) -> list[Bounds]:
-    """The cells that come into a window that moved by (dx, dy)."""
-    strips = []
-    if dx:
-        strips.append(Bounds(width - dx, 0, width, height) if dx > 0 else Bounds(0, 0, -dx, height))
-    if dy:
-        strips.append(Bounds(0, height - dy, width, height) if dy > 0 else Bounds(0, 0, width, -dy))
-    return [strip.clipped(width, height) for strip in strips]

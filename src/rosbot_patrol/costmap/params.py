@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -67,7 +68,7 @@ class SourceParams:
 
 @dataclass(frozen=True, kw_only=True)
 class ObstacleParams:
-    """Parameters of costmap_2d::ObstacleLayer (VoxelLayer's further ones are accepted and have no effect)."""
+    """Parameters of costmap_2d::ObstacleLayer."""
 
     enabled: bool = param(True)
     track_unknown_space: bool = param(False, doc="the costmap's own where not given")
@@ -76,6 +77,37 @@ class ObstacleParams:
     max_obstacle_height: float = param(2.0, unit="m")
     transform_tolerance: float = param(0.2, unit="s", lo=0.0)
     observation_sources: str = param("", doc="names of sources, separated by spaces")
+    forget_unseen_after: float = param(
+        0.0,
+        unit="s",
+        lo=0.0,
+        doc="ours: a mark goes that was not hit for so long while beams passed its place, ended they or not; 0 never",
+    )
+    forget_out_of_view_after: float = param(
+        0.0, unit="s", lo=0.0, doc="ours: a mark goes that was neither hit nor in view for so long; 0 never"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class VoxelParams(ObstacleParams):
+    """Parameters of costmap_2d::VoxelLayer, which with planar scans is an obstacle layer."""
+
+    origin_z: float = param(0.0, unit="m", doc="height of the lowest voxel")
+    z_resolution: float = param(0.2, unit="m", lo=0.0, doc="height of a voxel")
+    z_voxels: int = param(10, lo=0, hi=16, doc="voxels in a column; points above the column are not marked")
+    unknown_threshold: int = param(15, lo=0, hi=16, doc="accepted, has no effect: cells that beams passed are free")
+    mark_threshold: int = param(0, lo=0, hi=16, doc="more voxels than this mark a cell; a planar scan has one")
+    publish_voxel_map: bool = param(False, doc="accepted, has no effect: there are no voxels to show")
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeepoutParams(StaticParams):
+    """Parameters of rosbot_patrol/KeepoutLayer, which is ours."""
+
+    map_topic: str = param("keepout_mask", doc="nav_msgs/OccupancyGrid with the mask, where there is no mask_file")
+    mask_file: str = param("", doc="yaml of map_server to take the mask from")
+    subscribe_to_updates: bool = param(False, doc="listen to <map_topic>_updates")
+    trinary_costmap: bool = param(True, doc="false: values between become costs")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +126,7 @@ class LayerConfig:
 
     name: str
     type: str
-    params: StaticParams | ObstacleParams | InflationParams
+    params: StaticParams | ObstacleParams | InflationParams  # and what is derived of them
     sources: dict[str, SourceParams]
 
 
@@ -110,8 +142,9 @@ class CostmapConfig:
 LAYER_TYPES: dict[str, type] = {
     "StaticLayer": StaticParams,
     "ObstacleLayer": ObstacleParams,
-    "VoxelLayer": ObstacleParams,
+    "VoxelLayer": VoxelParams,
     "InflationLayer": InflationParams,
+    "KeepoutLayer": KeepoutParams,
 }
 
 _INHERITED = ("obstacle_range", "raytrace_range", "max_obstacle_height", "min_obstacle_height")
@@ -182,7 +215,7 @@ def _plugins(value: Any, name: str) -> list[tuple[str, str]]:
     for item in value:
         if not isinstance(item, Mapping) or not {"name", "type"} <= set(item):
             raise ParamError(name, f"expected {{name, type}}, got {item!r}")
-        kind = str(item["type"]).split("::")[-1]
+        kind = re.split("::|/", str(item["type"]))[-1]
         if kind not in LAYER_TYPES:
             raise ParamError(name, f"knows no layer '{item['type']}', expected one of {', '.join(LAYER_TYPES)}")
         found.append((str(item["name"]), kind))

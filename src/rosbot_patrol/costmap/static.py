@@ -24,6 +24,8 @@ class StaticLayer(Layer):
     frame, the map is sampled at the master's cells through `master_from_map`.
     """
 
+    sets_size = True  # whether a costmap that does not roll takes the map's place
+
     def __init__(self, params: StaticParams, *, name: str = "static_layer") -> None:
         self.name = name
         self.enabled = params.enabled
@@ -109,9 +111,14 @@ class StaticLayer(Layer):
                 area = np.s_[bounds.y0 : bounds.y1, bounds.x0 : bounds.x1]
                 master[area] = self._costs[area]
             return
+        self._sample(master, bounds, use_maximum=self.params.use_maximum)
+
+    def _sample(self, master: CostCells, bounds: Bounds, *, use_maximum: bool) -> None:
+        """Write the map's costs at the places of the master's cells."""
+        assert self._info is not None
+        assert self.map_info is not None
         self._sampled_from = self.master_from_map
-        affine = self._affine(self._info, self.map_info)
-        kernels.sample_map(master, self._costs, *bounds, affine, self.params.use_maximum)
+        kernels.sample_map(master, self._costs, *bounds, self._affine(self._info, self.map_info), use_maximum)
 
     def _affine(self, info: GridInfo, source: GridInfo) -> np.ndarray:
         """Cell of the map for a cell of the master, as `sample_map` wants it."""

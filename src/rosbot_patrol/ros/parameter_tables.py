@@ -13,9 +13,11 @@ from rosbot_patrol.control.teleop import TeleopParams
 from rosbot_patrol.costmap.params import (
     CostmapParams,
     InflationParams,
+    KeepoutParams,
     ObstacleParams,
     SourceParams,
     StaticParams,
+    VoxelParams,
 )
 from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.navigation.params import MoveBaseParams
@@ -56,6 +58,8 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
             ("<costmap>/obstacle_layer/", ObstacleParams),
             ("<costmap>/obstacle_layer/<source>/", SourceParams),
             ("<costmap>/inflation_layer/", InflationParams),
+            ("<costmap>/<name of a VoxelLayer>/", VoxelParams),
+            ("<costmap>/<name of a KeepoutLayer>/", KeepoutParams),
         ],
     ),
     ("amcl", [("", AmclParams)]),

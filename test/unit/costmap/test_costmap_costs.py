@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 
-from rosbot_patrol.costmap import costmap_kernels as kernels
-from rosbot_patrol.costmap.costs import costs_of_occupancy, occupancy_of
-from rosbot_patrol.costmap.inflation import cost_at, cost_table
+from rosbot_patrol.costmap import inflation_kernels as kernels
+from rosbot_patrol.costmap.bounds import Bounds
+from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL, UNKNOWN, costs_of_occupancy, occupancy_of
+from rosbot_patrol.costmap.footprint import Footprint
+from rosbot_patrol.costmap.inflation import InflationLayer, cost_at, cost_table
+from rosbot_patrol.costmap.params import InflationParams
+from rosbot_patrol.grid import GridInfo
 
 
 @pytest.mark.parametrize(("cost", "shown"), [(0, 0), (1, 1), (252, 98), (253, 99), (254, 100), (255, -1)])
@@ -40,21 +45,63 @@ def test_cost_decays_from_the_inscribed_radius():
     assert cost(0.3) == int(252 * math.exp(-1.0))
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_inflation_is_exact(seed):
-    rng = np.random.default_rng(seed)
-    cells = np.zeros((50, 70), np.uint8)
-    cells[rng.integers(0, 50, 9), rng.integers(0, 70, 9)] = 254
-    cells[rng.integers(0, 50, 30), rng.integers(0, 70, 30)] = 100
-    radius = int(rng.integers(1, 20))
-    table = cost_table(radius, 0.05, inscribed_radius=0.1, cost_scaling_factor=3.0)
-    ys, xs = np.nonzero(cells == 254)
-    y, x = np.mgrid[:50, :70]
+def inflate(cells, x0, y0, x1, y1, radius, table, inflate_unknown):
+    """Both kernels, which have to agree."""
+    padded = np.zeros(65536, np.uint8)
+    padded[: len(table)] = table
+    far, floor = cells.copy(), 1 if inflate_unknown else INSCRIBED
+    kernels.inflate_far(far, far, x0, y0, x1, y1, radius, table, floor)
+    kernels.inflate(cells, cells, x0, y0, x1, y1, radius, padded, floor)
+    assert np.array_equal(cells, far)
+
+
+def scattered(rng, shape, lethal, others):
+    cells = np.zeros(shape, np.uint8)
+    cells[rng.integers(0, shape[0], others), rng.integers(0, shape[1], others)] = 100
+    cells[rng.integers(0, shape[0], others), rng.integers(0, shape[1], others)] = UNKNOWN
+    cells[rng.integers(0, shape[0], lethal), rng.integers(0, shape[1], lethal)] = LETHAL
+    return cells
+
+
+@pytest.mark.parametrize("unknown", [False, True])
+@pytest.mark.parametrize("radius", [1, 2, 7, 15, 16, 17, 33, 63])
+def test_inflation_is_exact(radius, unknown):
+    rng = np.random.default_rng(radius)
+    cells = scattered(rng, (50, 150), 7, 300)
+    table = cost_table(radius, 0.05, inscribed_radius=0.1, cost_scaling_factor=1.5)
+    ys, xs = np.nonzero(cells == LETHAL)
+    y, x = np.mgrid[:50, :150]
     d2 = ((y[..., None] - ys) ** 2 + (x[..., None] - xs) ** 2).min(axis=-1)
-    expected = np.maximum(cells, np.where(d2 <= radius**2, table[np.minimum(d2, radius**2)], 0))
-    inflated = cells.copy()
-    kernels.inflate(inflated, 0, 0, 70, 50, radius, table, False)
-    assert (inflated == expected).all()
+    cost = np.where(d2 <= radius**2, table[np.minimum(d2, radius**2)], 0)
+    over_unknown = np.where(cost >= (1 if unknown else INSCRIBED), cost, UNKNOWN)
+    expected = np.where(cells == UNKNOWN, over_unknown, np.maximum(cells, cost))
+    inflate(cells, 0, 0, 150, 50, radius, table, unknown)
+    assert np.array_equal(cells, expected)
+
+
+@pytest.mark.parametrize(("radius", "lethal"), [(254, 1), (254, 40), (250, 0), (100, 4000)])
+def test_wide_inflation_is_exact_by_opencvs_distances(radius, lethal):
+    rng = np.random.default_rng(lethal)
+    cells = scattered(rng, (700, 900), lethal, 0)
+    table = cost_table(radius, 0.01, inscribed_radius=0.13, cost_scaling_factor=1.0)
+    expected = cells.copy()
+    if lethal:
+        d = cv2.distanceTransform((cells != LETHAL).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        d2 = np.rint(d.astype(np.float64) ** 2).astype(np.int64)
+        expected = np.where(d2 <= radius**2, table[np.minimum(d2, radius**2)], 0)
+    inflate(cells, 0, 0, 900, 700, radius, table, False)
+    assert np.array_equal(cells, expected)
+
+
+def test_a_reach_beyond_the_fast_kernels_is_inflated():
+    layer = InflationLayer(InflationParams(inflation_radius=3.0, cost_scaling_factor=0.1))
+    layer.match(GridInfo(resolution=0.01, width=400, height=3), Footprint.of([], robot_radius=0.1, padding=0.0))
+    cells = np.zeros((3, 400), np.uint8)
+    cells[1, 0] = LETHAL
+    layer.update_costs(cells, Bounds(0, 0, 400, 3))
+    assert layer.reach == 300
+    assert cells[1, 300] == int(252 * math.exp(-0.1 * (3.0 - 0.1 * math.cos(math.pi / 16))))
+    assert cells[1, 301] == 0
 
 
 def test_inflation_of_a_part_sees_obstacles_outside_it():
@@ -62,8 +109,8 @@ def test_inflation_of_a_part_sees_obstacles_outside_it():
     cells[10, 10] = 254
     table = cost_table(6, 0.1, inscribed_radius=0.2, cost_scaling_factor=3.0)
     whole, part = cells.copy(), cells.copy()
-    kernels.inflate(whole, 0, 0, 40, 20, 6, table, False)
-    kernels.inflate(part, 12, 5, 20, 15, 6, table, False)
+    inflate(whole, 0, 0, 40, 20, 6, table, False)
+    inflate(part, 12, 5, 20, 15, 6, table, False)
     assert (part[5:15, 12:20] == whole[5:15, 12:20]).all()
     assert part[10, 11] == 0
 
@@ -73,7 +120,7 @@ def test_unknown_cells_are_inflated_only_by_the_robots_own_radius():
     cells[0, 0] = 254
     table = cost_table(8, 0.1, inscribed_radius=0.2, cost_scaling_factor=3.0)
     careful, bold = cells.copy(), cells.copy()
-    kernels.inflate(careful, 0, 0, 9, 1, 8, table, False)
-    kernels.inflate(bold, 0, 0, 9, 1, 8, table, True)
+    inflate(careful, 0, 0, 9, 1, 8, table, False)
+    inflate(bold, 0, 0, 9, 1, 8, table, True)
     assert careful[0].tolist() == [254, 253, 253, 255, 255, 255, 255, 255, 255]
     assert bold[0, 3] == table[9]

@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""The costmap on the tutorial's 3500 x 3500 cells: a full inflation, and an update after 0.1 m of motion.
+
+    PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_costmap.py [--json FILE] [--quick]
+
+Content: the tutorial's rolling global costmap (drop_in/tutorial_pkg, 35 x 35 m at 0.01 m, inflation 2.5 m = 250 cells)
+after a patrol through all rooms of worlds/house.world, seen by the simulator's lidar (720 beams, 1 cm of noise): walls
+are ragged lines of marks, as they are in the robot's costmap, and each new scan moves some of them by a cell. The
+tutorial's `cost_scaling_factor` (upstream's 10) lets costs end after 0.69 m, so that 250 cells take no longer than 69;
+the figures are therefore taken at a factor of 1, with which all 250 cells have a cost, and `..._tutorial_ms` at 10.
+An update after 0.1 m is all of `LayeredCostmap.update`: shift, clearing, marking, inflation; each has its own scan.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import math
+import os
+import statistics
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "src"))
+
+from rosbot_patrol.costmap.bounds import Bounds  # noqa: E402
+from rosbot_patrol.costmap.inflation import InflationLayer  # noqa: E402
+from rosbot_patrol.costmap.layered import LayeredCostmap  # noqa: E402
+from rosbot_patrol.costmap.obstacle import observe  # noqa: E402
+from rosbot_patrol.costmap.params import read_costmap  # noqa: E402
+from rosbot_patrol.geometry import Pose2D  # noqa: E402
+from rosbot_patrol.maps.map_io import read_map  # noqa: E402
+from rosbot_patrol.planning.registry import make_global_planner  # noqa: E402
+from rosbot_patrol.simulation.lidar import LidarParams, measure_scan  # noqa: E402
+from rosbot_patrol.simulation.slices import slice_bodies  # noqa: E402
+from rosbot_patrol.simulation.world import load_world  # noqa: E402
+
+AIMS = {"inflation_full_ms": 60.0, "inflation_shift_ms": 20.0}
+ROUND = (0, 1, 2, 3, 4, 5, 6, 7, 0)  # rooms in the order of the patrol
+LIDAR_HEIGHT = 0.15
+STEP = 0.1
+
+
+def tutorial_costmap(factor: float) -> LayeredCostmap:
+    """The tutorial's global costmap in the simulation."""
+    common = ROOT / "drop_in" / "tutorial_pkg" / "config" / "costmap_common_params.yaml"
+    tree: dict[str, Any] = yaml.safe_load(common.read_text(encoding="utf-8"))
+    own = yaml.safe_load((ROOT / "config" / "global_costmap_params.yaml").read_text(encoding="utf-8"))
+    return LayeredCostmap(read_costmap({**tree, **own["global_costmap"], "cost_scaling_factor": factor}))
+
+
+def patrol_poses() -> list[Pose2D]:
+    """Poses every 0.1 m of a way through all rooms and home."""
+    tree = {
+        "plugins": [{"name": "s", "type": "StaticLayer"}, {"name": "i", "type": "InflationLayer"}],
+        "s": {},
+        "i": {"inflation_radius": 0.6},
+        "robot_radius": 0.2,
+    }
+    costmap = LayeredCostmap(read_costmap(tree))
+    costmap.static_layers[0].set_map(read_map(ROOT / "maps" / "rosbot_map.yaml"))
+    costmap.update(0.0, Pose2D())
+    rooms = yaml.safe_load((ROOT / "params" / "room_points.yaml").read_text(encoding="utf-8"))["rooms"]
+    stops = [Pose2D(float(rooms[f"room{k}"]["x"]), float(rooms[f"room{k}"]["y"])) for k in ROUND]
+    planner = make_global_planner("navfn/NavfnROS", {})
+    ways = [np.asarray(planner.plan(costmap.grid, a, b)) for a, b in itertools.pairwise(stops)]
+    points = np.concatenate(ways)[:, :2]
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    at = np.arange(0.0, along[-1], STEP)
+    x, y = np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])
+    yaw = np.arctan2(np.gradient(y), np.gradient(x))
+    return [Pose2D(*pose) for pose in np.column_stack((x, y, yaw)).tolist()]
+
+
+def drive(costmap: LayeredCostmap, poses: list[Pose2D]) -> list[float]:
+    """Milliseconds of each update along the poses, a new scan at each."""
+    scene = slice_bodies(load_world(ROOT / "worlds" / "house.world").bodies, LIDAR_HEIGHT)
+    lidar, rng, times = LidarParams(), np.random.default_rng(1), []
+    buffer = costmap.obstacle_layers[0].buffers["laser_scan_sensor"]
+    for i, pose in enumerate(poses):
+        now = 0.5 * i
+        buffer.add(observe(measure_scan(lidar, scene, pose, now, rng), pose))
+        before = time.perf_counter()
+        costmap.update(now, pose)
+        times.append(1e3 * (time.perf_counter() - before))
+    return times[1:]
+
+
+def full_times(costmap: LayeredCostmap, repeats: int) -> list[float]:
+    """Milliseconds of the inflation alone over the whole costmap."""
+    layer = next(layer for layer in costmap.layers if isinstance(layer, InflationLayer))
+    marks = np.where(costmap.cells == 254, np.uint8(254), np.uint8(0))
+    cells, times = np.empty_like(marks), []
+    for _ in range(repeats + 1):
+        cells[:] = marks
+        before = time.perf_counter()
+        layer.update_costs(cells, Bounds(0, 0, costmap.info.width, costmap.info.height))
+        times.append(1e3 * (time.perf_counter() - before))
+    assert np.array_equal(cells, costmap.cells)  # what the updates made in parts
+    return times[1:]
+
+
+def figures(*, repeats: int = 20, every: int = 1) -> dict[str, float]:
+    """Medians by the names of FIGURES.md, with a row printed for each."""
+    poses = patrol_poses()[::every] if every > 1 else patrol_poses()
+    found: dict[str, float] = {}
+    for factor, ending in ((1.0, ""), (10.0, "_tutorial")):
+        costmap = tutorial_costmap(factor)
+        shifts = drive(costmap, poses)
+        lethal, raised = int((costmap.cells == 254).sum()), float((costmap.cells > 0).mean())
+        for name, times in (("inflation_shift", shifts), ("inflation_full", full_times(costmap, repeats))):
+            key = f"{name}{ending}_ms"
+            found[key] = round(statistics.median(times), 2)
+            high = sorted(times)[math.ceil(0.99 * len(times)) - 1]
+            aim = f"{AIMS[key]:6.0f}" if key in AIMS else " " * 6
+            print(f"{key:28s} {found[key]:8.2f} {min(times):8.2f} {high:8.2f} {aim}  of {len(times)}")
+        print(f"  cost_scaling_factor {factor:g}: {lethal} lethal cells, {100 * raised:.0f} % of the cells have a cost")
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--quick", action="store_true", help="few repeats")
+    wanted = parser.parse_args()
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    print(f"1 core of {os.cpu_count()}")
+    print(f"{'figure':28s} {'ms':>8s} {'least':>8s} {'99 %':>8s} {'aim':>6s}")
+    found = figures(repeats=5 if wanted.quick else 20, every=5 if wanted.quick else 1)
+    if wanted.json:
+        wanted.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

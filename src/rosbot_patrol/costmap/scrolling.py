@@ -1,0 +1,67 @@
+"""Cells of a window that moves: the window slides over its memory, so that a step copies nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosbot_patrol.costmap.bounds import Bounds
+from rosbot_patrol.costmap.costs import CostCells
+
+
+class ScrollingCells:
+    """Cells of shape (height, width), always contiguous, that can be shifted in no time.
+
+    Rows lie one after the other, so content that moves by (-dx, -dy) cells is the same memory read from
+    dy * width + dx farther on; what runs over a row's end lies in cells that come in and are overwritten. Where the
+    slack at an end is used up the cells are moved back to the middle once.
+    """
+
+    def __init__(self, height: int, width: int, default: int, *, moves: bool = True) -> None:
+        self._shape = (height, width)
+        self._default = default
+        self._slack = max(height // 32, 16) * width + width if moves else 0
+        self._memory: CostCells = np.empty(height * width + 2 * self._slack, np.uint8)
+        self._at = self._slack
+        self.cells = self._view()
+        self.cells.fill(default)
+
+    def _view(self) -> CostCells:
+        height, width = self._shape
+        return self._memory[self._at : self._at + height * width].reshape(height, width)
+
+    def shift(self, dx: int, dy: int) -> None:
+        """Move the content by (-dx, -dy) cells; what comes in is the default. Arrays taken before are stale."""
+        height, width = self._shape
+        if abs(dx) >= width or abs(dy) >= height:
+            self.cells.fill(self._default)
+            return
+        step = dy * width + dx
+        if not 0 <= self._at + step <= 2 * self._slack:
+            self._centre(step)
+        self._at += step
+        self.cells = self._view()
+        for strip in strips(width, height, dx, dy):
+            self.cells[strip.y0 : strip.y1, strip.x0 : strip.x1] = self._default
+
+    def _centre(self, step: int) -> None:
+        """Make room for a step, however long."""
+        count = self._shape[0] * self._shape[1]
+        if abs(step) > self._slack:
+            self._slack = 2 * abs(step)
+            memory = np.empty(count + 2 * self._slack, np.uint8)
+        else:
+            memory = self._memory
+        memory[self._slack : self._slack + count] = self._memory[self._at : self._at + count]
+        self._memory, self._at = memory, self._slack
+
+
+def strips(width: int, height: int, dx: int, dy: int) -> list[Bounds]:
+    """The cells that come into a window that moved by (dx, dy), as rectangles without a common cell."""
+    dx, dy = max(-width, min(dx, width)), max(-height, min(dy, height))
+    found = []
+    if dy:
+        found.append(Bounds(0, height - dy, width, height) if dy > 0 else Bounds(0, 0, width, -dy))
+    if dx:
+        y0, y1 = max(-dy, 0), height - max(dy, 0)
+        found.append(Bounds(width - dx, y0, width, y1) if dx > 0 else Bounds(0, y0, -dx, y1))
+    return [strip for strip in found if not strip.is_empty]
