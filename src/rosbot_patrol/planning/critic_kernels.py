@@ -1,4 +1,4 @@
-"""Inner loops of the local planner: simulating trajectories, checking footprints, reading distance fields."""
+"""Inner loops of the local planners: clearances, simulated drives with their collision check, distance fields."""
 
 from __future__ import annotations
 
@@ -8,31 +8,109 @@ import numpy as np
 
 from rosbot_patrol.kernels import kernel
 
+SLACK = 1.42  # a point and a cell that touch lie at most this far from the centres of their cells, together [cells]
 
-@kernel("float64[:, :, ::1](float64[::1], float64[:, ::1], float64[::1], float64, int64, float64, float64)")
-def simulate(pose, samples, velocity, sim_time, steps, acc_x, acc_theta):
-    """Drive each velocity (vx, wz) of `samples`, shape (K, 2), for `sim_time` from a pose.
 
-    The robot speeds up from its velocity (vx, wz) to the sample with the accelerations given.
+@kernel("float32[:, ::1](uint8[:, ::1], int64, int64, int64, int64, int64)")
+def clearances(cells, x0, y0, x1, y1, cap):
+    """Distance from each cell of [y0:y1, x0:x1] to the nearest lethal or unknown cell in it, or beyond the grid's edge.
 
-    Returns:
-        Poses after each step, shape (K, steps, 3).
+    Exact between centres of cells [cells], bounded by `cap` (two passes: Meijster, Roerdink, Hesselink 2000).
     """
-    out = np.empty((samples.shape[0], steps, 3), np.float64)
-    dt = sim_time / steps
-    for k in range(samples.shape[0]):
-        x, y, yaw = pose[0], pose[1], pose[2]
-        vx, wz = velocity[0], velocity[1]
-        for i in range(steps):
-            dv, dw = samples[k, 0] - vx, samples[k, 1] - wz
-            vx += min(max(dv, -acc_x * dt), acc_x * dt)
-            wz += min(max(dw, -acc_theta * dt), acc_theta * dt)
-            middle = yaw + wz * dt / 2.0
-            x += vx * math.cos(middle) * dt
-            y += vx * math.sin(middle) * dt
-            yaw += wz * dt
-            out[k, i, 0], out[k, i, 1], out[k, i, 2] = x, y, yaw
+    height, width = cells.shape
+    w, h = x1 - x0, y1 - y0
+    far = np.int32(cap)
+    column = np.empty((h, w), np.int32)
+    for x in range(w):
+        column[0, x] = 0 if cells[y0, x0 + x] >= 254 else min(far, y0 + 1)
+    for y in range(1, h):
+        for x in range(w):
+            column[y, x] = 0 if cells[y0 + y, x0 + x] >= 254 else min(column[y - 1, x] + 1, far)
+    for x in range(w):
+        column[h - 1, x] = min(column[h - 1, x], height - y1 + 1)
+    for y in range(h - 2, -1, -1):
+        for x in range(w):
+            column[y, x] = min(column[y, x], column[y + 1, x] + 1)
+    out = np.empty((h, w), np.float32)
+    site = np.empty(w, np.int32)
+    start = np.empty(w, np.int32)
+    for y in range(h):
+        row = column[y]
+        n = 0
+        for u in range(w):
+            g = row[u]
+            if g >= far:
+                continue
+            begin = 0
+            while n > 0:
+                v = site[n - 1]
+                begin = (u * u - v * v + g * g - row[v] * row[v]) // (2 * (u - v)) + 1
+                if begin > start[n - 1]:
+                    break
+                n -= 1
+            if n == 0:
+                begin = 0
+            if begin < w:
+                site[n], start[n] = u, max(begin, 0)
+                n += 1
+        for i in range(n):
+            v = site[i]
+            g2 = float(row[v] * row[v])
+            end = start[i + 1] if i + 1 < n else w
+            for u in range(start[i], end):
+                out[y, u] = min(math.sqrt(float((u - v) * (u - v)) + g2), float(far))
+        if n == 0:
+            out[y, :] = far
+        for u in range(w):
+            out[y, u] = min(out[y, u], float(min(x0 + u + 1, width - x0 - u)))
     return out
+
+
+@kernel(
+    "float64(float32[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64, float64, float64, "
+    "float64)"
+)
+def footprint_clearance(near, left, low, resolution, outline, spacing, reach, scale, x, y, yaw):
+    """How far the robot at a pose may move before it can touch anything, at least [cells]; -1 where it touches.
+
+    Args:
+        near: `clearances` of a window.
+        left: the window's corner in x [m].
+        low: and in y [m].
+        resolution: edge of a cell [m].
+        outline: points along the footprint in the robot's frame [m], shape (M, 2), at most `spacing` apart.
+        spacing: see there [m].
+        reach: the farthest of them from the centre [m].
+        scale: enlarges the footprint.
+        x: of the pose [m].
+        y: of the pose [m].
+        yaw: of the pose [rad].
+    """
+    height, width = near.shape
+    jx, jy = math.floor((x - left) / resolution), math.floor((y - low) / resolution)
+    if jx < 0 or jy < 0 or jx >= width or jy >= height:
+        return -1.0
+    free = near[jy, jx] - SLACK - scale * reach / resolution
+    if free > 0.0:
+        return free
+    c, s = math.cos(yaw) * scale / resolution, math.sin(yaw) * scale / resolution
+    u, v = (x - left) / resolution, (y - low) / resolution
+    gap = scale * spacing / resolution
+    least = 1e9
+    k = 0
+    while k < outline.shape[0]:
+        jx = math.floor(u + c * outline[k, 0] - s * outline[k, 1])
+        jy = math.floor(v + s * outline[k, 0] + c * outline[k, 1])
+        if jx < 0 or jy < 0 or jx >= width or jy >= height:
+            return -1.0
+        free = near[jy, jx] - SLACK
+        if free < SLACK and near[jy, jx] == 0.0:
+            return -1.0
+        # points half that far along the outline are free as well, and half of it is left for them
+        skip = int(0.5 * free / gap) if free > 0.0 else 0
+        least = min(least, free - skip * gap)
+        k += 1 + skip
+    return max(least, 0.0)
 
 
 @kernel("int64(uint8[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64)")
@@ -50,76 +128,148 @@ def count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw):
     return count
 
 
-@kernel("float64[::1](float64[:, :, ::1], uint8[:, ::1], float64, float64, float64, float64[:, ::1], int64)")
-def leaving_costs(trajectories, cells, resolution, origin_x, origin_y, outline, touching):
-    """For a robot that touches something: how much it still touches at each end, -1 where it ever touches more.
+@kernel("int64(float64[:, ::1], int64, float64[::1])")
+def count_steps(samples, k, motion):
+    """Steps of sample k: none longer than the granularities [m], [rad], four at least."""
+    straight = math.sqrt(samples[k, 0] ** 2 + samples[k, 1] ** 2) * motion[0] / motion[2]
+    return max(4, math.ceil(max(straight, abs(samples[k, 2]) * motion[0] / motion[3])))
 
-    `touching` is how many points of the outline touch now; a trajectory has to end with fewer. Shape (K,).
-    """
-    count, steps, _ = trajectories.shape
-    out = np.zeros(count, np.float64)
-    for k in range(count):
-        n = touching
-        for i in range(steps):
-            x, y, yaw = trajectories[k, i, 0], trajectories[k, i, 1], trajectories[k, i, 2]
-            n = count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw)
-            if n > touching:
-                break
-        out[k] = n if n < touching else -1.0
+
+@kernel("UniTuple(float64, 6)(float64[::1], float64[:, ::1], int64, float64, float64[::1])")
+def advance(state, samples, k, dt, motion):
+    """(x, y, yaw, vx, vy, wz) after dt [s], speeding up towards sample k as fast as the accelerations allow."""
+    x, y, yaw = state[0], state[1], state[2]
+    vx = state[3] + min(max(samples[k, 0] - state[3], -motion[4] * dt), motion[4] * dt)
+    vy = state[4] + min(max(samples[k, 1] - state[4], -motion[5] * dt), motion[5] * dt)
+    wz = state[5] + min(max(samples[k, 2] - state[5], -motion[6] * dt), motion[6] * dt)
+    middle = yaw + wz * dt / 2.0
+    c, s = math.cos(middle), math.sin(middle)
+    return x + (vx * c - vy * s) * dt, y + (vx * s + vy * c) * dt, yaw + wz * dt, vx, vy, wz
+
+
+@kernel("float64[:, ::1](float64[::1], float64[:, ::1], int64, float64[::1])")
+def trace(start, samples, k, motion):
+    """Poses after each step of sample k, shape (steps, 3); arguments as of `drive`."""
+    steps = count_steps(samples, k, motion)
+    out = np.empty((steps, 3), np.float64)
+    state = start.copy()
+    for i in range(steps):
+        state[0], state[1], state[2], state[3], state[4], state[5] = advance(
+            state, samples, k, motion[0] / steps, motion
+        )
+        out[i] = state[:3]
     return out
-
-
-@kernel("int64(uint8[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64, int64, int64)")
-def footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, free_below, taken_from):
-    """Cost of the robot standing at a pose, -1 in collision, -2 where it is unknown, -3 off the map.
-
-    `outline` holds points along the footprint's edges in the robot's frame, shape (M, 2); where the centre costs less
-    than `free_below`, it need not be looked at; where it costs `taken_from` or more, the robot cannot be.
-    """
-    height, width = cells.shape
-    ix, iy = math.floor((x - origin_x) / resolution), math.floor((y - origin_y) / resolution)
-    if ix < 0 or iy < 0 or ix >= width or iy >= height:
-        return -3
-    highest = np.int64(cells[iy, ix])
-    if highest == 255:
-        return -2
-    if highest >= taken_from:
-        return -1
-    if highest < free_below:
-        return highest
-    c, s = math.cos(yaw), math.sin(yaw)
-    for k in range(outline.shape[0]):
-        px = x + c * outline[k, 0] - s * outline[k, 1]
-        py = y + s * outline[k, 0] + c * outline[k, 1]
-        jx, jy = math.floor((px - origin_x) / resolution), math.floor((py - origin_y) / resolution)
-        if jx < 0 or jy < 0 or jx >= width or jy >= height:
-            return -3
-        cost = cells[jy, jx]
-        if cost == 254:
-            return -1
-        if cost == 255:
-            return -2
-    return highest
 
 
 @kernel(
-    "float64[::1](float64[:, :, ::1], uint8[:, ::1], float64, float64, float64, float64[:, ::1], int64, int64)",
+    "void(float64[::1], float64[:, ::1], float64[::1], uint8[:, ::1], float64[::1], float32[:, ::1], int64, int64, "
+    "int64, int64, float64[:, ::1], float64[:, ::1], float64[::1])"
 )
-def worst_footprint_costs(trajectories, cells, resolution, origin_x, origin_y, outline, free_below, taken_from):
-    """Highest cost along each trajectory, negative as `footprint_cost` where one pose is not free; shape (K,)."""
-    count, steps, _ = trajectories.shape
-    out = np.zeros(count, np.float64)
-    for k in range(count):
-        worst = 0
-        for i in range(steps):
-            x, y, yaw = trajectories[k, i, 0], trajectories[k, i, 1], trajectories[k, i, 2]
-            cost = footprint_cost(cells, resolution, origin_x, origin_y, outline, x, y, yaw, free_below, taken_from)
-            if cost < 0:
-                worst = cost
+def drive(start, samples, motion, cells, place, near, near_x, near_y, taken_from, touching, outline, ends, worst):
+    """Simulate each sample until it hits something.
+
+    Between two steps the outline is looked at as often as it may have moved by its clearance, or by a cell.
+
+    Args:
+        start: pose and velocity (x, y, yaw, vx, vy, wz).
+        samples: velocities (vx, vy, wz), shape (K, 3).
+        motion: horizon [s], time of `ends` [s], granularity [m], angular granularity [rad], accelerations in x, y,
+            theta, what is added to the time for braking [s], reach and spacing of the outline [m]; speed from which
+            the footprint grows [m/s], by how much, at which speed.
+        cells: costs.
+        place: resolution, origin_x, origin_y of the cells [m].
+        near: `clearances` of a window that holds all that the outline can reach.
+        near_x: the window's first column.
+        near_y: its first row.
+        taken_from: a centre that costs this or more is a collision.
+        touching: points of the outline that touch something at the start; if any, a sample has to end with fewer.
+        outline: see `footprint_clearance`.
+        ends: is set to the pose at the time given, shape (K, 3).
+        worst: samples below 0 are left out; is set to the highest cost of the centre (while touching: to the points
+            that touch at the end), or to -1 where it hits something, is unknown or off the grid. Shape (K,).
+    """
+    height, width = cells.shape
+    resolution, origin_x, origin_y = place[0], place[1], place[2]
+    left, low = origin_x + near_x * resolution, origin_y + near_y * resolution
+    reach, spacing = motion[8], motion[9]
+    state = np.empty(6, np.float64)
+    plain = 0.0
+    if touching == 0:
+        plain = footprint_clearance(
+            near, left, low, resolution, outline, spacing, reach, 1.0, start[0], start[1], start[2]
+        )
+    for k in range(samples.shape[0]):
+        if worst[k] < 0.0:
+            continue
+        speed = math.sqrt(samples[k, 0] ** 2 + samples[k, 1] ** 2)
+        scale = 1.0
+        if speed > motion[10] and motion[12] > motion[10]:
+            scale += motion[11] * min(1.0, (speed - motion[10]) / (motion[12] - motion[10]))
+        steps = count_steps(samples, k, motion)
+        dt = motion[0] / steps
+        # a velocity is admissible if the robot can stop before it hits something (Fox, Burgard, Thrun 1997)
+        braking = 0.0
+        for i in range(3):
+            if motion[4 + i] > 1e-3:
+                braking = max(braking, abs(samples[k, i]) / (2.0 * motion[4 + i]))
+        looked_at = max(steps, math.ceil((braking + motion[7]) / dt))
+        state[:] = start
+        budget = plain if scale == 1.0 else 0.0
+        highest = 0.0
+        if motion[1] <= 0.0:
+            ends[k] = state[:3]
+        for i in range(looked_at):
+            x, y, yaw = state[0], state[1], state[2]
+            state[0], state[1], state[2], state[3], state[4], state[5] = advance(state, samples, k, dt, motion)
+            ix = math.floor((state[0] - origin_x) / resolution)
+            iy = math.floor((state[1] - origin_y) / resolution)
+            if ix < 0 or iy < 0 or ix >= width or iy >= height:
+                highest = -1.0
                 break
-            worst = max(worst, cost)
-        out[k] = worst
-    return out
+            if touching > 0:
+                count = count_touching(cells, resolution, origin_x, origin_y, outline, state[0], state[1], state[2])
+                highest = float(count)
+                if count > touching or cells[iy, ix] >= 254:
+                    highest = -1.0
+                    break
+            else:
+                cost = cells[iy, ix]
+                if cost >= taken_from:
+                    highest = -1.0
+                    break
+                highest = max(highest, float(cost))
+                turned = abs(state[2] - yaw) * reach * scale
+                moved = (math.sqrt((state[0] - x) ** 2 + (state[1] - y) ** 2) + turned) / resolution
+                safe = budget
+                while safe < moved:
+                    at = min(max(safe, 0.0) + 1.0, moved)
+                    f = at / moved if moved > 0.0 else 0.0
+                    free = footprint_clearance(
+                        near,
+                        left,
+                        low,
+                        resolution,
+                        outline,
+                        spacing,
+                        reach,
+                        scale,
+                        x + f * (state[0] - x),
+                        y + f * (state[1] - y),
+                        yaw + f * (state[2] - yaw),
+                    )
+                    if free < 0.0:
+                        highest = -1.0
+                        break
+                    safe = at + free
+                if highest < 0.0:
+                    break
+                budget = safe - moved
+            time = (i + 1) * dt
+            if time - dt < motion[1] - 1e-9 and time >= motion[1] - 1e-9:
+                ends[k] = state[:3]
+        if touching > 0 and highest >= touching:
+            highest = -1.0
+        worst[k] = highest
 
 
 @kernel("float64(float32[:, ::1], float64, float64, float64, float64, float64)")
@@ -145,23 +295,23 @@ def read_field(field, resolution, origin_x, origin_y, x, y):
     return total / weight
 
 
-@kernel("float64[::1](float64[:, :, ::1], float32[:, ::1], float64, float64, float64, float64)")
-def end_distances(trajectories, field, resolution, origin_x, origin_y, nose):
-    """A distance field at the last pose of each trajectory, meant with the point `nose` ahead; shape (K,).
+@kernel("float64[:, ::1](float64[:, ::1], float32[:, ::1], float64, float64, float64, float64)")
+def end_distances(ends, field, resolution, origin_x, origin_y, nose):
+    """A distance field [cells] at poses, shape (K, 3), and at the points `nose` [m] ahead of them; shape (2, K).
 
-    Where the end cannot be reached at all it is inf; a nose in an obstacle counts as far as it can be.
+    Where the pose itself cannot be reached both are inf; a nose in an obstacle counts as far as it can be.
     """
-    count, steps, _ = trajectories.shape
-    out = np.empty(count, np.float64)
-    for k in range(count):
-        x, y, yaw = trajectories[k, steps - 1, 0], trajectories[k, steps - 1, 1], trajectories[k, steps - 1, 2]
-        end = read_field(field, resolution, origin_x, origin_y, x, y)
-        if nose > 0.0 and math.isfinite(end):
-            px, py = x + nose * math.cos(yaw), y + nose * math.sin(yaw)
-            ahead = read_field(field, resolution, origin_x, origin_y, px, py)
-            ahead = min(ahead, end + nose / resolution)
-            end = 0.5 * (end + ahead)
-        out[k] = end
+    out = np.empty((2, ends.shape[0]), np.float64)
+    for k in range(ends.shape[0]):
+        x, y, yaw = ends[k, 0], ends[k, 1], ends[k, 2]
+        here = read_field(field, resolution, origin_x, origin_y, x, y)
+        ahead = here
+        if nose > 0.0 and math.isfinite(here):
+            ahead = read_field(
+                field, resolution, origin_x, origin_y, x + nose * math.cos(yaw), y + nose * math.sin(yaw)
+            )
+            ahead = min(ahead, here + nose / resolution)
+        out[0, k], out[1, k] = here, ahead
     return out
 
 
@@ -171,7 +321,153 @@ def shrink(cells, factor):
     height, width = cells.shape
     h, w = (height + factor - 1) // factor, (width + factor - 1) // factor
     out = np.zeros((h, w), np.uint8)
-    for y in range(height):
-        for x in range(width):
-            out[y // factor, x // factor] = max(out[y // factor, x // factor], cells[y, x])
+    column = np.empty(width, np.uint8)
+    for y in range(h):
+        column[:] = cells[y * factor]
+        for iy in range(y * factor + 1, min((y + 1) * factor, height)):
+            row = cells[iy]
+            for x in range(width):
+                column[x] = max(column[x], row[x])
+        for x in range(w):
+            highest = np.uint8(0)
+            for ix in range(x * factor, min((x + 1) * factor, width)):
+                highest = max(highest, column[ix])
+            out[y, x] = highest
+    return out
+
+
+@kernel("float32[:, ::1](uint8[:, ::1], int64[:, ::1])")
+def spread(cells, sources):
+    """Distance [cells] from the nearest source around what cannot be crossed (253 and more), inf where there is no way.
+
+    First-order upwind differences (Sethian 1996), relaxed in the order of a queue; cells of a source count as free.
+
+    Args:
+        cells: costs.
+        sources: cells (ix, iy), shape (N, 2); those outside are left out.
+    """
+    height, width = cells.shape
+    out = np.full((height, width), np.inf, np.float32)
+    flat = out.ravel()
+    queue = np.empty(height * width + 1, np.int32)
+    waiting = np.zeros(height * width, np.bool_)
+    first, last = 0, 0
+    for i in range(sources.shape[0]):
+        ix, iy = sources[i, 0], sources[i, 1]
+        if 0 <= ix < width and 0 <= iy < height and not waiting[iy * width + ix]:
+            flat[iy * width + ix] = 0.0
+            queue[last] = iy * width + ix
+            waiting[queue[last]] = True
+            last += 1
+    far = np.float32(np.inf)
+    while first != last:
+        cell = queue[first]
+        first = first + 1 if first < height * width else 0
+        waiting[cell] = False
+        cy, cx = cell // width, cell % width
+        here = flat[cell]
+        for k in range(4):
+            nx = cx + (1 if k == 0 else (-1 if k == 1 else 0))
+            ny = cy + (1 if k == 2 else (-1 if k == 3 else 0))
+            if nx < 0 or ny < 0 or nx >= width or ny >= height or cells[ny, nx] >= 253:
+                continue
+            there = ny * width + nx
+            old = flat[there]
+            if old <= here:
+                continue
+            a = min(flat[there - 1] if nx > 0 else far, flat[there + 1] if nx + 1 < width else far)
+            b = min(flat[there - width] if ny > 0 else far, flat[there + width] if ny + 1 < height else far)
+            low, high = min(a, b), max(a, b)
+            if high - low >= 1.0:
+                t = low + np.float32(1.0)
+            else:
+                gap = high - low
+                t = np.float32(0.5) * (low + high + np.float32(math.sqrt(np.float32(2.0) - gap * gap)))
+            if t >= old - np.float32(1e-3):
+                continue
+            flat[there] = t
+            if not waiting[there]:
+                waiting[there] = True
+                queue[last] = there
+                last = last + 1 if last < height * width else 0
+    return out
+
+
+@kernel("Tuple((float64[:, ::1], int64))(float64[:, ::1], int64, float64[::1], float64[::1], float64[::1])")
+def cut_plan(plan, passed, local_from_plan, here, window):
+    """The plan in the local frame, from where the robot is to where it leaves the local costmap.
+
+    Args:
+        plan: poses in the plan's frame, shape (N, 3).
+        passed: the first that counts.
+        local_from_plan: x, y, yaw.
+        here: the robot's x, y.
+        window: least and greatest x and y of the local costmap.
+
+    Returns:
+        Poses inside, shape (M, 3), empty where the nearest is outside; and the index of that nearest pose. It is not
+        one of a later leg that only passes by: at most 1 m farther along the plan than the robot is from its start.
+    """
+    c, s = math.cos(local_from_plan[2]), math.sin(local_from_plan[2])
+    ox, oy = local_from_plan[0], local_from_plan[1]
+    nearest, best = passed, np.inf
+    along, limit, before_x, before_y = 0.0, np.inf, 0.0, 0.0
+    for i in range(passed, plan.shape[0]):
+        x = ox + c * plan[i, 0] - s * plan[i, 1]
+        y = oy + s * plan[i, 0] + c * plan[i, 1]
+        off = math.hypot(x - here[0], y - here[1])
+        if i == passed:
+            limit = 1.0 + off
+        else:
+            along += math.hypot(x - before_x, y - before_y)
+        if along > limit:
+            break
+        if off < best:
+            best, nearest = off, i
+        before_x, before_y = x, y
+    out = np.empty((plan.shape[0] - nearest, 3), np.float64)
+    n = 0
+    for i in range(nearest, plan.shape[0]):
+        x = ox + c * plan[i, 0] - s * plan[i, 1]
+        y = oy + s * plan[i, 0] + c * plan[i, 1]
+        if not (window[0] <= x <= window[1] and window[2] <= y <= window[3]):
+            break
+        yaw = plan[i, 2] + local_from_plan[2]
+        out[n, 0], out[n, 1] = x, y
+        out[n, 2] = yaw - math.tau * math.floor((yaw + math.pi) / math.tau)
+        n += 1
+    return out[:n].copy(), nearest
+
+
+@kernel("float64[::1](float64[:, ::1], float64[:, ::1], uint8[:, ::1], float64, float64, float64)")
+def headings_off(ends, plan, cells, resolution, origin_x, origin_y):
+    """Angle between the heading of each end and the first pose of the plan in its line of sight, pi where none is.
+
+    Args:
+        ends: poses, shape (K, 3).
+        plan: poses, the best first, shape (N, 3).
+        cells: costs; 253 and more hide what is behind.
+        resolution: edge of a cell [m].
+        origin_x: their corner [m].
+        origin_y: their corner [m].
+    """
+    height, width = cells.shape
+    out = np.full(ends.shape[0], math.pi, np.float64)
+    for k in range(ends.shape[0]):
+        x, y = ends[k, 0], ends[k, 1]
+        for i in range(plan.shape[0]):
+            dx, dy = plan[i, 0] - x, plan[i, 1] - y
+            length = math.hypot(dx, dy)
+            count = int(length / resolution) + 1
+            is_seen = True
+            for j in range(count + 1):
+                ix = math.floor((x + dx * j / count - origin_x) / resolution)
+                iy = math.floor((y + dy * j / count - origin_y) / resolution)
+                if ix < 0 or iy < 0 or ix >= width or iy >= height or cells[iy, ix] >= 253:
+                    is_seen = False
+                    break
+            if is_seen and length > 1e-6:
+                off = math.atan2(dy, dx) - ends[k, 2]
+                out[k] = abs(off - math.tau * math.floor((off + math.pi) / math.tau))
+                break
     return out

@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from rosbot_patrol.costmap.costs import LETHAL
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.geometry import Pose2D, Twist2D, angle_difference
 from rosbot_patrol.params import param
-from rosbot_patrol.planning import critic_kernels as kernels
+from rosbot_patrol.planning.critics import SUDDEN, Motion, ObstacleCritic
 from rosbot_patrol.planning.interfaces import Recovery, RecoveryView
 
 
@@ -106,9 +103,6 @@ class Rotate(Recovery):
 
 
 def _is_free(costmap: LayeredCostmap, pose: Pose2D, angle: float, step: float) -> bool:
-    yaws = pose.yaw + np.append(np.arange(0.0, angle, max(step, 0.02)), angle)
-    trajectory = np.empty((1, len(yaws), 3))
-    trajectory[0, :, 0], trajectory[0, :, 1], trajectory[0, :, 2] = pose.x, pose.y, yaws
-    outline = costmap.footprint.outline(costmap.info.resolution * 0.7)
-    place = (costmap.info.resolution, costmap.info.origin_x, costmap.info.origin_y)
-    return bool(kernels.worst_footprint_costs(trajectory, costmap.cells, *place, outline, 0, LETHAL)[0] >= 0.0)
+    turn = Motion(horizon=1.0, accelerations=SUDDEN, angular_granularity=step)
+    critic = ObstacleCritic(costmap.footprint, resolution=costmap.info.resolution)
+    return critic.is_free(costmap.grid, pose, Twist2D(0.0, 0.0, max(angle, 1e-3)), turn)

@@ -11,7 +11,8 @@ from rosbot_patrol.params import load
 from rosbot_patrol.planning.interfaces import GlobalPlanner, LocalPlanner, Recovery
 from rosbot_patrol.planning.navfn import NavfnParams, NavfnPlanner
 from rosbot_patrol.planning.recoveries import ClearCostmap, ClearCostmapParams, Rotate, RotateParams
-from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
+from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner
+from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 
 GLOBAL_PLANNERS = ("navfn/NavfnROS",)
 LOCAL_PLANNERS = ("base_local_planner/TrajectoryPlannerROS",)
@@ -57,7 +58,6 @@ def make_local_planner(
         params,
         costmap.footprint,
         resolution=costmap.info.resolution,
-        circumscribed_cost=costmap.circumscribed_cost,
     )
 
 

@@ -7,381 +7,275 @@ dynamic_reconfigure file, which win there.
 
 Differs:
     - Distances are Euclidean around obstacles, interpolated, and judged at the trajectory's end and at a point
-      `heading_lookahead` ahead of it; upstream counts 4-connected cells.
+      `heading_lookahead` ahead of it; upstream counts 4-connected cells, and looks ahead only for turns on the spot.
+    - The cost of an obstacle is that of the cells under the robot's centre; upstream takes those under its edges too.
+    - The swept footprint is checked cell by cell, whatever the steps, both for a base that follows within its
+      accelerations and for one that follows at once. `stop_time_buffer` works; upstream reads it only.
     - Where nothing is free over `sim_time`, slow motions are tried over 0.6 s before it backs up.
     - It backs up only where the way behind is free; upstream does so blindly.
     - A robot whose footprint touches an obstacle may move so that it touches less; upstream finds no trajectory.
     - Where the plan is blocked in view and nothing leads round, it stops short of the place and says so.
-    - `heading_scoring`, `simple_attractor`, `dwa`, `holonomic_robot`, `y_vels` and `acc_lim_y` are accepted and have no
-      effect: the base is driven as a differential drive.
+    - `simple_attractor` counts the squared distance to the local goal in metres, whatever `meter_scoring`.
+    - `y_vels` defaults to -0.3, -0.1, 0.1, 0.3; the dynamic_reconfigure file has the last sign wrong.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.errors import ControlError
-from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, angle_difference, compose_poses
-from rosbot_patrol.grid import Grid, GridInfo, cells_of_points
-from rosbot_patrol.params import param
-from rosbot_patrol.planning import critic_kernels as kernels
-from rosbot_patrol.planning.critics import GoalDistanceCritic, ObstacleCritic, PathDistanceCritic, Situation
-from rosbot_patrol.planning.critics.field import distance_field
-from rosbot_patrol.planning.interfaces import Array, LocalPlanner, LocalView
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, angle_difference
+from rosbot_patrol.planning.critics import (
+    SUDDEN,
+    AlignmentCritic,
+    AttractionCritic,
+    FacingGoalCritic,
+    GoalDistanceCritic,
+    HeadingCritic,
+    Motion,
+    PathDistanceCritic,
+    Situation,
+)
+from rosbot_patrol.planning.interfaces import Array, LocalView
+from rosbot_patrol.planning.trajectory_planner_base import Ground, SamplingPlanner
+from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams, read_speeds
+from rosbot_patrol.planning.trajectory_planner_stop import StopLimits
 
-_COARSE = 0.05  # edge of the cells of distance fields [m]
 _SHORT, _SLOW = 0.6, 0.1  # how far ahead [s] slow motions [m/s] are looked at where it is narrow
-_TOO_NEAR = 0.3  # of a plan that is blocked, less than this ahead is not worth driving [m]
+_HEADING_WEIGHT = 0.3  # of an angle, with heading_scoring (upstream's)
+_STRAFE = 0.1  # speed forward and sideways of a holonomic base's two slanting samples [m/s] (upstream's)
+_NOTHING_FREE = "no trajectory is free of obstacles"
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrajectoryPlannerParams:
-    """Parameters of TrajectoryPlannerROS; names and defaults as upstream."""
-
-    max_vel_x: float = param(0.55, unit="m/s", lo=0.0, doc="top forward speed")
-    min_vel_x: float = param(0.0, unit="m/s", lo=0.0, doc="slowest forward speed that moves the base")
-    max_vel_theta: float = param(1.0, unit="rad/s", lo=0.0, doc="top turning speed")
-    min_vel_theta: float = param(-1.0, unit="rad/s", hi=0.0, doc="top turning speed to the right")
-    min_in_place_vel_theta: float = param(0.4, unit="rad/s", lo=0.0, doc="slowest turn on the spot that moves the base")
-    max_rotational_vel: float = param(1.0, unit="rad/s", lo=0.0, doc="top speed when turning to the goal's heading")
-    acc_lim_x: float = param(2.5, unit="m/s^2", lo=0.0, doc="forward acceleration")
-    acc_lim_y: float = param(2.5, unit="m/s^2", lo=0.0, doc="accepted, has no effect")
-    acc_lim_theta: float = param(3.2, unit="rad/s^2", lo=0.0, doc="turning acceleration")
-    sim_time: float = param(1.7, unit="s", lo=0.1, hi=10.0, doc="how far ahead is simulated")
-    sim_granularity: float = param(0.025, unit="m", lo=0.001, doc="step between poses that are checked")
-    angular_sim_granularity: float = param(0.1, unit="rad", lo=0.001, doc="the same for turning")
-    vx_samples: int = param(20, lo=1, hi=200, doc="forward speeds tried")
-    vtheta_samples: int = param(20, lo=1, hi=200, doc="turning speeds tried")
-    path_distance_bias: float = param(0.6, lo=0.0, doc="weight of staying on the plan")
-    goal_distance_bias: float = param(0.8, lo=0.0, doc="weight of getting on")
-    occdist_scale: float = param(0.01, lo=0.0, doc="weight of staying away from obstacles")
-    meter_scoring: bool = param(False, doc="distances in metres instead of cells")
-    heading_lookahead: float = param(0.325, unit="m", lo=0.0, doc="point ahead at which alignment is judged")
-    oscillation_reset_dist: float = param(0.05, unit="m", lo=0.0, doc="motion after which directions may change again")
-    escape_vel: float = param(-0.1, unit="m/s", hi=0.0, doc="speed of backing up")
-    escape_reset_dist: float = param(0.1, unit="m", lo=0.0, doc="how far it backs up")
-    escape_reset_theta: float = param(math.pi / 2, unit="rad", lo=0.0, doc="or how far it turns meanwhile")
-    xy_goal_tolerance: float = param(0.10, unit="m", lo=0.0, doc="how near to the goal is there")
-    yaw_goal_tolerance: float = param(0.05, unit="rad", lo=0.0, doc="how near to its heading is right")
-    latch_xy_goal_tolerance: bool = param(False, doc="once there, only turn")
-    rot_stopped_velocity: float = param(0.01, unit="rad/s", lo=0.0, doc="slower is standing")
-    trans_stopped_velocity: float = param(0.01, unit="m/s", lo=0.0, doc="slower is standing")
-    prune_plan: bool = param(True, doc="drop the part of the plan that is behind")
-    holonomic_robot: bool = param(True, doc="accepted, has no effect")
-    dwa: bool = param(False, doc="accepted, has no effect")
-    heading_scoring: bool = param(False, doc="accepted, has no effect")
-    heading_scoring_timestep: float = param(0.8, doc="accepted, has no effect")
-    simple_attractor: bool = param(False, doc="accepted, has no effect")
-    stop_time_buffer: float = param(0.2, doc="accepted, has no effect")
-    y_vels: Any = param("-0.3,-0.1,0.1,0.3", doc="accepted, has no effect")
-    y_samples: int = param(0, doc="accepted, has no effect")
-    publish_cost_grid_pc: bool = param(False, doc="accepted, has no effect")
-    global_frame_id: str = param("odom", doc="accepted, has no effect")
-    sim_period: float = param(0.1, doc="accepted, has no effect")
-    controller_frequency: float = param(
-        20.0, unit="Hz", lo=0.1, doc="cycles a second, for accelerations; move_base's own where not given"
-    )
-
-
-@dataclass
-class _Memory:
-    """What is remembered from cycle to cycle."""
-
-    xy_reached: bool = False
-    turning_to_goal: bool = False
-    escape_from: Pose2D | None = None
-    turn_sign: int = 0  # direction of the last turn on the spot, 0 where both are free
-    turned_at: Pose2D = field(default_factory=Pose2D)
-    passed: int = 0  # index of the plan's pose that the robot is at
-
-
-class TrajectoryPlanner(LocalPlanner):
+class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
     """Samples velocities and drives the best.
 
     Args:
         params: as upstream.
         footprint: the robot's padded outline.
-        circumscribed_cost: see `ObstacleCritic`.
         resolution: of the local costmap [m].
     """
 
-    def __init__(
-        self, params: TrajectoryPlannerParams, footprint: Footprint, *, resolution: float, circumscribed_cost: int = 0
-    ) -> None:
-        self.params = params
-        self._obstacles = ObstacleCritic(footprint, resolution=resolution, circumscribed_cost=circumscribed_cost)
-        self._path_distance = PathDistanceCritic()
-        self._goal_distance = GoalDistanceCritic()
-        self._plan: Array = np.empty((0, 3))
-        self._memory = _Memory()
-        self._local_plan: Array = np.empty((0, 3))
-        self._visible: Array = np.empty((0, 3))
+    def __init__(self, params: TrajectoryPlannerParams, footprint: Footprint, *, resolution: float) -> None:
+        super().__init__(params, footprint, resolution=resolution)
+        self._path, self._alignment = PathDistanceCritic(), AlignmentCritic()
+        self._goal, self._facing = GoalDistanceCritic(), FacingGoalCritic()
+        self._heading, self._attraction = HeadingCritic(), AttractionCritic()
+        self._escape_from: Pose2D | None = None
 
     def reset(self) -> None:
         """Forget the goal that was worked on."""
-        self._memory = _Memory()
-
-    def set_plan(self, poses: Array) -> None:
-        """Follow a new plan."""
-        if len(poses) == 0:
-            raise ControlError("a plan without poses cannot be followed")
-        same_goal = len(self._plan) > 0 and np.allclose(self._plan[-1], poses[-1], atol=1e-6)
-        if not same_goal:
-            self._memory.xy_reached = self._memory.turning_to_goal = False
-        self._memory.passed = 0
-        self._plan = np.array(poses, dtype=np.float64)
+        super().reset()
+        self._escape_from = None
 
     @property
-    def local_plan(self) -> Array:
-        """What the last velocity would drive."""
-        return self._local_plan
+    def _goal_rule(self) -> tuple[float, bool]:
+        return self._driven.xy_goal_tolerance, self._driven.latch_xy_goal_tolerance
 
     @property
-    def visible_plan(self) -> Array:
-        """The part of the plan that is followed now."""
-        return self._visible
+    def _stop_limits(self) -> StopLimits:
+        p = self._driven
+        return StopLimits(
+            yaw_tolerance=p.yaw_goal_tolerance,
+            slowest_turn=p.min_in_place_vel_theta,
+            fastest_left=min(p.max_vel_theta, p.max_rotational_vel),
+            fastest_right=min(-p.min_vel_theta, p.max_rotational_vel),
+            accelerations=self._accelerations,
+            trans_stopped=p.trans_stopped_velocity,
+            rot_stopped=p.rot_stopped_velocity,
+            period=1.0 / p.controller_frequency,
+        )
 
-    def is_goal_reached(self, view: LocalView) -> bool:
-        """Whether the robot stands at the goal, turned as it should."""
-        if len(self._plan) == 0 or not self._is_at_goal_xy(view):
-            return False
-        p, goal = self.params, self._goal(view)
-        return abs(angle_difference(goal.yaw, view.pose.yaw)) <= p.yaw_goal_tolerance and self._is_standing(view)
+    @property
+    def _accelerations(self) -> tuple[float, float, float]:
+        p = self._driven
+        return p.acc_lim_x, p.acc_lim_y if p.holonomic_robot else 0.0, p.acc_lim_theta
 
-    def _is_standing(self, view: LocalView) -> bool:
-        v = view.velocity
-        return abs(v.wz) <= self.params.rot_stopped_velocity and abs(v.vx) <= self.params.trans_stopped_velocity
-
-    def _goal(self, view: LocalView) -> Pose2D:
-        return view.local_from_plan @ Pose2D(*self._plan[-1].tolist())
-
-    def _is_at_goal_xy(self, view: LocalView) -> bool:
-        goal = self._goal(view)
-        near = math.hypot(goal.x - view.pose.x, goal.y - view.pose.y) <= self.params.xy_goal_tolerance
-        if near and self.params.latch_xy_goal_tolerance:
-            self._memory.xy_reached = True
-        return near or self._memory.xy_reached
-
-    def compute(self, view: LocalView) -> Twist2D:
-        """The velocity for this cycle; raises ControlError."""
-        if len(self._plan) == 0:
-            raise ControlError("there is no plan to follow")
-        if self._is_at_goal_xy(view):
-            return self._turn_to_goal(view)
-        self._memory.turning_to_goal = False
-        plan = self._part_in_view(view)
-        self._visible = plan
-        return self._follow(view, plan)
+    def _slowed(self, params: TrajectoryPlannerParams, trans: float, rot: float) -> TrajectoryPlannerParams:
+        return replace(
+            params,
+            max_vel_x=min(params.max_vel_x, trans),
+            min_vel_x=min(params.min_vel_x, trans),
+            max_vel_theta=min(params.max_vel_theta, rot),
+            min_vel_theta=max(params.min_vel_theta, -rot),
+            max_rotational_vel=min(params.max_rotational_vel, rot),
+            min_in_place_vel_theta=min(params.min_in_place_vel_theta, rot),
+            y_vels=[min(max(v, -trans), trans) for v in read_speeds(params.y_vels)],
+        )
 
     # ---- following
 
-    def _part_in_view(self, view: LocalView) -> Array:
-        """The plan in the local frame, from where the robot is to where it leaves the local costmap."""
-        memory = self._memory
-        poses = compose_poses(view.local_from_plan, self._plan[memory.passed :])
-        distances = np.hypot(poses[:, 0] - view.pose.x, poses[:, 1] - view.pose.y)
-        # nearest point, but not one of a later leg that only passes by
-        along = np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T))
-        window = max(1, int(np.searchsorted(along, 1.0 + distances[0])))
-        nearest = int(np.argmin(distances[:window]))
-        if self.params.prune_plan:
-            memory.passed += nearest
-        poses = poses[nearest:]
-        info = view.costmap.info
-        cells = np.floor((poses[:, :2] - (info.origin_x, info.origin_y)) / info.resolution)
-        inside = ((cells >= 1) & (cells < (info.width - 1, info.height - 1))).all(axis=1)
-        if not inside[0]:
-            raise ControlError("the plan does not pass through the local costmap")
-        last = len(inside) if inside.all() else int(np.argmin(inside))
-        return poses[:last]
-
-    def _situation(self, view: LocalView, trajectories: Array, plan: Array) -> Situation:
-        info = view.costmap.info
-        factor = max(1, round(_COARSE / info.resolution))
-        cells = kernels.shrink(view.costmap.cells, factor) if factor > 1 else view.costmap.cells
-        coarse = GridInfo(
-            resolution=info.resolution * factor,
-            width=cells.shape[1],
-            height=cells.shape[0],
-            origin_x=info.origin_x,
-            origin_y=info.origin_y,
-        )
-        plan = self._reachable_part(view, plan, Grid(coarse, cells))
-        to_goal = float(np.hypot(plan[-1, 0] - view.pose.x, plan[-1, 1] - view.pose.y))
-        nose = min(self.params.heading_lookahead, 0.5 * to_goal)
-        return Situation(
-            pose=view.pose,
-            trajectories=trajectories,
-            costmap=view.costmap,
-            coarse=coarse,
-            coarse_cells=cells,
-            plan=plan,
-            nose=nose,
-        )
-
-    def _reachable_part(self, view: LocalView, plan: Array, grid: Grid) -> Array:
-        """The plan up to its last pose in view that the robot can get to.
-
-        Raises:
-            ControlError: something stands on the plan right ahead, and nothing leads round it.
-        """
-        info = grid.info
-        here = np.array([info.cell_of_clamped(view.pose.x, view.pose.y)])
-        distances = distance_field(info, grid.cells, here)
-        ix, iy = cells_of_points(info, plan[:, :2]).T
-        reachable = np.isfinite(distances[iy.clip(0, info.height - 1), ix.clip(0, info.width - 1)])
-        last = int(np.flatnonzero(reachable)[-1]) if reachable.any() else -1
-        if last == len(plan) - 1:
-            return plan
-        gap = math.hypot(plan[last, 0] - view.pose.x, plan[last, 1] - view.pose.y) if last >= 0 else 0.0
-        if gap < _TOO_NEAR:
-            raise ControlError("something stands on the plan and there is no way round it in view")
-        return plan[: last + 1]
-
-    def _follow(self, view: LocalView, plan: Array) -> Twist2D:
+    def _follow(self, view: LocalView) -> Twist2D:
         """The best of all samples; where none is free, of slow ones that are looked at less far ahead."""
-        p = self.params
-        samples = self._samples(view)
-        slow = np.ascontiguousarray(samples[samples[:, 0] <= max(p.min_vel_x, _SLOW)])
-        for tried, horizon in ((samples, p.sim_time), (slow, min(p.sim_time, _SHORT))):
-            best = self._best(view, plan, tried, horizon)
+        p = self._driven
+        self._visible = self._track.part_in_view(view, prune=p.prune_plan)
+        ground = self._ground(view, self._visible)
+        for tried, horizon in self._attempts(view):
+            best = self._best(view, ground, tried, horizon)
             if best is not None:
-                self._memory.escape_from = None
-                self._remember_turn(view, best)
+                self._oscillation.remember(
+                    view.pose, best, still=1e-3, distance=p.oscillation_reset_dist, angle=math.pi / 2
+                )
                 return self._limited(view, best)
         return self._escape(view)
 
-    def _best(self, view: LocalView, plan: Array, samples: Array, horizon: float) -> Twist2D | None:
+    def _ground(self, view: LocalView, plan: Array) -> Ground:
+        if self._driven.simple_attractor:
+            return Ground(view.costmap, plan, np.empty((0, 0), np.float32))
+        return super()._ground(view, plan)
+
+    def _attempts(self, view: LocalView) -> list[tuple[Array, float]]:
+        """Samples (vx, vy, wz) that are tried one set after the other, and how far ahead each is looked at [s]."""
+        p = self._driven
+        turns = self._turns()
+        if self._is_escaping(view):
+            return [(turns, p.sim_time), (turns, min(p.sim_time, _SHORT))]
+        ahead = self._ahead(view)
+        samples = np.concatenate((ahead, turns))
+        slow = np.concatenate((ahead[ahead[:, 0] <= max(p.min_vel_x, _SLOW)], turns))
+        attempts = [(samples, p.sim_time), (slow, min(p.sim_time, _SHORT))]
+        if p.holonomic_robot:
+            sideways = np.zeros((len(read_speeds(p.y_vels)), 3))
+            sideways[:, 1] = read_speeds(p.y_vels)
+            attempts.insert(1, (sideways, p.sim_time))
+        return attempts
+
+    def _ahead(self, view: LocalView) -> Array:
+        """Velocities that lead ahead, shape (K, 3): all pairs of forward and turning speeds."""
+        p = self._driven
+        goal = self._track.goal(view)
+        to_goal = math.hypot(goal.x - view.pose.x, goal.y - view.pose.y)
+        # slow down in time to stand at the goal
+        top = min(p.max_vel_x, max(p.min_vel_x, to_goal / p.sim_time, 0.05))
+        window = 1.0 / p.controller_frequency if p.dwa else p.sim_time
+        fastest = min(top, max(view.velocity.vx, 0.0) + p.acc_lim_x * window)
+        fastest = max(fastest, min(top, p.min_vel_x))
+        slowest = min(max(p.min_vel_x, view.velocity.vx - p.acc_lim_x * window), fastest)
+        vx = np.linspace(slowest, fastest, p.vx_samples)
+        vx = vx[vx > 1e-3]
+        left, right = p.max_vel_theta, p.min_vel_theta
+        if p.dwa:
+            left = min(left, max(view.velocity.wz, right) + p.acc_lim_theta * window)
+            right = max(right, min(view.velocity.wz, left) - p.acc_lim_theta * window)
+        wz = np.linspace(right, left, p.vtheta_samples)
+        if right < 0.0 < left:
+            wz = np.append(wz, 0.0)
+        out = np.zeros((len(vx) * len(wz), 3))
+        out[:, 0], out[:, 2] = np.tile(vx, len(wz)), np.repeat(wz, len(vx))
+        if p.holonomic_robot:
+            strafe = min(_STRAFE, top)
+            out = np.concatenate((out, [[strafe, strafe, 0.0], [strafe, -strafe, 0.0]]))
+        return out
+
+    def _turns(self) -> Array:
+        """Turns on the spot (0, 0, wz), shape (K, 3), none slower than the base can."""
+        p = self._driven
+        wz = np.linspace(p.min_vel_theta, p.max_vel_theta, p.vtheta_samples)
+        least = p.min_in_place_vel_theta
+        wz = np.concatenate((wz[np.abs(wz) >= least], [-least, least]))
+        out = np.zeros((len(wz), 3))
+        out[:, 2] = wz
+        return out[np.abs(wz) > 1e-3]
+
+    def _motion(self, horizon: float) -> Motion:
+        p = self._driven
+        return Motion(
+            horizon=horizon,
+            accelerations=self._accelerations,
+            granularity=p.sim_granularity,
+            angular_granularity=p.angular_sim_granularity * p.sim_time,  # upstream's rule: of a second's turn
+            judged_at=p.heading_scoring_timestep if p.heading_scoring else None,
+            stop_time_buffer=p.stop_time_buffer,
+        )
+
+    def _best(self, view: LocalView, ground: Ground, samples: Array, horizon: float) -> Twist2D | None:
         """The cheapest sample, None where none is free.
 
         Raises:
             ControlError: some are free, but lead nowhere.
         """
-        p = self.params
-        trajectories = self._simulate(view, samples, horizon)
-        situation = self._situation(view, trajectories, plan)
+        p, motion = self._driven, self._motion(horizon)
+        around = self._obstacles.survey(view.costmap, view.pose, motion.reach(samples, view.velocity))
+        ends = np.empty((len(samples), 3))
+        danger = self._obstacles.drive(around, view.velocity, samples, motion, ends=ends)
         # the base may follow at once, or as slowly as its accelerations say: both have to be free
-        sudden = self._simulate(view, samples, min(horizon, _SHORT), sudden=True)
-        danger = 0.5 * self._obstacles.score(situation) + 0.5 * self._obstacles.check(sudden, view.costmap, view.pose)
-        if not np.isfinite(danger).any():
+        at_once = replace(motion, horizon=min(horizon, _SHORT), accelerations=SUDDEN, judged_at=None)
+        danger = 0.5 * danger + 0.5 * self._obstacles.drive(around, view.velocity, samples, at_once, failed=danger)
+        free = np.isfinite(danger)
+        if not free.any():
             return None
-        scale = situation.coarse.resolution
-        if not p.meter_scoring:
-            scale /= view.costmap.info.resolution
-        cost = p.occdist_scale * danger
-        cost += p.path_distance_bias * scale * self._path_distance.score(situation)
-        cost += p.goal_distance_bias * scale * self._goal_distance.score(situation)
-        cost = self._without_reversals(view, samples, cost)
+        samples, ends = np.ascontiguousarray(samples[free]), np.ascontiguousarray(ends[free])
+        situation = ground.situation(view, samples, ends, self._nose(view, ground.plan))
+        cost = p.occdist_scale * danger[free] + self._distance_costs(situation, view.costmap.info.resolution)
+        cost[self._oscillation.forbidden(samples)] = np.inf
         best = int(np.argmin(cost))
         if not math.isfinite(cost[best]):
             raise ControlError("no free trajectory leads on along the plan")
-        self._local_plan = trajectories[best]
-        return Twist2D(float(samples[best, 0]), 0.0, float(samples[best, 1]))
+        twist = Twist2D(*samples[best].tolist())
+        self._local_plan = self._obstacles.trace(view.pose, view.velocity, twist, motion)
+        return twist
 
-    def _samples(self, view: LocalView) -> Array:
-        """Velocities to try (vx, wz), shape (K, 2): all pairs, turns on the spot."""
-        p = self.params
-        goal = self._goal(view)
-        to_goal = math.hypot(goal.x - view.pose.x, goal.y - view.pose.y)
-        # slow down in time to stand at the goal
-        top = min(p.max_vel_x, max(p.min_vel_x, to_goal / p.sim_time, 0.05))
-        fastest = min(top, max(view.velocity.vx, 0.0) + p.acc_lim_x * p.sim_time)
-        slowest = min(max(p.min_vel_x, view.velocity.vx - p.acc_lim_x * p.sim_time), fastest)
-        vx = np.linspace(slowest, fastest, p.vx_samples)
-        vx = vx[vx > 1e-3]
-        wz = np.linspace(p.min_vel_theta, p.max_vel_theta, p.vtheta_samples)
-        wz = np.append(wz, 0.0)
-        pairs = np.array(np.meshgrid(vx, wz)).reshape(2, -1).T
-        turns = wz[np.abs(wz) >= p.min_in_place_vel_theta]
-        slow = np.array([-p.min_in_place_vel_theta, p.min_in_place_vel_theta])
-        turns = np.concatenate((turns, slow))
-        spot = np.column_stack((np.zeros_like(turns), turns))
-        return np.ascontiguousarray(np.concatenate((pairs, spot)))
+    def _nose(self, view: LocalView, plan: Array) -> float:
+        to_goal = float(np.hypot(plan[-1, 0] - view.pose.x, plan[-1, 1] - view.pose.y))
+        return min(self._driven.heading_lookahead, 0.5 * to_goal)
 
-    def _simulate(self, view: LocalView, samples: Array, horizon: float, *, sudden: bool = False) -> Array:
-        p = self.params
-        limits = (1e6, 1e6) if sudden else (p.acc_lim_x, p.acc_lim_theta)
-        speed, turn = float(np.abs(samples[:, 0]).max()), float(np.abs(samples[:, 1]).max())
-        steps = max(speed * horizon / p.sim_granularity, turn * horizon / p.angular_sim_granularity)
-        pose = np.array(view.pose, dtype=np.float64)
-        velocity = np.array([view.velocity.vx, view.velocity.wz])
-        return kernels.simulate(pose, samples, velocity, horizon, max(4, math.ceil(steps)), *limits)
+    def _distance_costs(self, situation: Situation, resolution: float) -> Array:
+        """What the distances to plan and goal cost, shape (K,)."""
+        p = self._driven
+        if p.simple_attractor:
+            return p.goal_distance_bias * self._attraction.score(situation)
+        scale = 1.0 if p.meter_scoring else 1.0 / resolution
+        to_plan, to_goal = self._path.score(situation), self._goal.score(situation)
+        if p.heading_scoring:
+            turned = _HEADING_WEIGHT * self._heading.score(situation)
+            return scale * (p.path_distance_bias * to_plan + p.goal_distance_bias * to_goal) + turned
+        to_plan = 0.5 * (to_plan + self._alignment.score(situation))
+        to_goal = 0.5 * (to_goal + self._facing.score(situation))
+        return scale * (p.path_distance_bias * to_plan + p.goal_distance_bias * to_goal)
 
     def _limited(self, view: LocalView, twist: Twist2D) -> Twist2D:
-        """Never more than an acceleration allows in two cycles (the measured velocity lags)."""
-        p = self.params
+        """Never faster than an acceleration allows in two cycles (the measured velocity lags)."""
+        p = self._driven
         dt = 2.0 / p.controller_frequency
         vx = min(twist.vx, max(view.velocity.vx, 0.0) + p.acc_lim_x * dt)
-        return Twist2D(max(vx, min(twist.vx, p.min_vel_x)), 0.0, twist.wz)
+        vx = max(vx, min(twist.vx, p.min_vel_x))
+        least = p.min_in_place_vel_theta if vx == 0.0 else 0.0
+        most = max(abs(view.velocity.wz) + p.acc_lim_theta * dt, least)
+        return Twist2D(vx, twist.vy, math.copysign(min(abs(twist.wz), most), twist.wz))
 
-    # ---- oscillation, escape
+    # ---- escape
 
-    def _without_reversals(self, view: LocalView, samples: Array, cost: Array) -> Array:
-        """Turning on the spot keeps its direction until the robot has moved."""
-        memory = self._memory
-        moved = math.hypot(view.pose.x - memory.turned_at.x, view.pose.y - memory.turned_at.y)
-        turned = abs(angle_difference(view.pose.yaw, memory.turned_at.yaw))
-        if memory.turn_sign and (moved > self.params.oscillation_reset_dist or turned > math.pi / 2):
-            memory.turn_sign = 0
-        if memory.turn_sign:
-            against = (np.abs(samples[:, 0]) < 1e-3) & (np.sign(samples[:, 1]) == -memory.turn_sign)
-            cost = np.where(against, np.inf, cost)
-        return cost
-
-    def _remember_turn(self, view: LocalView, twist: Twist2D) -> None:
-        if abs(twist.vx) < 1e-3 and self._memory.turn_sign == 0:
-            self._memory.turn_sign = 1 if twist.wz > 0.0 else -1
-            self._memory.turned_at = view.pose
+    def _is_escaping(self, view: LocalView) -> bool:
+        """Whether it still backs up: until it has moved or turned enough it does not drive ahead."""
+        start, p = self._escape_from, self._driven
+        if start is None:
+            return False
+        gone = math.hypot(view.pose.x - start.x, view.pose.y - start.y)
+        turned = abs(angle_difference(view.pose.yaw, start.yaw))
+        if gone > p.escape_reset_dist or turned > p.escape_reset_theta:
+            self._escape_from = None
+        return self._escape_from is not None
 
     def _escape(self, view: LocalView) -> Twist2D:
         """Back up a little where that is free."""
-        p, memory = self.params, self._memory
-        if memory.escape_from is None:
-            memory.escape_from = view.pose
-        start = memory.escape_from
-        gone = math.hypot(view.pose.x - start.x, view.pose.y - start.y)
-        turned = abs(angle_difference(view.pose.yaw, start.yaw))
-        if p.escape_vel == 0.0 or gone > p.escape_reset_dist or turned > p.escape_reset_theta:
-            memory.escape_from = None
-            raise ControlError("no trajectory is free of obstacles")
-        samples = np.array([[p.escape_vel, 0.0]])
-        trajectories = self._simulate(view, samples, p.sim_time)
-        if not self._is_free(view, trajectories):
-            raise ControlError("no trajectory is free of obstacles, not even backwards")
-        self._local_plan = trajectories[0]
-        return Twist2D(p.escape_vel, 0.0, 0.0)
-
-    def _is_free(self, view: LocalView, trajectories: Array) -> bool:
-        return bool(np.isfinite(self._obstacles.check(trajectories, view.costmap, view.pose)).all())
-
-    # ---- at the goal
-
-    def _turn_to_goal(self, view: LocalView) -> Twist2D:
-        p, memory = self.params, self._memory
-        goal = self._goal(view)
-        self._visible = np.array([view.pose, goal])
-        self._local_plan = np.empty((0, 3))
-        error = angle_difference(goal.yaw, view.pose.yaw)
-        if abs(error) <= p.yaw_goal_tolerance:
-            memory.turning_to_goal = False
-            return STOP
-        if not memory.turning_to_goal and not self._is_standing(view) and abs(view.velocity.vx) > 0.05:
-            return STOP
-        memory.turning_to_goal = True
-        # fast enough to arrive, slow enough to stop in time
-        speed = min(p.max_rotational_vel, math.sqrt(2.0 * p.acc_lim_theta * abs(error)), 2.0 * abs(error))
-        speed = max(speed, p.min_in_place_vel_theta)
-        speed = min(speed, p.max_vel_theta if error > 0.0 else -p.min_vel_theta)
-        twist = Twist2D(0.0, 0.0, math.copysign(speed, error))
-        check = np.array([[0.0, twist.wz]])
-        short = kernels.simulate(
-            np.array(view.pose), check, np.array([0.0, twist.wz]), min(0.5, abs(error) / max(speed, 1e-3)), 8, 1.0, 10.0
-        )
-        if not self._is_free(view, short):
-            raise ControlError("there is no room to turn to the goal's heading")
+        p = self._driven
+        if p.escape_vel == 0.0:
+            raise ControlError(_NOTHING_FREE)
+        twist = Twist2D(p.escape_vel, 0.0, 0.0)
+        motion = replace(self._motion(p.sim_time), judged_at=None)
+        if not self._can_drive(view, twist, motion):
+            self._escape_from = None
+            raise ControlError(f"{_NOTHING_FREE}, not even backwards")
+        if self._escape_from is None:
+            self._escape_from = view.pose
+        self._local_plan = self._obstacles.trace(view.pose, STOP, twist, motion)
         return twist
+
+    def _can_drive(self, view: LocalView, twist: Twist2D, motion: Motion) -> bool:
+        samples = np.array([twist], dtype=np.float64)
+        around = self._obstacles.survey(view.costmap, view.pose, motion.reach(samples, view.velocity))
+        return bool(np.isfinite(self._obstacles.drive(around, view.velocity, samples, motion)[0]))

@@ -13,7 +13,8 @@ from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, wrap_angle
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.planning.interfaces import LocalView
 from rosbot_patrol.planning.navfn import with_headings
-from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner, TrajectoryPlannerParams
+from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner
+from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 
 CORNERS = np.array([[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]])
 ORIGIN = Pose2D()
@@ -33,6 +34,7 @@ def make(**changes):
         "latch_xy_goal_tolerance": True,
         "rot_stopped_velocity": 0.05,
         "trans_stopped_velocity": 0.03,
+        "holonomic_robot": False,
         **changes,
     }
     return TrajectoryPlanner(

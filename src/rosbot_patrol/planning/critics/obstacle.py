@@ -2,47 +2,162 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, field
+
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL, UNKNOWN
 from rosbot_patrol.costmap.footprint import Footprint
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.planning import critic_kernels as kernels
-from rosbot_patrol.planning.critics.situation import Array, Situation
+from rosbot_patrol.planning.critics.situation import Array
+
+SUDDEN = (1e6, 1e6, 1e6)  # accelerations of a base that follows at once
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """How velocities are simulated.
+
+    Attributes:
+        horizon: for how long [s].
+        accelerations: of vx, vy [m/s^2] and wz [rad/s^2].
+        granularity: longest step [m]; angular_granularity: the same for turning [rad].
+        judged_at: when the trajectory is judged [s]; at its end where None.
+        stop_time_buffer: time to spare when braking before an obstacle [s].
+        growing: speed from which the footprint is enlarged [m/s], by how much at most, and the speed at which it is.
+    """
+
+    horizon: float
+    accelerations: tuple[float, float, float]
+    granularity: float = 0.025
+    angular_granularity: float = 0.025
+    judged_at: float | None = None
+    stop_time_buffer: float = 0.0
+    growing: tuple[float, float, float] = (math.inf, 0.0, 0.0)
+
+    def reach(self, samples: Array, velocity: Twist2D) -> float:
+        """How far any of some velocities can lead, counting the time for braking [m]."""
+        if not len(samples):
+            return 0.0
+        speeds = np.abs(samples).max(axis=0)
+        braking = max(v / (2.0 * a) if a > 1e-3 else 0.0 for v, a in zip(speeds, self.accelerations, strict=True))
+        speed = max(float(np.hypot(samples[:, 0], samples[:, 1]).max()), math.hypot(velocity.vx, velocity.vy))
+        return speed * 1.05 * max(self.horizon, braking + self.stop_time_buffer)
+
+    def packed(self, reach: float, spacing: float) -> Array:
+        """As `critic_kernels.drive` wants it."""
+        judged_at = self.horizon if self.judged_at is None else min(self.judged_at, self.horizon)
+        steps = self.granularity, self.angular_granularity
+        own = (self.horizon, judged_at, *steps, *self.accelerations, self.stop_time_buffer)
+        return np.array([*own, reach, spacing, *self.growing])
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What can be hit from a pose: made once a cycle by `ObstacleCritic.survey`."""
+
+    pose: Pose2D
+    costmap: Grid
+    near: NDArray[np.float32] = field(repr=False)
+    corner: tuple[int, int]
+    touching: int
+    taken_from: int
 
 
 class ObstacleCritic:
     """The highest cost that a trajectory's poses meet; inf where the footprint touches, is unknown or leaves the map.
 
-    A robot that touches something already may only move so that it touches less.
+    The swept outline is checked cell by cell, whatever the steps of the simulation. A velocity is also refused if the
+    robot could not stop before it hits something. A robot that touches something already may only move so that it
+    touches less.
 
     Args:
         footprint: the robot's padded outline.
         resolution: of the local costmap [m].
-        circumscribed_cost: a centre that costs less has its footprint free; 0 checks each outline.
     """
 
-    def __init__(self, footprint: Footprint, *, resolution: float, circumscribed_cost: int) -> None:
+    def __init__(self, footprint: Footprint, *, resolution: float) -> None:
         self._outline = footprint.outline(resolution * 0.7)
-        self._free_below = circumscribed_cost
+        gaps = np.hypot(*(np.roll(self._outline, -1, axis=0) - self._outline).T)
+        self._spacing = float(gaps.max())
+        self._reach = footprint.circumscribed_radius
 
-    def score(self, situation: Situation) -> Array:
-        """Costs of the trajectories, shape (K,)."""
-        return self.check(situation.trajectories, situation.costmap, situation.pose)
+    def survey(self, costmap: Grid, pose: Pose2D, distance: float, *, growth: float = 0.0) -> Surroundings:
+        """Look around a pose.
 
-    def check(self, trajectories: Array, costmap: Grid, pose: Pose2D) -> Array:
-        """Costs of trajectories that begin at a pose, shape (K,)."""
+        Args:
+            costmap: the local costs.
+            pose: where the robot is.
+            distance: how far it may be moved [m].
+            growth: by what part its footprint may be enlarged.
+        """
         info, cells = costmap.info, costmap.cells
-        place = (info.resolution, info.origin_x, info.origin_y)
-        touching = kernels.count_touching(cells, *place, self._outline, *pose)
-        if touching:
-            worst = kernels.leaving_costs(trajectories, cells, *place, self._outline, touching)
-        else:
-            # cells are coarse: a centre may stand in an inscribed one though the outline is free
-            here = int(costmap.at(pose.x, pose.y)) if info.contains(pose.x, pose.y) else UNKNOWN
-            taken_from = LETHAL if here == INSCRIBED else INSCRIBED
-            worst = kernels.worst_footprint_costs(
-                trajectories, cells, *place, self._outline, self._free_below, taken_from
-            )
+        reach = self._reach * (1.0 + growth)
+        side = math.ceil((distance + reach) / info.resolution) + 3
+        ix, iy = info.cell_of_clamped(pose.x, pose.y)
+        x0, y0 = max(ix - side, 0), max(iy - side, 0)
+        x1, y1 = min(ix + side + 1, info.width), min(iy + side + 1, info.height)
+        cap = math.ceil(2.0 * reach / info.resolution) + 4
+        # cells are coarse: a centre may stand in an inscribed one though the outline is free
+        here = int(costmap.at(pose.x, pose.y)) if info.contains(pose.x, pose.y) else UNKNOWN
+        return Surroundings(
+            pose=pose,
+            costmap=costmap,
+            near=kernels.clearances(cells, x0, y0, x1, y1, cap),
+            corner=(x0, y0),
+            touching=kernels.count_touching(cells, info.resolution, info.origin_x, info.origin_y, self._outline, *pose),
+            taken_from=LETHAL if here == INSCRIBED else INSCRIBED,
+        )
+
+    def drive(
+        self,
+        around: Surroundings,
+        velocity: Twist2D,
+        samples: Array,
+        motion: Motion,
+        *,
+        ends: Array | None = None,
+        failed: Array | None = None,
+    ) -> Array:
+        """Costs of velocities driven from the pose surveyed, shape (K,); inf where something is hit.
+
+        Args:
+            around: of that pose, far enough for the motion.
+            velocity: the robot's now.
+            samples: velocities (vx, vy, wz), shape (K, 3).
+            motion: how they are simulated.
+            ends: is filled with where each leads, shape (K, 3).
+            failed: costs of which those that are inf need not be looked at again, shape (K,).
+        """
+        info = around.costmap.info
+        worst = np.zeros(len(samples)) if failed is None else np.where(np.isfinite(failed), 0.0, -1.0)
+        kernels.drive(
+            np.array([*around.pose, *velocity]),
+            samples,
+            motion.packed(self._reach, self._spacing),
+            around.costmap.cells,
+            np.array([info.resolution, info.origin_x, info.origin_y]),
+            around.near,
+            *around.corner,
+            around.taken_from,
+            around.touching,
+            self._outline,
+            np.empty((len(samples), 3)) if ends is None else ends,
+            worst,
+        )
         return np.where(worst < 0.0, np.inf, worst)
+
+    def is_free(self, costmap: Grid, pose: Pose2D, twist: Twist2D, motion: Motion) -> bool:
+        """Whether one velocity can be driven from a pose."""
+        samples = np.array([twist], dtype=np.float64)
+        around = self.survey(costmap, pose, motion.reach(samples, STOP))
+        return bool(np.isfinite(self.drive(around, twist, samples, motion)[0]))
+
+    def trace(self, pose: Pose2D, velocity: Twist2D, twist: Twist2D, motion: Motion) -> Array:
+        """The poses that a velocity leads through, shape (N, 3)."""
+        start = np.array([*pose, *velocity])
+        return kernels.trace(start, np.array([twist], dtype=np.float64), 0, motion.packed(self._reach, self._spacing))

@@ -2,35 +2,91 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.costmap.costs import CostCells
+from rosbot_patrol.costmap.costs import INSCRIBED
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.grid import Grid, GridInfo, cells_of_points
+from rosbot_patrol.planning import critic_kernels as kernels
 
 Array = NDArray[np.float64]
+
+COARSE = 0.05  # edge of the cells of distance fields [m]
+
+
+def shrink(costmap: Grid) -> Grid:
+    """The highest costs of blocks of about 5 cm, over which distance fields are computed."""
+    info = costmap.info
+    factor = max(1, round(COARSE / info.resolution))
+    if factor == 1:
+        return costmap
+    cells = kernels.shrink(costmap.cells, factor)
+    coarse = GridInfo(
+        resolution=info.resolution * factor,
+        width=cells.shape[1],
+        height=cells.shape[0],
+        origin_x=info.origin_x,
+        origin_y=info.origin_y,
+    )
+    return Grid(coarse, cells)
+
+
+def distances_from(grid: Grid, points: Array) -> NDArray[np.float32]:
+    """Distance to the nearest of some points around what cannot be crossed [cells], inf where there is no way."""
+    return kernels.spread(grid.cells, cells_of_points(grid.info, points))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Situation:
-    """One control cycle.
+    """One control cycle; the distance fields that critics share are computed once, when first asked for.
 
     Attributes:
         pose: where the robot is.
-        trajectories: simulated poses in the local costmap's frame, shape (K, T, 3).
-        costmap: the local costs.
-        coarse, coarse_cells: the same in cells of about 5 cm, for distance fields.
-        plan: the part of the plan inside, shape (N, 3).
-        nose: how far ahead of the last pose alignment is judged [m].
+        samples: velocities (vx, vy, wz) that are judged, shape (K, 3).
+        ends: where each of them leads, in the local costmap's frame, shape (K, 3).
+        coarse: the local costs in cells of about 5 cm.
+        plan: the part of the plan that is followed, shape (N, 3).
+        nose: how far ahead of a pose alignment is judged [m].
+        goal_field: distance to the local goal, the plan's last pose [cells of the coarse grid].
     """
 
     pose: Pose2D
-    trajectories: Array
-    costmap: Grid
-    coarse: GridInfo
-    coarse_cells: CostCells
+    samples: Array
+    ends: Array
+    coarse: Grid
     plan: Array
     nose: float
+    goal_field: NDArray[np.float32]
+
+    def read(self, field: NDArray[np.float32]) -> Array:
+        """A distance field at the ends and at the points `nose` ahead of them [m], shape (2, K); inf: no way."""
+        info = self.coarse.info
+        found = kernels.end_distances(self.ends, field, info.resolution, info.origin_x, info.origin_y, self.nose)
+        return info.resolution * found
+
+    @cached_property
+    def to_plan(self) -> Array:
+        """Distance to the plan from ends and noses [m], shape (2, K)."""
+        info = self.coarse.info
+        cells = cells_of_points(info, self.plan[:, :2])
+        changes = np.append(True, (cells[1:] != cells[:-1]).any(axis=1))
+        cells = cells[changes]
+        ix, iy = cells.T
+        # what leads through an obstacle must not pull into it
+        free = self.coarse.cells[iy.clip(0, info.height - 1), ix.clip(0, info.width - 1)] < INSCRIBED
+        return self.read(kernels.spread(self.coarse.cells, np.ascontiguousarray(cells[free])))
+
+    @cached_property
+    def to_goal(self) -> Array:
+        """Distance to the local goal from ends and noses [m], shape (2, K)."""
+        return self.read(self.goal_field)
+
+    @cached_property
+    def goal_distance(self) -> float:
+        """From the robot to the local goal, as the crow flies [m]."""
+        return math.hypot(self.plan[-1, 0] - self.pose.x, self.plan[-1, 1] - self.pose.y)

@@ -1,0 +1,192 @@
+#!/usr/bin/env python3
+"""The local planners: how long a control cycle takes.
+
+    PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_control.py [--json FILE] [--quick]
+
+control_cycle_ms: `compute` of TrajectoryPlannerROS with the tutorial's parameters (20 x 20 samples over 1.7 s) on its
+local costmap (3 x 3 m in cells of 0.01 m, inflated by 1.0 m), cutting the plan and all distance fields included. The
+situations are those of a drive through the house: from the base through the door (0.90 m) to room 2, and to room 7,
+every 0.5 m along the global plan, which has a pose every 0.01 m; the costmap holds what a lidar of 720 beams sees
+there. Pinned to one core; median over the places of the median of each place's repeats. `worst` is the slowest place.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import math
+import os
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "src"))
+
+from rosbot_patrol.costmap.layered import LayeredCostmap  # noqa: E402
+from rosbot_patrol.costmap.obstacle import observe  # noqa: E402
+from rosbot_patrol.costmap.params import read_costmap  # noqa: E402
+from rosbot_patrol.errors import ControlError  # noqa: E402
+from rosbot_patrol.geometry import Pose2D, Twist2D  # noqa: E402
+from rosbot_patrol.grid import Grid  # noqa: E402
+from rosbot_patrol.maps.map_io import read_map  # noqa: E402
+from rosbot_patrol.planning.interfaces import LocalPlanner, LocalView  # noqa: E402
+from rosbot_patrol.planning.registry import (  # noqa: E402
+    LOCAL_PLANNERS,
+    make_global_planner,
+    make_local_planner,
+    short_name,
+)
+from rosbot_patrol.scan import LaserScan  # noqa: E402
+
+AIMS = {"control_cycle_ms": 4.0}
+CONFIG = ROOT / "drop_in" / "tutorial_pkg" / "config"
+ROOMS = ((-3.489, 0.306), (14.75, 11.48))  # 2, behind the door, and 7, at the end of the house
+
+
+@dataclass(frozen=True)
+class Place:
+    """One situation: what the planner sees, the plan that it follows, and the local costmap it belongs to."""
+
+    view: LocalView
+    plan: np.ndarray
+    costmap: LayeredCostmap
+
+
+def tutorial(name: str) -> dict[str, Any]:
+    return yaml.safe_load((CONFIG / name).read_text(encoding="utf-8"))
+
+
+def local_costmap() -> LayeredCostmap:
+    """The tutorial's, over an obstacle layer that also clears along beams without a hit."""
+    tree = {**tutorial("costmap_common_params.yaml"), **tutorial("local_costmap_params.yaml")["local_costmap"]}
+    return LayeredCostmap(read_costmap(tree))
+
+
+def global_plan(house: Grid, goal: tuple[float, float]) -> np.ndarray:
+    """Poses 0.01 m apart from the base to a place."""
+    tree = {
+        "plugins": [
+            {"name": "static", "type": "costmap_2d::StaticLayer"},
+            {"name": "inflation", "type": "costmap_2d::InflationLayer"},
+        ],
+        "footprint": [[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]],
+        "inflation": {"inflation_radius": 1.0, "cost_scaling_factor": 6.0},
+    }
+    costmap = LayeredCostmap(read_costmap(tree))
+    costmap.static_layers[0].set_map(house)
+    costmap.update(0.0, Pose2D())
+    path = make_global_planner("navfn/NavfnROS", {}).plan(costmap.grid, Pose2D(), Pose2D(*goal, 0.0))
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T)))
+    at = np.arange(0.0, along[-1], 0.01)
+    yaw = np.interp(at, along, np.unwrap(path[:, 2]))
+    return np.column_stack((np.interp(at, along, path[:, 0]), np.interp(at, along, path[:, 1]), yaw))
+
+
+def scan_at(house: Grid, pose: Pose2D) -> LaserScan:
+    """720 beams over the map's occupied cells."""
+    angles = -math.pi + np.arange(720) * math.tau / 720
+    reach = np.arange(0.0, 6.0, 0.01)
+    x = pose.x + np.outer(np.cos(angles + pose.yaw), reach)
+    y = pose.y + np.outer(np.sin(angles + pose.yaw), reach)
+    info = house.info
+    ix = ((x - info.origin_x) / info.resolution).astype(int)
+    iy = ((y - info.origin_y) / info.resolution).astype(int)
+    hit = house.cells[iy, ix] == 100
+    ranges = np.where(hit.any(axis=1), reach[hit.argmax(axis=1)], np.inf)
+    return LaserScan(
+        stamp=0.0,
+        frame_id="laser",
+        angle_min=-math.pi,
+        angle_increment=math.tau / 720,
+        range_min=0.1,
+        range_max=12.0,
+        ranges=ranges,
+    )
+
+
+def places(spacing: float = 0.5) -> Iterator[Place]:
+    """The situations of the drives."""
+    house = read_map(ROOT / "maps" / "rosbot_map.yaml")
+    for goal in ROOMS:
+        plan = global_plan(house, goal)
+        for start in range(0, len(plan) - 50, round(spacing / 0.01)):
+            x, y, yaw = plan[start]
+            pose = Pose2D(float(x), float(y), float(yaw) + 0.1)
+            costmap = local_costmap()
+            costmap.update(0.0, pose)
+            for layer in costmap.obstacle_layers:
+                for buffer in layer.buffers.values():
+                    buffer.add(observe(scan_at(house, pose), pose))
+            costmap.update(0.1, pose)
+            grid = Grid(costmap.info, costmap.cells)
+            # the global plan is made once a second: it begins up to a few decimetres behind the robot
+            yield Place(
+                view=LocalView(now=0.0, pose=pose, velocity=Twist2D(0.1, 0.0, 0.1), costmap=grid),
+                plan=plan[max(0, start - 20) :],
+                costmap=costmap,
+            )
+
+
+def make_planner(plugin: str, place: Place, **changes: Any) -> LocalPlanner:
+    tree = {short_name(plugin): {**tutorial("trajectory_planner.yaml")["TrajectoryPlannerROS"], **changes}}
+    return make_local_planner(plugin, tree, place.costmap, controller_frequency=25.0)
+
+
+def cycle_times(plugin: str, repeats: int, **changes: Any) -> tuple[list[float], int]:
+    """Milliseconds of `compute` at each place (median of the repeats), and how often no way was found."""
+    times, refused = [], 0
+    for place in places():
+        planner = make_planner(plugin, place, **changes)
+        own = []
+        for i in range(repeats + 2):
+            planner.set_plan(place.plan)
+            before = time.perf_counter()
+            try:
+                planner.compute(place.view)
+            except ControlError:
+                refused += i == 0
+            own.append(1e3 * (time.perf_counter() - before))
+        times.append(statistics.median(own[2:]))
+    return times, refused
+
+
+def figures(*, quick: bool = False) -> dict[str, float]:
+    """The figures of FIGURES.md that this module knows, printed as a table."""
+    repeats = 5 if quick else 50
+    logging.disable(logging.WARNING)
+    found: dict[str, float] = {}
+    print(f"{'figure':32s} {'ms':>8s} {'worst':>8s} {'aim':>6s} {'places':>7s} {'no way':>7s}")
+    for plugin in LOCAL_PLANNERS:
+        times, refused = cycle_times(plugin, repeats)
+        own = short_name(plugin) == "TrajectoryPlannerROS"
+        name = "control_cycle_ms" if own else f"control_cycle_{short_name(plugin)}_ms"
+        found[name] = round(statistics.median(times), 3)
+        found[name.replace("_ms", "_worst_ms")] = round(max(times), 3)
+        aim = f"{AIMS[name]:6.1f}" if name in AIMS else ""
+        print(f"{name:32s} {found[name]:8.3f} {max(times):8.3f} {aim:>6s} {len(times):7d} {refused:7d}")
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--quick", action="store_true", help="few repeats")
+    wanted = parser.parse_args()
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    print(f"1 core of {os.cpu_count()}")
+    found = figures(quick=wanted.quick)
+    if wanted.json:
+        wanted.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,13 @@
+"""Whether a trajectory ends with the robot's nose on the plan."""
+
+from __future__ import annotations
+
+from rosbot_patrol.planning.critics.situation import Array, Situation
+
+
+class AlignmentCritic:
+    """Distance to the plan from a point ahead of the trajectory's end (dwa_local_planner's alignment costs)."""
+
+    def score(self, situation: Situation) -> Array:
+        """Distances of the noses [m], shape (K,); inf where the trajectory's end cannot reach the plan."""
+        return situation.to_plan[1]

@@ -1,0 +1,37 @@
+"""Whether a trajectory ends with the robot's nose towards the local goal."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rosbot_patrol.costmap.costs import INSCRIBED
+from rosbot_patrol.planning.critics.situation import Array, Situation, distances_from
+
+
+class FacingGoalCritic:
+    """Distance to the local goal from a point ahead of the trajectory's end (of TrajectoryPlannerROS)."""
+
+    def score(self, situation: Situation) -> Array:
+        """Distances of the noses [m], shape (K,)."""
+        return situation.to_goal[1]
+
+
+class GoalFrontCritic:
+    """The same with the goal moved away by as much (dwa_local_planner's goal_front costs).
+
+    Differs: where the goal moved would lie in an obstacle or off the costmap it is moved only as far as is free.
+    """
+
+    def score(self, situation: Situation) -> Array:
+        """Distances of the noses [m], shape (K,)."""
+        info, goal = situation.coarse.info, situation.plan[-1]
+        angle = math.atan2(goal[1] - situation.pose.y, goal[0] - situation.pose.x)
+        front = (goal[0], goal[1])
+        for shift in np.linspace(0.0, situation.nose, max(2, math.ceil(situation.nose / info.resolution) + 1))[1:]:
+            x, y = goal[0] + shift * math.cos(angle), goal[1] + shift * math.sin(angle)
+            if not info.contains(x, y) or situation.coarse.at(x, y) >= INSCRIBED:
+                break
+            front = (x, y)
+        return situation.read(distances_from(situation.coarse, np.array([front])))[1]

@@ -1,0 +1,24 @@
+"""Whether a trajectory heads for what can be seen of the plan."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosbot_patrol.planning import critic_kernels as kernels
+from rosbot_patrol.planning.critics.situation import Array, Situation
+
+
+class HeadingCritic:
+    """Angle between the robot's heading and the farthest pose of the plan in its line of sight.
+
+    That of TrajectoryPlannerROS with `heading_scoring`. Differs: where nothing of the plan is seen it is pi; upstream
+    takes the largest number there is.
+    """
+
+    def score(self, situation: Situation) -> Array:
+        """Angles [rad], shape (K,), 0 to pi."""
+        info = situation.coarse.info
+        place = (info.resolution, info.origin_x, info.origin_y)
+        step = max(1, len(situation.plan) // 60)
+        plan = np.ascontiguousarray(situation.plan[::-1][::step])
+        return kernels.headings_off(situation.ends, plan, situation.coarse.cells, *place)

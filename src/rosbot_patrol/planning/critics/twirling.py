@@ -1,0 +1,15 @@
+"""How much a velocity turns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosbot_patrol.planning.critics.situation import Array, Situation
+
+
+class TwirlingCritic:
+    """The turning speed, so that a base that can go sideways does not spin on its way (TwirlingCostFunction)."""
+
+    def score(self, situation: Situation) -> Array:
+        """Turning speeds [rad/s], shape (K,)."""
+        return np.abs(situation.samples[:, 2])
