@@ -336,15 +336,15 @@ def shrink(cells, factor):
     return out
 
 
-@kernel("float32[:, ::1](uint8[:, ::1], int64[:, ::1])")
+@kernel("float32[:, ::1](uint8[:, ::1], float64[:, ::1])")
 def spread(cells, sources):
     """Distance [cells] from the nearest source around what cannot be crossed (253 and more), inf where there is no way.
 
-    First-order upwind differences (Sethian 1996), relaxed in the order of a queue; cells of a source count as free.
+    First-order upwind differences (Sethian 1996), relaxed in the order of a queue; a source's own cell counts as free.
 
     Args:
         cells: costs.
-        sources: cells (ix, iy), shape (N, 2); those outside are left out.
+        sources: points (x, y) [cells, from the grid's corner], shape (N, 2); those outside are left out.
     """
     height, width = cells.shape
     out = np.full((height, width), np.inf, np.float32)
@@ -353,12 +353,24 @@ def spread(cells, sources):
     waiting = np.zeros(height * width, np.bool_)
     first, last = 0, 0
     for i in range(sources.shape[0]):
-        ix, iy = sources[i, 0], sources[i, 1]
-        if 0 <= ix < width and 0 <= iy < height and not waiting[iy * width + ix]:
-            flat[iy * width + ix] = 0.0
-            queue[last] = iy * width + ix
-            waiting[queue[last]] = True
-            last += 1
+        u, v = sources[i, 0], sources[i, 1]
+        own_x, own_y = math.floor(u), math.floor(v)
+        x0, y0 = math.floor(u - 0.5), math.floor(v - 0.5)
+        if own_x < 0 or own_y < 0 or own_x >= width or own_y >= height:
+            continue
+        for k in range(4):
+            ix, iy = x0 + (k & 1), y0 + (k >> 1)
+            if ix < 0 or iy < 0 or ix >= width or iy >= height:
+                continue
+            if cells[iy, ix] >= 253 and not (ix == own_x and iy == own_y):
+                continue
+            cell = iy * width + ix
+            off = np.float32(math.sqrt((ix + 0.5 - u) ** 2 + (iy + 0.5 - v) ** 2))
+            flat[cell] = min(flat[cell], off)
+            if not waiting[cell]:
+                waiting[cell] = True
+                queue[last] = cell
+                last += 1
     far = np.float32(np.inf)
     while first != last:
         cell = queue[first]

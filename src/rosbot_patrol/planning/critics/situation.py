@@ -38,7 +38,8 @@ def shrink(costmap: Grid) -> Grid:
 
 def distances_from(grid: Grid, points: Array) -> NDArray[np.float32]:
     """Distance to the nearest of some points around what cannot be crossed [cells], inf where there is no way."""
-    return kernels.spread(grid.cells, cells_of_points(grid.info, points))
+    info = grid.info
+    return kernels.spread(grid.cells, (points - (info.origin_x, info.origin_y)) / info.resolution)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,18 +74,21 @@ class Situation:
     def to_plan(self) -> Array:
         """Distance to the plan from ends and noses [m], shape (2, K)."""
         info = self.coarse.info
-        cells = cells_of_points(info, self.plan[:, :2])
-        changes = np.append(True, (cells[1:] != cells[:-1]).any(axis=1))
-        cells = cells[changes]
-        ix, iy = cells.T
+        ix, iy = cells_of_points(info, self.plan[:, :2]).T
         # what leads through an obstacle must not pull into it
         free = self.coarse.cells[iy.clip(0, info.height - 1), ix.clip(0, info.width - 1)] < INSCRIBED
-        return self.read(kernels.spread(self.coarse.cells, np.ascontiguousarray(cells[free])))
+        return self.read(distances_from(self.coarse, self.plan[free, :2]))
 
     @cached_property
     def to_goal(self) -> Array:
-        """Distance to the local goal from ends and noses [m], shape (2, K)."""
-        return self.read(self.goal_field)
+        """Distance to the local goal from ends and noses [m], shape (2, K); near it exact, where cells are too coarse."""
+        found = self.read(self.goal_field)
+        x, y, yaw = self.ends.T
+        noses = (x + self.nose * np.cos(yaw), y + self.nose * np.sin(yaw))
+        exact = np.array([np.hypot(px - self.plan[-1, 0], py - self.plan[-1, 1]) for px, py in ((x, y), noses)])
+        by_field = np.clip(found / self.coarse.info.resolution - 2.0, 0.0, 1.0)
+        with np.errstate(invalid="ignore"):  # an infinite distance stays so
+            return np.where(by_field == 1.0, found, by_field * found + (1.0 - by_field) * exact)
 
     @cached_property
     def goal_distance(self) -> float:
