@@ -42,6 +42,9 @@ class Layer(ABC):
     def clear_outside(self, keep: Bounds) -> None:
         """Forget what was sensed outside `keep`."""
 
+    def clear_inside(self, area: Bounds) -> None:
+        """Forget what was sensed in `area`."""
+
     def is_current(self, now: float) -> bool:
         """Whether the layer's inputs are as fresh as its parameters demand."""
         del now

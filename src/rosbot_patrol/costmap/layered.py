@@ -10,6 +10,8 @@ leaves both as they are until a beam touches the cells. Distances of the inflati
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds, merged
@@ -191,8 +193,33 @@ class LayeredCostmap:
 
     def clear_outside(self, pose: Pose2D, side: float) -> None:
         """Forget what was sensed outside a square of `side` [m] around a pose."""
+        self.clear_square(pose, side)
+
+    def clear_square(
+        self, pose: Pose2D, side: float, *, inside: bool = False, names: Sequence[str] | None = None
+    ) -> list[str]:
+        """Forget what was sensed outside or inside a square around a pose.
+
+        Args:
+            pose: its middle.
+            side: its extent [m].
+            inside: forget what is inside.
+            names: of the layers that forget; all where None.
+
+        Returns:
+            Those of the names that no layer has.
+        """
         x0, y0 = self.info.cell_of(pose.x - side / 2.0, pose.y - side / 2.0)
         x1, y1 = self.info.cell_of(pose.x + side / 2.0, pose.y + side / 2.0)
+        square = Bounds(x0, y0, x1 + 1, y1 + 1)
         for layer in self.layers:
-            layer.clear_outside(Bounds(x0, y0, x1 + 1, y1 + 1))
+            if names is None or layer.name in names:
+                (layer.clear_inside if inside else layer.clear_outside)(square)
+        self._fresh = True
+        own = {layer.name for layer in self.layers}
+        return [name for name in names or () if name not in own]
+
+    def update_now(self, now: float) -> None:
+        """Take in at once what was cleared; the next update computes and returns everything again."""
+        self.update(now, self.pose)
         self._fresh = True

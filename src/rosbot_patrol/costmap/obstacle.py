@@ -163,6 +163,15 @@ class ObstacleLayer(Layer):
             cells[keep.y0 : keep.y1, keep.x1 :] = self._default
         self._dirty = Bounds(0, 0, width, height)
 
+    def clear_inside(self, area: Bounds) -> None:
+        """Forget what was sensed in an area."""
+        if self._info is None:
+            return
+        area = area.clipped(self._info.width, self._info.height)
+        if not area.is_empty:
+            self._window.cells[area.y0 : area.y1, area.x0 : area.x1] = self._default
+            self._dirty = self._dirty.union(area)
+
     def is_current(self, now: float) -> bool:
         """Whether the inputs are fresh."""
         return all(buffer.is_current(now) for buffer in self.buffers.values())

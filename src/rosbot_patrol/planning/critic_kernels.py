@@ -153,6 +153,8 @@ def trace(start, samples, k, motion):
     steps = count_steps(samples, k, motion)
     out = np.empty((steps, 3), np.float64)
     state = start.copy()
+    if motion[13] > 0.0:
+        state[3:] = samples[k]
     for i in range(steps):
         state[0], state[1], state[2], state[3], state[4], state[5] = advance(
             state, samples, k, motion[0] / steps, motion
@@ -175,7 +177,7 @@ def drive(start, samples, motion, cells, place, near, near_x, near_y, taken_from
         samples: velocities (vx, vy, wz), shape (K, 3).
         motion: horizon [s], time of `ends` [s], granularity [m], angular granularity [rad], accelerations in x, y,
             theta, what is added to the time for braking [s], reach and spacing of the outline [m]; speed from which
-            the footprint grows [m/s], by how much, at which speed.
+            the footprint grows [m/s], by how much, at which speed; 1 if a sample is had at once, else 0.
         cells: costs.
         place: resolution, origin_x, origin_y of the cells [m].
         near: `clearances` of a window that holds all that the outline can reach.
@@ -214,6 +216,8 @@ def drive(start, samples, motion, cells, place, near, near_x, near_y, taken_from
                 braking = max(braking, abs(samples[k, i]) / (2.0 * motion[4 + i]))
         looked_at = max(steps, math.ceil((braking + motion[7]) / dt))
         state[:] = start
+        if motion[13] > 0.0:
+            state[3:] = samples[k]
         budget = plain if scale == 1.0 else 0.0
         highest = 0.0
         if motion[1] <= 0.0:
@@ -405,8 +409,8 @@ def spread(cells, sources):
     return out
 
 
-@kernel("Tuple((float64[:, ::1], int64))(float64[:, ::1], int64, float64[::1], float64[::1], float64[::1])")
-def cut_plan(plan, passed, local_from_plan, here, window):
+@kernel("Tuple((float64[:, ::1], int64))(float64[:, ::1], int64, float64[::1], float64[::1], float64[::1], boolean)")
+def cut_plan(plan, passed, local_from_plan, here, window, prune):
     """The plan in the local frame, from where the robot is to where it leaves the local costmap.
 
     Args:
@@ -415,6 +419,7 @@ def cut_plan(plan, passed, local_from_plan, here, window):
         local_from_plan: x, y, yaw.
         here: the robot's x, y.
         window: least and greatest x and y of the local costmap.
+        prune: leave out what lies behind; else it is taken from where it came into the local costmap.
 
     Returns:
         Poses inside, shape (M, 3), empty where the nearest is outside; and the index of that nearest pose. It is not
@@ -437,9 +442,16 @@ def cut_plan(plan, passed, local_from_plan, here, window):
         if off < best:
             best, nearest = off, i
         before_x, before_y = x, y
-    out = np.empty((plan.shape[0] - nearest, 3), np.float64)
+    first = nearest
+    while not prune and first > 0:
+        x = ox + c * plan[first - 1, 0] - s * plan[first - 1, 1]
+        y = oy + s * plan[first - 1, 0] + c * plan[first - 1, 1]
+        if not (window[0] <= x <= window[1] and window[2] <= y <= window[3]):
+            break
+        first -= 1
+    out = np.empty((plan.shape[0] - first, 3), np.float64)
     n = 0
-    for i in range(nearest, plan.shape[0]):
+    for i in range(first, plan.shape[0]):
         x = ox + c * plan[i, 0] - s * plan[i, 1]
         y = oy + s * plan[i, 0] + c * plan[i, 1]
         if not (window[0] <= x <= window[1] and window[2] <= y <= window[3]):

@@ -70,6 +70,9 @@ class LocalPlanner(ABC):
     def reset(self) -> None:
         """Forget the goal that was worked on."""
 
+    def limit_speed(self, trans: float, rot: float, *, distance: float) -> None:
+        """Drive no faster than this [m/s, rad/s] until the robot has moved by `distance` [m]; may be ignored."""
+
     @property
     def local_plan(self) -> Array:
         """What the last velocity would drive, shape (N, 3), in the local costmap's frame."""

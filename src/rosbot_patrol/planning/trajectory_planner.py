@@ -42,7 +42,7 @@ from rosbot_patrol.planning.critics import (
 )
 from rosbot_patrol.planning.interfaces import Array, LocalView
 from rosbot_patrol.planning.trajectory_planner_base import Ground, SamplingPlanner
-from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams, read_speeds
+from rosbot_patrol.planning.trajectory_planner_params import TUNABLE, TrajectoryPlannerParams, read_speeds
 from rosbot_patrol.planning.trajectory_planner_stop import StopLimits
 
 _SHORT, _SLOW = 0.6, 0.1  # how far ahead [s] slow motions [m/s] are looked at where it is narrow
@@ -59,6 +59,8 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         footprint: the robot's padded outline.
         resolution: of the local costmap [m].
     """
+
+    tunable = TUNABLE
 
     def __init__(self, params: TrajectoryPlannerParams, footprint: Footprint, *, resolution: float) -> None:
         super().__init__(params, footprint, resolution=resolution)

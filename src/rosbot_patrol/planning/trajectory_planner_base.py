@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from rosbot_patrol.planning.critics import ObstacleCritic, OscillationCritic, Si
 from rosbot_patrol.planning.interfaces import Array, LocalPlanner, LocalView
 from rosbot_patrol.planning.trajectory_planner_stop import StopAndTurn, StopLimits
 from rosbot_patrol.planning.trajectory_planner_track import Track
+from rosbot_patrol.planning.tunable import changed
 
 P = TypeVar("P")
 
@@ -70,6 +72,8 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         resolution: of the local costmap [m].
     """
 
+    tunable: ClassVar[tuple[str, ...]] = ()
+
     def __init__(self, params: P, footprint: Footprint, *, resolution: float) -> None:
         self.params = params
         self._driven = params  # what holds now: `params`, or slower
@@ -113,6 +117,15 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
             raise TypeError(f"expected {type(self.params).__name__}, got {type(params).__name__}")
         self.params = params
         self._apply()
+
+    def reconfigure(self, changes: Mapping[str, Any], *, name: str = "") -> P:
+        """Change some of the parameters in `tunable`, as a dynamic_reconfigure server asks; returns all of them.
+
+        Raises:
+            ParamError: one is not tunable, of the wrong type or out of bounds; `name` is the prefix in its message.
+        """
+        self.set_params(changed(self.params, changes, self.tunable, name=name))
+        return self.params
 
     def limit_speed(self, trans: float, rot: float, *, distance: float) -> None:
         """Drive no faster than this [m/s, rad/s] until the robot has moved by `distance` [m]."""

@@ -54,7 +54,7 @@ class Track:
 
         Args:
             view: where the robot is and what it sees.
-            prune: forget what lies behind.
+            prune: without what lies behind.
 
         Raises:
             ControlError: it does not pass through the local costmap.
@@ -72,9 +72,8 @@ class Track:
         )
         place = np.array(view.local_from_plan, dtype=np.float64)
         here = np.array([view.pose.x, view.pose.y])
-        poses, nearest = kernels.cut_plan(self.poses, self.passed, place, here, window)
+        poses, nearest = kernels.cut_plan(self.poses, self.passed, place, here, window, prune)
         if len(poses) == 0:
             raise ControlError("the plan does not pass through the local costmap")
-        if prune:
-            self.passed = nearest
+        self.passed = nearest
         return poses

@@ -29,6 +29,7 @@ class Motion:
         judged_at: when the trajectory is judged [s]; at its end where None.
         stop_time_buffer: time to spare when braking before an obstacle [s].
         growing: speed from which the footprint is enlarged [m/s], by how much at most, and the speed at which it is.
+        is_held: the velocity is had at once, as in a dynamic window; accelerations count for braking only.
     """
 
     horizon: float
@@ -38,6 +39,7 @@ class Motion:
     judged_at: float | None = None
     stop_time_buffer: float = 0.0
     growing: tuple[float, float, float] = (math.inf, 0.0, 0.0)
+    is_held: bool = False
 
     def reach(self, samples: Array, velocity: Twist2D) -> float:
         """How far any of some velocities can lead, counting the time for braking [m]."""
@@ -53,7 +55,7 @@ class Motion:
         judged_at = self.horizon if self.judged_at is None else min(self.judged_at, self.horizon)
         steps = self.granularity, self.angular_granularity
         own = (self.horizon, judged_at, *steps, *self.accelerations, self.stop_time_buffer)
-        return np.array([*own, reach, spacing, *self.growing])
+        return np.array([*own, reach, spacing, *self.growing, float(self.is_held)])
 
 
 @dataclass(frozen=True)

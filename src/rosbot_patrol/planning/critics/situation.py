@@ -81,7 +81,7 @@ class Situation:
 
     @cached_property
     def to_goal(self) -> Array:
-        """Distance to the local goal from ends and noses [m], shape (2, K); near it exact, where cells are too coarse."""
+        """Distance to the local goal from ends and noses [m], shape (2, K); exact near it, where cells are coarse."""
         found = self.read(self.goal_field)
         x, y, yaw = self.ends.T
         noses = (x + self.nose * np.cos(yaw), y + self.nose * np.sin(yaw))

@@ -1,0 +1,53 @@
+"""Parameters that can be changed while the robot drives: what a dynamic_reconfigure server needs to know of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import declared, load, unknown_name
+
+P = TypeVar("P")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tunable:
+    """One of them: name, type ("float", "int", "bool" or "str"), default, bounds (None: none), unit and meaning."""
+
+    name: str
+    type: str
+    default: Any
+    lo: float | None
+    hi: float | None
+    unit: str
+    doc: str
+
+
+def tunable(cls: type, names: Iterable[str]) -> tuple[Tunable, ...]:
+    """Those parameters of a class that are named, in that order, as they were declared."""
+    rows = {key: (kind, default, info) for key, kind, default, info in declared(cls)}
+    found = []
+    for name in names:
+        kind, default, info = rows[name]
+        kind = "str" if kind == "Any" else kind
+        found.append(
+            Tunable(name=name, type=kind, default=default, lo=info.lo, hi=info.hi, unit=info.unit, doc=info.doc)
+        )
+    return tuple(found)
+
+
+def changed(params: P, changes: Mapping[str, Any], names: Iterable[str], *, name: str = "") -> P:
+    """Parameters with some of them changed, checked as at start.
+
+    Raises:
+        ParamError: a change is not among `names`, of the wrong type or out of bounds.
+    """
+    known = list(names)
+    for key in changes:
+        if key not in known:
+            raise ParamError(f"{name}{key}", unknown_name(key, known))
+    own = {field.name: getattr(params, field.name) for field in dataclasses.fields(params)}  # type: ignore[arg-type]
+    return load(type(params), {**own, **changes}, name=name)
