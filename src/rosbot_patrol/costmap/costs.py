@@ -47,6 +47,7 @@ def costs_of_occupancy(
         trinary: only free, lethal and unknown; otherwise values between are scaled.
     """
     value = np.arange(-128, 128)
+    lethal_threshold = min(max(lethal_threshold, 0), 100)  # as upstream
     scaled = (np.clip(value, 0, None) / max(lethal_threshold, 1) * LETHAL).clip(0, LETHAL)
     table = np.zeros(256, np.uint8) if trinary else scaled.astype(np.uint8)
     # Upstream reads the bytes unsigned: 255 (that is -1) and everything else above the threshold is lethal.

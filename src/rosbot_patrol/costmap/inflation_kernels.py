@@ -19,9 +19,22 @@ NEAR = 254  # cells; its square still fits 16 bits
 _BLOCK = 64  # cells of a row that are worked on at once
 _SHIFT = 6  # log2 of it
 _STEPS = 16  # distances tried between two looks whether to stop
-_PAD = 320  # room beside a row: NEAR and a block, no cell of it lethal
+_PAD = 336  # room beside a row, NEAR, the last steps and a block; no cell of it lethal
 _BAND = 128  # rows whose column distances are held at once
 _NONE = np.uint16(65535)
+_ONE, _TWO, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
+
+
+@kernel("uint16(int64)")
+def _square(d):
+    return np.uint16(min(d * d, 65535))
+
+
+@kernel("uint16(uint16, uint16)")
+def _plus(a, b):
+    """Saturating sum."""
+    total = np.uint16(a + b)
+    return total if total >= b else _NONE
 
 
 @kernel("boolean(uint16[::1], int64, int64, uint16[::1], int64, uint16[::1])", inline="never")
@@ -62,15 +75,16 @@ def _nearest_in_row(squares, at, reach, least, d2_max, found):
         for k in range(max(low >> _SHIFT, 0), min(high >> _SHIFT, last) + 1):
             near |= least[k] < limit
         if near:
-            for d in range(step, end):
-                square = np.uint16(d * d)
-                before = squares[at - d : at - d + _BLOCK]
-                after = squares[at + d : at + d + _BLOCK]
+            for d in range(step, step + _STEPS, 4):  # four at once keep `found` in registers
+                s0, s1, s2, s3 = _square(d), _square(d + 1), _square(d + 2), _square(d + 3)
+                l0, r0 = np.uint64(at - d), np.uint64(at + d)  # unsigned: no look for negative indices
+                l1, r1, l2, r2, l3, r3 = l0 - _ONE, r0 + _ONE, l0 - _TWO, r0 + _TWO, l0 - _THREE, r0 + _THREE
                 for j in range(_BLOCK):
-                    d2 = np.uint16(min(before[j], after[j]) + square)
-                    if d2 < square:  # it wrapped
-                        d2 = _NONE
-                    found[j] = min(found[j], d2)
+                    i = np.uint64(j)
+                    d2 = min(found[j], _plus(min(squares[l0 + i], squares[r0 + i]), s0))
+                    d2 = min(d2, _plus(min(squares[l1 + i], squares[r1 + i]), s1))
+                    d2 = min(d2, _plus(min(squares[l2 + i], squares[r2 + i]), s2))
+                    found[j] = min(d2, _plus(min(squares[l3 + i], squares[r3 + i]), s3))
             top = np.uint16(0)
             for j in range(_BLOCK):
                 top = max(top, found[j])

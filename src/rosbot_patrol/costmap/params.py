@@ -147,25 +147,30 @@ LAYER_TYPES: dict[str, type] = {
     "KeepoutLayer": KeepoutParams,
 }
 
-_INHERITED = ("obstacle_range", "raytrace_range", "max_obstacle_height", "min_obstacle_height")
+_RANGES = ("obstacle_range", "raytrace_range")
+_HEIGHTS = ("max_obstacle_height", "min_obstacle_height")
 _VOXEL = ("origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold", "publish_voxel_map")
-_LEGACY = {
-    "static_layer": (
-        "map_topic",
-        "unknown_cost_value",
-        "lethal_cost_threshold",
-        "subscribe_to_updates",
-        "first_map_only",
-    ),
-    "obstacle_layer": ("observation_sources", *_INHERITED),
-    "inflation_layer": ("cost_scaling_factor", "inflation_radius"),
+# What a layer of each type takes from the costmap's own namespace, over its own (upstream's copyParentParameters).
+_FROM_COSTMAP: dict[str, tuple[str, ...]] = {
+    "StaticLayer": ("map_topic", "unknown_cost_value", "lethal_cost_threshold", "track_unknown_space"),
+    "ObstacleLayer": ("max_obstacle_height", *_RANGES, "track_unknown_space"),
+    "VoxelLayer": _VOXEL,
+    "InflationLayer": ("cost_scaling_factor", "inflation_radius"),
+    "KeepoutLayer": (),
+}
+# And what pre-hydro files have there besides (the last two of the map are ours: upstream drops them).
+_LEGACY: dict[str, tuple[str, ...]] = {
+    "static_layer": (*_FROM_COSTMAP["StaticLayer"], "subscribe_to_updates", "first_map_only"),
+    "obstacle_layer": (*_FROM_COSTMAP["ObstacleLayer"], *_VOXEL, "min_obstacle_height", "observation_sources"),
+    "inflation_layer": _FROM_COSTMAP["InflationLayer"],
 }
 
 
 def read_costmap(tree: Mapping[str, Any], *, name: str = "~costmap/") -> CostmapConfig:
     """A costmap's namespace as one checked configuration.
 
-    Without `plugins` the pre-hydro names are translated, as upstream's resetOldParameters does.
+    Without `plugins` the pre-hydro names are translated, as upstream's loadOldParameters does; with them, layers take
+    some parameters from the costmap's namespace, as its copyParentParameters does.
 
     Raises:
         ParamError: a value is wrong, or a plug-in's type is not known.
@@ -177,9 +182,10 @@ def read_costmap(tree: Mapping[str, Any], *, name: str = "~costmap/") -> Costmap
         tree = translate_legacy(tree)
     plugins = _plugins(tree["plugins"], name + "plugins")
     sources = [s for p in plugins for s in str(_sub(tree, p[0], name).get("observation_sources", "")).split()]
-    ignore = ["plugins", "static_map", "map_type", *[p[0] for p in plugins], *sources, *_INHERITED]
+    taken = [key for plugin in plugins for key in _FROM_COSTMAP[plugin[1]]]
+    ignore = ["plugins", "static_map", "map_type", *[p[0] for p in plugins], *sources, *taken, *_RANGES, *_HEIGHTS]
     if legacy:
-        ignore += [key for keys in _LEGACY.values() for key in keys] + list(_VOXEL)
+        ignore += [key for keys in _LEGACY.values() for key in keys]
     params = load(CostmapParams, tree, name=name, ignore=ignore)
     layers = [_read_layer(tree, plugin, params, name) for plugin in plugins]
     return CostmapConfig(params, layers, name.strip("~/"))
@@ -200,10 +206,8 @@ def translate_legacy(tree: Mapping[str, Any]) -> dict[str, Any]:
         moved = {key: tree[key] for key in keys if key in tree}
         if layer == "obstacle_layer":
             moved.update({s: tree[s] for s in str(tree.get("observation_sources", "")).split() if s in tree})
-            if "track_unknown_space" in tree:
-                moved["track_unknown_space"] = tree["track_unknown_space"]
         given = tree.get(layer, {})
-        out[layer] = {**moved, **(given if isinstance(given, Mapping) else {})}
+        out[layer] = {**given, **moved} if isinstance(given, Mapping) else given
     out["plugins"] = plugins
     return out
 
@@ -232,13 +236,14 @@ def _sub(tree: Mapping[str, Any], key: str, name: str) -> Mapping[str, Any]:
 def _read_layer(tree: Mapping[str, Any], plugin: tuple[str, str], params: CostmapParams, name: str) -> LayerConfig:
     layer, kind = plugin
     own = dict(_sub(tree, layer, name))
+    own.update({key: tree[key] for key in _FROM_COSTMAP[kind] if key in tree})
     prefix = f"{name}{layer}/"
     sources: dict[str, SourceParams] = {}
     if kind in ("ObstacleLayer", "VoxelLayer"):
         own.setdefault("track_unknown_space", params.track_unknown_space)
         for source in str(own.get("observation_sources", "")).split():
             sources[source] = _read_source(tree, own, source, prefix)
-    ignore = [*sources, *_INHERITED, *_VOXEL]
+    ignore = [*sources, *_RANGES, *_HEIGHTS, *_VOXEL]
     return LayerConfig(layer, kind, load(LAYER_TYPES[kind], own, name=prefix, ignore=ignore), sources)
 
 
@@ -246,7 +251,7 @@ def _read_source(tree: Mapping[str, Any], layer: Mapping[str, Any], source: str,
     """Ranges and heights are looked for in the source, then in the layer, then in the costmap (searchParam)."""
     inherited: dict[str, Any] = {}
     for scope in (tree, layer):
-        inherited.update({key: scope[key] for key in ("obstacle_range", "raytrace_range") if key in scope})
+        inherited.update({key: scope[key] for key in _RANGES if key in scope})
     own = _sub(layer, source, prefix)
     values = {**inherited, "topic": source, **own}
     return load(SourceParams, values, name=f"{prefix}{source}/")
