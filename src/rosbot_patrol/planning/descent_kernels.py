@@ -48,10 +48,12 @@ def descend(times, from_x, from_y, to_x, to_y, step):
             out = np.concatenate((out, np.empty_like(out)))
         out[n, 0], out[n, 1] = x, y
         n += 1
-        if abs(x - to_x) < 1.0 and abs(y - to_y) < 1.0:
-            reached = 1
-            break
         ix, iy = round(x), round(y)
+        if abs(x - to_x) < 1.0 and abs(y - to_y) < 1.0:
+            end_x, end_y = round(to_x), round(to_y)
+            if ix == end_x or iy == end_y or (math.isfinite(times[iy, end_x]) and math.isfinite(times[end_y, ix])):
+                reached = 1
+                break
         # gradient, interpolated between the four centres around, those without a way left out
         x0, y0 = math.floor(x), math.floor(y)
         fx, fy = x - x0, y - y0
@@ -98,3 +100,34 @@ def descend(times, from_x, from_y, to_x, to_y, step):
         out[n, 0], out[n, 1] = to_x, to_y
         n += 1
     return out[:n].copy(), reached
+
+
+@kernel("Tuple((float64[:, ::1], int64))(float32[:, ::1], int64, int64, int64, int64)")
+def descend_cells(times, from_x, from_y, to_x, to_y):
+    """Follow the fall of `times` from cell to cell, in eight directions, not between cells without a time.
+
+    Returns:
+        Cells (x, y), shape (N, 2), and 1 if the last is (to_x, to_y), else 0.
+    """
+    height, width = times.shape
+    out = np.empty((1024, 2), np.float64)
+    n, x, y = 0, from_x, from_y
+    while True:
+        if n == out.shape[0]:
+            out = np.concatenate((out, np.empty_like(out)))
+        out[n, 0], out[n, 1] = x, y
+        n += 1
+        if x == to_x and y == to_y:
+            return out[:n].copy(), 1
+        best, bx, by = times[y, x], x, y
+        for dy in range(-1, 2):
+            for dx in range(-1, 2):
+                jx, jy = x + dx, y + dy
+                if jx < 0 or jy < 0 or jx >= width or jy >= height or not times[jy, jx] < best:
+                    continue
+                if dx != 0 and dy != 0 and not (math.isfinite(times[y, jx]) and math.isfinite(times[jy, x])):
+                    continue
+                best, bx, by = times[jy, jx], jx, jy
+        if bx == x and by == y:
+            return out[:n].copy(), 0
+        x, y = bx, by

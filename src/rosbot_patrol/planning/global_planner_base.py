@@ -36,6 +36,9 @@ from rosbot_patrol.planning.interfaces import Array, GlobalPlanner
 class PotentialPlanner(GlobalPlanner):
     """Cheapest ways over the costs.
 
+    Attributes:
+        prices: as given.
+
     Args:
         prices: what crossing a cell costs, by its cost, inf where it cannot be crossed; shape (256,).
         tolerance: how far from the goal a plan may end [m], where a request does not say.
@@ -53,7 +56,7 @@ class PotentialPlanner(GlobalPlanner):
         outline: bool = False,
         descend: Descend = descend_smoothly,
     ) -> None:
-        self._prices = prices
+        self.prices = prices
         self._kinds = kinds_of_costs(prices)
         self._tolerance = tolerance
         self._escape_radius = escape_radius
@@ -78,15 +81,17 @@ class PotentialPlanner(GlobalPlanner):
         self._open_start(cells, start_cell, info)
         failure = self._occupied(cells, info, goal, goal_cell)
         if failure is None:
-            points = self._way(info, cells, start, goal_cell)
+            points = self._way(info, cells, start, goal)
             if points is not None:
                 return self._finished(points, start, goal)
         near = None
         if reach > 0.0:
             near = nearest_reachable(cells, self._kinds, start_cell, goal_cell, int(reach / info.resolution))
-        points = None if near is None else self._way(info, cells, start, near)
-        if points is not None and near is not None:
-            return self._finished(points, start, Pose2D(*info.centre_of(*near), goal.yaw))
+        if near is not None:
+            end = Pose2D(*info.centre_of(*near), goal.yaw)
+            points = self._way(info, cells, start, end)
+            if points is not None:
+                return self._finished(points, start, end)
         if failure is None:
             reason = why_no_way(info, cells, self._kinds, start_cell, goal_cell)
             failure = NoPath((start.x, start.y), (goal.x, goal.y), reason)
@@ -110,15 +115,12 @@ class PotentialPlanner(GlobalPlanner):
             area[(self._kinds[area] == Kind.NARROW) & (dx * dx + dy * dy <= r * r)] = dearest
         cells[iy, ix] = FREE
 
-    def _way(self, info: GridInfo, cells: CostCells, start: Pose2D, goal_cell: Cell) -> Array | None:
-        """Points from the start to the middle of a cell [m], shape (N, 2)."""
-        here = (
-            (start.x - info.origin_x) / info.resolution - 0.5,
-            (start.y - info.origin_y) / info.resolution - 0.5,
-        )
-        there = (float(goal_cell[0]), float(goal_cell[1]))
-        points = find_way(cells, self._prices, here, there, self._descend)
-        return None if points is None else (points + 0.5) * info.resolution + (info.origin_x, info.origin_y)
+    def _way(self, info: GridInfo, cells: CostCells, start: Pose2D, goal: Pose2D) -> Array | None:
+        """Points [m], shape (N, 2), from the start to the goal."""
+        origin, resolution = np.array([info.origin_x, info.origin_y]), info.resolution
+        ends = [tuple((np.array([pose.x, pose.y]) - origin) / resolution - 0.5) for pose in (start, goal)]
+        points = find_way(cells, self.prices, ends[0], ends[1], self._descend)
+        return None if points is None else (points + 0.5) * resolution + origin
 
     def _finished(self, points: Array, start: Pose2D, goal: Pose2D) -> Array:
         points[-1] = goal.x, goal.y

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,24 +24,57 @@ from numpy.typing import NDArray
 from rosbot_patrol.costmap.costs import CostCells
 from rosbot_patrol.planning import descent_kernels
 from rosbot_patrol.planning import potential_kernels as kernels
+from rosbot_patrol.planning import straighten_kernels as straighten
 
 Cell = tuple[int, int]
 Point = tuple[float, float]
 Times = NDArray[np.float32]
 Points = NDArray[np.float64]
-Descend = Callable[[Times, Point, Point], Points]
+Descend = Callable[["Field", Point, Point], Points]
 
 SLACK = 0.004  # a way is not looked for where it could not be cheaper by more than this share
+_STEP = 0.5  # cells between the points of a way, as upstream
+_PULLS = 3
+_PULL_WINDOW = 24
+_SMOOTH = 4  # points on each side
+_SMOOTH_PRICE = 1.003  # share of its price that a stretch may then have
+_SMOOTHINGS = 2
 _WHOLE = 256 * 256  # cells of a grid that is solved as a whole
 _CORRIDOR = 4  # blocks on each side of the coarse way
 _COARSE = 0.99  # the coarse field against the fine one, in the open
 _BENDS = 12.0  # blocks that a coarse way may be longer because it bends at their centres
 
 
-def descend_smoothly(times: Times, goal: Point, start: Point) -> Points:
-    """Down the gradient of a field, in steps of half a cell; from start to goal, shape (N, 2), N = 0 where it fails."""
-    points, arrived = descent_kernels.descend(times, *goal, *start, 0.5)
-    return points[::-1] if arrived else np.empty((0, 2))
+@dataclass(frozen=True)
+class Field:
+    """Arrival times over a costmap: costs, prices by cost, and times, which are inf or unset where none is known."""
+
+    cells: CostCells
+    prices: NDArray[np.float32]
+    times: Times
+
+
+def descend_smoothly(field: Field, goal: Point, start: Point) -> Points:
+    """Down the gradient of a field, pulled straight; from start to goal, shape (N, 2), N = 0 where it fails."""
+    points, arrived = descent_kernels.descend(field.times, *goal, *start, _STEP)
+    if not arrived:
+        return np.empty((0, 2))
+    points = np.ascontiguousarray(points[::-1])
+    for _ in range(_PULLS):
+        points = straighten.pull(field.cells, field.prices, straighten.cut(points, 2.0 * _STEP), _PULL_WINDOW)
+    points = straighten.cut(points, _STEP)
+    for _ in range(_SMOOTHINGS):
+        points = straighten.smooth(field.cells, field.prices, points, _SMOOTH, _SMOOTH_PRICE)
+    return points
+
+
+def descend_by_cells(field: Field, goal: Point, start: Point) -> Points:
+    """From cell to cell, in eight directions; from the start's cell to the goal's, shape (N, 2), N = 0 if it fails."""
+    shape = field.times.shape
+    points, arrived = descent_kernels.descend_cells(
+        field.times, *_nearest_cell(goal, shape), *_nearest_cell(start, shape)
+    )
+    return np.ascontiguousarray(points[::-1]) if arrived else np.empty((0, 2))
 
 
 def find_way(
@@ -92,7 +126,7 @@ class _Search:
             field = self.field(np.where(np.isfinite(far), np.float32(np.inf), np.float32(-1.0)))
             return None if field is None else _points(descend(field, self.goal, self.start))
         points = _points(descend(field, self.goal, self.start))
-        worth_it = (1.0 - SLACK) * float(field[self.goal_cell[1], self.goal_cell[0]])
+        worth_it = (1.0 - SLACK) * float(field.times[self.goal_cell[1], self.goal_cell[0]])
         del field
         limits = (worth_it - self._least_times(far)).astype(np.float32)
         if limits[iy, ix] < 0.0:
@@ -100,13 +134,13 @@ class _Search:
         better = self.field(limits)
         return points if better is None else _points(descend(better, self.goal, self.start))
 
-    def field(self, limits: Times) -> Times | None:
+    def field(self, limits: Times) -> Field | None:
         """Arrival times from the start, as far as the goal, within limits; None where it is not reached."""
         times = np.empty(self.cells.shape, np.float32)  # only what is touched takes memory
         kernels.open_blocks(limits, times)
         source, zero = np.array([self.start_cell], np.int64), np.zeros(1, np.float32)
         found = kernels.propagate(self.cells, self.prices, source, zero, *self.goal_cell, limits, times)
-        return times if found else None
+        return Field(self.cells, self.prices, times) if found else None
 
     def _times_to_goal(self) -> Times:
         order = np.argsort(self.prices, kind="stable")

@@ -11,6 +11,7 @@ from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import load
 from rosbot_patrol.planning.dwa_params import RENAMED, DWAPlannerParams, with_new_names
 from rosbot_patrol.planning.dwa_planner import DWAPlanner
+from rosbot_patrol.planning.global_planner import GlobalPlannerParams, PotentialFieldPlanner
 from rosbot_patrol.planning.interfaces import GlobalPlanner, LocalPlanner, Recovery
 from rosbot_patrol.planning.navfn import NavfnParams, NavfnPlanner
 from rosbot_patrol.planning.recoveries import (
@@ -26,7 +27,7 @@ from rosbot_patrol.planning.trajectory_planner_base import SamplingPlanner
 from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 from rosbot_patrol.planning.tunable import tunable
 
-GLOBAL_PLANNERS = ("navfn/NavfnROS",)
+GLOBAL_PLANNERS = ("navfn/NavfnROS", "global_planner/GlobalPlanner")
 TRAJECTORY, DWA = "base_local_planner/TrajectoryPlannerROS", "dwa_local_planner/DWAPlannerROS"
 CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
 ROTATE = "rotate_recovery/RotateRecovery"
@@ -65,8 +66,12 @@ def _group(tree: Tree, key: str, name: str) -> dict[str, Any]:
 
 def make_global_planner(plugin: str, tree: Tree, *, name: str = "~") -> GlobalPlanner:
     """The planner of a name such as navfn/NavfnROS, with its parameters from move_base's namespace."""
-    space = short_name(_known(plugin, GLOBAL_PLANNERS, f"{name}base_global_planner"))
-    return NavfnPlanner(load(NavfnParams, _group(tree, space, name), name=f"{name}{space}/"))
+    kind = _known(plugin, GLOBAL_PLANNERS, f"{name}base_global_planner")
+    space = short_name(kind)
+    values, where = _group(tree, space, name), f"{name}{space}/"
+    if kind == GLOBAL_PLANNERS[0]:
+        return NavfnPlanner(load(NavfnParams, values, name=where))
+    return PotentialFieldPlanner(load(GlobalPlannerParams, values, name=where))
 
 
 def make_local_planner(

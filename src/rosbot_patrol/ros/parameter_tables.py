@@ -25,6 +25,7 @@ from rosbot_patrol.params import declared, table
 from rosbot_patrol.patrol.drive import DriveParams
 from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.planning.global_planner import GlobalPlannerParams
 from rosbot_patrol.planning.navfn import NavfnParams
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, RotateParams
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
@@ -50,6 +51,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
         [
             ("", MoveBaseParams),
             ("NavfnROS/", NavfnParams),
+            ("GlobalPlanner/", GlobalPlannerParams),
             ("TrajectoryPlannerROS/", TrajectoryPlannerParams),
             ("conservative_reset/, aggressive_reset/", ClearCostmapParams),
             ("rotate_recovery/", RotateParams),
