@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from rosbot_patrol.kernels import kernel
 
 CLEARED = 1  # a lethal cell that a ray has cleared in this update and that nothing has marked again yet
@@ -154,10 +156,18 @@ def sample_map(master, source, x0, y0, x1, y1, affine, use_maximum):
     """
     height, width = source.shape
     a, b, c, d, e, f = affine[0], affine[1], affine[2], affine[3], affine[4], affine[5]
+    is_turned = b != 0.0 or d != 0.0
+    columns = np.empty(max(x1 - x0, 0), np.int64)
+    for x in range(x0, x1):
+        columns[x - x0] = math.floor(a * x + c)
     for y in range(y0, y1):
+        row = math.floor(e * y + f)
+        if not is_turned and (row < 0 or row >= height):
+            continue
         for x in range(x0, x1):
-            sx = math.floor(a * x + b * y + c)
-            sy = math.floor(d * x + e * y + f)
+            sx, sy = columns[x - x0], row
+            if is_turned:
+                sx, sy = math.floor(a * x + b * y + c), math.floor(d * x + e * y + f)
             if sx < 0 or sy < 0 or sx >= width or sy >= height:
                 continue
             new, old = source[sy, sx], master[y, x]

@@ -18,14 +18,15 @@ class KeepoutLayer(StaticLayer):
     those below become costs where `trinary_costmap` is false, unknown ones say nothing. Costs combine by maximum and
     the mask never gives the costmap its size. Put it before the inflation layer, so that the way keeps its distance.
     As with a map, the costmap is not current until the mask has come: a robot that does not know yet where it must
-    not go does not start.
+    not go does not start. Files are read at the edges: the node gives `set_map` what `mask_file` holds, if that is
+    set, else what comes on `map_topic`.
     """
 
     sets_size = False
 
     def __init__(self, params: KeepoutParams, *, name: str = "keepout_layer") -> None:
         super().__init__(params, name=name)
-        self.mask_file = params.mask_file
+        self.mask_file, self.mask_frame = params.mask_file, params.mask_frame
 
     def _translate(self, occupancy: np.ndarray) -> CostCells:
         costs = super()._translate(occupancy)

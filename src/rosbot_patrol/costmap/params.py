@@ -106,6 +106,7 @@ class KeepoutParams(StaticParams):
 
     map_topic: str = param("keepout_mask", doc="nav_msgs/OccupancyGrid with the mask, where there is no mask_file")
     mask_file: str = param("", doc="yaml of map_server to take the mask from")
+    mask_frame: str = param("map", doc="frame of mask_file")
     subscribe_to_updates: bool = param(False, doc="listen to <map_topic>_updates")
     trinary_costmap: bool = param(True, doc="false: values between become costs")
 

@@ -44,9 +44,11 @@ class StaticLayer(Layer):
         grid.info.require_aligned(self.name)
         if grid.info.width < 1 or grid.info.height < 1 or grid.info.resolution <= 0.0:
             raise MapError(self.name, f"a map of {grid.info.width} x {grid.info.height} cells is no map")
-        self._costs = self._translate(grid.cells)
+        before, self._costs = self._costs, self._translate(grid.cells)
+        whole = Bounds(0, 0, grid.info.width, grid.info.height)
+        changed = _difference(before, self._costs) if self.map_info == grid.info else whole
+        self._changed = changed.union(self._changed or NOTHING)
         self.map_info = grid.info
-        self._changed = Bounds(0, 0, grid.info.width, grid.info.height)
 
     def update_map(self, x: int, y: int, cells: np.ndarray) -> None:
         """Take new occupancy for a rectangle of the map; what lies outside is ignored."""
@@ -92,6 +94,8 @@ class StaticLayer(Layer):
                 return self._whole(bounds)  # the map moved against the master
             return bounds
         changed, self._changed = self._changed, None
+        if changed.is_empty:
+            return bounds
         if self._is_aligned:
             return bounds.union(changed)
         return self._whole(bounds)
@@ -133,3 +137,12 @@ class StaticLayer(Layer):
     def is_current(self, now: float) -> bool:
         """Whether there is a map."""
         return self.map_info is not None or not self.enabled
+
+
+def _difference(before: CostCells, after: CostCells) -> Bounds:
+    """A rectangle around the cells that differ, of two grids of one shape."""
+    differs = before != after
+    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
+    if not len(rows):
+        return NOTHING
+    return Bounds(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)

@@ -213,3 +213,18 @@ def test_layers_work_in_the_configured_order():
 def test_areas_that_overlap_are_merged():
     areas = merged([Bounds(0, 0, 5, 5), Bounds(10, 10, 12, 12), Bounds(4, 4, 6, 6), Bounds(3, 3, 3, 9)])
     assert sorted(areas) == [Bounds(0, 0, 6, 6), Bounds(10, 10, 12, 12)]
+
+
+def test_the_same_map_again_changes_nothing_and_a_corrected_one_only_what_differs():
+    tree = {"plugins": [{"name": "static", "type": "costmap_2d::StaticLayer"}], "footprint": FOOTPRINT}
+    costmap = LayeredCostmap(read_costmap(tree))
+    layer = costmap.static_layers[0]
+    for _ in range(2):
+        layer.set_map(static_map())
+        areas = costmap.update(0.0, Pose2D())
+    assert areas == []
+    corrected = static_map()
+    corrected.cells[12, 5], corrected.cells[14, 9] = 100, 100
+    layer.set_map(corrected)
+    assert costmap.update(0.0, Pose2D()) == [Bounds(5, 12, 10, 15)]
+    assert costmap.cells[14, 9] == 254
