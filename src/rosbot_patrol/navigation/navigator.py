@@ -14,7 +14,7 @@ from __future__ import annotations
 import enum
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -79,13 +79,24 @@ class PlanSource(Protocol):
         """Forget the open request and its result."""
 
 
+def _never(_twist: Twist2D) -> str:
+    return ""
+
+
 @dataclass(frozen=True, kw_only=True)
 class NavigatorView:
-    """What the navigator sees in a step: the two planners' views, and whether the sensors can be trusted."""
+    """What the navigator sees in a step.
+
+    Attributes:
+        local, recovery: the views of the planners and of the recovery behaviours.
+        is_current: whether the sensors can be trusted.
+        must_wait: for whom the robot has to stand still instead of driving a velocity, "" for nobody.
+    """
 
     local: LocalView
     recovery: RecoveryView
     is_current: bool = True
+    must_wait: Callable[[Twist2D], str] = _never
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +139,7 @@ class _Progress:
     recovery_index: int = 0
     trigger: Trigger = Trigger.PLANNING
     running: Recovery | None = None
+    held_back: Twist2D | None = None  # what a recovery wanted when somebody came
     control_failed: bool = False
 
 
@@ -291,11 +303,15 @@ class Navigator:
         progress.last_control, progress.control_failed = now, False
         if progress.trigger is Trigger.CONTROLLING:
             progress.recovery_index = 0
+        someone = view.must_wait(twist)
+        if someone:
+            progress.last_motion = now  # to wait for somebody is no oscillation
+            return Command(twist=STOP, reason=f"waiting: {someone}")
         return Command(twist=twist, reason="driving")
 
     def _recover(self, trigger: Trigger, context: _Context) -> Command:
         context.progress.trigger = trigger
-        context.progress.running = None
+        context.progress.running = context.progress.held_back = None
         self.state = State.CLEARING
         return Command(twist=STOP, reason=f"recovering ({trigger.name.lower()})")
 
@@ -314,7 +330,11 @@ class Navigator:
                 recovery=(progress.recovery_index, count, progress.running.name),
                 reason=f"recovery {progress.running.name}",
             )
-        twist = progress.running.step(view.recovery)
+        twist = progress.held_back or progress.running.step(view.recovery)
+        if twist is not None and (someone := view.must_wait(twist)):
+            progress.held_back = twist
+            return Command(twist=STOP, reason=f"waiting: {someone}")
+        progress.held_back = None
         if twist is not None:
             return Command(twist=twist, reason=f"recovery {progress.running.name}")
         log.info("recovery %s: %s", progress.running.name, progress.running.last_words)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from rosbot_patrol.control.give_way import GiveWayParams
+from rosbot_patrol.control.movers import MoverParams
 from rosbot_patrol.params import param
 
 
@@ -33,6 +35,8 @@ class MoveBaseParams:
     make_plan_add_unreachable_goal: bool = param(True, doc="end make_plan at the goal asked for")
     odom_topic: str = param("odom", doc="where velocities come from")
     odom_timeout: float = param(0.5, unit="s", lo=0.0, doc="older odometry stops the robot, 0 is never; ours")
+    give_way: GiveWayParams = field(default_factory=GiveWayParams)
+    movers: MoverParams = field(default_factory=MoverParams)
 
     @property
     def aggressive_radius(self) -> float:

@@ -213,8 +213,11 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         samples, ends = np.ascontiguousarray(samples[free]), np.ascontiguousarray(ends[free])
         situation = ground.situation(view, samples, ends, self._nose(view, ground.plan))
         cost = p.occdist_scale * danger[free] + self._distance_costs(situation, view.costmap.info.resolution)
+        leads_on = np.isfinite(cost).any()
         cost[self._oscillation.forbidden(samples)] = np.inf
         best = int(np.argmin(cost))
+        if leads_on and not math.isfinite(cost[best]):
+            return None  # all that is left is to turn to and fro: back up
         if not math.isfinite(cost[best]):
             raise ControlError("no free trajectory leads on along the plan")
         twist = Twist2D(*samples[best].tolist())

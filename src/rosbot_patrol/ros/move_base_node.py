@@ -5,6 +5,7 @@ Differs:
     - Cancelling works inside recovery behaviours.
     - Odometry that is older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
     - A goal in a frame that tf does not know is aborted at once with the planner's text, instead of after recoveries.
+    - It stands still for somebody whose way it would cross, and goes on when they have passed (`~give_way`).
     - Topics that nobody listens to are not built. No dynamic_reconfigure.
 """
 
@@ -35,6 +36,7 @@ from rosbot_patrol.ros.move_base_costmap import CostmapNode
 from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_goal
 from rosbot_patrol.ros.move_base_plans import ThreadedPlans
 from rosbot_patrol.ros.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.people import People
 from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
@@ -78,11 +80,20 @@ class MoveBaseNode:
             name=name,
         )
         self._navigator = Navigator(p, plans=self._plans, controller=self._controller, recoveries=recoveries)
+        self._people = People(self._scan_topic(), self._local.frame, self._transforms, p.movers, p.give_way)
         self._velocity: Latest[Twist2D] = Latest()
         self._slow_cycles = 0
         self._said = ""
         self._health_due = float("-inf")
         self._advertise()
+
+    def _scan_topic(self) -> str:
+        """Where the local costmap's first scans come from, "" where it takes none."""
+        for layer in self._local.costmap.obstacle_layers:
+            for key, buffer in layer.buffers.items():
+                if buffer.params.data_type == "LaserScan":
+                    return buffer.params.topic or key
+        return ""
 
     def _make_costmap(self, tree: dict[str, Any], key: str, name: str) -> CostmapNode:
         return CostmapNode(read_costmap(_group(tree, key), name=f"{name}{key}/"), self._transforms, key)
@@ -175,6 +186,7 @@ class MoveBaseNode:
         self._work(time)
 
     def _work(self, time: float) -> None:
+        self._people.look()
         view, problem = self._view(time)
         if self._navigator.state is State.CLEARING:
             with self._global.lock, self._local.lock:
@@ -221,7 +233,13 @@ class MoveBaseNode:
         problem = "" if moving_known else f"no odometry on {self.params.odom_topic} for {timeout} s"
         if not self._local.is_current(time):
             problem = "Sensor data is out of date, we're not going to allow commanding of the base for safety"
-        return NavigatorView(local=local, recovery=recovery, is_current=not problem), problem
+        view = NavigatorView(
+            local=local,
+            recovery=recovery,
+            is_current=not problem,
+            must_wait=lambda wish: self._people.waits(wish, pose_local, time),
+        )
+        return view, problem
 
     # ---- outputs
 

@@ -3,6 +3,7 @@
 Matches twist_mux 3.1 (Noetic): `~topics` and `~locks` (name, topic, timeout, priority), `cmd_vel_out`.
 
 Differs:
+- Whoever commands, the base stands still for somebody whose way it would cross (`~give_way`).
 - What is chosen goes through the collision guard (`~guard`, true), which slows and stops for what `scan` shows in the
   direction of motion. A command is checked again with each scan, not only when it comes.
 - When every source has fallen silent, or a lock closes, a zero is published; upstream publishes nothing.
@@ -23,9 +24,11 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 from std_msgs.msg import Bool
 
 from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, Verdict
+from rosbot_patrol.control.give_way import GiveWay, GiveWayParams
+from rosbot_patrol.control.movers import MoverParams, MoverWatch
 from rosbot_patrol.control.mux import Choice, LockParams, MuxParams, SourceParams, TwistMux
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose
 from rosbot_patrol.params import param
 from rosbot_patrol.ros.convert import scan_from_msg, twist_from_msg, twist_to_msg
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
@@ -48,6 +51,8 @@ class TwistMuxParams(MuxParams):
     base_frame: str = param("base_link", doc="frame of the footprint")
     odom_frame: str = param("odom", doc="frame in which motion between scans is measured")
     collision_guard: GuardParams = dataclasses.field(default_factory=GuardParams)
+    give_way: GiveWayParams = dataclasses.field(default_factory=lambda: GiveWayParams(horizon=1.5))
+    movers: MoverParams = dataclasses.field(default_factory=MoverParams)
 
 
 class Eyes:
@@ -55,6 +60,8 @@ class Eyes:
 
     def __init__(self, params: TwistMuxParams, wake: threading.Event) -> None:
         self.guard = CollisionGuard(params.collision_guard)
+        self._movers = MoverWatch(params.movers)
+        self._give_way = GiveWay(params.give_way)
         self._params = params
         self._transforms = Transforms()
         self._scans: Latest[LaserScanMsg] = Latest()
@@ -78,8 +85,20 @@ class Eyes:
                 log.warning("the collision guard cannot place the scan: %s", err)
             return False
         pose = self.pose(message.header.stamp.to_sec())
-        self.guard.see(scan_from_msg(message), self._mounts[frame], self._scans.stamp, pose)
+        scan = scan_from_msg(message)
+        self.guard.see(scan, self._mounts[frame], self._scans.stamp, pose)
+        if pose is not None:
+            self._movers.see(scan, compose(pose, self._mounts[frame]))
         return True
+
+    def limit(self, wish: Twist2D, current: float) -> Verdict:
+        """The part of a command that is safe."""
+        pose = self.pose()
+        if pose is not None and abs(current - self._movers.stamp) < self._params.collision_guard.stale_after:
+            someone = self._give_way.waits(wish, self._movers.movers(current), pose, current)
+            if someone:
+                return Verdict(STOP, 0.0, someone)
+        return self.guard.limit(wish, current, pose)
 
     def pose(self, stamp: float | None = None) -> Pose2D | None:
         """odom_from_base at a time, else the newest, None where there is none."""
@@ -170,7 +189,7 @@ class TwistMuxNode:
     def _guarded(self, wish: Twist2D, current: float) -> Verdict:
         if self._eyes is None:
             return Verdict(wish, 1.0, "")
-        return self._eyes.guard.limit(wish, current, self._eyes.pose())
+        return self._eyes.limit(wish, current)
 
     def _tell(self, choice: Choice, verdict: Verdict) -> None:
         self._health.set(

@@ -81,6 +81,7 @@ class Bench:
         self.plans, self.controller = Plans(), Controller()
         self.recoveries = [Spin("first"), Spin("second")]
         self.pose, self.current, self.now = Pose2D(), True, 0.0
+        self.someone = ""
         self.commands = []
         self.navigator = Navigator(
             MoveBaseParams(**{"planner_patience": 2.0, "controller_patience": 3.0, **params}),
@@ -100,6 +101,7 @@ class Bench:
                 local_costmap=COSTMAP,
             ),
             is_current=self.current,
+            must_wait=lambda wish: self.someone if wish != STOP else "",
         )
 
     def step(self, *, blind=False):
@@ -262,3 +264,32 @@ def test_a_plan_that_the_controller_refuses_aborts():
     bench = Bench()
     bench.controller.refuses = True
     assert bench.go().outcome.text == "Failed to pass global plan to the controller."
+
+
+def test_it_waits_for_somebody_without_counting_that_as_being_stuck():
+    bench = Bench(oscillation_timeout=2.0)
+    bench.navigator.set_goal(GOAL, 0.0)
+    bench.step()
+    assert bench.step().twist == FORWARD
+    bench.someone = "someone comes this way"
+    for _ in range(100):
+        command = bench.step()
+        assert command.twist == STOP
+        assert command.reason == "waiting: someone comes this way"
+    assert bench.navigator.state is State.CONTROLLING
+    bench.someone = ""
+    assert bench.step().twist == FORWARD
+
+
+def test_a_recovery_stands_still_for_somebody_and_goes_on():
+    bench = Bench()
+    bench.controller.fails = True
+    bench.navigator.set_goal(GOAL, 0.0)
+    while bench.navigator.state is not State.CLEARING:
+        bench.step()
+    bench.step()
+    bench.someone = "someone comes this way"
+    for _ in range(20):
+        assert bench.step().twist == STOP
+    bench.someone = ""
+    assert bench.step().twist == TURN

@@ -1,0 +1,236 @@
+#!/usr/bin/env python3
+"""Random goals in the three houses, half of them with somebody in the way who never yields.
+
+    PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_goals.py [--goals 200] [--seed 1] [--house NAME]
+
+The robot's own programs (amcl, costmaps, move_base, collision guard) run in one process with the simulator, on its
+clock (`rosbot_patrol/replay/closed_loop.py`), each goal after the last, from where the robot then stands. Somebody
+walks the robot's plan towards it or from behind it, once, or across it, to and fro over 2.4 to 5 m, at 0.5 to 1.2 m/s,
+and stops for nothing: whoever meets the robot steps over it, and at the end of the way has left. A contact with a wall
+or a thing always counts, one with somebody unless the robot's wheels had stood for 0.5 s. `ideal` is the plan's length
+at full speed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "src"))
+
+from rosbot_patrol.costmap.costs import INSCRIBED  # noqa: E402
+from rosbot_patrol.errors import PlanningError, WorldError  # noqa: E402
+from rosbot_patrol.geometry import Pose2D  # noqa: E402
+from rosbot_patrol.grid import Grid  # noqa: E402
+from rosbot_patrol.maps.map_io import read_map  # noqa: E402
+from rosbot_patrol.planning.registry import make_global_planner  # noqa: E402
+from rosbot_patrol.replay.closed_loop import ClosedLoop, Drive, read_profile  # noqa: E402
+from rosbot_patrol.simulation.engine import Engine, EngineParams  # noqa: E402
+from rosbot_patrol.simulation.robot import load_robot  # noqa: E402
+from rosbot_patrol.simulation.world import load_world  # noqa: E402
+
+HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}
+FULL_SPEED = 0.36  # [m/s]
+BLOCK = 10  # goals from one start, with one amcl
+
+
+@dataclass
+class Result:
+    """One goal."""
+
+    number: int
+    house: str
+    goal: Pose2D
+    walker: str
+    drive: Drive
+
+    @property
+    def reached(self) -> bool:
+        """Whether move_base says so, and it is true."""
+        outcome = self.drive.outcome
+        return outcome is not None and outcome.succeeded and self.drive.error < 0.25
+
+    @property
+    def ideal(self) -> float:
+        """The plan at full speed [s]."""
+        return self.drive.planned / FULL_SPEED
+
+
+def free_poses(loop: ClosedLoop, rng: np.random.Generator) -> Iterator[Pose2D]:
+    """Places where the robot has room and that can be reached, by the global costmap."""
+    costmap = loop.global_costmap
+    planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
+    cells = costmap.cells
+    free = np.argwhere(cells < INSCRIBED // 2)
+    while True:
+        iy, ix = free[rng.integers(len(free))]
+        x, y = costmap.info.centre_of(int(ix), int(iy))
+        pose = Pose2D(x, y, float(rng.uniform(-math.pi, math.pi)))
+        if math.dist((x, y), loop.map_pose[:2]) < 1.5:
+            continue
+        try:
+            planner.plan(Grid(costmap.info, cells.copy()), loop.map_pose, pose)
+        except PlanningError:
+            continue
+        yield pose
+
+
+def _as_far_as_free(loop: ClosedLoop, start: Pose2D, yaw: float) -> Pose2D:
+    """The farthest place, up to 2.5 m off in a direction, that somebody can walk to."""
+    costmap, end = loop.global_costmap, start
+    for away in np.arange(0.1, 2.55, 0.1):
+        place = Pose2D(start.x + away * math.cos(yaw), start.y + away * math.sin(yaw), yaw)
+        ix, iy = costmap.info.cell_of(place.x, place.y)
+        if not (0 <= ix < costmap.info.width and 0 <= iy < costmap.info.height) or costmap.cells[iy, ix] > 100:
+            break
+        end = place
+    return end
+
+
+def send_somebody(loop: ClosedLoop, goal: Pose2D, rng: np.random.Generator) -> str:
+    """Let somebody walk in the way of the robot; how, or "" where there is no room for it."""
+    engine, costmap = loop.engine, loop.global_costmap
+    planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
+    plan = planner.plan(Grid(costmap.info, costmap.cells.copy()), loop.map_pose, goal)[:, :2]
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(plan, axis=0).T))))
+    if along[-1] < 2.5:
+        return ""
+
+    def at(way: float) -> Pose2D:
+        return Pose2D(*(float(np.interp(way, along, plan[:, k])) for k in (0, 1)))
+
+    kind = ("towards", "behind", "across")[int(rng.integers(3))]
+    speed = float(rng.uniform(0.5, 1.2))
+    far = min(float(along[-1]), float(rng.uniform(2.5, 7.0)))
+    if kind == "towards":
+        ways = [at(w) for w in np.arange(far, -1e-6, -0.5)]
+    elif kind == "behind":
+        ways = [at(w) for w in np.arange(0.0, far + 1e-6, 0.5)]
+        heading = math.atan2(ways[1].y - ways[0].y, ways[1].x - ways[0].x)
+        ways = [_as_far_as_free(loop, ways[0], heading + math.pi), *ways[1:]]
+    else:
+        middle, ahead = at(far / 2.0), at(far / 2.0 + 0.3)
+        yaw = math.atan2(ahead.y - middle.y, ahead.x - middle.x) + math.pi / 2.0
+        ways = [_as_far_as_free(loop, middle, yaw + turn) for turn in (math.pi, 0.0)]
+        if min(math.dist(way[:2], middle[:2]) for way in ways) < 1.2:
+            return ""  # who turns round so near would walk over the robot without end
+    start = ways[0]
+    if math.dist(start[:2], engine.pose[:2]) < 1.5:
+        return ""
+    heading = math.atan2(ways[1].y - start.y, ways[1].x - start.x)
+    try:
+        engine.spawn_actor("somebody", "person", "", Pose2D(start.x, start.y, heading))
+    except WorldError:
+        return ""
+    try:
+        loops = kind == "across"
+        path = [*ways[1:], *([start] if loops else [])]
+        engine.move_actor("somebody", path, speed, loop=loops, pause=1.0 if loops else 0.0, yields=False)
+    except WorldError:
+        engine.remove_actor("somebody")
+        return ""
+    return f"{kind} {speed:.1f} m/s"
+
+
+def see_out(engine: Engine, *, always: bool = False) -> None:
+    """Take somebody out who has come to the end of the way."""
+    for actor in engine.actors:
+        if actor.name == "somebody" and (always or actor.has_arrived):
+            engine.remove_actor("somebody")
+
+
+def drives(house: str, count: int, seed: int, *, only_block: int | None = None) -> Iterator[Result]:
+    """Goals in one house."""
+    known = read_map(ROOT / "maps" / f"{HOUSES[house]}.yaml")
+    world = load_world(ROOT / "worlds" / f"{house}.world")
+    params = read_profile(ROOT / "config" / "tuned")
+    for first in range(0, count, BLOCK):
+        if only_block not in (None, first // BLOCK):
+            continue
+        rng = np.random.default_rng([seed, sum(map(ord, house)), first])
+        engine = Engine(world, EngineParams(seed=seed + first))
+        engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
+        loop = ClosedLoop(engine, known, params, seed=seed + first)
+        loop.drive_to(Pose2D(0.0, 0.0, 1.5), 20.0)
+        for number in range(first, min(first + BLOCK, count)):
+            goal = next(free_poses(loop, rng))
+            walker = send_somebody(loop, goal, rng) if number % 2 else ""
+            drive = loop.drive_to(goal, 240.0, each_step=partial(see_out, engine))
+            see_out(engine, always=True)
+            yield Result(number, house, goal, walker, drive)
+        engine.close()
+
+
+def main() -> None:
+    """Drive, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--goals", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--house", choices=list(HOUSES), action="append")
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    houses = args.house or list(HOUSES)
+    results: list[Result] = []
+    clock = time.perf_counter()
+    for i, house in enumerate(houses):
+        count = args.goals // len(houses) + (i < args.goals % len(houses))
+        for result in drives(house, count, args.seed):
+            results.append(result)
+            tell(result)
+    wall = time.perf_counter() - clock
+    figures = summary(results)
+    simulated = sum(r.drive.seconds for r in results)
+    print(f"\n{len(results)} goals, {simulated:.0f} simulated s in {wall:.0f} s of wall time ({simulated / wall:.1f}x)")
+    print("\n| figure | value |\n|---|---|")
+    for name, value in figures.items():
+        print(f"| {name} | {value:.3g} |")
+    if args.json:
+        args.json.write_text(json.dumps(figures, indent=1))
+
+
+def tell(result: Result) -> None:
+    """One line of a goal."""
+    drive = result.drive
+    end = drive.outcome.text if drive.outcome else "timed out"
+    line = f"{result.house} {result.number}: {'reached' if result.reached else 'NOT REACHED: ' + end}"
+    line += f" {drive.seconds:.0f} s, ideal {result.ideal:.0f}, off {drive.error:.2f} m"
+    if result.walker:
+        line += f", somebody {result.walker}, waited {drive.waited:.0f} s"
+    for when, kind, name in drive.contacts:
+        line += f", TOUCHED {kind} '{name}' at {when:.2f}"
+    if drive.recoveries:
+        line += f", recoveries {drive.recoveries}"
+    if not result.reached:
+        line += f", {drive.reasons[-4:]}, goal {tuple(round(v, 2) for v in result.goal)}"
+    print(line, flush=True)
+
+
+def summary(results: list[Result]) -> dict[str, float]:
+    """The figures of FIGURES.md and some more."""
+    touched = [kind for r in results for _, kind, _ in r.drive.contacts]
+    ratios = [r.drive.seconds / max(r.ideal, 1.0) for r in results if r.reached]
+    alone = [r.drive.seconds / max(r.ideal, 1.0) for r in results if r.reached and not r.walker]
+    return {
+        "goals_reached_rate": sum(r.reached for r in results) / len(results),
+        "contacts": len(touched),
+        "contacts_person": sum(kind == "person" for kind in touched),
+        "contacts_other": sum(kind != "person" for kind in touched),
+        "with_somebody": sum(bool(r.walker) for r in results),
+        "time_over_ideal_median": float(np.median(ratios)) if ratios else math.nan,
+        "time_over_ideal_alone_median": float(np.median(alone)) if alone else math.nan,
+        "goals_with_recoveries": sum(bool(r.drive.recoveries) for r in results),
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+"""Whether the robot should stand still for someone who moves: it waits, and goes on when they have passed.
+
+Both are driven ahead, the robot along the arc of its command and the other straight on, and the least gap between them
+decides. A robot that stands can be walked round or into, but never walks into anybody.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.control.movers import Mover
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
+from rosbot_patrol.params import param
+
+Array = NDArray[np.float64]
+
+_STEPS = 21
+_SUDDEN = 0.6  # [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GiveWayParams:
+    """Parameters of giving way."""
+
+    clearance: float = param(0.75, lo=0.0, unit="m", doc="from base_link to the middle of who passes")
+    near: float = param(1.4, lo=0.0, unit="m", doc="who is nearer and comes nearer is waited for in any case")
+    beside: float = param(0.6, lo=0.0, unit="m", doc="who is nearer is waited for until they clearly leave")
+    horizon: float = param(2.2, lo=0.0, unit="s", doc="how far it is looked ahead; 0 gives way to nobody")
+    turn_horizon: float = param(1.2, lo=0.0, unit="s", doc="the same for turning on the spot")
+    least_speed: float = param(0.15, lo=0.0, unit="m/s", doc="who is slower is an obstacle like others")
+    least_age: float = param(0.25, lo=0.0, unit="s", doc="who was followed for less is not believed, unless near")
+    hold: float = param(0.5, lo=0.0, unit="s", doc="it stands at least so long")
+    hold_beside: float = param(1.5, lo=0.0, unit="s", doc="the same after somebody was beside it, whom it may not see")
+
+
+class GiveWay:
+    """Decides, and keeps to it for a moment. Times [s] are of one clock."""
+
+    def __init__(self, params: GiveWayParams | None = None) -> None:
+        self._params = params or GiveWayParams()
+        self._until = -math.inf
+
+    def waits(self, wish: Twist2D, movers: Sequence[Mover], odom_from_base: Pose2D, now: float) -> str:
+        """For whom it has to wait with a command, in a few words; "" where the way is free."""
+        p = self._params
+        if wish == STOP or p.horizon == 0.0:
+            return ""
+        for mover in movers:
+            away = math.hypot(mover.x - odom_from_base.x, mover.y - odom_from_base.y)
+            if mover.speed < p.least_speed or (mover.age < p.least_age and away > p.near):
+                continue
+            is_sudden = away < p.near and mover.age < _SUDDEN  # where legs that begin to walk will go is not known yet
+            if is_sudden or self._meets(wish, mover, odom_from_base, away):
+                self._until = now + (p.hold_beside if away < p.clearance else p.hold)
+                return f"someone comes this way, {away:.1f} m off"
+        if now < self._until <= now + max(p.hold, p.hold_beside):
+            return "someone has just passed"
+        return ""
+
+    def _meets(self, wish: Twist2D, mover: Mover, pose: Pose2D, away: float) -> bool:
+        p = self._params
+        dx, dy = mover.x - pose.x, mover.y - pose.y
+        leaving = (mover.vx * dx + mover.vy * dy) / max(away, 1e-6)  # [m/s], negative: comes nearer by itself
+        if away < p.near and leaving < -0.5 * p.least_speed:
+            return True
+        if away < p.beside and leaving < 0.5 * mover.speed:
+            return True
+        is_turn = math.hypot(wish.vx, wish.vy) < 0.01
+        times = np.linspace(0.0, p.turn_horizon if is_turn else p.horizon, _STEPS)
+        x, y = _driven(pose, wish, times)
+        gaps = np.hypot(mover.x + mover.vx * times - x, mover.y + mover.vy * times - y)
+        return bool(gaps.min() < min(p.clearance, gaps[0] - 0.02))
+
+
+def _driven(pose: Pose2D, twist: Twist2D, times: Array) -> tuple[Array, Array]:
+    """Where the robot is after driving a velocity for each of some times."""
+    angle = twist.wz * times
+    if abs(twist.wz) < 1e-6:
+        ahead, left = twist.vx * times, twist.vy * times
+    else:
+        s, c = np.sin(angle) / twist.wz, (1.0 - np.cos(angle)) / twist.wz
+        ahead, left = twist.vx * s - twist.vy * c, twist.vx * c + twist.vy * s
+    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+    return pose.x + cos * ahead - sin * left, pose.y + sin * ahead + cos * left

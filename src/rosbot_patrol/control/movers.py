@@ -1,0 +1,246 @@
+"""What moves around the robot, as the lidar sees it: people, pets, doors; each with a place and a velocity.
+
+A beam that ends where, a moment ago, beams passed through has hit something that came there (free-space violation, as
+in Wang, Thorpe, Thrun 2003). Such points are put together to things, a thing is followed from sweep to sweep, and its
+velocity is the slope of a line through its last places. What stands still for a while becomes an obstacle like any
+other. No map is needed; odometry has to hold for `memory` seconds only.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import Pose2D, transform_points
+from rosbot_patrol.params import param
+from rosbot_patrol.scan import LaserScan
+
+Array = NDArray[np.float64]
+
+_CELL = 0.1  # [m]
+_PERIOD = 0.045  # scans that follow faster are left out [s]
+_MARGIN = 0.15  # the last of a beam that tells nothing: noise and drift of the odometry [m]
+_AROUND = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1)]
+_MOSTLY = 7  # of the nine cells around a hit were free: it is no edge of a wall
+_SLIPPED = 0.3  # where so many of the hits are new, it is the odometry that has moved
+_SIGHTINGS = 4  # within the window; less is a flicker
+_NEVER = -math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class MoverParams:
+    """Parameters of the watch for what moves."""
+
+    reach: float = param(4.0, lo=0.5, hi=20.0, unit="m", doc="nothing farther is followed")
+    memory: float = param(2.0, lo=0.2, unit="s", doc="how long a place counts as seen free")
+    still_after: float = param(1.2, lo=0.2, unit="s", doc="what stands that long is no mover any more")
+    min_points: int = param(3, lo=1, doc="beams that must agree on a thing")
+    gap: float = param(0.45, lo=0.05, unit="m", doc="nearer points are one thing: two legs, one person")
+    jump: float = param(0.6, lo=0.1, unit="m", doc="farthest that a thing is from where it was expected")
+    window: float = param(0.7, lo=0.2, unit="s", doc="places of so long give the velocity")
+    coast: float = param(0.6, lo=0.0, unit="s", doc="how long a thing that is hidden is believed to go on")
+
+
+class Mover(NamedTuple):
+    """A thing that moves, in the frame of the odometry: place [m], velocity [m/s], for how long it was followed [s]."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    age: float
+
+    @property
+    def speed(self) -> float:
+        """[m/s]."""
+        return math.hypot(self.vx, self.vy)
+
+    def at(self, seconds: float) -> tuple[float, float]:
+        """Where it will be."""
+        return self.x + self.vx * seconds, self.y + self.vy * seconds
+
+
+@dataclass
+class _Track:
+    places: list[tuple[float, float, float]] = field(default_factory=list)  # time, x, y
+    since: float = 0.0
+
+    def velocity(self) -> tuple[float, float]:
+        if len(self.places) < 2:
+            return 0.0, 0.0
+        t, x, y = np.array(self.places).T
+        t = t - t.mean()
+        spread = float(t @ t)
+        if spread <= 0.0:
+            return 0.0, 0.0
+        return float(t @ x) / spread, float(t @ y) / spread
+
+    def expected(self, now: float) -> tuple[float, float]:
+        """Where the line through its places has it."""
+        t, x, y = np.array(self.places).T
+        vx, vy = self.velocity()
+        gone = now - float(t.mean())
+        return float(x.mean()) + vx * gone, float(y.mean()) + vy * gone
+
+
+class MoverWatch:
+    """Follows what moves. Times [s] are those of the scans.
+
+    Args:
+        params: sizes and times.
+    """
+
+    def __init__(self, params: MoverParams | None = None) -> None:
+        self._params = params or MoverParams()
+        self._side = 2 * math.ceil(self._params.reach / _CELL) + 4
+        self._tracks: list[_Track] = []
+        self._slipped_at = _NEVER
+        self._forget()
+
+    def _forget(self) -> None:
+        shape = (self._side, self._side)
+        self._owner = np.full(shape, np.iinfo(np.int64).min, np.int64)  # which cell of the plane a cell stands for
+        self._free_at = np.full(shape, _NEVER)
+        self._hit_first = np.full(shape, _NEVER)  # of the hits that have not paused since
+        self._hit_last = np.full(shape, _NEVER)
+        self._tracks.clear()
+        self._now = _NEVER
+
+    def see(self, scan: LaserScan, odom_from_laser: Pose2D) -> list[Mover]:
+        """Take a scan; returns what moves, `movers` later too."""
+        now = scan.stamp
+        if now < self._now - 1.0:
+            self._forget()
+        if now < self._now + _PERIOD:
+            return self.movers(now)
+        self._now = now
+        near = scan.is_hit & (scan.ranges < self._params.reach)
+        angles = scan.angles
+        units = np.column_stack((np.cos(angles), np.sin(angles)))
+        hits = transform_points(odom_from_laser, units[near] * scan.ranges[near, None])
+        is_new = self._are_new(hits, now)
+        if len(hits) and is_new.mean() > _SLIPPED:
+            self._forget()
+            self._now, self._slipped_at, is_new = now, now, np.zeros(len(hits), bool)
+        moving = hits[is_new]
+        self._mark_hits(hits, now)
+        self._mark_free(scan, units, odom_from_laser, now)
+        self._follow(_things(moving, self._params.gap, self._params.min_points), now)
+        return self.movers(now)
+
+    def movers(self, now: float) -> list[Mover]:
+        """What moves, where it is at a time not far from the last scan."""
+        found: list[Mover] = []
+        if 0.0 <= now - self._slipped_at < self._params.memory:
+            return found
+        for track in self._tracks:
+            if len(track.places) < _SIGHTINGS:
+                continue
+            x, y = track.expected(now)
+            found.append(Mover(x, y, *track.velocity(), now - track.since))
+        return found
+
+    @property
+    def stamp(self) -> float:
+        """Time of the last scan taken."""
+        return self._now
+
+    # Cells: the plane, folded onto an array of `_side` cells ---------------------------------------------------------
+
+    def _cells(self, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Row, column and number of the cells of points."""
+        ij = np.floor(points / _CELL).astype(np.int64)
+        rows, columns = ij[:, 1] % self._side, ij[:, 0] % self._side
+        return rows, columns, ij[:, 1] * (1 << 32) + ij[:, 0]
+
+    def _own(self, rows: NDArray[np.int64], columns: NDArray[np.int64], number: NDArray[np.int64]) -> None:
+        """Let cells stand for these places; those that stood for others forget."""
+        stale = self._owner[rows, columns] != number
+        rows, columns = rows[stale], columns[stale]
+        self._owner[rows, columns] = number[stale]
+        for table in (self._free_at, self._hit_first, self._hit_last):
+            table[rows, columns] = _NEVER
+
+    def _are_new(self, hits: Array, now: float) -> NDArray[np.bool_]:
+        """Whether each hit lies where it was free a moment ago, and nothing has stood beside it for long."""
+        free = np.zeros(len(hits), np.int64)
+        stands = np.zeros(len(hits), bool)
+        for dx, dy in _AROUND:
+            r, c, n = self._cells(hits + np.array([dx, dy]) * _CELL)
+            is_known = self._owner[r, c] == n
+            free += is_known & (self._free_at[r, c] > now - self._params.memory)
+            lasts = is_known & (self._hit_last[r, c] > now - 0.5)
+            stands |= lasts & (self._hit_first[r, c] < now - self._params.still_after)
+        return (free >= _MOSTLY) & ~stands
+
+    def _mark_hits(self, hits: Array, now: float) -> None:
+        if not len(hits):
+            return
+        rows, columns, number = self._cells(hits)
+        self._own(rows, columns, number)
+        paused = self._hit_last[rows, columns] < now - 0.5
+        self._hit_first[rows[paused], columns[paused]] = now
+        self._hit_last[rows, columns] = now
+
+    def _mark_free(self, scan: LaserScan, units: Array, odom_from_laser: Pose2D, now: float) -> None:
+        ranges = np.where(np.isposinf(scan.ranges), scan.range_max, scan.ranges)
+        valid = (ranges >= scan.range_min) & ~np.isnan(ranges)
+        lengths = np.minimum(ranges[valid] - _MARGIN, self._params.reach)
+        units = units[valid]
+        thin = max(1, len(units) // 360)
+        lengths, units = lengths[::thin], units[::thin]
+        steps = np.arange(scan.range_min, self._params.reach, _CELL)
+        if not len(lengths) or not len(steps):
+            return
+        along = (units[:, None, :] * steps[None, :, None])[steps[None, :] < lengths[:, None]]
+        rows, columns, number = self._cells(transform_points(odom_from_laser, along))
+        self._own(rows, columns, number)
+        self._free_at[rows, columns] = now
+
+    # Things ----------------------------------------------------------------------------------------------------------
+
+    def _follow(self, things: list[tuple[float, float]], now: float) -> None:
+        p = self._params
+        expected = [track.expected(now) for track in self._tracks]
+        pairs = sorted(
+            (math.dist(place, thing), i, k)
+            for i, place in enumerate(expected)
+            for k, thing in enumerate(things)
+            if math.dist(place, thing) < p.jump
+        )
+        taken_tracks: set[int] = set()
+        taken_things: set[int] = set()
+        for _, i, k in pairs:
+            if i in taken_tracks or k in taken_things:
+                continue
+            taken_tracks.add(i)
+            taken_things.add(k)
+            self._tracks[i].places.append((now, *things[k]))
+        for k, thing in enumerate(things):
+            if k not in taken_things:
+                self._tracks.append(_Track([(now, *thing)], now))
+        for track in self._tracks:
+            track.places = [place for place in track.places if place[0] > now - p.window] or track.places[-1:]
+        self._tracks = [track for track in self._tracks if track.places[-1][0] >= now - p.coast]
+
+
+def _things(points: Array, gap: float, least: int) -> list[tuple[float, float]]:
+    """Middles of groups of points that are nearer to each other than a gap."""
+    found = []
+    left = list(range(len(points)))
+    while left:
+        group, queue = [], [left.pop()]
+        while queue:
+            i = queue.pop()
+            group.append(i)
+            close = [k for k in left if math.dist(points[i], points[k]) < gap]
+            left = [k for k in left if k not in close]
+            queue += close
+        if len(group) >= least:
+            low, high = points[group].min(axis=0), points[group].max(axis=0)
+            found.append((float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0))
+    return found
