@@ -112,6 +112,10 @@ class InflationLayer(Layer):
             return Bounds(0, 0, self._info.width, self._info.height)
         return bounds.grown(self._reach)
 
+    def sources(self, master: CostCells) -> CostCells:
+        """Where the lethal cells are that this layer inflates."""
+        return master if self._source is None else self._source.cells
+
     def take_sources(self, master: CostCells, areas: list[Bounds]) -> None:
         """Note what the layers before wrote, where others write later: before the first of the areas is inflated."""
         if self._source is not None:
@@ -123,7 +127,7 @@ class InflationLayer(Layer):
         """Write this layer's costs."""
         if self._reach == 0:
             return
-        source = master if self._source is None else self._source.cells
+        source = self.sources(master)
         floor = 1 if self.params.inflate_unknown else INSCRIBED
         run = kernels.inflate if self._reach <= kernels.NEAR else kernels.inflate_far
         run(source, master, *bounds, self._reach, self._table, floor)

@@ -172,13 +172,16 @@ class LayeredCostmap:
         return [*came, *(area.grown(self._reach) for area in left)]
 
     def _lethal_leaving(self, dx: int, dy: int) -> list[Bounds]:
-        """Where lethal cells will lie, outside the window, when it has moved."""
+        """Where lethal cells that are inflated will lie, outside the window, when it has moved."""
         found = []
+        inflated = [layer.sources(self.cells) for layer in self.layers if isinstance(layer, InflationLayer)]
         for strip in strips(self.info.width, self.info.height, -dx, -dy):
-            ys, xs = np.nonzero(self.cells[strip.y0 : strip.y1, strip.x0 : strip.x1] == LETHAL)
-            if len(ys):
-                x, y = strip.x0 - dx, strip.y0 - dy
-                found.append(Bounds(x + int(xs.min()), y + int(ys.min()), x + int(xs.max()) + 1, y + int(ys.max()) + 1))
+            for cells in inflated:
+                ys, xs = np.nonzero(cells[strip.y0 : strip.y1, strip.x0 : strip.x1] == LETHAL)
+                if len(ys):
+                    x, y = strip.x0 - dx, strip.y0 - dy
+                    low, high = (x + int(xs.min()), y + int(ys.min())), (x + int(xs.max()) + 1, y + int(ys.max()) + 1)
+                    found.append(Bounds(*low, *high))
         return found
 
     def is_current(self, now: float) -> bool:
