@@ -13,6 +13,8 @@
 | mail server that is down       | here, for a mail that waits; test_patrol_node: test_unreachable_mail_server...      |
 | mail server that says nothing  | here                                                                                |
 | world, sensors, configuration  | here; launch arguments: test_launch_files                                           |
+| move_base: parameters, plug-ins | here; every parameter: test/unit/{costmap,planning}, test_params                   |
+| goals: NaN, frame, quaternion, wall, off the map | test_move_base_actions                                            |
 """
 
 import random
@@ -360,10 +362,6 @@ def test_worlds_sensors_and_configuration_that_make_no_sense(ros, tmp_path):
             start(ros, "demo_intruder", walks=tmp_path / "walks.yaml"),
             "walks.yaml: walks: expected a walk for each room, got 5",
         ),
-        (
-            start(ros, "move_base", global_costmap__resolution="fine"),
-            "/global_costmap/resolution: expected a number [m], got 'fine'",
-        ),
         (start(ros, "amcl", max_particles="many"), "/max_particles: expected a whole number, got 'many'"),
         (start(ros, "twist_mux", topics="5"), "/topics: expected a list, each a group of parameters, got 5"),
         (
@@ -373,3 +371,28 @@ def test_worlds_sensors_and_configuration_that_make_no_sense(ros, tmp_path):
     ]
     for node, said in cases:
         assert_refused(node, said)
+
+
+def test_parameters_and_plug_ins_that_move_base_cannot_use(ros):
+    layers = "[{name: sonar, type: 'range_sensor_layer::RangeSensorLayer'}]"
+    cases = {
+        "global_costmap/resolution: expected a number [m], got 'fine'": {"global_costmap__resolution": "fine"},
+        "local_costmap: expected a group of parameters, got 5": {"local_costmap": 5},
+        "local_costmap/footprint": {"local_costmap__footprint": "[[0.1, 0.1], [0.1]]"},
+        "local_costmap/plugins: knows no layer 'range_sensor_layer::RangeSensorLayer', expected one of StaticLayer": {
+            "local_costmap__plugins": layers
+        },
+        "controller_frequency: expected a number [Hz], got 'fast'": {"controller_frequency": "fast"},
+        "TrajectoryPlannerROS/max_vel_x: is -1.0, expected at least 0.0 m/s": {"TrajectoryPlannerROS__max_vel_x": -1.0},
+        "base_local_planner: knows no plug-in 'teb_local_planner/TebLocalPlannerROS', expected one of "
+        "base_local_planner/TrajectoryPlannerROS": {"base_local_planner": "teb_local_planner/TebLocalPlannerROS"},
+        "base_global_planner: knows no plug-in 'SBPLLatticePlanner', expected one of navfn/NavfnROS": {
+            "base_global_planner": "SBPLLatticePlanner"
+        },
+        "recovery_behaviors: knows no plug-in 'step_back/Away', expected one of clear_costmap_recovery": {
+            "recovery_behaviors": "[{name: away, type: step_back/Away}]"
+        },
+    }
+    started = [(start(ros, "move_base", **params), said) for said, params in cases.items()]
+    for node, said in started:
+        assert_refused(node, f"/{said}")

@@ -2,6 +2,7 @@
 
 import os
 import pty
+import signal
 import subprocess
 from pathlib import Path
 
@@ -53,6 +54,17 @@ def test_priorities_time_out_and_lock(ros, base):
     mux.says("the base is stopped: e_stop is set")
     base.tell(publish=["/cmd_vel/teleop", {"linear": {"x": 0.5}}])
     assert speeds(base)[-1] == 0.0
+
+
+def test_who_dies_while_it_drives_is_silent_at_once(ros, base):
+    topics = "[{name: move_base, topic: /cmd_vel/dying, priority: 1, timeout: 60.0}]"
+    subprocess.run(["rosparam", "set", "/twist_mux/topics", topics], env=ros.env, check=True)
+    mux = ros.node("twist_mux", "_guard:=false", "cmd_vel_out:=/cmd_vel")
+    dying = Process(["rostopic", "pub", "-r", "20", "/cmd_vel/dying", TWIST, "{linear: {x: 0.5}}"], ros.env)
+    wait_for(lambda: speeds(base)[-3:] == [0.5] * 3, 10.0, "0.5 m/s")
+    dying.stop(signal.SIGKILL)
+    wait_for(lambda: speeds(base)[-1] == 0.0, 2.0, "a zero")
+    mux.says("move_base has gone while it drove")
 
 
 def test_without_a_scan_it_creeps_and_says_so(ros, base):

@@ -105,6 +105,12 @@ class TwistMux:
         source.stamp = now
         source.count += 1
 
+    def forget(self, name: str) -> bool:
+        """Who commanded as this source has gone: it is silent until the next command. Whether it had a say."""
+        source = self._sources[name]
+        had, source.twist = source.twist is not None, None
+        return had
+
     def lock(self, name: str, value: bool, now: float) -> None:
         """A lock is set or released."""
         self._locks[name].is_set = value

@@ -6,6 +6,8 @@ one of upstream's result texts. Planning itself happens behind `PlanSource`, so 
 Differs:
     - A recovery behaviour is cancelled like everything else, at the next step.
     - A robot whose pose is not known stands still and waits; only `step` with a pose counts against patience.
+    - A new goal that replaces one that is driven to sends no velocity until its plan comes, as upstream, but stops the
+      robot where that takes longer than 0.35 s.
     - A plan that came before a goal was cancelled or replaced is dropped.
 """
 
@@ -27,6 +29,8 @@ from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.planning.interfaces import LocalPlanner, LocalView, Recovery, RecoveryView
 
 log = logging.getLogger(__name__)
+
+_COAST = 0.35  # how long the last velocity may hold while a new goal is planned for [s]
 
 Array = NDArray[np.float64]
 
@@ -134,6 +138,7 @@ class _Progress:
     last_control: float
     last_motion: float
     last_request: float = -math.inf
+    coast_until: float = -math.inf
     motion_from: Pose2D | None = None
     retries: int = 0
     recovery_index: int = 0
@@ -141,6 +146,10 @@ class _Progress:
     running: Recovery | None = None
     held_back: Twist2D | None = None  # what a recovery wanted when somebody came
     control_failed: bool = False
+
+    def wait(self, now: float) -> None:
+        """The robot has to stand for what no planner or behaviour can help: no patience ends by it."""
+        self.last_plan = self.last_control = self.last_motion = now
 
 
 @dataclass
@@ -185,7 +194,9 @@ class Navigator:
         """Start for a goal; a goal before is given up without stopping."""
         self._plans.drop()
         self._controller.reset()
-        self._context = _Context(goal, _Progress(last_plan=now, last_control=now, last_motion=now))
+        coast_until = now + _COAST if self.state is State.CONTROLLING else -math.inf
+        progress = _Progress(last_plan=now, last_control=now, last_motion=now, coast_until=coast_until)
+        self._context = _Context(goal, progress)
         self._begin_planning(now)
 
     def cancel(self) -> Command:
@@ -215,6 +226,7 @@ class Navigator:
         if context is None:
             return Command(reason=self.reason)
         if view is None:
+            context.progress.wait(now)
             self.reason = "the robot's pose is not known"
             return Command(twist=STOP, reason=self.reason)
         self._watch_motion(now, view.local.pose, context)
@@ -278,7 +290,9 @@ class Navigator:
             return self._recover(Trigger.PLANNING, context)
         if now - progress.last_request >= (1.0 / p.planner_frequency if p.planner_frequency > 0.0 else 0.2):
             self._request(now)
-        return Command(twist=STOP, reason=context.failures[-1] if context.failures else "planning")
+        coasting = now < progress.coast_until and view.is_current and not context.failures
+        reason = context.failures[-1] if context.failures else "planning"
+        return Command(twist=None if coasting else STOP, reason=reason)
 
     def _controlling(self, now: float, view: NavigatorView, context: _Context) -> Command:
         progress, p = context.progress, self.params
@@ -287,7 +301,7 @@ class Navigator:
         if p.oscillation_timeout > 0.0 and now > progress.last_motion + p.oscillation_timeout:
             return self._recover(Trigger.OSCILLATION, context)
         if not view.is_current:
-            progress.last_control = now
+            progress.wait(now)
             return Command(twist=STOP, reason="sensor data is out of date")
         if p.planner_frequency > 0.0 and now - progress.last_request >= 1.0 / p.planner_frequency:
             self._request(now)
@@ -330,6 +344,9 @@ class Navigator:
                 recovery=(progress.recovery_index, count, progress.running.name),
                 reason=f"recovery {progress.running.name}",
             )
+        if not view.is_current:
+            progress.wait(now)
+            return Command(twist=STOP, reason="sensor data is out of date")
         twist = progress.held_back or progress.running.step(view.recovery)
         if twist is not None and (someone := view.must_wait(twist)):
             progress.held_back = twist

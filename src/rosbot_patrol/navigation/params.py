@@ -35,6 +35,9 @@ class MoveBaseParams:
     make_plan_add_unreachable_goal: bool = param(True, doc="end make_plan at the goal asked for")
     odom_topic: str = param("odom", doc="where velocities come from")
     odom_timeout: float = param(0.5, unit="s", lo=0.0, doc="older odometry stops the robot, 0 is never; ours")
+    stop_without_map: bool = param(
+        False, doc="ours: stand while nobody publishes the map any more; false drives on by what it has, as upstream"
+    )
     give_way: GiveWayParams = field(default_factory=GiveWayParams)
     movers: MoverParams = field(default_factory=MoverParams)
 

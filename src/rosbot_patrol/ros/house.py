@@ -281,7 +281,7 @@ class House:
         """Process id of every node of this master."""
         found = {}
         for name in rosnode.get_node_names():
-            uri = rosnode.get_api_uri(rosgraph.Master("/house"), name)
+            uri = rosnode.get_api_uri(rosgraph.Master("/house"), name, skip_cache=True)  # it may have been respawned
             if uri is None:
                 continue
             with contextlib.suppress(OSError):

@@ -70,6 +70,7 @@ class CostmapNode:
         self._said: str = ""
         self._sources: list[_Source] = []
         self._map_frames: dict[int, str] = {}
+        self._map_subscribers: dict[int, rospy.Subscriber] = {}
         self._pending = NOTHING
         self._published_info: GridInfo | None = None
         self._last_published = float("-inf")
@@ -88,7 +89,7 @@ class CostmapNode:
     def _subscribe(self) -> None:
         for layer in self.costmap.static_layers:
             topic = layer.params.map_topic
-            rospy.Subscriber(
+            self._map_subscribers[id(layer)] = rospy.Subscriber(
                 topic, numpy_msg(OccupancyGrid), partial(self._on_map, layer), queue_size=1, buff_size=2**24
             )
             if layer.params.subscribe_to_updates:
@@ -125,6 +126,15 @@ class CostmapNode:
         cells = np.array(msg.data, dtype=np.int8).reshape(msg.height, msg.width)
         with self.lock:
             layer.update_map(msg.x, msg.y, cells)
+
+    @property
+    def departed_map(self) -> str:
+        """The topic of a map that came from somebody who has gone, empty where there is none."""
+        for key in self._map_frames:
+            subscriber = self._map_subscribers[key]
+            if subscriber.get_num_connections() == 0:
+                return str(subscriber.resolved_name)
+        return ""
 
     # ---- pose
 

@@ -3,6 +3,8 @@
 Differs:
     - Planning runs on a copy of the global costmap: neither the control cycle nor the costmap waits for it.
     - Cancelling works inside recovery behaviours.
+    - When a node has died that the pose comes from (amcl, the base), the robot stands at once, not only when its last
+      transform is too old; with `stop_without_map` it also stands while the map server is down.
     - Odometry that is older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
     - A goal in a frame that tf does not know is aborted at once with the planner's text, instead of after recoveries.
     - It stands still for somebody whose way it would cross, and goes on when they have passed (`~give_way`).
@@ -194,10 +196,7 @@ class MoveBaseNode:
         else:
             command = self._navigator.step(time, view)
         self._publish(command, time)
-        reason = problem or command.reason
-        if reason != self._said and reason not in ("driving", "planning", ""):
-            (log.info if command.outcome and command.outcome.succeeded else log.warning)("%s", reason)
-        self._said = reason
+        self._say(problem or command.reason, succeeded=command.outcome is not None and command.outcome.succeeded)
         if view is not None:
             self._goals.feedback(view.recovery.pose_global, time)
         if command.outcome is not None:
@@ -205,8 +204,25 @@ class MoveBaseNode:
         self._watch_rate(time)
         self._tell(time)
 
+    def _say(self, reason: str, *, succeeded: bool) -> None:
+        kind = reason.split(":")[0]  # what follows has figures that change
+        if kind != self._said and reason not in ("driving", "planning", ""):
+            (log.info if succeeded else log.warning)("%s", reason)
+        self._said = kind
+
+    def _departed(self) -> str:
+        """Which other node that it cannot drive without has gone, in a sentence; else empty."""
+        gone = self._transforms.departed(self._local.base_frame)
+        if not gone and self.params.stop_without_map:
+            topic = self._global.departed_map or self._local.departed_map
+            gone = f"nobody publishes the map on {topic} any more" if topic else ""
+        return gone
+
     def _view(self, time: float) -> tuple[NavigatorView | None, str]:
-        """What the navigator sees, None and why where the robot's pose is not known."""
+        """What the navigator sees, None and why where it must not drive by it: the robot's pose is not known."""
+        gone = self._departed()
+        if gone:
+            return None, gone
         try:
             pose_global = self._global.robot_pose(time)
             pose_local = self._local.robot_pose(time)

@@ -4,9 +4,29 @@ from __future__ import annotations
 
 import rospy
 import tf2_ros
+from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
+
+
+class _Listener(tf2_ros.TransformListener):
+    """Remembers who told where a frame is, too."""
+
+    def __init__(self, buffer: tf2_ros.Buffer) -> None:
+        self.told: dict[str, tuple[str, str]] = {}  # frame: (its parent, name of the node)
+        super().__init__(buffer, tcp_nodelay=True)
+
+    def callback(self, data: TFMessage) -> None:
+        """Take in transforms that move."""
+        super().callback(data)
+        who = data._connection_header.get("callerid", "")
+        for each in data.transforms:
+            self.told[each.child_frame_id.lstrip("/")] = (each.header.frame_id.lstrip("/"), who)
+
+    def connected(self) -> set[str]:
+        """Names of the nodes whose transforms come; rospy drops a connection as soon as its other end has died."""
+        return {getattr(connection, "callerid_pub", "") for connection in self.tf_sub.impl.connections}
 
 
 class Transforms:
@@ -14,7 +34,22 @@ class Transforms:
 
     def __init__(self, cache_s: float = 10.0) -> None:
         self.buffer = tf2_ros.Buffer(rospy.Duration.from_sec(cache_s))
-        self._listener = tf2_ros.TransformListener(self.buffer, tcp_nodelay=True)
+        self._listener = _Listener(self.buffer)
+
+    def departed(self, frame: str) -> str:
+        """Who has gone of those who told where a frame is in the frames above it, in a sentence; else empty.
+
+        Much sooner known than that a transform is old: within milliseconds on one host.
+        """
+        connected = self._listener.connected()
+        frame, seen = frame.lstrip("/"), set[str]()
+        while frame in self._listener.told and frame not in seen:
+            parent, who = self._listener.told[frame]
+            if who and who not in connected:
+                return f"{who} has gone, which told where '{frame}' is in '{parent}'"
+            seen.add(frame)
+            frame = parent
+        return ""
 
     def lookup(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
         """`target_from_source` at a time [s], or the newest.

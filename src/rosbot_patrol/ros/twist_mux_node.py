@@ -7,6 +7,8 @@ Differs:
 - What is chosen goes through the collision guard (`~guard`, true), which slows and stops for what `scan` shows in the
   direction of motion. A command is checked again with each scan, not only when it comes.
 - When every source has fallen silent, or a lock closes, a zero is published; upstream publishes nothing.
+- A topic whose last publisher has gone is silent at once: on one host a program that dies is noticed within
+  milliseconds. The time-out stays for one that hangs, or whose host has gone.
 - Only the planar part of a Twist is passed on.
 """
 
@@ -130,6 +132,7 @@ class TwistMuxNode:
         self._stopped_at = float("-inf")
         self._reason = ""
         self._told = float("-inf")
+        self._subscribers: dict[str, rospy.Subscriber] = {}
         for source in params.topics:
             self._listen(source)
         for lock in params.locks:
@@ -152,7 +155,7 @@ class TwistMuxNode:
                 self._mux.command(source.name, twist_from_msg(message), now())
             self._wake.set()
 
-        rospy.Subscriber(source.topic, Twist, callback, queue_size=1, tcp_nodelay=True)
+        self._subscribers[source.name] = rospy.Subscriber(source.topic, Twist, callback, queue_size=1, tcp_nodelay=True)
 
     def _listen_lock(self, lock: LockParams) -> None:
         def callback(message: Bool) -> None:
@@ -164,6 +167,7 @@ class TwistMuxNode:
 
     def _step(self, current: float) -> None:
         with self._lock:
+            self._forget_the_gone()
             choice = self._mux.choose(current)
         seen = self._eyes.look() if self._eyes is not None else False
         if choice.source is None:
@@ -173,6 +177,11 @@ class TwistMuxNode:
             self._publisher.publish(twist_to_msg(verdict.twist))
             self._tell(choice, verdict)
         self._last = choice
+
+    def _forget_the_gone(self) -> None:
+        for name, subscriber in self._subscribers.items():
+            if subscriber.get_num_connections() == 0 and self._mux.forget(name) and name == self._last.source:
+                log.warning("%s has gone while it drove", name)
 
     def _stand(self, choice: Choice, current: float) -> None:
         """Publish a zero where the base was driven until now, and again and again where a lock holds."""

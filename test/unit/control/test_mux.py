@@ -45,6 +45,17 @@ def test_a_command_is_fresh_once():
     assert it.choose(0.2).fresh
 
 
+def test_a_source_that_has_gone_is_silent_until_it_speaks_again():
+    it = mux()
+    it.command("move_base", AHEAD, 0.0)
+    it.command("teleop", BACK, 0.1)
+    assert it.forget("teleop")
+    assert not it.forget("patrol")  # had no say
+    assert it.choose(0.1).source == "move_base"
+    it.command("teleop", BACK, 0.2)
+    assert it.choose(0.2).source == "teleop"
+
+
 def test_a_lock_stops_everyone_below_it_until_released():
     it = mux(lock_priority=25)
     it.lock("e_stop", True, 0.0)

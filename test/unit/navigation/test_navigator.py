@@ -227,6 +227,31 @@ def test_a_new_goal_replaces_the_old_without_stopping():
     assert bench.step().twist == FORWARD
 
 
+def test_a_new_goal_while_driving_holds_the_velocity_for_a_short_time_only():
+    bench = Bench()
+    bench.go()
+    bench.plans.slow = True
+    bench.navigator.set_goal(Pose2D(1.0, 1.0), bench.now)
+    assert [bench.step().twist for _ in range(5)] == [None, None, None, None, STOP]
+    bench.navigator.set_goal(Pose2D(2.0, 1.0), bench.now)  # it stands by now
+    assert bench.step().twist == STOP
+
+
+@pytest.mark.parametrize("blind", [False, True])
+@pytest.mark.parametrize("state", [State.PLANNING, State.CONTROLLING])
+def test_waiting_for_sensors_or_the_pose_is_no_failure(state, blind):
+    bench = Bench(oscillation_timeout=5.0)
+    bench.go()
+    bench.controller.fails = state is State.PLANNING
+    bench.step()
+    bench.current = blind
+    assert {bench.step(blind=blind).twist for _ in range(200)} == {STOP}
+    bench.current, bench.controller.fails = True, False
+    bench.step()
+    assert bench.step().twist == FORWARD
+    assert [r.started for r in bench.recoveries] == [0, 0]
+
+
 def test_stale_sensors_stop_the_robot():
     bench = Bench()
     bench.go()
@@ -234,6 +259,19 @@ def test_stale_sensors_stop_the_robot():
     assert bench.step().twist == STOP
     bench.current = True
     assert bench.step().twist == FORWARD
+
+
+def test_stale_sensors_stop_a_recovery():
+    bench = Bench()
+    bench.recoveries[0].steps = 20
+    bench.controller.fails = True
+    bench.go()
+    while bench.commands[-1].twist != TURN:
+        bench.step()
+    bench.current = False
+    assert bench.step().twist == STOP
+    bench.current = True
+    assert bench.step().twist == TURN
 
 
 def test_an_unknown_pose_stops_the_robot():

@@ -1,0 +1,74 @@
+"""Kill -9 in mid-drive: the base stands within half a second, and after the respawn the patrol goes on."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
+import rospy
+from nav_msgs.msg import Odometry
+from rosbot_patrol.msg import PatrolState
+
+from rosbot_patrol.ros.house import House
+
+pytestmark = pytest.mark.system
+
+ROOM, ROOM_POINT = 5, (2.682, 7.352)
+VICTIMS = ("move_base", "amcl", "map_server")
+STANDS_WITHIN = 0.5  # [s] of simulated time, by ground truth at 20 Hz
+FAST, STANDING = 0.25, 0.01  # [m/s]
+
+
+class Speedometer:
+    """Speeds of the base by ground truth: (stamp [s], [m/s])."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[float, float]] = []
+        self._subscriber = rospy.Subscriber("/ground_truth/odom", Odometry, self._on_truth, queue_size=50)
+
+    def _on_truth(self, message: Odometry) -> None:
+        twist = message.twist.twist
+        speed = math.hypot(twist.linear.x, twist.linear.y) + 0.2 * abs(twist.angular.z)
+        self.heard.append((message.header.stamp.to_sec(), speed))
+
+    def is_fast(self) -> bool:
+        return len(self.heard) > 5 and min(speed for _, speed in self.heard[-5:]) > FAST
+
+    def stood_after(self, stamp: float) -> float:
+        """How long after a stamp it came to stand for good."""
+        moving = [s for s, speed in self.heard if s > stamp and speed > STANDING]
+        return max(moving, default=stamp) - stamp
+
+    def stop(self) -> None:
+        self._subscriber.unregister()
+
+
+@pytest.mark.slow
+def test_whoever_dies_in_mid_drive_the_base_stands_and_the_patrol_goes_on(master: object, folder: Path) -> None:
+    stood: dict[str, float] = {}
+    speed = Speedometer()
+    with House(folder, detector="pc") as house:
+        house.wait_ready(90.0)
+        house.trigger(ROOM)
+        for victim in VICTIMS:
+            house.wait(speed.is_fast, 60.0, f"the robot driving, to kill {victim}")
+            assert house.state is not None
+            assert house.state.state == PatrolState.DRIVING
+            pid = house.pids()[f"/{victim}"]
+            house.wait(speed.is_fast, 60.0, "the robot driving still")
+            stamp = speed.heard[-1][0]
+            os.kill(pid, signal.SIGKILL)
+            time.sleep(1.2)  # it is not back yet
+            stood[victim] = speed.stood_after(stamp)
+        house.wait(lambda: house.state.state == PatrolState.LOOKING, 60.0, f"the arrival in room {ROOM}")
+        assert house.pose is not None
+        assert math.dist(house.pose[:2], ROOM_POINT) < 0.3
+        assert not [contact for contact in house.contacts if contact[0] != "floor"]
+    speed.stop()
+    assert {victim: took for victim, took in stood.items() if took > STANDS_WITHIN} == {}, stood
