@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.costmap.costs import LETHAL, UNKNOWN
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
-from rosbot_patrol.planning.global_planner_base import PotentialPlanner
+from rosbot_patrol.planning.global_planner_base import PotentialPlanner, Settings
 from rosbot_patrol.planning.global_planner_orientation import OrientationMode, with_orientations
 from rosbot_patrol.planning.global_planner_search import descend_by_cells, descend_smoothly
 from rosbot_patrol.planning.interfaces import Array
@@ -74,17 +74,29 @@ def crossing_costs(params: GlobalPlannerParams) -> NDArray[np.float32]:
     return table
 
 
-class PotentialFieldPlanner(PotentialPlanner):
+class PotentialFieldPlanner(PotentialPlanner[GlobalPlannerParams]):
     """Shortest ways over the costs, with a choice of paths and headings."""
 
+    tunable = (
+        "lethal_cost",
+        "neutral_cost",
+        "cost_factor",
+        "publish_potential",
+        "orientation_mode",
+        "orientation_window_size",
+        "outline_map",
+    )
+
     def __init__(self, params: GlobalPlannerParams | None = None) -> None:
-        self.params = params or GlobalPlannerParams()
-        super().__init__(
-            crossing_costs(self.params),
-            tolerance=self.params.default_tolerance,
-            escape_radius=self.params.escape_radius,
-            outline=self.params.outline_map,
-            descend=descend_by_cells if self.params.use_grid_path else descend_smoothly,
+        super().__init__(params or GlobalPlannerParams())
+
+    def _settings_of(self, params: GlobalPlannerParams) -> Settings:
+        return Settings(
+            prices=crossing_costs(params),
+            tolerance=params.default_tolerance,
+            escape_radius=params.escape_radius,
+            outline=params.outline_map,
+            descend=descend_by_cells if params.use_grid_path else descend_smoothly,
         )
 
     def _poses(self, points: Array, start: Pose2D, goal: Pose2D) -> Array:

@@ -13,6 +13,7 @@ from rosbot_patrol.planning.reach_kernels import flood
 
 Cell = tuple[int, int]
 _ANYWHERE = (-1, -1)
+_ALL = -1
 _BACK = {1: (-1, 0), 2: (1, 0), 3: (0, -1), 4: (0, 1)}
 
 
@@ -47,7 +48,7 @@ def kinds_of_costs(prices: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 def nearest_reachable(cells: CostCells, kinds: NDArray[np.uint8], start: Cell, goal: Cell, reach: int) -> Cell | None:
     """The open cell nearest to the goal, at most `reach` cells away, that the start is connected with."""
-    came = flood(cells, kinds, *start, *_ANYWHERE, Kind.OPEN)
+    came, _ = flood(cells, kinds, *start, *_ANYWHERE, Kind.OPEN, _ALL)
     x0, y0 = max(goal[0] - reach, 0), max(goal[1] - reach, 0)
     window = np.s_[y0 : max(goal[1] + reach + 1, 0), x0 : max(goal[0] + reach + 1, 0)]
     reached = (came[window] > 0) & (kinds[cells[window]] == Kind.OPEN)
@@ -61,7 +62,7 @@ def nearest_reachable(cells: CostCells, kinds: NDArray[np.uint8], start: Cell, g
 
 def why_no_way(info: GridInfo, cells: CostCells, kinds: NDArray[np.uint8], start: Cell, goal: Cell) -> str:
     """Which end is shut in, by what and where; empty where neither is."""
-    came = flood(cells, kinds, *start, *goal, Kind.OBSTACLE)
+    came, from_start = flood(cells, kinds, *start, *goal, Kind.OBSTACLE, _ALL)
     ix, iy = goal
     worst, place = Kind.OPEN, goal
     while came[iy, ix] in _BACK:
@@ -72,12 +73,9 @@ def why_no_way(info: GridInfo, cells: CostCells, kinds: NDArray[np.uint8], start
         ix, iy = ix + step[0], iy + step[1]
     if worst is Kind.OPEN:
         return ""
-    areas = [_area(info, cells, kinds, cell) for cell in (start, goal)]
-    end, area = ("start", areas[0]) if areas[0] <= areas[1] else ("goal", areas[1])
+    _, from_goal = flood(cells, kinds, *goal, *_ANYWHERE, Kind.OPEN, from_start)
+    end = "start" if from_start <= from_goal else "goal"
+    area = min(from_start, from_goal) * info.resolution**2
+    size = f"{area:.0f}" if area >= 10.0 else f"{area:.2g}"
     x, y = info.centre_of(*place)
-    return f"the {end} is shut in ({area:.2g} m2 are open around it); in the way: {_WHAT[worst]} at ({x:.2f}, {y:.2f})"
-
-
-def _area(info: GridInfo, cells: CostCells, kinds: NDArray[np.uint8], start: Cell) -> float:
-    came = flood(cells, kinds, *start, *_ANYWHERE, Kind.OPEN)
-    return float(np.count_nonzero((came > 0) & (kinds[cells] == Kind.OPEN))) * info.resolution**2
+    return f"the {end} is shut in ({size} m2 are open around it); in the way: {_WHAT[worst]} at ({x:.2f}, {y:.2f})"

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL, UNKNOWN
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
-from rosbot_patrol.planning.global_planner_base import PotentialPlanner, with_headings
+from rosbot_patrol.planning.global_planner_base import PotentialPlanner, Settings, with_headings
 from rosbot_patrol.planning.interfaces import Array
 
 COST_NEUTRAL = 50.0
@@ -49,15 +49,19 @@ def crossing_costs(allow_unknown: bool) -> NDArray[np.float32]:
     return table
 
 
-class NavfnPlanner(PotentialPlanner):
+class NavfnPlanner(PotentialPlanner[NavfnParams]):
     """Shortest ways over the costs."""
 
+    tunable = ("allow_unknown", "default_tolerance")
+
     def __init__(self, params: NavfnParams | None = None) -> None:
-        self.params = params or NavfnParams()
-        super().__init__(
-            crossing_costs(self.params.allow_unknown),
-            tolerance=self.params.default_tolerance,
-            escape_radius=self.params.escape_radius,
+        super().__init__(params or NavfnParams())
+
+    def _settings_of(self, params: NavfnParams) -> Settings:
+        return Settings(
+            prices=crossing_costs(params.allow_unknown),
+            tolerance=params.default_tolerance,
+            escape_radius=params.escape_radius,
         )
 
     def _poses(self, points: Array, start: Pose2D, goal: Pose2D) -> Array:

@@ -27,7 +27,8 @@ from rosbot_patrol.planning.trajectory_planner_base import SamplingPlanner
 from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 from rosbot_patrol.planning.tunable import tunable
 
-GLOBAL_PLANNERS = ("navfn/NavfnROS", "global_planner/GlobalPlanner")
+NAVFN, GLOBAL_PLANNER = "navfn/NavfnROS", "global_planner/GlobalPlanner"
+GLOBAL_PLANNERS = (NAVFN, GLOBAL_PLANNER)
 TRAJECTORY, DWA = "base_local_planner/TrajectoryPlannerROS", "dwa_local_planner/DWAPlannerROS"
 CLEAR = "clear_costmap_recovery/ClearCostmapRecovery"
 ROTATE = "rotate_recovery/RotateRecovery"
@@ -36,6 +37,8 @@ LOCAL_PLANNERS = (TRAJECTORY, DWA)
 RECOVERIES = (CLEAR, ROTATE, MOVE_SLOW)
 # What a dynamic_reconfigure server offers, by plug-in; a change goes to the planner's `reconfigure`.
 TUNABLE = {
+    NAVFN: tunable(NavfnParams, NavfnPlanner.tunable),
+    GLOBAL_PLANNER: tunable(GlobalPlannerParams, PotentialFieldPlanner.tunable),
     TRAJECTORY: tunable(TrajectoryPlannerParams, TrajectoryPlanner.tunable),
     DWA: tunable(DWAPlannerParams, DWAPlanner.tunable),
 }
@@ -69,7 +72,7 @@ def make_global_planner(plugin: str, tree: Tree, *, name: str = "~") -> GlobalPl
     kind = _known(plugin, GLOBAL_PLANNERS, f"{name}base_global_planner")
     space = short_name(kind)
     values, where = _group(tree, space, name), f"{name}{space}/"
-    if kind == GLOBAL_PLANNERS[0]:
+    if kind == NAVFN:
         return NavfnPlanner(load(NavfnParams, values, name=where))
     return PotentialFieldPlanner(load(GlobalPlannerParams, values, name=where))
 

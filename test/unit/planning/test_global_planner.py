@@ -13,7 +13,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.planning.global_planner import GlobalPlannerParams, PotentialFieldPlanner, crossing_costs
 from rosbot_patrol.planning.global_planner_orientation import OrientationMode, with_orientations
-from rosbot_patrol.planning.registry import make_global_planner
+from rosbot_patrol.planning.registry import GLOBAL_PLANNERS, TUNABLE, make_global_planner
 
 START, GOAL = Pose2D(0.55, 0.55, 0.4), Pose2D(2.55, 1.55, -2.0)
 
@@ -77,6 +77,36 @@ def test_parameters_come_by_name_and_are_checked():
         make_global_planner("GlobalPlanner", {"GlobalPlanner": {"orientation_mode": 7}})
     with pytest.raises(ParamError, match="lethal_cost"):
         make_global_planner("GlobalPlanner", {"GlobalPlanner": {"lethal_cost": "high"}})
+
+
+def test_parameters_change_in_use():
+    planner = make_global_planner("GlobalPlanner", {"GlobalPlanner": {"cost_factor": 1.0}})
+    changed = planner.reconfigure({"neutral_cost": 80, "outline_map": False, "orientation_mode": 4})
+    assert (changed.neutral_cost, changed.cost_factor) == (80, 1.0)
+    assert planner.prices[[0, 10]].tolist() == [80.0, 90.0]
+    path = planner.plan(hall(), START, Pose2D(2.55, 0.05))
+    assert abs(path[0, 2]) > math.pi / 2
+    with pytest.raises(ParamError, match="~GlobalPlanner/cost_factor"):
+        planner.reconfigure({"cost_factor": 9.0}, name="~GlobalPlanner/")
+    with pytest.raises(ParamError, match="use_grid_path"):
+        planner.reconfigure({"use_grid_path": True})
+    assert planner.params == changed
+
+
+def test_navfns_parameters_change_in_use():
+    grid = hall()
+    grid.cells[:, 15] = 255
+    planner = make_global_planner("navfn/NavfnROS", {})
+    assert len(planner.plan(Grid(grid.info, grid.cells.copy()), START, GOAL)) > 10
+    planner.reconfigure({"allow_unknown": False, "default_tolerance": 1.2})
+    assert planner.plan(grid, START, GOAL)[-1, 0] == pytest.approx(1.45)
+
+
+@pytest.mark.parametrize("plugin", GLOBAL_PLANNERS)
+def test_what_can_be_tuned_is_declared(plugin):
+    names = {row.name for row in TUNABLE[plugin]}
+    assert names == set(make_global_planner(plugin, {}).tunable)
+    assert all(row.type in ("bool", "int", "float") for row in TUNABLE[plugin])
 
 
 # ---- headings
