@@ -409,7 +409,9 @@ def spread(cells, sources):
     return out
 
 
-@kernel("Tuple((float64[:, ::1], int64))(float64[:, ::1], int64, float64[::1], float64[::1], float64[::1], boolean)")
+@kernel(
+    "Tuple((float64[:, ::1], int64, int64))(float64[:, ::1], int64, float64[::1], float64[::1], float64[::1], boolean)"
+)
 def cut_plan(plan, passed, local_from_plan, here, window, prune):
     """The plan in the local frame, from where the robot is to where it leaves the local costmap.
 
@@ -422,8 +424,9 @@ def cut_plan(plan, passed, local_from_plan, here, window, prune):
         prune: leave out what lies behind; else it is taken from where it came into the local costmap.
 
     Returns:
-        Poses inside, shape (M, 3), empty where the nearest is outside; and the index of that nearest pose. It is not
-        one of a later leg that only passes by: at most 1 m farther along the plan than the robot is from its start.
+        Poses inside, shape (M, 3), empty where the nearest is outside; the index of that nearest pose, and how many of
+        those returned lie before it. It is not one of a later leg that only passes by: at most 1 m farther along the
+        plan than the robot is from its start.
     """
     c, s = math.cos(local_from_plan[2]), math.sin(local_from_plan[2])
     ox, oy = local_from_plan[0], local_from_plan[1]
@@ -460,7 +463,7 @@ def cut_plan(plan, passed, local_from_plan, here, window, prune):
         out[n, 0], out[n, 1] = x, y
         out[n, 2] = yaw - math.tau * math.floor((yaw + math.pi) / math.tau)
         n += 1
-    return out[:n].copy(), nearest
+    return out[:n].copy(), nearest, nearest - first
 
 
 @kernel("float64[::1](float64[:, ::1], float64[:, ::1], uint8[:, ::1], float64, float64, float64)")

@@ -13,9 +13,11 @@ Differs:
     - A standing base may start with `min_vel_trans` or `min_vel_theta` where one cycle's acceleration gives less;
       upstream then finds no velocity, or cannot turn on the spot.
     - Where nothing is free over `sim_time`, slow motions are tried over 0.6 s. A robot whose footprint touches an
-      obstacle may move so that it touches less; one that cannot go on by any of its velocities backs out of what it
-      touches at `min_vel_trans`.
-    - Where the plan is blocked in view and nothing leads round, it stops short of the place and says so.
+      obstacle may move so that it touches less, back out of it at `min_vel_trans`, and where only the padding touches,
+      move slowly by its bare outline.
+    - The local goal lies about a metre along the plan, beyond what a trajectory reaches; upstream takes the last pose
+      in view, and so stays where it is in a bend. Where something stands on the plan, the way round it counts as the
+      plan; where nothing leads round, it stops short of the place and says so.
     - The latch of `latch_xy_goal_tolerance` is kept when a new plan leads to the same goal.
     - Names from before Noetic (`max_trans_vel`, ...) are taken, with a warning; upstream warns and ignores them.
 """
@@ -43,10 +45,12 @@ from rosbot_patrol.planning.critics import (
 )
 from rosbot_patrol.planning.dwa_params import TUNABLE, DWAPlannerParams
 from rosbot_patrol.planning.interfaces import Array, LocalView
-from rosbot_patrol.planning.trajectory_planner_base import Ground, SamplingPlanner
+from rosbot_patrol.planning.trajectory_planner_base import SamplingPlanner
+from rosbot_patrol.planning.trajectory_planner_ground import Ground
 from rosbot_patrol.planning.trajectory_planner_stop import StopLimits
 
 _SHORT = 0.6  # how far ahead slow motions are looked at where it is narrow [s]
+_BEYOND = 0.2  # the local goal lies that much beyond what a trajectory can reach [m]
 _EPS = 1e-4
 
 
@@ -108,32 +112,33 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
         """The best velocity within reach; where none is free, a slow one that is looked at less far ahead."""
         p = self._driven
         self._visible = self._track.part_in_view(view, prune=p.prune_plan)
-        ground = self._ground(view, self._visible)
+        ground = self._ground(view, p.max_vel_trans * p.sim_time + p.forward_point_distance + _BEYOND)
         samples = self._samples(view)
         slow = samples[np.hypot(samples[:, 0], samples[:, 1]) <= max(p.min_vel_trans, 0.1) + _EPS]
-        back = np.array([[-max(p.min_vel_trans, 0.05), 0.0, 0.0]])
-        for tried, horizon in ((samples, p.sim_time), (slow, min(p.sim_time, _SHORT)), (back, _SHORT)):
-            if tried is back and not self._is_touching(view):
-                continue
-            best = self._best(view, ground, tried, horizon)
-            if best is not None:
-                self._oscillation.remember(
-                    view.pose,
-                    best,
-                    still=p.min_vel_trans,
-                    distance=p.oscillation_reset_dist,
-                    angle=p.oscillation_reset_angle,
-                )
-                return best
-        raise ControlError("the DWA planner found no velocity that is free of obstacles")
-
-    def _is_touching(self, view: LocalView) -> bool:
-        return self._obstacles.survey(view.costmap, view.pose, 0.0).touching > 0
+        short = min(p.sim_time, _SHORT)
+        best = self._best(view, ground, samples, p.sim_time)
+        if best is None:
+            best = self._best(view, ground, slow, short)
+        if best is None and self._obstacles.is_squeezed(view.costmap, view.pose):
+            back = np.array([[-max(p.min_vel_trans, 0.05), 0.0, 0.0]])
+            best = self._best(view, ground, back, short)
+            if best is None:
+                best = self._best(view, ground, np.concatenate((slow, back)), short, bare=True)
+        if best is None:
+            raise ControlError("the DWA planner found no velocity that is free of obstacles")
+        self._oscillation.remember(
+            view.pose,
+            best,
+            still=p.min_vel_trans,
+            distance=p.oscillation_reset_dist,
+            angle=p.oscillation_reset_angle,
+        )
+        return best
 
     def _samples(self, view: LocalView) -> Array:
         """Velocities within reach (vx, vy, wz), shape (K, 3), none too slow or too fast for the base."""
         p, v = self._driven, view.velocity
-        most_x, most_y = p.max_vel_x, p.max_vel_y
+        most_x, most_y = min(p.max_vel_x, p.max_vel_trans), min(p.max_vel_y, p.max_vel_trans)
         window = 1.0 / p.controller_frequency if p.use_dwa else p.sim_time
         if not p.use_dwa:  # do not overshoot the goal
             goal = self._track.goal(view)
@@ -160,7 +165,9 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
             is_held=p.use_dwa,
         )
 
-    def _best(self, view: LocalView, ground: Ground, samples: Array, horizon: float) -> Twist2D | None:
+    def _best(
+        self, view: LocalView, ground: Ground, samples: Array, horizon: float, *, bare: bool = False
+    ) -> Twist2D | None:
         """The best sample, None where none is free.
 
         Raises:
@@ -170,9 +177,12 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
             return None
         p, motion = self._driven, self._motion(horizon)
         reach = motion.reach(samples, view.velocity)
-        around = self._obstacles.survey(view.costmap, view.pose, reach, growth=p.max_scaling_factor)
+        around = self._obstacles.survey(view.costmap, view.pose, reach, growth=p.max_scaling_factor, bare=bare)
         ends = np.empty((len(samples), 3))
         danger = self._obstacles.drive(around, view.velocity, samples, motion, ends=ends)
+        # the base may follow at once, or as slowly as its accelerations say: both have to be free
+        slowly = replace(motion, horizon=min(horizon, _SHORT), is_held=False)
+        danger = 0.5 * danger + 0.5 * self._obstacles.drive(around, view.velocity, samples, slowly, failed=danger)
         free = np.isfinite(danger) & ~self._oscillation.forbidden(samples)
         if not free.any():
             return None

@@ -13,8 +13,11 @@ Differs:
       accelerations and for one that follows at once. `stop_time_buffer` works; upstream reads it only.
     - Where nothing is free over `sim_time`, slow motions are tried over 0.6 s before it backs up.
     - It backs up only where the way behind is free; upstream does so blindly.
-    - A robot whose footprint touches an obstacle may move so that it touches less; upstream finds no trajectory.
-    - Where the plan is blocked in view and nothing leads round, it stops short of the place and says so.
+    - A robot whose footprint touches an obstacle may move so that it touches less, and where only the padding does,
+      move slowly by its bare outline; upstream finds no trajectory.
+    - The local goal lies about a metre along the plan, beyond what a trajectory reaches; upstream takes the last pose
+      in view, and so cuts corners. Where something stands on the plan, the way round it counts as the plan; where
+      nothing leads round, it stops short of the place and says so.
     - `simple_attractor` counts the squared distance to the local goal in metres, whatever `meter_scoring`.
     - `y_vels` defaults to -0.3, -0.1, 0.1, 0.3; the dynamic_reconfigure file has the last sign wrong.
 """
@@ -41,13 +44,15 @@ from rosbot_patrol.planning.critics import (
     Situation,
 )
 from rosbot_patrol.planning.interfaces import Array, LocalView
-from rosbot_patrol.planning.trajectory_planner_base import Ground, SamplingPlanner
+from rosbot_patrol.planning.trajectory_planner_base import SamplingPlanner
+from rosbot_patrol.planning.trajectory_planner_ground import Ground
 from rosbot_patrol.planning.trajectory_planner_params import TUNABLE, TrajectoryPlannerParams, read_speeds
 from rosbot_patrol.planning.trajectory_planner_stop import StopLimits
 
 _SHORT, _SLOW = 0.6, 0.1  # how far ahead [s] slow motions [m/s] are looked at where it is narrow
 _HEADING_WEIGHT = 0.3  # of an angle, with heading_scoring (upstream's)
 _STRAFE = 0.1  # speed forward and sideways of a holonomic base's two slanting samples [m/s] (upstream's)
+_BEYOND = 0.2  # the local goal lies that much beyond what a trajectory can reach [m]
 _NOTHING_FREE = "no trajectory is free of obstacles"
 
 
@@ -115,20 +120,36 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         """The best of all samples; where none is free, of slow ones that are looked at less far ahead."""
         p = self._driven
         self._visible = self._track.part_in_view(view, prune=p.prune_plan)
-        ground = self._ground(view, self._visible)
+        if p.simple_attractor:
+            ground = Ground(view.costmap, self._visible, np.empty((0, 0), np.float32))
+        else:
+            ground = self._ground(view, p.max_vel_x * p.sim_time + p.heading_lookahead + _BEYOND)
         for tried, horizon in self._attempts(view):
             best = self._best(view, ground, tried, horizon)
             if best is not None:
-                self._oscillation.remember(
-                    view.pose, best, still=1e-3, distance=p.oscillation_reset_dist, angle=math.pi / 2
-                )
-                return self._limited(view, best)
-        return self._escape(view)
+                return self._chosen(view, best)
+        try:
+            return self._escape(view)
+        except ControlError:
+            best = self._squeeze(view, ground)
+            if best is None:
+                raise
+            return self._chosen(view, best)
 
-    def _ground(self, view: LocalView, plan: Array) -> Ground:
-        if self._driven.simple_attractor:
-            return Ground(view.costmap, plan, np.empty((0, 0), np.float32))
-        return super()._ground(view, plan)
+    def _chosen(self, view: LocalView, best: Twist2D) -> Twist2D:
+        p = self._driven
+        self._oscillation.remember(view.pose, best, still=1e-3, distance=p.oscillation_reset_dist, angle=math.pi / 2)
+        return self._limited(view, best)
+
+    def _squeeze(self, view: LocalView, ground: Ground) -> Twist2D | None:
+        """The best slow motion of a robot whose padding touches something, by its bare outline; None: it does not."""
+        p = self._driven
+        if not self._obstacles.is_squeezed(view.costmap, view.pose):
+            return None
+        ahead = self._ahead(view)
+        ahead = ahead[ahead[:, 0] <= max(p.min_vel_x, _SLOW)]
+        slow = np.concatenate((ahead, self._turns(), [[p.escape_vel, 0.0, 0.0]]))
+        return self._best(view, ground, slow, min(p.sim_time, _SHORT), bare=True)
 
     def _attempts(self, view: LocalView) -> list[tuple[Array, float]]:
         """Samples (vx, vy, wz) that are tried one set after the other, and how far ahead each is looked at [s]."""
@@ -194,14 +215,16 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
             stop_time_buffer=p.stop_time_buffer,
         )
 
-    def _best(self, view: LocalView, ground: Ground, samples: Array, horizon: float) -> Twist2D | None:
+    def _best(
+        self, view: LocalView, ground: Ground, samples: Array, horizon: float, *, bare: bool = False
+    ) -> Twist2D | None:
         """The cheapest sample, None where none is free.
 
         Raises:
             ControlError: some are free, but lead nowhere.
         """
         p, motion = self._driven, self._motion(horizon)
-        around = self._obstacles.survey(view.costmap, view.pose, motion.reach(samples, view.velocity))
+        around = self._obstacles.survey(view.costmap, view.pose, motion.reach(samples, view.velocity), bare=bare)
         ends = np.empty((len(samples), 3))
         danger = self._obstacles.drive(around, view.velocity, samples, motion, ends=ends)
         # the base may follow at once, or as slowly as its accelerations say: both have to be free

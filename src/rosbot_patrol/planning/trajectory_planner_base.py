@@ -9,22 +9,20 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rosbot_patrol.costmap.costs import INSCRIBED
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.errors import ControlError
 from rosbot_patrol.geometry import Pose2D, Twist2D, angle_difference
-from rosbot_patrol.grid import Grid, cells_of_points
-from rosbot_patrol.planning.critics import ObstacleCritic, OscillationCritic, Situation, distances_from, shrink
+from rosbot_patrol.planning.critics import ObstacleCritic, OscillationCritic
 from rosbot_patrol.planning.interfaces import Array, LocalPlanner, LocalView
+from rosbot_patrol.planning.trajectory_planner_ground import Ground, survey_ground
 from rosbot_patrol.planning.trajectory_planner_stop import StopAndTurn, StopLimits
 from rosbot_patrol.planning.trajectory_planner_track import Track
 from rosbot_patrol.planning.tunable import changed
 
 P = TypeVar("P")
 
-_TOO_NEAR = 0.3  # of a plan that is blocked, less than this ahead is not worth driving [m]
+_LOOKAHEAD = 1.0  # along the plan lies the local goal, at least [m]
 
 
 @dataclass
@@ -40,27 +38,6 @@ class _SpeedLimit:
         if self.since is None:
             self.since = pose
         return math.hypot(pose.x - self.since.x, pose.y - self.since.y) >= self.distance
-
-
-@dataclass(frozen=True)
-class Ground:
-    """What one cycle drives over: costs in coarse cells, the plan as far as it leads, distances to its end [cells]."""
-
-    coarse: Grid
-    plan: Array
-    goal_field: NDArray[np.float32]
-
-    def situation(self, view: LocalView, samples: Array, ends: Array, nose: float) -> Situation:
-        """What critics look at."""
-        return Situation(
-            pose=view.pose,
-            samples=samples,
-            ends=ends,
-            coarse=self.coarse,
-            plan=self.plan,
-            nose=nose,
-            goal_field=self.goal_field,
-        )
 
 
 class SamplingPlanner(LocalPlanner, Generic[P]):
@@ -80,6 +57,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         self._limit: _SpeedLimit | None = None
         self._obstacles = ObstacleCritic(footprint, resolution=resolution)
         self._oscillation = OscillationCritic()
+        self._radius = footprint.circumscribed_radius
         self._track = Track()
         self._stop = StopAndTurn(self._obstacles)
         self._local_plan: Array = np.empty((0, 3))
@@ -188,42 +166,8 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         self._stop.reset()
         return self._follow(view)
 
-    # ---- what is ahead
-
-    def _ground(self, view: LocalView, plan: Array) -> Ground:
-        """The plan up to its last pose in view that the robot can get to, and the distances to it.
-
-        Raises:
-            ControlError: something stands on the plan right ahead, and nothing leads round it.
-        """
-        coarse = shrink(view.costmap)
-        field = distances_from(coarse, plan[-1:, :2])
-        if not _reaches(coarse, field, view.pose, plan[-1]):
-            plan = _reachable_part(coarse, view.pose, plan)
-            field = distances_from(coarse, plan[-1:, :2])
-        return Ground(coarse, plan, field)
-
-
-def _reaches(coarse: Grid, field: NDArray[np.float32], pose: Pose2D, goal: Array) -> bool:
-    """Whether distances to a goal's place are known where the robot is, and the goal itself is free."""
-    info = coarse.info
-    ix, iy = info.cell_of_clamped(goal[0], goal[1])
-    if coarse.cells[iy, ix] >= INSCRIBED:
-        return False
-    ix, iy = info.cell_of_clamped(pose.x, pose.y)
-    cross = (field[iy, max(ix - 1, 0) : ix + 2], field[max(iy - 1, 0) : iy + 2, ix])
-    return any(bool(np.isfinite(part).any()) for part in cross)
-
-
-def _reachable_part(coarse: Grid, pose: Pose2D, plan: Array) -> Array:
-    info = coarse.info
-    distances = distances_from(coarse, np.array([[pose.x, pose.y]]))
-    ix, iy = cells_of_points(info, plan[:, :2]).T
-    reachable = np.isfinite(distances[iy.clip(0, info.height - 1), ix.clip(0, info.width - 1)])
-    last = int(np.flatnonzero(reachable)[-1]) if reachable.any() else -1
-    if last == len(plan) - 1:
-        return plan
-    gap = math.hypot(plan[last, 0] - pose.x, plan[last, 1] - pose.y) if last >= 0 else 0.0
-    if gap < _TOO_NEAR:
-        raise ControlError("something stands on the plan and there is no way round it in view")
-    return plan[: last + 1]
+    def _ground(self, view: LocalView, lookahead: float) -> Ground:
+        """What is followed now; raises ControlError where something stands on it and nothing leads round."""
+        return survey_ground(
+            view, self._visible, behind=self._track.behind, lookahead=max(lookahead, _LOOKAHEAD), radius=self._radius
+        )

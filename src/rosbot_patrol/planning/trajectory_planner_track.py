@@ -18,6 +18,7 @@ class Track:
     def __init__(self) -> None:
         self.poses: Array = np.empty((0, 3))
         self.passed = 0
+        self.behind = 0  # how many poses of the last part in view lie behind
         self.xy_reached = False
 
     def take(self, poses: Array) -> bool:
@@ -71,8 +72,8 @@ class Track:
             ]
         )
         place = np.array(view.local_from_plan, dtype=np.float64)
-        here = np.array([view.pose.x, view.pose.y])
-        poses, nearest = kernels.cut_plan(self.poses, self.passed, place, here, window, prune)
+        here = np.array([view.pose.x, view.pose.y], dtype=np.float64)
+        poses, nearest, self.behind = kernels.cut_plan(self.poses, self.passed, place, here, window, prune)
         if len(poses) == 0:
             raise ControlError("the plan does not pass through the local costmap")
         self.passed = nearest

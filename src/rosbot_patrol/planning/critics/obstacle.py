@@ -15,6 +15,7 @@ from rosbot_patrol.grid import Grid
 from rosbot_patrol.planning import critic_kernels as kernels
 from rosbot_patrol.planning.critics.situation import Array
 
+_SPACING = 0.25  # of the outline's points, of a cell: a cell's corner hardly fits between two
 SUDDEN = (1e6, 1e6, 1e6)  # accelerations of a base that follows at once
 
 
@@ -68,6 +69,7 @@ class Surroundings:
     corner: tuple[int, int]
     touching: int
     taken_from: int
+    outline: Array = field(repr=False)
 
 
 class ObstacleCritic:
@@ -75,7 +77,7 @@ class ObstacleCritic:
 
     The swept outline is checked cell by cell, whatever the steps of the simulation. A velocity is also refused if the
     robot could not stop before it hits something. A robot that touches something already may only move so that it
-    touches less.
+    touches less; where only its padding does, it can be checked without.
 
     Args:
         footprint: the robot's padded outline.
@@ -83,12 +85,14 @@ class ObstacleCritic:
     """
 
     def __init__(self, footprint: Footprint, *, resolution: float) -> None:
-        self._outline = footprint.outline(resolution * 0.7)
-        gaps = np.hypot(*(np.roll(self._outline, -1, axis=0) - self._outline).T)
-        self._spacing = float(gaps.max())
+        self._padded = footprint.outline(resolution * _SPACING)
+        self._bare = Footprint(footprint.body, footprint.body).outline(resolution * _SPACING)
+        self._spacing = max(_widest_gap(self._padded), _widest_gap(self._bare))
         self._reach = footprint.circumscribed_radius
 
-    def survey(self, costmap: Grid, pose: Pose2D, distance: float, *, growth: float = 0.0) -> Surroundings:
+    def survey(
+        self, costmap: Grid, pose: Pose2D, distance: float, *, growth: float = 0.0, bare: bool = False
+    ) -> Surroundings:
         """Look around a pose.
 
         Args:
@@ -96,7 +100,9 @@ class ObstacleCritic:
             pose: where the robot is.
             distance: how far it may be moved [m].
             growth: by what part its footprint may be enlarged.
+            bare: check the robot's own outline, without the padding.
         """
+        outline = self._bare if bare else self._padded
         info, cells = costmap.info, costmap.cells
         reach = self._reach * (1.0 + growth)
         side = math.ceil((distance + reach) / info.resolution) + 3
@@ -111,8 +117,9 @@ class ObstacleCritic:
             costmap=costmap,
             near=kernels.clearances(cells, x0, y0, x1, y1, cap),
             corner=(x0, y0),
-            touching=kernels.count_touching(cells, info.resolution, info.origin_x, info.origin_y, self._outline, *pose),
-            taken_from=LETHAL if here == INSCRIBED else INSCRIBED,
+            touching=kernels.count_touching(cells, info.resolution, info.origin_x, info.origin_y, outline, *pose),
+            taken_from=LETHAL if here == INSCRIBED or bare else INSCRIBED,
+            outline=outline,
         )
 
     def drive(
@@ -138,7 +145,7 @@ class ObstacleCritic:
         info = around.costmap.info
         worst = np.zeros(len(samples)) if failed is None else np.where(np.isfinite(failed), 0.0, -1.0)
         kernels.drive(
-            np.array([*around.pose, *velocity]),
+            np.array([*around.pose, *velocity], dtype=np.float64),
             samples,
             motion.packed(self._reach, self._spacing),
             around.costmap.cells,
@@ -147,11 +154,18 @@ class ObstacleCritic:
             *around.corner,
             around.taken_from,
             around.touching,
-            self._outline,
+            around.outline,
             np.empty((len(samples), 3)) if ends is None else ends,
             worst,
         )
         return np.where(worst < 0.0, np.inf, worst)
+
+    def is_squeezed(self, costmap: Grid, pose: Pose2D) -> bool:
+        """Whether the padded outline touches something at a pose, or is a hair away from it."""
+        info = costmap.info
+        outline = self._padded * (1.0 + self._spacing / self._reach)
+        place = (info.resolution, info.origin_x, info.origin_y)
+        return bool(kernels.count_touching(costmap.cells, *place, outline, *pose) > 0)
 
     def is_free(self, costmap: Grid, pose: Pose2D, twist: Twist2D, motion: Motion) -> bool:
         """Whether one velocity can be driven from a pose."""
@@ -161,5 +175,9 @@ class ObstacleCritic:
 
     def trace(self, pose: Pose2D, velocity: Twist2D, twist: Twist2D, motion: Motion) -> Array:
         """The poses that a velocity leads through, shape (N, 3)."""
-        start = np.array([*pose, *velocity])
+        start = np.array([*pose, *velocity], dtype=np.float64)
         return kernels.trace(start, np.array([twist], dtype=np.float64), 0, motion.packed(self._reach, self._spacing))
+
+
+def _widest_gap(outline: Array) -> float:
+    return float(np.hypot(*(np.roll(outline, -1, axis=0) - outline).T).max())
