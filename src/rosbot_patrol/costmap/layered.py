@@ -29,7 +29,9 @@ from rosbot_patrol.costmap.params import (
     ObstacleParams,
     StaticParams,
 )
+from rosbot_patrol.costmap.range_layer import RangeSensorLayer
 from rosbot_patrol.costmap.scrolling import ScrollingCells, strips
+from rosbot_patrol.costmap.sensor_params import RangeSensorParams
 from rosbot_patrol.costmap.static import StaticLayer
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
@@ -44,6 +46,8 @@ def make_layer(config: LayerConfig) -> Layer:
         return StaticLayer(params, name=config.name)
     if isinstance(params, ObstacleParams):
         return ObstacleLayer(params, config.sources, name=config.name)
+    if isinstance(params, RangeSensorParams):
+        return RangeSensorLayer(params, name=config.name)
     assert isinstance(params, InflationParams)
     return InflationLayer(params, name=config.name)
 
@@ -109,6 +113,11 @@ class LayeredCostmap:
     def obstacle_layers(self) -> list[ObstacleLayer]:
         """The layers that want scans."""
         return [layer for layer in self.layers if isinstance(layer, ObstacleLayer)]
+
+    @property
+    def range_layers(self) -> list[RangeSensorLayer]:
+        """The layers that want readings of range sensors."""
+        return [layer for layer in self.layers if isinstance(layer, RangeSensorLayer)]
 
     @property
     def circumscribed_cost(self) -> int:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.costmap import costmap_kernels as kernels
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds
 from rosbot_patrol.costmap.costs import FREE, UNKNOWN, CostCells
+from rosbot_patrol.costmap.depth import DepthObservation
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.costmap.layer import Layer
 from rosbot_patrol.costmap.marks import MarkMemory, Seen
@@ -93,7 +94,9 @@ class ObstacleLayer(Layer):
         place = info.resolution, info.origin_x, info.origin_y
         cells = self._window.cells
         for source, o in seen:
-            if source.clearing:
+            if source.clearing and isinstance(o, DepthObservation):
+                o.depth.clear(cells, info, self._cleared, changes)
+            elif source.clearing:
                 reach = max(0, math.ceil(source.raytrace_range / info.resolution - 1e-9))
                 kernels.clear_rays(cells, *place, *o.sensor, o.ends, reach, self._cleared, changes)
         for source, o in seen:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import load, param
 
@@ -46,24 +47,6 @@ class StaticParams:
     lethal_cost_threshold: int = param(100, lo=0, hi=255)
     unknown_cost_value: int = param(-1, lo=-128, hi=255)
     trinary_costmap: bool = param(True)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SourceParams:
-    """One observation source of an obstacle layer."""
-
-    topic: str = param("", doc="topic, the source's name where empty")
-    sensor_frame: str = param("", doc="frame of the sensor, the message's where empty")
-    data_type: str = param("PointCloud", choices=("LaserScan", "PointCloud", "PointCloud2"))
-    observation_persistence: float = param(0.0, unit="s", lo=0.0, doc="how long a scan is used again")
-    expected_update_rate: float = param(0.0, unit="s", lo=0.0, doc="older input stops the robot; 0 is never")
-    min_obstacle_height: float = param(0.0, unit="m")
-    max_obstacle_height: float = param(2.0, unit="m")
-    obstacle_range: float = param(2.5, unit="m", lo=0.0, doc="hits farther away are not marked")
-    raytrace_range: float = param(3.0, unit="m", lo=0.0, doc="cells are cleared up to here")
-    inf_is_valid: bool = param(False, doc="a beam without a hit clears")
-    clearing: bool = param(False)
-    marking: bool = param(True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +110,7 @@ class LayerConfig:
 
     name: str
     type: str
-    params: StaticParams | ObstacleParams | InflationParams  # and what is derived of them
+    params: StaticParams | ObstacleParams | InflationParams | RangeSensorParams  # and what is derived of them
     sources: dict[str, SourceParams]
 
 
@@ -146,6 +129,7 @@ LAYER_TYPES: dict[str, type] = {
     "VoxelLayer": VoxelParams,
     "InflationLayer": InflationParams,
     "KeepoutLayer": KeepoutParams,
+    "RangeSensorLayer": RangeSensorParams,
 }
 
 _RANGES = ("obstacle_range", "raytrace_range")
@@ -158,6 +142,7 @@ _FROM_COSTMAP: dict[str, tuple[str, ...]] = {
     "VoxelLayer": _VOXEL,
     "InflationLayer": ("cost_scaling_factor", "inflation_radius"),
     "KeepoutLayer": (),
+    "RangeSensorLayer": (),
 }
 # And what pre-hydro files have there besides (the last two of the map are ours: upstream drops them).
 _LEGACY: dict[str, tuple[str, ...]] = {
@@ -254,5 +239,6 @@ def _read_source(tree: Mapping[str, Any], layer: Mapping[str, Any], source: str,
     for scope in (tree, layer):
         inherited.update({key: scope[key] for key in _RANGES if key in scope})
     own = _sub(layer, source, prefix)
-    values = {**inherited, "topic": source, **own}
-    return load(SourceParams, values, name=f"{prefix}{source}/")
+    values = {**inherited, **own, "topic": own.get("topic") or source}
+    kind = DepthSourceParams if own.get("data_type") == "DepthImage" else SourceParams
+    return load(kind, values, name=f"{prefix}{source}/")

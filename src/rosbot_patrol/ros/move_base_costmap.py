@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections import deque
 from functools import partial
 
 import numpy as np
@@ -14,37 +13,23 @@ from geometry_msgs.msg import Point32, PolygonStamped
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid
 from rospy.numpy_msg import numpy_msg
-from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds
 from rosbot_patrol.costmap.costs import occupancy_of
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import ObservationBuffer, observe
 from rosbot_patrol.costmap.params import CostmapConfig
 from rosbot_patrol.costmap.static import StaticLayer
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.ros.convert import grid_from_msg, grid_to_msg, scan_from_msg, time_to_msg
+from rosbot_patrol.ros.convert import grid_from_msg, grid_to_msg, time_to_msg
+from rosbot_patrol.ros.costmap_sources import Source, subscribe_sources
 from rosbot_patrol.ros.node import Loop
 from rosbot_patrol.ros.transforms import Transforms
-from rosbot_patrol.scan import LaserScan
 
 log = logging.getLogger(__name__)
 
 _START_GRACE_S = 3.0  # wall time in which a transform that is not there yet is no fault
-_SCANS_KEPT = 5
-
-
-class _Source:
-    """Scans of one observation source that wait for their transform."""
-
-    def __init__(self, buffer: ObservationBuffer) -> None:
-        self.buffer = buffer
-        self.waiting: deque[LaserScan] = deque(maxlen=_SCANS_KEPT)
-
-    def receive(self, msg: LaserScanMsg) -> None:
-        self.waiting.append(scan_from_msg(msg))
 
 
 class CostmapNode:
@@ -68,7 +53,7 @@ class CostmapNode:
         self._born = time.monotonic()
         self._transforms = transforms
         self._said: str = ""
-        self._sources: list[_Source] = []
+        self._sources: list[Source] = []
         self._map_frames: dict[int, str] = {}
         self._map_subscribers: dict[int, rospy.Subscriber] = {}
         self._pending = NOTHING
@@ -95,15 +80,7 @@ class CostmapNode:
             if layer.params.subscribe_to_updates:
                 callback = partial(self._on_map_update, layer)
                 rospy.Subscriber(f"{topic}_updates", numpy_msg(OccupancyGridUpdate), callback, queue_size=10)
-        for obstacles in self.costmap.obstacle_layers:
-            for key, buffer in obstacles.buffers.items():
-                if buffer.params.data_type != "LaserScan":
-                    log.warning("%s: source '%s' is no LaserScan and is not used", self.name, key)
-                    continue
-                source = _Source(buffer)
-                self._sources.append(source)
-                topic = buffer.params.topic or key
-                rospy.Subscriber(topic, LaserScanMsg, source.receive, queue_size=1, buff_size=2**18, tcp_nodelay=True)
+        self._sources = subscribe_sources(self.costmap)
 
     def _on_map(self, layer: StaticLayer, msg: OccupancyGrid) -> None:
         try:
@@ -165,7 +142,8 @@ class CostmapNode:
             self._complain(str(err))
             return
         with self.lock:
-            self._take_scans()
+            for source in self._sources:
+                source.take(self._transforms, self.frame)
             self._place_maps()
             areas = self.costmap.update(now, pose)
             self.updates += 1
@@ -182,23 +160,6 @@ class CostmapNode:
         if problem and kind != self._said:
             log.warning("%s: %s", self.name, problem)
         self._said = kind
-
-    def _take_scans(self) -> None:
-        for source in self._sources:
-            later: list[LaserScan] = []
-            newest_only = source.buffer.params.observation_persistence == 0.0
-            for scan in reversed(list(source.waiting)):
-                frame = source.buffer.params.sensor_frame or scan.frame_id
-                try:
-                    pose = self._transforms.lookup(self.frame, frame, scan.stamp)
-                except TransformError:
-                    later.append(scan)
-                    continue
-                source.buffer.add(observe(scan, pose, inf_is_valid=source.buffer.params.inf_is_valid))
-                if newest_only:
-                    break
-            newest = later[0].stamp if later else 0.0
-            source.waiting = deque((s for s in reversed(later) if newest - s.stamp < 1.0), maxlen=_SCANS_KEPT)
 
     def _place_maps(self) -> None:
         for layer in self.costmap.static_layers:
@@ -217,6 +178,10 @@ class CostmapNode:
     def is_current(self, now: float) -> bool:
         """Whether what drives by this costmap can trust it."""
         return not self.problem and self.costmap.is_current(now)
+
+    def troubles(self, now: float) -> list[str]:
+        """Which inputs are silent or cannot be used."""
+        return [f"{self.name}/{text}" for text in (source.trouble(now) for source in self._sources) if text]
 
     # ---- showing
 

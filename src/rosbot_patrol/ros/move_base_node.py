@@ -306,12 +306,16 @@ class MoveBaseNode:
             "reason": self._navigator.reason,
             "slow cycles": self._slow_cycles,
         }
+        troubles = [text for costmap in (self._global, self._local) for text in costmap.troubles(now())]
         problems = [f"{c.name}: {c.problem}" for c in (self._global, self._local) if c.problem]
         if problems:
             level = WARN if self._navigator.state is State.IDLE else ERROR
             self._health.set("", level, "; ".join(problems), values)
         elif self._navigator.state is not State.IDLE and not self._local.is_current(time):
-            self._health.set("", ERROR, "sensor data is out of date", values)
+            told = "; ".join(["sensor data is out of date", *troubles])
+            self._health.set("", ERROR, told, values)
+        elif troubles:
+            self._health.set("", WARN, "; ".join(troubles), values)
         else:
             self._health.set("", OK, self._navigator.state.value, values)
 

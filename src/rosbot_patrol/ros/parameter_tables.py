@@ -15,10 +15,10 @@ from rosbot_patrol.costmap.params import (
     InflationParams,
     KeepoutParams,
     ObstacleParams,
-    SourceParams,
     StaticParams,
     VoxelParams,
 )
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import declared, table
@@ -59,9 +59,11 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
             ("<costmap>/static_layer/", StaticParams),
             ("<costmap>/obstacle_layer/", ObstacleParams),
             ("<costmap>/obstacle_layer/<source>/", SourceParams),
+            ("<costmap>/obstacle_layer/<source of data_type DepthImage>/", DepthSourceParams),
             ("<costmap>/inflation_layer/", InflationParams),
             ("<costmap>/<name of a VoxelLayer>/", VoxelParams),
             ("<costmap>/<name of a KeepoutLayer>/", KeepoutParams),
+            ("<costmap>/<name of a RangeSensorLayer>/", RangeSensorParams),
         ],
     ),
     ("amcl", [("", AmclParams)]),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import rospy
 import tf2_ros
+from numpy.typing import NDArray
 from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.errors import TransformError
@@ -65,6 +67,19 @@ class Transforms:
         t, q = found.transform.translation, found.transform.rotation
         return Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
+    def lookup_matrix(self, target: str, source: str, stamp: float) -> NDArray[np.float64]:
+        """`target_from_source` in space at a time [s], shape (4, 4); raises TransformError."""
+        when = rospy.Time.from_sec(stamp)
+        try:
+            found = self.buffer.lookup_transform(target.lstrip("/"), source.lstrip("/"), when)
+        except tf2_ros.TransformException as err:
+            raise TransformError(target, source, str(err)) from err
+        t, q = found.transform.translation, found.transform.rotation
+        matrix = np.eye(4)
+        matrix[:3, :3] = _rotation(q.x, q.y, q.z, q.w)
+        matrix[:3, 3] = t.x, t.y, t.z
+        return matrix
+
     def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
         """The newest `target_from_source` and its stamp [s]; raises TransformError."""
         try:
@@ -73,3 +88,15 @@ class Transforms:
             raise TransformError(target, source, str(err)) from err
         t, q = found.transform.translation, found.transform.rotation
         return Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w)), found.header.stamp.to_sec()
+
+
+def _rotation(x: float, y: float, z: float, w: float) -> NDArray[np.float64]:
+    """Of a quaternion of any length but zero, shape (3, 3)."""
+    s = 2.0 / (x * x + y * y + z * z + w * w)
+    return np.array(
+        [
+            [1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+            [s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)],
+            [s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)],
+        ]
+    )
