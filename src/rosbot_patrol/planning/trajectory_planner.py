@@ -148,7 +148,10 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
             return None
         ahead = self._ahead(view)
         ahead = ahead[ahead[:, 0] <= max(p.min_vel_x, _SLOW)]
-        slow = np.concatenate((ahead, self._turns(), [[p.escape_vel, 0.0, 0.0]]))
+        back = np.array([[p.escape_vel, 0.0, 0.0]])[: p.escape_vel < 0.0]
+        slow = np.concatenate((ahead, self._turns(), back))
+        if not len(slow):
+            return None
         return self._best(view, ground, slow, min(p.sim_time, _SHORT), bare=True)
 
     def _attempts(self, view: LocalView) -> list[tuple[Array, float]]:

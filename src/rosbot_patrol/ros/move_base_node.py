@@ -80,6 +80,7 @@ class MoveBaseNode:
             clearing_radius=p.aggressive_radius,
             clearing_rotation=p.clearing_rotation_allowed,
             name=name,
+            planner=self._controller,
         )
         self._navigator = Navigator(p, plans=self._plans, controller=self._controller, recoveries=recoveries)
         self._people = People(self._scan_topic(), self._local.frame, self._transforms, p.movers, p.give_way)

@@ -25,10 +25,11 @@ from rosbot_patrol.params import declared, table
 from rosbot_patrol.patrol.drive import DriveParams
 from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.planning.dwa_params import DWAPlannerParams
 from rosbot_patrol.planning.global_planner import GlobalPlannerParams
 from rosbot_patrol.planning.navfn import NavfnParams
-from rosbot_patrol.planning.recoveries import ClearCostmapParams, RotateParams
-from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
+from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
+from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 from rosbot_patrol.ros.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.map_server_node import MapServerParams
 from rosbot_patrol.ros.narrator_node import NarratorParams
@@ -53,8 +54,10 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
             ("NavfnROS/", NavfnParams),
             ("GlobalPlanner/", GlobalPlannerParams),
             ("TrajectoryPlannerROS/", TrajectoryPlannerParams),
+            ("DWAPlannerROS/", DWAPlannerParams),
             ("conservative_reset/, aggressive_reset/", ClearCostmapParams),
             ("rotate_recovery/", RotateParams),
+            ("<name of a MoveSlowAndClear>/", MoveSlowParams),
             ("global_costmap/, local_costmap/", CostmapParams),
             ("<costmap>/static_layer/", StaticParams),
             ("<costmap>/obstacle_layer/", ObstacleParams),

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from rosbot_patrol.costmap.layered import LayeredCostmap
+from rosbot_patrol.costmap.obstacle import observe
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.geometry import Pose2D, wrap_angle
-from rosbot_patrol.planning.interfaces import RecoveryView
-from rosbot_patrol.planning.recoveries import ClearCostmap, ClearCostmapParams, Rotate, RotateParams
+from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
+from rosbot_patrol.planning.interfaces import LocalView, RecoveryView
+from rosbot_patrol.planning.recoveries import (
+    ClearCostmap,
+    ClearCostmapParams,
+    MoveSlowAndClear,
+    MoveSlowParams,
+    Rotate,
+    RotateParams,
+)
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
+from rosbot_patrol.scan import LaserScan
 
 
 def costmap():
@@ -101,3 +111,93 @@ def test_unknown_plugins_are_named():
         make_local_planner("teb_local_planner/TebLocalPlannerROS", {}, costmap(), controller_frequency=10.0)
     with pytest.raises(ParamError, match="NavfnROS"):
         make_global_planner("navfn/NavfnROS", {"NavfnROS": 3})
+
+
+def obstructed():
+    """A costmap whose obstacle layer has seen something at 0.5 m and at 1.5 m."""
+    tree = {
+        "rolling_window": True,
+        "width": 4.0,
+        "height": 4.0,
+        "resolution": 0.05,
+        "robot_radius": 0.2,
+        "plugins": [
+            {"name": "obstacle_layer", "type": "costmap_2d::ObstacleLayer"},
+            {"name": "inflation_layer", "type": "costmap_2d::InflationLayer"},
+        ],
+        "obstacle_layer": {"observation_sources": "scan", "scan": {"data_type": "LaserScan", "marking": True}},
+    }
+    made = LayeredCostmap(read_costmap(tree))
+    scan = LaserScan(
+        stamp=0.0,
+        frame_id="laser",
+        angle_min=0.0,
+        angle_increment=math.pi / 2,
+        range_min=0.1,
+        range_max=10.0,
+        ranges=np.array([0.5, 1.5]),
+    )
+    made.obstacle_layers[0].buffers["scan"].add(observe(scan, Pose2D()))
+    made.update(0.0, Pose2D())
+    made.obstacle_layers[0].buffers["scan"].clear()
+    return made
+
+
+def lethal(local):
+    return [bool(local.grid.at(0.5, 0.001) == 254), bool(local.grid.at(0.001, 1.5) == 254)]
+
+
+@pytest.mark.parametrize(("invert", "left"), [(False, [True, False]), (True, [False, True])])
+@pytest.mark.parametrize("force", [True, False])
+def test_clearing_outside_and_inside_a_square(invert, left, force):
+    local = obstructed()
+    assert lethal(local) == [True, True]
+    params = ClearCostmapParams(reset_distance=2.0, invert_area_to_clear=invert, force_updating=force)
+    ClearCostmap(params, name="c").start(view(Pose2D(), 0.0, local))
+    assert lethal(local) == (left if force else [True, True])
+    written = local.update(0.1, Pose2D())
+    assert lethal(local) == left
+    assert sum(area.size for area in written) == 80 * 80  # whoever shows it gets all of it
+
+
+def test_only_the_layers_named_are_cleared(caplog):
+    local = obstructed()
+    params = ClearCostmapParams(reset_distance=0.0, layer_names=["obstacles"])
+    ClearCostmap(params, name="c").start(view(Pose2D(), 0.0, local))
+    local.update(0.1, Pose2D())
+    assert lethal(local) == [True, True]
+    assert "Cannot clear layer obstacles because it does not exist" in caplog.text
+    params = ClearCostmapParams(reset_distance=0.0, layer_names=["obstacle_layer"])
+    ClearCostmap(params, name="c").start(view(Pose2D(), 0.0, local))
+    local.update(0.1, Pose2D())
+    assert lethal(local) == [False, False]
+
+
+def test_move_slow_and_clear():
+    local = obstructed()
+    planner = make_local_planner("DWAPlannerROS", {}, local, controller_frequency=10.0)
+    params = MoveSlowParams(clearing_distance=0.6, limited_trans_speed=0.12, limited_distance=0.3)
+    slow = MoveSlowAndClear(params, name="m", planner=planner)
+    slow.start(view(Pose2D(), 0.0, local))
+    assert slow.step(view(Pose2D(), 0.0, local)) is None
+    local.update(0.1, Pose2D())
+    assert lethal(local) == [False, True]
+    planner.set_plan(np.column_stack((np.linspace(0, 1.5, 31), np.zeros((31, 2)))))
+    seen = LocalView(now=0.0, pose=Pose2D(), velocity=Twist2D(0.12), costmap=local.grid)
+    assert planner.compute(seen).vx <= 0.12
+    seen = LocalView(now=0.0, pose=Pose2D(0.35, 0.0, 0.0), velocity=Twist2D(0.12), costmap=local.grid)
+    assert planner.compute(seen).vx > 0.12
+    assert "0.12 m/s" in slow.last_words
+
+
+def test_listed_move_slow_and_clear_gets_the_planner():
+    listed = {"recovery_behaviors": [{"name": "m", "type": "move_slow_and_clear/MoveSlowAndClear"}]}
+    assert isinstance(recoveries(listed)[0], MoveSlowAndClear)
+
+
+def test_a_rotation_takes_its_limits_from_the_local_planner():
+    dwa = {"base_local_planner": "dwa_local_planner/DWAPlannerROS", "DWAPlannerROS": {"max_vel_theta": 0.7}}
+    assert recoveries(dwa)[1].params.max_rotational_vel == 0.7
+    own = {"TrajectoryPlannerROS": {"max_vel_theta": 0.9, "yaw_goal_tolerance": 0.2, "acc_lim_th": 1.5}}
+    params = recoveries(own)[1].params
+    assert (params.max_rotational_vel, params.yaw_goal_tolerance, params.acc_lim_th) == (0.9, 0.2, 1.5)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.costmap.footprint import Footprint, padded
-from rosbot_patrol.errors import ControlError
+from rosbot_patrol.errors import ControlError, ParamError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, wrap_angle
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.params import load
 from rosbot_patrol.planning.interfaces import LocalView
 from rosbot_patrol.planning.navfn import with_headings
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner
@@ -171,3 +172,80 @@ def test_the_goal_is_not_reached_while_moving():
     planner.set_plan(line(0, 0, 0.05, 0))
     assert planner.is_goal_reached(view())
     assert not planner.is_goal_reached(view(velocity=Twist2D(0.2)))
+
+
+def test_a_dynamic_window_is_what_a_cycle_can_reach():
+    planner = make(dwa=True, acc_lim_x=1.0, acc_lim_theta=2.0)
+    planner.set_plan(line(0, 0, 1.5, 1.0))
+    twist = planner.compute(view(velocity=Twist2D(0.2, 0.0, 0.1)))
+    assert 0.1 - 1e-9 <= twist.vx <= 0.3 + 1e-9
+    assert twist.vx == 0.0 or -0.1 - 1e-9 <= twist.wz <= 0.3 + 1e-9
+
+
+def test_a_simple_attractor_cuts_the_corner_of_a_plan():
+    """The plan leads up and then right; its end lies ahead."""
+    corner = np.concatenate((line(0, 0, 0, 0.8), line(0, 0.8, 1.2, 0.8), line(1.2, 0.8, 1.2, 0.0)))
+    planner = make(simple_attractor=True)
+    planner.set_plan(corner)
+    twist = planner.compute(view(velocity=Twist2D(0.3)))
+    assert twist.vx > 0.3
+    assert abs(twist.wz) < 0.1
+    planner = make()
+    planner.set_plan(corner)
+    assert planner.compute(view(velocity=Twist2D(0.3))).wz > 0.3
+
+
+def test_heading_scoring_turns_towards_the_plan():
+    planner = make(heading_scoring=True, heading_scoring_timestep=0.8)
+    planner.set_plan(line(0, 0, 1.2, 1.2))
+    assert planner.compute(view()).wz > 0.3
+    pose, _ = drive(planner, Pose2D())
+    assert math.dist(pose[:2], (1.2, 1.2)) <= 0.12
+
+
+def test_a_holonomic_base_goes_sideways_where_nothing_else_is_free():
+    cells = block(block(empty(), 0.21, -0.6, 0.3, 0.6), -0.3, -0.6, -0.21, 0.6)  # between two walls, no room to turn
+    plan = line(0, 0, 0, 1.5)
+    tight = {"escape_vel": 0.0, "min_vel_x": 0.1, "min_in_place_vel_theta": 1.5, "max_vel_theta": 1.5}
+    stuck = make(**tight)
+    stuck.set_plan(plan)
+    with pytest.raises(ControlError):
+        stuck.compute(view(cells=cells))
+    planner = make(holonomic_robot=True, y_vels=[-0.2, 0.2], **tight)
+    planner.set_plan(plan)
+    assert planner.compute(view(cells=cells)) == Twist2D(0.0, 0.2, 0.0)
+
+
+def test_wrong_sideways_speeds_are_named():
+    with pytest.raises(ParamError, match="y_vels"):
+        load(TrajectoryPlannerParams, {"y_vels": "0.1,fast"})
+    assert load(TrajectoryPlannerParams, {"y_vels": "0.1, -0.1"}).y_vels == "0.1, -0.1"
+
+
+def test_once_it_backs_up_it_does_so_for_its_distance():
+    """A box right ahead, no room to turn: back, and no forward motion before escape_reset_dist."""
+    cells = block(empty(), 0.2, -0.6, 0.4, 0.6)
+    cells = block(cells, -0.6, 0.2, 0.2, 0.3)
+    cells = block(cells, -0.6, -0.3, 0.2, -0.2)
+    planner = make(escape_reset_dist=0.15, min_in_place_vel_theta=1.0, vtheta_samples=3, max_vel_theta=1.0)
+    planner.set_plan(line(-0.5, 0.0, -1.5, 0.0))
+    pose = Pose2D()
+    for _ in range(8):
+        twist = planner.compute(view(pose, cells=cells))
+        if math.hypot(pose.x, pose.y) < 0.15:
+            assert twist.vx <= 0.0
+        pose = Pose2D(pose.x + 0.1 * twist.vx, 0.0, 0.0)
+    assert pose.x < 0.0
+
+
+def test_pruning_only_shows():
+    """Without it the plan behind still counts, and the local goal is the same."""
+    found = []
+    for prune in (True, False):
+        planner = make(prune_plan=prune)
+        planner.set_plan(line(-1.5, 0, 1.5, 0))
+        planner.compute(view())
+        found.append(planner.visible_plan)
+    assert found[0][0, 0] == pytest.approx(0.0, abs=0.05)
+    assert found[1][0, 0] == pytest.approx(-1.5, abs=0.05)
+    assert found[0][-1].tolist() == found[1][-1].tolist()
