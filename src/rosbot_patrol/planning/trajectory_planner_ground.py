@@ -12,7 +12,7 @@ from rosbot_patrol.costmap.costs import INSCRIBED
 from rosbot_patrol.errors import ControlError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo, cells_of_points
-from rosbot_patrol.planning import critic_kernels as kernels
+from rosbot_patrol.planning import sweep_kernels as kernels
 from rosbot_patrol.planning.critics import Situation, distances_from, shrink
 from rosbot_patrol.planning.interfaces import Array, LocalView
 

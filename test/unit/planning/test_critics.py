@@ -11,7 +11,7 @@ import pytest
 from rosbot_patrol.costmap.footprint import Footprint, padded
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.planning import critic_kernels as kernels
+from rosbot_patrol.planning import critic_kernels, sweep_kernels
 from rosbot_patrol.planning.critics import (
     SUDDEN,
     AlignmentCritic,
@@ -202,7 +202,7 @@ def test_clearances_are_exact(seed):
     random = np.random.default_rng(seed)
     cells = np.where(random.random((40, 50)) < 0.01, 254 + random.integers(0, 2, (40, 50)), 100).astype(np.uint8)
     x0, y0, x1, y1 = 7, 5, 45, 40
-    found = kernels.clearances(cells, x0, y0, x1, y1, 9)
+    found = sweep_kernels.clearances(cells, x0, y0, x1, y1, 9)
     iy, ix = np.nonzero(cells[y0:y1, x0:x1] >= 254)
     y, x = np.mgrid[y0:y1, x0:x1]
     far = np.full(found.shape, 9.0)
@@ -215,7 +215,7 @@ def test_clearances_are_exact(seed):
 @pytest.mark.parametrize("factor", [2, 3, 5])
 def test_blocks_have_their_highest_cost(factor):
     cells = np.random.default_rng(factor).integers(0, 256, (31, 42)).astype(np.uint8)
-    found = kernels.shrink(cells, factor)
+    found = critic_kernels.shrink(cells, factor)
     assert found.shape == (math.ceil(31 / factor), math.ceil(42 / factor))
     for iy, ix in np.ndindex(*found.shape):
         assert found[iy, ix] == cells[iy * factor : (iy + 1) * factor, ix * factor : (ix + 1) * factor].max()

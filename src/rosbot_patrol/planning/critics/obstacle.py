@@ -12,7 +12,7 @@ from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL, UNKNOWN
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.planning import critic_kernels as kernels
+from rosbot_patrol.planning import sweep_kernels as kernels
 from rosbot_patrol.planning.critics.situation import Array
 
 _SPACING = 0.25  # of the outline's points, of a cell: a cell's corner hardly fits between two
@@ -52,7 +52,7 @@ class Motion:
         return speed * 1.05 * max(self.horizon, braking + self.stop_time_buffer)
 
     def packed(self, reach: float, spacing: float) -> Array:
-        """As `critic_kernels.drive` wants it."""
+        """As `sweep_kernels.drive` wants it."""
         judged_at = self.horizon if self.judged_at is None else min(self.judged_at, self.horizon)
         steps = self.granularity, self.angular_granularity
         own = (self.horizon, judged_at, *steps, *self.accelerations, self.stop_time_buffer)
