@@ -94,10 +94,16 @@ class OutOfBounds(PlanningError):
 
     Args:
         what: "start" or "goal".
+        x: where it lies [m].
+        y: where it lies [m].
+        covers: lowest and highest x and y of the costmap [m], where known.
     """
 
-    def __init__(self, what: str, x: float, y: float) -> None:
-        super().__init__(f"the {what} ({x:.2f}, {y:.2f}) is off the global costmap")
+    def __init__(self, what: str, x: float, y: float, covers: tuple[float, float, float, float] | None = None) -> None:
+        extent = ""
+        if covers is not None:
+            extent = ", which now reaches from ({:.1f}, {:.1f}) to ({:.1f}, {:.1f})".format(*covers)
+        super().__init__(f"the {what} ({x:.2f}, {y:.2f}) is off the global costmap{extent}")
         self.what = what
         self.x = x
         self.y = y

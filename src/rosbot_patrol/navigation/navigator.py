@@ -54,7 +54,7 @@ class Trigger(enum.Enum):
 
 REACHED = "Goal reached."
 BAD_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
-OFF_MAP = "The goal sent to the navfn planner is off the global costmap. Planning will always fail to this goal."
+OFF_MAP = "The goal sent to the {} planner is off the global costmap. Planning will always fail to this goal."
 PLAN_REFUSED = "Failed to pass global plan to the controller."
 
 
@@ -259,7 +259,8 @@ class Navigator:
             if self.state is State.PLANNING and (not context.failures or context.failures[-1] != self.reason):
                 log.warning("no plan: %s", self.reason)
                 if isinstance(result.error, OutOfBounds) and result.error.what == "goal":
-                    log.warning(OFF_MAP)
+                    is_navfn = "navfn" in self.params.base_global_planner.lower()
+                    log.warning(OFF_MAP.format("navfn" if is_navfn else "global"))
                 context.failures.append(self.reason)
             return None
         progress.last_plan, progress.retries = now, 0

@@ -147,17 +147,23 @@ def with_headings(points: Array, last_yaw: float) -> Array:
 def _cell_of(what: str, pose: Pose2D, info: GridInfo, *, margin: float = 0.0) -> Cell:
     """The cell of a pose, which may lie off the grid by a margin [m]."""
     if not (math.isfinite(pose.x) and math.isfinite(pose.y)):
-        raise OutOfBounds(what, pose.x, pose.y)
+        raise OutOfBounds(what, pose.x, pose.y)  # NaN is nowhere
     cell = info.cell_of(pose.x, pose.y)
     gaps = [max(-i, i - n + 1, 0) * info.resolution for i, n in zip(cell, (info.width, info.height), strict=True)]
     if math.hypot(*gaps) > margin:
-        raise OutOfBounds(what, pose.x, pose.y)
+        raise OutOfBounds(what, pose.x, pose.y, _covered(info))
     return cell
+
+
+def _covered(info: GridInfo) -> tuple[float, float, float, float]:
+    """Lowest and highest x and y of a grid [m]."""
+    width, height = info.size
+    return info.origin_x, info.origin_y, info.origin_x + width, info.origin_y + height
 
 
 def _occupied(settings: Settings, cells: CostCells, info: GridInfo, goal: Pose2D, cell: Cell) -> PlanningError | None:
     if not info.contains_cell(*cell):
-        return OutOfBounds("goal", goal.x, goal.y)
+        return OutOfBounds("goal", goal.x, goal.y, _covered(info))
     kind = Kind(int(settings.kinds[cells[cell[1], cell[0]]]))
     return GoalOccupied(goal.x, goal.y, WHY_OCCUPIED[kind]) if kind else None
 

@@ -124,7 +124,18 @@ class MoveBaseNode:
         self._goals.start()
         Loop(self.params.controller_frequency, self.step, name="control").start()
         log.info("move_base takes goals in frame '%s'", self._global.frame)
+        self._tell_reach()
         rospy.spin()
+
+    def _tell_reach(self) -> None:
+        """Say how far goals may be where the global costmap moves with the robot, as with the tutorial's values."""
+        shape = self._global.params
+        if shape.rolling_window:
+            log.warning(
+                "the global costmap is a window of %.0f x %.0f m that moves with the robot: goals that lie farther than"
+                " %.1f m along x or %.1f m along y cannot be planned to (width and height of global_costmap)",
+                shape.width, shape.height, shape.width / 2.0, shape.height / 2.0,
+            )  # fmt: skip
 
     def _stop(self) -> None:
         if self._navigator.state is not State.IDLE:
