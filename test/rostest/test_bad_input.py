@@ -374,12 +374,12 @@ def test_worlds_sensors_and_configuration_that_make_no_sense(ros, tmp_path):
 
 
 def test_parameters_and_plug_ins_that_move_base_cannot_use(ros):
-    layers = "[{name: sonar, type: 'range_sensor_layer::RangeSensorLayer'}]"
+    layers = "[{name: sonar, type: 'social_layer::ProxemicLayer'}]"
     cases = {
         "global_costmap/resolution: expected a number [m], got 'fine'": {"global_costmap__resolution": "fine"},
         "local_costmap: expected a group of parameters, got 5": {"local_costmap": 5},
         "local_costmap/footprint": {"local_costmap__footprint": "[[0.1, 0.1], [0.1]]"},
-        "local_costmap/plugins: knows no layer 'range_sensor_layer::RangeSensorLayer', expected one of StaticLayer": {
+        "local_costmap/plugins: knows no layer 'social_layer::ProxemicLayer', expected one of StaticLayer": {
             "local_costmap__plugins": layers
         },
         "controller_frequency: expected a number [Hz], got 'fast'": {"controller_frequency": "fast"},

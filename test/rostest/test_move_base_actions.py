@@ -5,85 +5,26 @@ The client is Debian's actionlib (action_client.py), the base a stand-in in an e
 """
 
 import itertools
-import json
 import math
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import pytest
-import yaml
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, Teller, wait_for
+from move_base_bench import start_move_base
+from ros_processes import Process, wait_for
 
-HERE = Path(__file__).resolve().parent
-TUNED = HERE.parents[1] / "config" / "tuned"
 AWAY, AWAY_TOO, CLOSED = [12.0, 0.0, 0.0], [-12.0, 3.0, 0.0], [4.0, 4.0, 0.0]
 PROMPT = 0.2  # from cancelling to the result and to the zero velocity [s]
 RECOVERIES = ["conservative_reset", "rotate_recovery", "aggressive_reset", "rotate_recovery"]
 NO_PLAN = "Failed to find a valid plan. Even after executing recovery behaviors."
 
 
-def parameters():
-    """The tuned profile, less patient, turning quickly, and strict about goals."""
-    tree = {}
-    for name in ("move_base", "trajectory_planner", "local_costmap_params", "global_costmap_params"):
-        tree |= yaml.safe_load((TUNED / f"{name}.yaml").read_text())
-    common = yaml.safe_load((TUNED / "costmap_common_params.yaml").read_text())
-    for costmap in ("global_costmap", "local_costmap"):
-        tree[costmap] = common | tree[costmap]
-    quick = {"max_rotational_vel": 3.0, "acc_lim_th": 20.0}
-    return tree | {
-        "planner_patience": 0.6,
-        "controller_frequency": 20.0,
-        "rotate_recovery": quick,
-        "NavfnROS": {"allow_unknown": False, "default_tolerance": 0.0},
-    }
-
-
-class Client(Teller):
-    """action_client.py at the other end of two pipes."""
-
-    def __init__(self, ros):
-        self._count = 0
-        super().__init__(Process([sys.executable, str(HERE / "action_client.py")], ros.env, stdin=subprocess.PIPE))
-        ros.processes.append(self.process)
-
-    def since(self, t):
-        """What was said after a time, as it sees it."""
-        return [said for said in self.heard() if said["t"] > t]
-
-    def tells(self, **command):
-        """Tell, and return when it did so."""
-        self._count += 1
-        self.process.popen.stdin.write(json.dumps(command | {"count": self._count}) + "\n")
-        self.process.popen.stdin.flush()
-        return self.expect(lambda said: said.get("count") == self._count)["t"]
-
-    def next(self, t, condition, seconds=10.0, what="what comes next"):
-        """The first thing said after a time that meets a condition."""
-        return wait_for(lambda: next((s for s in self.since(t) if condition(s)), None), seconds, what)
-
-    def speed(self):
-        said = [s for s in self.heard() if "v" in s]
-        return said[-1]["v"], said[-1]["w"]
-
-
 @pytest.fixture(scope="module")
 def started(master):
-    """Base, move_base and client for all tests here: a start takes longer than each of them."""
-    master.processes.append(base := Process([sys.executable, str(HERE / "light_base.py")], master.env))
-    subprocess.run(
-        ["rosparam", "load", "-", "/move_base"], env=master.env, input=yaml.dump(parameters()), text=True, check=True
-    )
-    node = master.node("move_base")
-    client = Client(master)
-    node.says("global_costmap: map of 2000 x 2000 cells", 30.0)
-    time.sleep(1.5)  # the first update of the global costmap
-    yield node, client, base
+    yield start_move_base(master)
     master.stop_nodes()
 
 

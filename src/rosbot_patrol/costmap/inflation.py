@@ -72,6 +72,12 @@ class InflationLayer(Layer):
         if self._info is not None:
             self._set_table()
 
+    def fit(self, footprint: Footprint) -> None:
+        """Take another outline of the robot."""
+        self._inscribed = footprint.inscribed_radius
+        if self._info is not None:
+            self._set_table()
+
     def _set_table(self) -> None:
         assert self._info is not None
         radius = max(0, math.ceil(self.params.inflation_radius / self._info.resolution - 1e-9))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Any
 
 from rosbot_patrol.costmap.bounds import Bounds
 from rosbot_patrol.costmap.costs import CostCells
@@ -21,6 +22,14 @@ class Layer(ABC):
 
     name: str = ""
     enabled: bool = True
+    params: Any = None
+
+    def configure(self, params: Any) -> None:
+        """Take other parameters of the same class; the costmap is then computed anew."""
+        self.params, self.enabled = params, params.enabled
+
+    def fit(self, footprint: Footprint) -> None:
+        """Take another outline of the robot, keeping what is known and sensed."""
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
         """Take the master's place and size, forgetting everything that depends on it."""

@@ -23,6 +23,7 @@ from rosbot_patrol.costmap.layer import Layer
 from rosbot_patrol.costmap.obstacle import ObstacleLayer
 from rosbot_patrol.costmap.params import (
     CostmapConfig,
+    CostmapParams,
     InflationParams,
     KeepoutParams,
     LayerConfig,
@@ -35,6 +36,16 @@ from rosbot_patrol.costmap.sensor_params import RangeSensorParams
 from rosbot_patrol.costmap.static import StaticLayer
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
+
+
+def _footprint(p: CostmapParams, name: str) -> Footprint:
+    return Footprint.of(p.footprint, robot_radius=p.robot_radius, padding=p.footprint_padding, name=f"{name}/footprint")
+
+
+def _info(p: CostmapParams) -> GridInfo:
+    # as upstream's cast to a whole number, but for what a division leaves below one
+    size = max(1, int(p.width / p.resolution + 1e-9)), max(1, int(p.height / p.resolution + 1e-9))
+    return GridInfo(resolution=p.resolution, width=size[0], height=size[1], origin_x=p.origin_x, origin_y=p.origin_y)
 
 
 def make_layer(config: LayerConfig) -> Layer:
@@ -60,22 +71,32 @@ class LayeredCostmap:
         self.params = p
         self.name = config.name
         self.layers = [make_layer(layer) for layer in config.layers]
-        self.footprint = Footprint.of(
-            p.footprint,
-            robot_radius=p.robot_radius,
-            padding=p.footprint_padding,
-            name=f"{config.name}/footprint",
-        )
+        self.footprint = _footprint(p, config.name)
         self._default = UNKNOWN if p.track_unknown_space else FREE
         self._arrange()
         self._fresh = True
         self._enabled: list[bool] = []
         self.pose = Pose2D()
-        # as upstream's cast to a whole number, but for what a division leaves below one
-        size = max(1, int(p.width / p.resolution + 1e-9)), max(1, int(p.height / p.resolution + 1e-9))
-        self._resize(
-            GridInfo(resolution=p.resolution, width=size[0], height=size[1], origin_x=p.origin_x, origin_y=p.origin_y)
-        )
+        self._resize(_info(p))
+
+    def configure(self, params: CostmapParams) -> None:
+        """Take other parameters; where size, place or resolution change, what was sensed is forgotten (maps are kept).
+
+        Raises:
+            ParamError: the footprint is none.
+        """
+        self.footprint = _footprint(params, self.name)
+        before, self.params = self.params, params
+        if _info(before) != _info(params):
+            self._resize(_info(params))
+        for layer in self.layers:
+            layer.fit(self.footprint)
+        self._fresh = True
+
+    def configure_layer(self, layer: Layer, params: StaticParams | ObstacleParams | InflationParams) -> None:
+        """Give one of the layers other parameters."""
+        layer.configure(params)
+        self._fresh = True
 
     def _arrange(self) -> None:
         """Tell the layers what else there is."""

@@ -67,6 +67,15 @@ class ObstacleLayer(Layer):
             self._marks.clear()
         self._dirty = Bounds(0, 0, info.width, info.height)
 
+    def configure(self, params: ObstacleParams) -> None:
+        """Take other parameters; what was sensed stays."""
+        super().configure(params)
+        self._outline = None
+
+    def fit(self, footprint: Footprint) -> None:
+        """Take another outline of the robot."""
+        self._footprint = footprint
+
     def move(self, info: GridInfo, dx: int, dy: int) -> None:
         """Follow the rolling window."""
         self._info = info

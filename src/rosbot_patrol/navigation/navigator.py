@@ -190,6 +190,11 @@ class Navigator:
         """The goal that is worked on, in the global costmap's frame."""
         return self._context.goal if self._context else None
 
+    def configure(self, params: MoveBaseParams, recoveries: Sequence[Recovery]) -> None:
+        """Other parameters from the next step on; a behaviour that is running ends first."""
+        self.params = params
+        self._recoveries = list(recoveries)
+
     def set_goal(self, goal: Pose2D, now: float) -> None:
         """Start for a goal; a goal before is given up without stopping."""
         self._plans.drop()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.geometry import Pose2D, Twist2D
 from rosbot_patrol.grid import Grid
@@ -69,6 +70,9 @@ class LocalPlanner(ABC):
 
     def reset(self) -> None:
         """Forget the goal that was worked on."""
+
+    def fit(self, footprint: Footprint, *, resolution: float) -> None:
+        """Drive with another padded outline of the robot, or on cells of another size [m]."""
 
     def limit_speed(self, trans: float, rot: float, *, distance: float) -> None:
         """Drive no faster than this [m/s, rad/s] until the robot has moved by `distance` [m]; may be ignored."""

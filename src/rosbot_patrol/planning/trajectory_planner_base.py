@@ -105,6 +105,11 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         self.set_params(changed(self.params, changes, self.tunable, name=name))
         return self.params
 
+    def fit(self, footprint: Footprint, *, resolution: float) -> None:
+        """Drive with another padded outline of the robot, or on cells of another size [m]."""
+        self._obstacles = ObstacleCritic(footprint, resolution=resolution)
+        self._stop = StopAndTurn(self._obstacles)
+
     def limit_speed(self, trans: float, rot: float, *, distance: float) -> None:
         """Drive no faster than this [m/s, rad/s] until the robot has moved by `distance` [m]."""
         self._limit = _SpeedLimit(trans, rot, distance)

@@ -50,4 +50,6 @@ def changed(params: P, changes: Mapping[str, Any], names: Iterable[str], *, name
         if key not in known:
             raise ParamError(f"{name}{key}", unknown_name(key, known))
     own = {field.name: getattr(params, field.name) for field in dataclasses.fields(params)}  # type: ignore[arg-type]
-    return load(type(params), {**own, **changes}, name=name)
+    plain = {key: value for key, value in own.items() if not dataclasses.is_dataclass(value)}
+    loaded = load(type(params), {**plain, **changes}, name=name)
+    return dataclasses.replace(params, **{key: getattr(loaded, key) for key in changes})  # type: ignore[type-var]

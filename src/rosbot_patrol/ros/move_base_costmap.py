@@ -17,7 +17,7 @@ from rospy.numpy_msg import numpy_msg
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds
 from rosbot_patrol.costmap.costs import occupancy_of
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.params import CostmapConfig
+from rosbot_patrol.costmap.params import CostmapConfig, CostmapParams
 from rosbot_patrol.costmap.static import StaticLayer
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D
@@ -60,6 +60,7 @@ class CostmapNode:
         self._published_info: GridInfo | None = None
         self._last_published = float("-inf")
         self._listeners = 0
+        self._loop = Loop(self.params.update_frequency or 1.0, self.update, name=name)
         self._advertise()
         self._subscribe()
 
@@ -131,11 +132,18 @@ class CostmapNode:
 
     def start(self) -> None:
         """Begin to update."""
-        if self.params.update_frequency > 0.0:
-            Loop(self.params.update_frequency, self.update, name=self.name).start()
+        self._loop.start()
+
+    def configure(self, params: CostmapParams) -> None:
+        """Take other parameters, `lock` being held; raises ParamError."""
+        self.costmap.configure(params)
+        self.params = params
+        self._loop.set_rate(params.update_frequency or 1.0)
 
     def update(self, now: float) -> None:
-        """One update, and what is to be shown."""
+        """One update, and what is to be shown; none where `update_frequency` is 0."""
+        if self.params.update_frequency == 0.0:
+            return
         try:
             pose = self.robot_pose(now)
         except TransformError as err:

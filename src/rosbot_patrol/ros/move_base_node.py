@@ -8,12 +8,15 @@ Differs:
     - Odometry that is older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
     - A goal in a frame that tf does not know is aborted at once with the planner's text, instead of after recoveries.
     - It stands still for somebody whose way it would cross, and goes on when they have passed (`~give_way`).
-    - Topics that nobody listens to are not built. No dynamic_reconfigure.
+    - Topics that nobody listens to are not built.
+    - dynamic_reconfigure: see `move_base_tuning`.
 """
 
 from __future__ import annotations
 
 import logging
+import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +32,7 @@ from rosbot_patrol.errors import ParamError, PlanningError, TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
 from rosbot_patrol.navigation.navigator import Command, Navigator, NavigatorView, State
 from rosbot_patrol.navigation.params import MoveBaseParams
-from rosbot_patrol.planning.interfaces import LocalView, RecoveryView
+from rosbot_patrol.planning.interfaces import LocalView, Recovery, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries, short_name
 from rosbot_patrol.ros.convert import path_to_msg, twist_from_msg, twist_to_msg
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
@@ -37,6 +40,7 @@ from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
 from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_goal
 from rosbot_patrol.ros.move_base_plans import ThreadedPlans
+from rosbot_patrol.ros.move_base_tuning import Tuning
 from rosbot_patrol.ros.node import Loop, load_params, now, run_node
 from rosbot_patrol.ros.people import People
 from rosbot_patrol.ros.transforms import Transforms
@@ -62,11 +66,14 @@ class MoveBaseNode:
         groups = [key for key, value in tree.items() if isinstance(value, dict)]
         self.params = load_params(MoveBaseParams, tree=tree, ignore=[*groups, "recovery_behaviors"])
         name = rospy.get_name() + "/"
+        self._tree, self._name = tree, name
+        self._cycle = threading.RLock()
         self._transforms = Transforms()
         self._global = self._make_costmap(tree, "global_costmap", name)
         self._local = self._make_costmap(tree, "local_costmap", name)
         p = self.params
-        self._plans = ThreadedPlans(make_global_planner(p.base_global_planner, tree, name=name), self._global)
+        self._planner = make_global_planner(p.base_global_planner, tree, name=name)
+        self._plans = ThreadedPlans(self._planner, self._global)
         self._controller = make_local_planner(
             p.base_local_planner,
             tree,
@@ -74,21 +81,47 @@ class MoveBaseNode:
             controller_frequency=p.controller_frequency,
             name=name,
         )
-        recoveries = make_recoveries(
-            tree,
-            conservative=p.conservative_reset_dist,
-            clearing_radius=p.aggressive_radius,
-            clearing_rotation=p.clearing_rotation_allowed,
-            name=name,
-            planner=self._controller,
+        self._navigator = Navigator(
+            p, plans=self._plans, controller=self._controller, recoveries=self._make_recoveries(p)
         )
-        self._navigator = Navigator(p, plans=self._plans, controller=self._controller, recoveries=recoveries)
         self._people = People(self._scan_topic(), self._local.frame, self._transforms, p.movers, p.give_way)
         self._velocity: Latest[Twist2D] = Latest()
         self._slow_cycles = 0
         self._said = ""
         self._health_due = float("-inf")
+        self._control = Loop(p.controller_frequency, self.step, name="control")
         self._advertise()
+        self._offer_tuning()
+
+    def _make_recoveries(self, p: MoveBaseParams) -> list[Recovery]:
+        return make_recoveries(
+            self._tree,
+            conservative=p.conservative_reset_dist,
+            clearing_radius=p.aggressive_radius,
+            clearing_rotation=p.clearing_rotation_allowed,
+            name=self._name,
+            planner=self._controller,
+        )
+
+    def _offer_tuning(self) -> None:
+        tuning = Tuning(self._name, self._cycle)
+        tuning.offer_node(self.params, self._configure)
+        tuning.offer_planner(short_name(self.params.base_global_planner), self._planner)
+        tuning.offer_planner(short_name(self.params.base_local_planner), self._controller)
+        tuning.offer_costmap(self._global, lambda: None)
+        tuning.offer_costmap(self._local, self._fit_controller)
+
+    def _configure(self, params: MoveBaseParams) -> None:
+        self.params = params
+        self._navigator.configure(params, self._make_recoveries(params))
+        self._control.set_rate(params.controller_frequency)
+        if "controller_frequency" not in _group(self._tree, short_name(params.base_local_planner)):
+            own = replace(self._controller.params, controller_frequency=params.controller_frequency)
+            self._controller.set_params(own)
+
+    def _fit_controller(self) -> None:
+        costmap = self._local.costmap
+        self._controller.fit(costmap.footprint, resolution=costmap.info.resolution)
 
     def _scan_topic(self) -> str:
         """Where the local costmap's first scans come from, "" where it takes none."""
@@ -122,7 +155,7 @@ class MoveBaseNode:
         self._global.start()
         self._local.start()
         self._goals.start()
-        Loop(self.params.controller_frequency, self.step, name="control").start()
+        self._control.start()
         log.info("move_base takes goals in frame '%s'", self._global.frame)
         self._tell_reach()
         rospy.spin()
@@ -182,6 +215,10 @@ class MoveBaseNode:
 
     def step(self, time: float) -> None:
         """One control cycle."""
+        with self._cycle:
+            self._step(time)
+
+    def _step(self, time: float) -> None:
         goal = self._goals.take(time)
         if goal is not None:
             if self._navigator.state is State.IDLE:

@@ -129,6 +129,10 @@ class Loop(Worker):
         self._period = 1.0 / rate
         self._step = step
 
+    def set_rate(self, rate: float) -> None:
+        """Another rate from the next step on."""
+        self._period = 1.0 / rate
+
     def run(self) -> None:
         """Run until shutdown."""
         due = now()
