@@ -121,9 +121,7 @@ class Tuning:
         for layer in costmap.costmap.layers:
             names = next((names for kind, names in LAYERS.items() if isinstance(layer.params, kind)), ("enabled",))
             apply_to_layer = partial(self._apply_to_layer, costmap, layer, names)
-            self._servers.append(
-                ReconfigureServer(f"{costmap.name}/{layer.name}", layer.params, names, apply_to_layer)
-            )
+            self._servers.append(ReconfigureServer(f"{costmap.name}/{layer.name}", layer.params, names, apply_to_layer))
 
     def _apply_to_layer(
         self, costmap: CostmapNode, layer: Layer, names: tuple[str, ...], changes: dict[str, Any]
