@@ -3,7 +3,9 @@
 The commanded arc is followed ahead, and the command is scaled down (its shape is kept) until the robot can stop before
 its footprint, with a gap in the direction of motion, meets something seen. What lies in the footprint's margin already
 blocks only a motion that goes deeper, so the robot can always leave. The lidar is blind closer than its minimum range:
-what was last seen there is remembered for a while.
+what was last seen there is remembered for a while. Range sensors near the floor see what the lidar passes over: a
+distance that two readings in a row agree on counts as `min_points` points, and is remembered for a while too, since
+their cones are narrow.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ _DEEPER = 0.002  # a point must sink that much in one glance to count as coming 
 _GLANCE = 0.1  # [s]
 _SELF = 0.06  # so deep inside the footprint a point is no obstacle but the robot itself [m]
 _CREEP = 0.05  # a scale below this is a stop
+_AGREE = 0.15  # two readings of a range sensor that differ by less are of the same thing [m]
+_BESIDE = 0.1  # so far off its axis a range sensor's reading still tells that nothing is there [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +49,32 @@ class GuardParams:
     stale_speed: float = param(0.1, lo=0.0, unit="m/s", doc="speed without a fresh scan")
     stale_turn: float = param(0.4, lo=0.0, unit="rad/s", doc="turning without a fresh scan")
     memory: float = param(20.0, lo=0.0, unit="s", doc="how long a thing in the lidar's blind ring is remembered")
+    range_memory: float = param(3.0, lo=0.0, unit="s", doc="how long what a range sensor met is remembered")
+
+
+class RangeReading(NamedTuple):
+    """What a range sensor says: distance [m] (inf: nothing, -inf: too near), its limits, and base_from_sensor."""
+
+    distance: float
+    range_min: float
+    range_max: float
+    base_from_sensor: Pose2D
+
+
+class _Met(NamedTuple):
+    """A place that a range sensor met: (x, y) in the base's frame at the reading, and odom_from_base then."""
+
+    x: float
+    y: float
+    pose: Pose2D | None
+    stamp: float
+
+    def now_in(self, odom_from_base: Pose2D | None) -> Array:
+        """The place in the base's frame, shape (1, 2)."""
+        point = np.array([[self.x, self.y]])
+        if odom_from_base is None or self.pose is None:
+            return point
+        return transform_points(compose(invert(odom_from_base), self.pose), point)
 
 
 class Verdict(NamedTuple):
@@ -69,6 +99,8 @@ class CollisionGuard:
         self._pose: Pose2D | None = None
         self._blind: Array = np.empty((0, 2))  # in odom
         self._blind_since: Array = np.empty(0)
+        self._last_met: dict[str, _Met] = {}  # of each range sensor, believed or not
+        self._met: list[_Met] = []
 
     def see(self, scan: LaserScan, base_from_laser: Pose2D, now: float, odom_from_base: Pose2D | None = None) -> None:
         """Take a scan."""
@@ -77,13 +109,40 @@ class CollisionGuard:
         self._seen = transform_points(base_from_laser, scan_points(scan))
         self._pose, self._stamp = odom_from_base, now
 
+    def see_range(self, name: str, reading: RangeReading, now: float, odom_from_base: Pose2D | None = None) -> None:
+        """Take a reading of a range sensor; NaN says nothing."""
+        if math.isnan(reading.distance):
+            return
+        sensor = reading.base_from_sensor
+        distance = max(reading.distance, reading.range_min)
+        nothing = distance >= reading.range_max
+        seen_to = reading.range_max if nothing else distance
+        self._met = [m for m in self._met if not self._is_past(m, sensor, seen_to, now, odom_from_base)]
+        before = self._last_met.pop(name, None)
+        if nothing:
+            return
+        place = transform_points(sensor, np.array([[distance, 0.0]]))[0]
+        met = _Met(float(place[0]), float(place[1]), odom_from_base, now)
+        self._last_met[name] = met
+        if before is None or not 0.0 <= now - before.stamp <= self._params.stale_after:
+            return
+        if float(np.hypot(*(before.now_in(odom_from_base)[0] - place))) <= _AGREE:
+            self._met.append(met)
+
+    def _is_past(self, met: _Met, sensor: Pose2D, seen_to: float, now: float, odom_from_base: Pose2D | None) -> bool:
+        """Whether a place is forgotten, or lies where a sensor has just looked: told anew, or nothing there."""
+        if not 0.0 <= now - met.stamp <= self._params.range_memory:
+            return True
+        x, y = transform_points(invert(sensor), met.now_in(odom_from_base))[0].tolist()
+        return math.hypot(x, y) < seen_to + _AGREE and abs(math.atan2(y, x)) < _BESIDE
+
     def limit(self, wish: Twist2D, now: float, odom_from_base: Pose2D | None = None) -> Verdict:
         """The part of a commanded velocity that is safe."""
         if wish == STOP:
             return Verdict(STOP, 1.0, "")
         if not 0.0 <= now - self._stamp <= self._params.stale_after:
             return self._without_sight(wish, now)
-        points = self._points(odom_from_base)
+        points = self._points(now, odom_from_base)
         scale = self._free_part(wish, points)
         if scale >= _CREEP or wish.wz == 0.0:
             return self._verdict(wish, scale)
@@ -111,15 +170,19 @@ class CollisionGuard:
         reason = "no scan yet" if math.isinf(age) else f"the last scan is {abs(age):.1f} s old"
         return Verdict(Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale), scale, reason)
 
-    def _points(self, odom_from_base: Pose2D | None) -> Array:
+    def _points(self, now: float, odom_from_base: Pose2D | None) -> Array:
         """What was seen and what is remembered, in the base's frame now."""
-        if odom_from_base is None or self._pose is None:
-            return self._seen
-        base_from_odom = invert(odom_from_base)
-        seen = transform_points(compose(base_from_odom, self._pose), self._seen)
-        if not len(self._blind):
-            return seen
-        return np.vstack((seen, transform_points(base_from_odom, self._blind)))
+        p = self._params
+        parts = [self._seen]
+        if odom_from_base is not None and self._pose is not None:
+            base_from_odom = invert(odom_from_base)
+            parts = [transform_points(compose(base_from_odom, self._pose), self._seen)]
+            if len(self._blind):
+                parts.append(transform_points(base_from_odom, self._blind))
+        for met in self._met:
+            if 0.0 <= now - met.stamp <= p.range_memory:
+                parts.append(np.repeat(met.now_in(odom_from_base), p.min_points, axis=0))
+        return np.vstack(parts)
 
     def _remember(self, range_min: float, odom_from_laser: Pose2D, now: float) -> None:
         """Keep what now lies closer to the lidar than it can see."""

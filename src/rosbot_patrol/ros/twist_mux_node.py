@@ -4,8 +4,9 @@ Matches twist_mux 3.1 (Noetic): `~topics` and `~locks` (name, topic, timeout, pr
 
 Differs:
 - Whoever commands, the base stands still for somebody whose way it would cross (`~give_way`).
-- What is chosen goes through the collision guard (`~guard`, true), which slows and stops for what `scan` shows in the
-  direction of motion. A command is checked again with each scan, not only when it comes.
+- What is chosen goes through the collision guard (`~guard`, true), which slows and stops for what `scan` and the range
+  sensors of `~range_topics` show in the direction of motion. A command is checked again with each scan, not only when
+  it comes.
 - When every source has fallen silent, or a lock closes, a zero is published; upstream publishes nothing.
 - A topic whose last publisher has gone is silent at once: on one host a program that dies is noticed within
   milliseconds. The time-out stays for one that hangs, or whose host has gone.
@@ -19,13 +20,15 @@ import logging
 import threading
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import rospy
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan as LaserScanMsg
+from sensor_msgs.msg import Range
 from std_msgs.msg import Bool
 
-from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, Verdict
+from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, RangeReading, Verdict
 from rosbot_patrol.control.give_way import GiveWay, GiveWayParams
 from rosbot_patrol.control.movers import MoverParams, MoverWatch
 from rosbot_patrol.control.mux import Choice, LockParams, MuxParams, SourceParams, TwistMux
@@ -52,6 +55,7 @@ class TwistMuxParams(MuxParams):
     guard: bool = param(True, doc="slow and stop for what the lidar sees")
     base_frame: str = param("base_link", doc="frame of the footprint")
     odom_frame: str = param("odom", doc="frame in which motion between scans is measured")
+    range_topics: tuple[str, ...] = param((), doc="sensor_msgs/Range near the floor that the guard stops for too")
     collision_guard: GuardParams = dataclasses.field(default_factory=GuardParams)
     give_way: GiveWayParams = dataclasses.field(default_factory=lambda: GiveWayParams(horizon=1.5))
     movers: MoverParams = dataclasses.field(default_factory=MoverParams)
@@ -70,28 +74,48 @@ class Eyes:
         self._mounts: dict[str, Pose2D] = {}
         self._told = float("-inf")
         self._wake = wake
+        self._ranges: dict[str, Latest[Range]] = {topic: Latest() for topic in params.range_topics}
         rospy.Subscriber("scan", LaserScanMsg, self._on_scan, queue_size=1, tcp_nodelay=True)
+        for topic in self._ranges:
+            rospy.Subscriber(topic, Range, partial(self._on_range, topic), queue_size=1, tcp_nodelay=True)
 
     def look(self) -> bool:
-        """Show the guard the newest scan; whether there was one."""
+        """Show the guard the newest scan and readings; whether there was a scan."""
+        for topic, latest in self._ranges.items():
+            reading = latest.take()
+            if reading is not None:
+                self._look_low(topic, reading, latest.stamp)
         message = self._scans.take()
         if message is None:
             return False
-        frame = message.header.frame_id.lstrip("/")
+        mount = self._mount(message.header.frame_id, "the scan")
+        if mount is None:
+            return False
+        pose = self.pose(message.header.stamp.to_sec())
+        scan = scan_from_msg(message)
+        self.guard.see(scan, mount, self._scans.stamp, pose)
+        if pose is not None:
+            self._movers.see(scan, compose(pose, mount))
+        return True
+
+    def _look_low(self, topic: str, message: Range, stamp: float) -> None:
+        mount = self._mount(message.header.frame_id, topic)
+        if mount is not None:
+            reading = RangeReading(message.range, message.min_range, message.max_range, mount)
+            self.guard.see_range(topic, reading, stamp, self.pose(message.header.stamp.to_sec()))
+
+    def _mount(self, frame: str, what: str) -> Pose2D | None:
+        """base_from_sensor, None (and said) where it is not known."""
+        frame = frame.lstrip("/")
         try:
             if frame not in self._mounts:
                 self._mounts[frame] = self._transforms.lookup(self._params.base_frame, frame)
         except TransformError as err:
             if time.monotonic() - self._told > REPEAT_LOG:
                 self._told = time.monotonic()
-                log.warning("the collision guard cannot place the scan: %s", err)
-            return False
-        pose = self.pose(message.header.stamp.to_sec())
-        scan = scan_from_msg(message)
-        self.guard.see(scan, self._mounts[frame], self._scans.stamp, pose)
-        if pose is not None:
-            self._movers.see(scan, compose(pose, self._mounts[frame]))
-        return True
+                log.warning("the collision guard cannot place %s: %s", what, err)
+            return None
+        return self._mounts[frame]
 
     def limit(self, wish: Twist2D, current: float) -> Verdict:
         """The part of a command that is safe."""
@@ -112,6 +136,9 @@ class Eyes:
                 if when is None:
                     return None
         return None
+
+    def _on_range(self, topic: str, message: Range) -> None:
+        self._ranges[topic].set(message, now())
 
     def _on_scan(self, message: LaserScanMsg) -> None:
         self._scans.set(message, now())

@@ -4,7 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams
+from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, RangeReading
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert, transform_points
 from rosbot_patrol.scan import LaserScan
 
@@ -167,3 +167,93 @@ def test_without_a_fresh_scan_it_creeps_and_says_so():
 def test_moves_between_scans_are_accounted_for():
     guard = guard_at(wall_ahead(0.5))
     assert guard.limit(AHEAD, 0.2, Pose2D(0.3, 0.0, 0.0)).scale < guard.limit(AHEAD, 0.2, Pose2D()).scale
+
+
+# ---- range sensors near the floor
+
+FRONT_LEFT = Pose2D(0.1, 0.05, 0.13)
+REAR_LEFT = Pose2D(-0.1, 0.05, 3.01)
+
+
+def hear(guard, distance, *, times=2, now=0.0, pose=None, sensor=FRONT_LEFT, name="fl"):
+    """So many readings at 5 Hz, the last of them at `now`."""
+    for k in range(times):
+        reading = RangeReading(distance, 0.01, 0.9, sensor)
+        guard.see_range(name, reading, now - 0.2 * (times - 1 - k), pose or Pose2D())
+
+
+def test_a_low_thing_that_only_a_range_sensor_sees_stops_the_robot():
+    guard = guard_at(wall_ahead(5.0))
+    hear(guard, 0.06)
+    verdict = guard.limit(AHEAD, 0.1, Pose2D())
+    assert verdict.twist == STOP
+    assert "in the way" in verdict.reason
+    assert guard.limit(BACK, 0.1, Pose2D()).scale == 1.0
+    hear(guard, 0.2)
+    assert 0.05 < guard.limit(AHEAD, 0.1, Pose2D()).scale < 1.0
+
+
+def test_one_reading_alone_is_not_believed():
+    guard = guard_at(wall_ahead(5.0))
+    hear(guard, 0.06, times=1)
+    assert guard.limit(AHEAD, 0.1, Pose2D()).scale == 1.0
+    hear(guard, 0.6, times=1, now=0.2)  # of another thing
+    assert guard.limit(Twist2D(0.2), 0.2, Pose2D()).scale == 1.0
+
+
+def test_readings_of_one_thing_while_the_robot_drives_agree():
+    guard = guard_at(wall_ahead(5.0))
+    for k in range(3):
+        pose = Pose2D(0.1 * k)
+        guard.see_range("fl", RangeReading(0.35 - 0.1 * k, 0.01, 0.9, FRONT_LEFT), 0.2 * k, pose)
+    assert guard.limit(AHEAD, 0.4, Pose2D(0.2)).scale < 0.5
+
+
+def test_the_end_of_the_range_and_nan_are_no_obstacles():
+    guard = guard_at(wall_ahead(5.0))
+    for nothing in (0.9, math.inf, math.nan):
+        hear(guard, nothing)
+    assert guard.limit(AHEAD, 0.1, Pose2D()) == (AHEAD, 1.0, "")
+
+
+def test_too_near_to_measure_is_near():
+    guard = guard_at(wall_ahead(5.0))
+    hear(guard, -math.inf)
+    assert guard.limit(AHEAD, 0.1, Pose2D()).twist.vx == 0.0
+
+
+def test_behind_counts_for_driving_back():
+    guard = guard_at(wall_ahead(5.0))
+    hear(guard, 0.05, sensor=REAR_LEFT, name="rl")
+    assert guard.limit(BACK, 0.1, Pose2D()).twist.vx == 0.0
+    assert guard.limit(AHEAD, 0.1, Pose2D()).scale == 1.0
+
+
+def test_what_a_range_sensor_met_is_remembered_while_the_robot_turns_for_a_while():
+    guard = guard_at(wall_ahead(5.0), stale_after=20.0)
+    hear(guard, 0.06)
+    turned = Pose2D(0.0, 0.0, 0.25)
+    hear(guard, 0.9, now=0.5, pose=turned)  # looks beside it now
+    assert guard.limit(AHEAD, 0.6, turned).twist.vx == 0.0
+    assert guard.limit(AHEAD, 4.0, turned).scale == 1.0
+
+
+def test_what_has_gone_is_free_at_once():
+    guard = guard_at(wall_ahead(5.0))
+    hear(guard, 0.06)
+    hear(guard, 0.9, times=1, now=0.2)
+    assert guard.limit(AHEAD, 0.3, Pose2D()).scale == 1.0
+
+
+def test_the_robot_stops_before_a_low_thing():
+    """Driven at 10 Hz towards an edge 0.4 m ahead of the front sensors that the lidar does not see."""
+    guard, pose, edge = CollisionGuard(GuardParams()), Pose2D(), 0.5
+    for step in range(60):
+        now = 0.1 * step
+        guard.see(cast(wall_ahead(5.0), pose), BASE_FROM_LASER, now, pose)
+        if step % 2 == 0:
+            ahead = (edge - pose.x - FRONT_LEFT.x) / math.cos(FRONT_LEFT.yaw)
+            guard.see_range("fl", RangeReading(ahead, 0.01, 0.9, FRONT_LEFT), now, pose)
+        twist = guard.limit(Twist2D(0.4), now, pose).twist
+        pose = Pose2D(pose.x + twist.vx * 0.1)
+    assert 0.02 < edge - pose.x - 0.12 < 0.12
