@@ -4,6 +4,7 @@ import os
 import pty
 import signal
 import subprocess
+import termios
 from pathlib import Path
 
 import pytest
@@ -96,11 +97,39 @@ def test_teleop_without_a_terminal_waits(ros):
     assert teleop.stop() == 0
 
 
+def in_terminal(ros, *command):
+    """A program whose own terminal it is, and the keyboard's end of that."""
+    keyboard, terminal = pty.openpty()
+    process = Process(["setsid", "--ctty", "--wait", *command], ros.env, stdin=terminal)
+    ros.processes.append(process)
+    os.close(terminal)
+    return process, keyboard
+
+
+def test_teleop_under_roslaunch_leaves_the_terminal_to_it(ros):
+    launch, keyboard = in_terminal(ros, "roslaunch", "--skip-log-check", "rosbot_patrol", "teleop.launch")
+    launch.says("no terminal here", 20.0)
+    assert termios.tcgetattr(keyboard)[3] & termios.ISIG
+    os.write(keyboard, b"\x03")
+    launch.popen.wait(15.0)
+    os.close(keyboard)
+
+
+def test_teleop_in_the_background_waits_for_the_front(ros):
+    start = " ".join(ros.command("teleop_twist_keyboard.py"))
+    shell, keyboard = in_terminal(ros, "bash", "-ic", f"{start} & read -r; fg; true")
+    shell.says("no terminal here", 20.0)
+    os.write(keyboard, b"\n")
+    shell.says("Waiting for subscriber")
+    os.write(keyboard, b"\x03")
+    shell.popen.wait(5.0)
+    os.close(keyboard)
+
+
 def test_teleop_in_a_terminal(ros):
     probe = ros.probe()
     probe.tell(subscribe=["/cmd_vel", TWIST])
-    keyboard, terminal = pty.openpty()
-    teleop = Process(ros.command("teleop_twist_keyboard.py"), ros.env, stdin=terminal)
+    teleop, keyboard = in_terminal(ros, *ros.command("teleop_twist_keyboard.py"))
     teleop.says("currently:")
     for key, speed in ((b"i", 0.5), (b",", -0.5), (b"k", 0.0), (b"w", 0.0), (b"i", 0.55)):
         os.write(keyboard, key)
@@ -109,4 +138,3 @@ def test_teleop_in_a_terminal(ros):
     assert teleop.popen.wait(5.0) == 0
     wait_for(lambda: speeds(probe)[-1] == 0.0, 3.0, "a zero at the end")
     os.close(keyboard)
-    os.close(terminal)

@@ -4,7 +4,9 @@ Matches teleop_twist_keyboard 1.0.0 for Noetic: keys, `cmd_vel` (queue 1), `~spe
 `~turn_limit`, `~repeat_rate`, `~key_timeout`, `~stamped`, `~frame_id`.
 
 Differs:
-- Without a terminal, as under roslaunch, it says so and waits, instead of ending with an error that respawns.
+- Without a terminal of its own, as under roslaunch, it says so and waits, instead of ending with an error that
+  respawns. roslaunch hands its own terminal on: upstream takes the keys there, also the Ctrl-C that should end the
+  launch. In the background of a shell it waits to be brought to the front.
 - The terminal is put back however the program ends, and a zero velocity is sent.
 """
 
@@ -74,6 +76,29 @@ class Sender:
         self._publisher.publish(stamped)
 
 
+def _has_keys() -> bool:
+    """Whether what is typed is for this program: not without a terminal, under roslaunch or in the background."""
+    try:
+        return sys.stdin is not None and sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except (OSError, ValueError):  # a terminal of another session, a closed input
+        return False
+
+
+def _wait_for_keys() -> bool:
+    """Wait until there are keys to drive by; whether to go on."""
+    if not _has_keys():
+        rospy.loginfo(
+            "%s: no terminal here, so there are no keys to drive by; waiting. Run it in a terminal of its own:"
+            " rosrun teleop_twist_keyboard teleop_twist_keyboard.py",
+            rospy.get_name(),
+        )
+    while not rospy.is_shutdown():
+        if _has_keys():
+            return True
+        time.sleep(0.5)
+    return False
+
+
 @contextmanager
 def _single_keys() -> Iterator[None]:
     """Keys come one by one and are not shown, until the end of the block."""
@@ -129,13 +154,7 @@ def _drive(sender: Sender, params: TeleopParams) -> None:
 def body() -> None:
     """Drive by keys until Ctrl-C."""
     params = load_params(TeleopParams)
-    if not sys.stdin.isatty():
-        rospy.loginfo(
-            "%s: no terminal here, so there are no keys to drive by; waiting. Run it in a terminal of its own:"
-            " rosrun teleop_twist_keyboard teleop_twist_keyboard.py",
-            rospy.get_name(),
-        )
-        rospy.spin()
+    if not _wait_for_keys():
         return
     sender = Sender(params)
     with _single_keys():
