@@ -41,6 +41,7 @@ from rosbot_patrol.simulation.world import load_world  # noqa: E402
 
 HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}
 FULL_SPEED = 0.36  # [m/s]
+TRIES = 30  # to find a goal on whose way somebody can walk
 BLOCK = 10  # goals from one start, with one amcl
 
 
@@ -163,8 +164,12 @@ def drives(house: str, count: int, seed: int, *, only_block: int | None = None) 
         loop = ClosedLoop(engine, known, params, seed=seed + first)
         loop.drive_to(Pose2D(0.0, 0.0, 1.5), 20.0)
         for number in range(first, min(first + BLOCK, count)):
-            goal = next(free_poses(loop, rng))
-            walker = send_somebody(loop, goal, rng) if number % 2 else ""
+            goals = free_poses(loop, rng)
+            goal, walker = next(goals), ""
+            for _ in range(TRIES if number % 2 else 0):
+                if walker := send_somebody(loop, goal, rng):
+                    break
+                goal = next(goals)  # there was no room for anybody on the way
             drive = loop.drive_to(goal, 240.0, each_step=partial(see_out, engine))
             see_out(engine, always=True)
             yield Result(number, house, goal, walker, drive)
