@@ -15,6 +15,7 @@ from rosbot_patrol.simulation.robot import load_robot
 from rosbot_patrol.simulation.world import load_world
 
 ROOT = Path(__file__).resolve().parents[3]
+HOME = Pose2D()
 GOAL = Pose2D(3.0, -0.2, 1.0)
 
 
@@ -22,7 +23,7 @@ GOAL = Pose2D(3.0, -0.2, 1.0)
 def build():
     engines = []
 
-    def make(start: Pose2D = Pose2D(), seed: int = 1) -> ClosedLoop:
+    def make(start: Pose2D = HOME, seed: int = 1) -> ClosedLoop:
         engine = Engine(load_world(ROOT / "worlds" / "house.world"), EngineParams(seed=seed))
         engines.append(engine)
         engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"), start)
