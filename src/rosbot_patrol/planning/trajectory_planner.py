@@ -12,7 +12,8 @@ Differs:
     - The swept footprint is checked cell by cell, whatever the steps, both for a base that follows within its
       accelerations and for one that follows at once. `stop_time_buffer` works; upstream reads it only.
     - Where nothing is free over `sim_time`, slow motions are tried over 0.6 s before it backs up.
-    - It backs up only where the way behind is free; upstream does so blindly.
+    - It backs up only where the way behind is free, upstream blindly; and after 2 s it looks ahead again, where
+      upstream may turn to and fro for ever.
     - A robot whose footprint touches an obstacle may move so that it touches less, and where only the padding does,
       move slowly by its bare outline; upstream finds no trajectory.
     - The local goal lies about a metre along the plan, beyond what a trajectory reaches; upstream takes the last pose
@@ -53,6 +54,7 @@ _SHORT, _SLOW = 0.6, 0.1  # how far ahead [s] slow motions [m/s] are looked at w
 _HEADING_WEIGHT = 0.3  # of an angle, with heading_scoring (upstream's)
 _STRAFE = 0.1  # speed forward and sideways of a holonomic base's two slanting samples [m/s] (upstream's)
 _BEYOND = 0.2  # the local goal lies that much beyond what a trajectory can reach [m]
+_ESCAPE_TIME = 2.0  # [s]
 _NOTHING_FREE = "no trajectory is free of obstacles"
 
 
@@ -73,6 +75,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         self._goal, self._facing = GoalDistanceCritic(), FacingGoalCritic()
         self._heading, self._attraction = HeadingCritic(), AttractionCritic()
         self._escape_from: Pose2D | None = None
+        self._escape_since = 0.0
 
     def reset(self) -> None:
         """Forget the goal that was worked on."""
@@ -281,13 +284,14 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
     # ---- escape
 
     def _is_escaping(self, view: LocalView) -> bool:
-        """Whether it still backs up: until it has moved or turned enough it does not drive ahead."""
+        """Whether it still backs up: until it has moved or turned enough, or for a while, it does not drive ahead."""
         start, p = self._escape_from, self._driven
         if start is None:
             return False
         gone = math.hypot(view.pose.x - start.x, view.pose.y - start.y)
         turned = abs(angle_difference(view.pose.yaw, start.yaw))
-        if gone > p.escape_reset_dist or turned > p.escape_reset_theta:
+        is_over = not 0.0 <= view.now - self._escape_since <= _ESCAPE_TIME  # who came too near may have left
+        if gone > p.escape_reset_dist or turned > p.escape_reset_theta or is_over:
             self._escape_from = None
         return self._escape_from is not None
 
@@ -302,7 +306,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
             self._escape_from = None
             raise ControlError(f"{_NOTHING_FREE}, not even backwards")
         if self._escape_from is None:
-            self._escape_from = view.pose
+            self._escape_from, self._escape_since = view.pose, view.now
         self._local_plan = self._obstacles.trace(view.pose, STOP, twist, motion)
         return twist
 
