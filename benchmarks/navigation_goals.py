@@ -36,6 +36,7 @@ from rosbot_patrol.maps.map_io import read_map  # noqa: E402
 from rosbot_patrol.planning.registry import make_global_planner  # noqa: E402
 from rosbot_patrol.replay.closed_loop import ClosedLoop, Drive, read_profile  # noqa: E402
 from rosbot_patrol.simulation.engine import Engine, EngineParams  # noqa: E402
+from rosbot_patrol.simulation.renderer import make_renderer  # noqa: E402
 from rosbot_patrol.simulation.robot import load_robot  # noqa: E402
 from rosbot_patrol.simulation.world import load_world  # noqa: E402
 
@@ -159,7 +160,7 @@ def drives(house: str, count: int, seed: int, *, only_block: int | None = None) 
         if only_block not in (None, first // BLOCK):
             continue
         rng = np.random.default_rng([seed, sum(map(ord, house)), first])
-        engine = Engine(world, EngineParams(seed=seed + first))
+        engine = Engine(world, EngineParams(seed=seed + first), make_renderer=make_renderer)
         engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
         loop = ClosedLoop(engine, known, params, seed=seed + first)
         loop.drive_to(Pose2D(0.0, 0.0, 1.5), 20.0)

@@ -33,6 +33,7 @@ from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
 from rosbot_patrol.planning.interfaces import Array, GlobalPlanner, LocalView, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
+from rosbot_patrol.replay.low_sight import LowSight
 from rosbot_patrol.simulation.engine import STEP, Engine
 from rosbot_patrol.yaml_files import read_mapping
 
@@ -175,6 +176,7 @@ class ClosedLoop:
         self._localizer.set_map(known)
         self._localizer.set_pose(engine.pose, np.diag([0.01, 0.01, 0.005]))
         self._guard = CollisionGuard(params.guard)
+        self._low_sight = LowSight(engine, (self.local_costmap, self.global_costmap), self._guard)
         self._movers = MoverWatch(params.movers)
         self._give_way = GiveWay(params.give_way)
         self._commands: deque[tuple[float, Twist2D]] = deque()
@@ -250,6 +252,7 @@ class ClosedLoop:
         if localized.estimate is not None and self._localizer.map_from_odom is not None:
             self._map_from_odom = self._localizer.map_from_odom
         self._guard.see(scan, base_from_laser, now, odom)
+        self._low_sight.look(now, odom, (odom, self.map_pose))
         self._movers.see(scan, compose(odom, base_from_laser))
         self._update(self.local_costmap, self.odom_pose, scan, base_from_laser)
         if self._ticks % (5 * self._every) == 0:
@@ -273,8 +276,9 @@ class ClosedLoop:
     def _update(self, costmap: LayeredCostmap, pose: Pose2D, scan: Any, base_from_laser: Pose2D) -> None:
         for layer in costmap.obstacle_layers:
             for buffer in layer.buffers.values():
-                valid = buffer.params.inf_is_valid
-                buffer.add(observe(scan, compose(pose, base_from_laser), inf_is_valid=valid))
+                if buffer.params.data_type == "LaserScan":
+                    valid = buffer.params.inf_is_valid
+                    buffer.add(observe(scan, compose(pose, base_from_laser), inf_is_valid=valid))
         costmap.update(self.now, pose)
 
     def _view(self, now: float) -> NavigatorView:

@@ -151,6 +151,11 @@ class Engine:
     # The robot -------------------------------------------------------------------------------------------------------
 
     @property
+    def has_camera(self) -> bool:
+        """Whether there is a renderer to take pictures by."""
+        return self._camera is not None
+
+    @property
     def has_robot(self) -> bool:
         """Whether a robot is there."""
         return self._robot is not None
