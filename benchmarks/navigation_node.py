@@ -5,8 +5,9 @@
 
 For each profile the whole house runs at real time without the detector, and the robot is sent from room to room.
 CPU of the process counts while the robot drives, as a share of one core; memory is what is resident at the end.
-`missed` counts the lines "missed its desired rate" of all the time since the start. Where the package path has the
-original move_base instead of ours, it is the one that is measured, and said so.
+`--busy N` lets N other processes run without a pause meanwhile. `missed` counts the lines "missed its desired rate"
+since the start. Where the package path has the original move_base instead of ours, it is the one that is measured, and
+said so.
 """
 
 from __future__ import annotations
@@ -115,6 +116,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures here")
     parser.add_argument("--quick", action="store_true", help="30 seconds of driving each")
     parser.add_argument("--seconds", type=float, default=120.0, help="of driving, for each profile")
+    parser.add_argument("--busy", type=int, default=0, metavar="N", help="processes that keep the machine busy")
     parser.add_argument("--profiles", nargs="+", choices=PROFILES, default=PROFILES)
     options = parser.parse_args()
     try:
@@ -125,6 +127,7 @@ def main() -> int:
     elf = original()
     print(f"measured: {elf or 'move_base of rosbot_patrol; the original is not on the package path'}", flush=True)
     costs: dict[str, Cost] = {}
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(options.busy)]
     with tempfile.TemporaryDirectory(prefix="navigation-node-") as name:
         master = Master(Path(name) / "roscore.log")
         try:
@@ -132,7 +135,9 @@ def main() -> int:
                 costs[profile] = measure(Path(name) / profile, profile, 30.0 if options.quick else options.seconds)
         finally:
             master.stop()
-    print(f"\n{os.cpu_count()} cores\n")
+            for process in busy:
+                process.kill()
+    print(f"\n{os.cpu_count()} cores, {options.busy} other busy processes\n")
     print("| profile | driven s (simulated) | % of a core | aim | MB | aim | peak MB | missed |")
     print("|---|---|---|---|---|---|---|---|")
     figures: dict[str, float] = {}

@@ -196,10 +196,14 @@ def test_patience_and_rate_are_move_bases_own(master, started, node):
         "/move_base",
         ("doubles", "planner_patience", 0.2),
         ("bools", "recovery_behavior_enabled", False),
-        ("doubles", "controller_frequency", 5.0),
+        ("doubles", "controller_frequency", 2.0),
     )
-    assert [a["value"] for a in answers] == [0.2, False, 5.0]
+    assert [a["value"] for a in answers] == [0.2, False, 2.0]
     t = client.tells(send=[4.0, 4.0, 0.0])  # where nothing leads
     end = client.next(t, lambda s: "done" in s, 8.0)
     assert end["text"] == "Failed to find a valid plan. Even after executing recovery behaviors."
     assert not [s for s in client.since(t) if "recovery" in s]
+    t = client.tells(send=[30.0, 0.0, 0.0])
+    client.next(t, lambda s: s.get("v", 0.0) > 0.2)
+    t = client.tells(cancel=None)
+    assert client.next(t, lambda s: "done" in s)["t"] - t < 0.2  # although a cycle takes half a second

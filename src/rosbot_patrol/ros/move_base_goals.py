@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 
 import actionlib
 import rospy
@@ -51,14 +52,22 @@ def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
 
 
 class GoalServer:
-    """Goals come in by the action `move_base` and by `move_base_simple/goal`."""
+    """Goals come in by the action `move_base` and by `move_base_simple/goal`.
 
-    def __init__(self, frame: str, transforms: Transforms) -> None:
+    Args:
+        frame: that goals are wanted in.
+        transforms: the node's tf listener.
+        notify: called, on another thread, when a goal has come or was cancelled.
+    """
+
+    def __init__(self, frame: str, transforms: Transforms, notify: Callable[[], None]) -> None:
         self._frame = frame
         self._transforms = transforms
         self._pub_goal = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=1)
         self._pub_current = rospy.Publisher("~current_goal", PoseStamped, queue_size=1)
         self._server = actionlib.SimpleActionServer("move_base", MoveBaseAction, auto_start=False)
+        self._server.register_goal_callback(notify)
+        self._server.register_preempt_callback(notify)
         rospy.Subscriber("move_base_simple/goal", PoseStamped, self._on_simple, queue_size=1)
 
     def start(self) -> None:

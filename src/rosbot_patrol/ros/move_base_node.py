@@ -2,7 +2,7 @@
 
 Differs:
     - Planning runs on a copy of the global costmap: neither the control cycle nor the costmap waits for it.
-    - Cancelling works inside recovery behaviours.
+    - Cancelling works inside recovery behaviours, and at once whatever the controller's frequency.
     - When a node has died that the pose comes from (amcl, the base), the robot stands at once, not only when its last
       transform is too old; with `stop_without_map` it also stands while the map server is down.
     - Odometry that is older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
@@ -143,7 +143,7 @@ class MoveBaseNode:
         self._pub_local_plan = rospy.Publisher(f"~{local_name}/local_plan", Path, queue_size=1)
         self._pub_recovery = rospy.Publisher("move_base/recovery_status", RecoveryStatus, queue_size=1)
         self._health = Health()
-        self._goals = GoalServer(self._global.frame, self._transforms)
+        self._goals = GoalServer(self._global.frame, self._transforms, self._control.hurry)
         rospy.Subscriber(p.odom_topic, Odometry, self._on_odom, queue_size=1, tcp_nodelay=True)
         rospy.Service("~make_plan", GetPlan, self._on_make_plan)
         rospy.Service(f"~{global_name}/make_plan", GetPlan, self._on_planner_make_plan)

@@ -128,10 +128,15 @@ class Loop(Worker):
         super().__init__(name=name)
         self._period = 1.0 / rate
         self._step = step
+        self._hurried = False
 
     def set_rate(self, rate: float) -> None:
         """Another rate from the next step on."""
         self._period = 1.0 / rate
+
+    def hurry(self) -> None:
+        """Have a step at once, besides those that are due; from any thread."""
+        self._hurried = True
 
     def run(self) -> None:
         """Run until shutdown."""
@@ -140,10 +145,12 @@ class Loop(Worker):
             current = now()
             if current + self._period + 1.0 < due:  # time went back
                 due = current
-            if current < due:
+            if current >= due:
+                due = max(due + self._period, current)
+            elif not self._hurried:
                 self._wait(due - current)
                 continue
-            due = max(due + self._period, current)
+            self._hurried = False
             self._step(current)
 
     def _wait(self, seconds: float) -> None:
