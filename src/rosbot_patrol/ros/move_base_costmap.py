@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import rospy
@@ -16,12 +17,14 @@ from rospy.numpy_msg import numpy_msg
 
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds
 from rosbot_patrol.costmap.costs import occupancy_of
+from rosbot_patrol.costmap.keepout import KeepoutLayer
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.params import CostmapConfig, CostmapParams
 from rosbot_patrol.costmap.static import StaticLayer
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.ros.convert import grid_from_msg, grid_to_msg, time_to_msg
 from rosbot_patrol.ros.costmap_sources import Source, subscribe_sources
 from rosbot_patrol.ros.node import Loop
@@ -74,6 +77,9 @@ class CostmapNode:
 
     def _subscribe(self) -> None:
         for layer in self.costmap.static_layers:
+            if isinstance(layer, KeepoutLayer) and layer.mask_file:
+                self._take_mask(layer)
+                continue
             topic = layer.params.map_topic
             self._map_subscribers[id(layer)] = rospy.Subscriber(
                 topic, numpy_msg(OccupancyGrid), partial(self._on_map, layer), queue_size=1, buff_size=2**24
@@ -82,6 +88,13 @@ class CostmapNode:
                 callback = partial(self._on_map_update, layer)
                 rospy.Subscriber(f"{topic}_updates", numpy_msg(OccupancyGridUpdate), callback, queue_size=10)
         self._sources = subscribe_sources(self.costmap)
+
+    def _take_mask(self, layer: KeepoutLayer) -> None:
+        """Read the mask of a keep-out layer; raises MapError, which names the file."""
+        grid = read_map(Path(layer.mask_file).expanduser())
+        layer.set_map(grid)
+        self._map_frames[id(layer)] = layer.mask_frame
+        log.info("%s: keep-out mask of %d x %d cells from %s", self.name, *grid.cells.shape[::-1], layer.mask_file)
 
     def _on_map(self, layer: StaticLayer, msg: OccupancyGrid) -> None:
         try:
