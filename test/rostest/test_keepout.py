@@ -54,5 +54,5 @@ def test_a_mask_that_is_missing_is_one_sentence(master, tmp_path):
     )
     node = master.node("move_base")
     assert node.popen.wait(20.0) == 1
-    assert "none.yaml: cannot be read" in node.output
+    assert "none.yaml: the map's yaml cannot be read" in node.output
     assert "Traceback" not in node.output
