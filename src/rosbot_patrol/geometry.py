@@ -93,6 +93,15 @@ def distance(a: Pose2D, b: Pose2D) -> float:
     return math.hypot(a.x - b.x, a.y - b.y)
 
 
+def driven(twist: Twist2D, times: Array) -> tuple[Array, Array, Array]:
+    """How far ahead, to the left and round a velocity that is kept for each of some times brings a base, shape (T,)."""
+    angle = twist.wz * times
+    if abs(twist.wz) < 1e-6:
+        return twist.vx * times, twist.vy * times, angle
+    s, c = np.sin(angle) / twist.wz, (1.0 - np.cos(angle)) / twist.wz
+    return twist.vx * s - twist.vy * c, twist.vx * c + twist.vy * s, angle
+
+
 def quaternion_from_yaw(yaw: float) -> tuple[float, float, float, float]:
     """(x, y, z, w) of a turn about z."""
     return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)

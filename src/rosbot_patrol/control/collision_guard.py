@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert, transform_points
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, driven, invert, transform_points
 from rosbot_patrol.params import param
 from rosbot_patrol.scan import LaserScan, scan_points
 
@@ -247,12 +247,7 @@ class CollisionGuard:
 
 def _seen_from(points: Array, twist: Twist2D, times: Array) -> Array:
     """Points in the robot's frame after moving at `twist` for each time, shape (N, 2, T)."""
-    angle = twist.wz * times
-    if abs(twist.wz) < 1e-6:
-        x, y = twist.vx * times, twist.vy * times
-    else:
-        s, c = np.sin(angle) / twist.wz, (1.0 - np.cos(angle)) / twist.wz
-        x, y = twist.vx * s - twist.vy * c, twist.vx * c + twist.vy * s
+    x, y, angle = driven(twist, times)
     dx, dy = points[:, 0:1] - x, points[:, 1:2] - y
     cos, sin = np.cos(angle), np.sin(angle)
     return np.stack((cos * dx + sin * dy, cos * dy - sin * dx), axis=1)

@@ -11,13 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rosbot_patrol.control.movers import Mover
-from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, driven, transform_points
 from rosbot_patrol.params import param
-
-Array = NDArray[np.float64]
 
 _STEPS = 21
 _SUDDEN = 0.6  # [s]
@@ -72,18 +69,7 @@ class GiveWay:
             return True
         is_turn = math.hypot(wish.vx, wish.vy) < 0.01
         times = np.linspace(0.0, p.turn_horizon if is_turn else p.horizon, _STEPS)
-        x, y = _driven(pose, wish, times)
-        gaps = np.hypot(mover.x + mover.vx * times - x, mover.y + mover.vy * times - y)
+        ahead, left, _ = driven(wish, times)
+        robot = transform_points(pose, np.column_stack((ahead, left)))
+        gaps = np.hypot(mover.x + mover.vx * times - robot[:, 0], mover.y + mover.vy * times - robot[:, 1])
         return bool(gaps.min() < min(p.clearance, gaps[0] - 0.02))
-
-
-def _driven(pose: Pose2D, twist: Twist2D, times: Array) -> tuple[Array, Array]:
-    """Where the robot is after driving a velocity for each of some times."""
-    angle = twist.wz * times
-    if abs(twist.wz) < 1e-6:
-        ahead, left = twist.vx * times, twist.vy * times
-    else:
-        s, c = np.sin(angle) / twist.wz, (1.0 - np.cos(angle)) / twist.wz
-        ahead, left = twist.vx * s - twist.vy * c, twist.vx * c + twist.vy * s
-    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    return pose.x + cos * ahead - sin * left, pose.y + sin * ahead + cos * left
