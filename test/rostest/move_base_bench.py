@@ -21,7 +21,7 @@ def parameters():
     common = yaml.safe_load((TUNED / "costmap_common_params.yaml").read_text())
     for costmap in ("global_costmap", "local_costmap"):
         tree[costmap] = common | tree[costmap]
-    quick = {"max_rotational_vel": 3.0, "acc_lim_th": 20.0}
+    quick = {"max_rotational_vel": 6.0, "acc_lim_th": 20.0}
     return tree | {
         "planner_patience": 0.6,
         "controller_frequency": 20.0,

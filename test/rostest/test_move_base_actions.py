@@ -53,7 +53,7 @@ def assert_stood(client, t):
 
 
 def test_a_goal_is_told_of_while_driving_and_reached(client):
-    x0 = 0.8
+    x0 = 0.5
     t = client.tells(send=[x0, 0.0, 0.0])
     client.next(t, lambda s: s.get("active"))
     assert client.next(t, lambda s: "current" in s)["current"] == x0
