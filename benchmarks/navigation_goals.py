@@ -38,10 +38,13 @@ from rosbot_patrol.replay.closed_loop import ClosedLoop, Drive, read_profile  # 
 from rosbot_patrol.simulation.engine import Engine, EngineParams  # noqa: E402
 from rosbot_patrol.simulation.renderer import make_renderer  # noqa: E402
 from rosbot_patrol.simulation.robot import load_robot  # noqa: E402
+from rosbot_patrol.simulation.slices import Slice, slice_bodies  # noqa: E402
 from rosbot_patrol.simulation.world import load_world  # noqa: E402
 
 HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}
 FULL_SPEED = 0.36  # [m/s]
+ROOM = 0.28  # round a goal: the robot's corners, its padding, and what it may stand off the goal [m]
+HEIGHTS = (0.01, 0.04, 0.07, 0.1, 0.16, 0.2)  # of the robot [m]
 TRIES = 30  # to find a goal on whose way somebody can walk
 BLOCK = 10  # goals from one start, with one amcl
 
@@ -68,8 +71,21 @@ class Result:
         return self.drive.planned / FULL_SPEED
 
 
+def _gap(cut: Slice, x: float, y: float) -> float:
+    """From a point to the nearest of what a plane cuts [m]."""
+    point = np.array([x, y])
+    start, end = cut.segments[:, :2], cut.segments[:, 2:]
+    along = end - start
+    share = ((point - start) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)
+    nearest = start + share.clip(0.0, 1.0)[:, None] * along
+    gaps = np.hypot(*(nearest - point).T)
+    rounds = np.hypot(*(cut.circles[:, :2] - point).T) - cut.circles[:, 2]
+    return min(gaps.min(initial=math.inf), rounds.min(initial=math.inf))
+
+
 def free_poses(loop: ClosedLoop, rng: np.random.Generator) -> Iterator[Pose2D]:
-    """Places where the robot has room and that can be reached, by the global costmap."""
+    """Places where the robot has room to turn, by the world itself, and that can be reached, by the global costmap."""
+    cuts = [slice_bodies(loop.engine.world.bodies, height) for height in HEIGHTS]
     costmap = loop.global_costmap
     planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
     cells = costmap.cells
@@ -78,7 +94,7 @@ def free_poses(loop: ClosedLoop, rng: np.random.Generator) -> Iterator[Pose2D]:
         iy, ix = free[rng.integers(len(free))]
         x, y = costmap.info.centre_of(int(ix), int(iy))
         pose = Pose2D(x, y, float(rng.uniform(-math.pi, math.pi)))
-        if math.dist((x, y), loop.map_pose[:2]) < 1.5:
+        if math.dist((x, y), loop.map_pose[:2]) < 1.5 or min(_gap(cut, x, y) for cut in cuts) < ROOM:
             continue
         try:
             planner.plan(Grid(costmap.info, cells.copy()), loop.map_pose, pose)
