@@ -19,10 +19,12 @@ SPACES = [
     "/move_base/TrajectoryPlannerROS",
     "/move_base/global_costmap",
     "/move_base/global_costmap/inflation_layer",
+    "/move_base/global_costmap/low_obstacle_layer",
     "/move_base/global_costmap/obstacle_layer",
     "/move_base/global_costmap/static_layer",
     "/move_base/local_costmap",
     "/move_base/local_costmap/inflation_layer",
+    "/move_base/local_costmap/low_obstacle_layer",
     "/move_base/local_costmap/obstacle_layer",
 ]
 PLANNER = "/move_base/TrajectoryPlannerROS"
