@@ -36,6 +36,7 @@ from rosbot_patrol.planning.interfaces import LocalView, Recovery, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries, short_name
 from rosbot_patrol.ros.convert import path_to_msg, twist_from_msg, twist_to_msg
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.ros.heap import give_back_large_blocks
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
 from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_goal
@@ -371,4 +372,5 @@ class MoveBaseNode:
 
 def main() -> None:
     """Start the node."""
+    give_back_large_blocks()
     run_node("move_base", lambda: MoveBaseNode().run())
