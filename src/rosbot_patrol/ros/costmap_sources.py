@@ -69,9 +69,9 @@ class Source(ABC, Generic[T]):
     def _place(self, item: T, stamp: float, frame: str, transforms: Transforms, target: str) -> None:
         """Put it into the layer; raises TransformError where it cannot be placed yet."""
 
+    @abstractmethod
     def _decode(self, msg: rospy.Message) -> T | None:
         """What is kept of a message, None for nothing; raises ImageError."""
-        raise NotImplementedError
 
     def receive(self, msg: rospy.Message) -> None:
         """Callback of the topic."""
