@@ -12,10 +12,7 @@ fastest update, which other work on the machine disturbs least.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
-import os
 import statistics
 import sys
 import time
@@ -25,6 +22,8 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
+
+from one_core import run  # noqa: E402
 
 from rosbot_patrol.amcl.localizer import Localizer  # noqa: E402
 from rosbot_patrol.amcl.parameters import AmclParams  # noqa: E402
@@ -80,15 +79,11 @@ def update_times(particles: int, beams: int, repeats: int, *, spread: bool) -> l
     return times[5:]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--quick", action="store_true", help="few repeats")
-    wanted = parser.parse_args()
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    repeats = 30 if wanted.quick else 300
+def measured(quick: bool) -> dict[str, float]:
+    """The figures of FIGURES.md that this program knows, printed as a table."""
+    repeats = 30 if quick else 300
     figures = {}
-    print(f"1 core of {os.cpu_count()}, medians of {repeats} updates")
+    print(f"medians of {repeats} updates")
     print(f"{'figure':32s} {'ms':>8s} {'least':>8s} {'aim':>6s} {'spread, ms':>11s}")
     for particles, beams in ((2000, 60), (5000, 180)):
         name = f"amcl_update_{particles}x{beams}_ms"
@@ -96,8 +91,11 @@ def main() -> None:
         figures[name] = round(statistics.median(times), 3)
         wide = statistics.median(update_times(particles, beams, repeats, spread=True))
         print(f"{name:32s} {figures[name]:8.3f} {min(times):8.3f} {AIMS[name]:6.1f} {wide:11.3f}")
-    if wanted.json:
-        wanted.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    return figures
+
+
+def main() -> None:
+    run(__doc__, measured)
 
 
 if __name__ == "__main__":

@@ -13,11 +13,8 @@ control_cycle_DWAPlannerROS_ms is the same for DWAPlannerROS with its defaults (
 
 from __future__ import annotations
 
-import argparse
-import json
 import logging
 import math
-import os
 import statistics
 import sys
 import time
@@ -31,6 +28,8 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
+
+from one_core import run  # noqa: E402
 
 from rosbot_patrol.costmap.layered import LayeredCostmap  # noqa: E402
 from rosbot_patrol.costmap.obstacle import observe  # noqa: E402
@@ -180,15 +179,7 @@ def figures(*, quick: bool = False) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--quick", action="store_true", help="few repeats")
-    wanted = parser.parse_args()
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    print(f"1 core of {os.cpu_count()}")
-    found = figures(quick=wanted.quick)
-    if wanted.json:
-        wanted.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    run(__doc__, lambda quick: figures(quick=quick))
 
 
 if __name__ == "__main__":

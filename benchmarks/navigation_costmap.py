@@ -13,11 +13,8 @@ An update after 0.1 m is all of `LayeredCostmap.update`: shift, clearing, markin
 
 from __future__ import annotations
 
-import argparse
 import itertools
-import json
 import math
-import os
 import statistics
 import sys
 import time
@@ -29,6 +26,8 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
+
+from one_core import run  # noqa: E402
 
 from rosbot_patrol.costmap.bounds import Bounds  # noqa: E402
 from rosbot_patrol.costmap.inflation import InflationLayer  # noqa: E402
@@ -109,6 +108,7 @@ def full_times(costmap: LayeredCostmap, repeats: int) -> list[float]:
 
 def figures(*, repeats: int = 20, every: int = 1) -> dict[str, float]:
     """Medians by the names of FIGURES.md, with a row printed for each."""
+    print(f"{'figure':28s} {'ms':>8s} {'least':>8s} {'99 %':>8s} {'aim':>6s}")
     poses = patrol_poses()[::every] if every > 1 else patrol_poses()
     found: dict[str, float] = {}
     for factor, ending in ((1.0, ""), (10.0, "_tutorial")):
@@ -126,16 +126,7 @@ def figures(*, repeats: int = 20, every: int = 1) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--quick", action="store_true", help="few repeats")
-    wanted = parser.parse_args()
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    print(f"1 core of {os.cpu_count()}")
-    print(f"{'figure':28s} {'ms':>8s} {'least':>8s} {'99 %':>8s} {'aim':>6s}")
-    found = figures(repeats=5 if wanted.quick else 20, every=5 if wanted.quick else 1)
-    if wanted.json:
-        wanted.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    run(__doc__, lambda quick: figures(repeats=5 if quick else 20, every=5 if quick else 1))
 
 
 if __name__ == "__main__":

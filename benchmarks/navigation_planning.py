@@ -19,8 +19,6 @@ pulled straight in the same way, and the cheaper one counts.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import os
 import statistics
@@ -33,6 +31,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
 
+from one_core import run  # noqa: E402
 from shortest_paths import path_price, path_to, pulled_straight, spread  # noqa: E402
 
 from rosbot_patrol.costmap.bounds import Bounds  # noqa: E402
@@ -203,17 +202,16 @@ def figures(*, quick: bool = False) -> dict[str, float]:
     return {**speed(5 if quick else 25), **excess(4 if quick else 12)}
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--quick", action="store_true", help="few repeats")
-    wanted = parser.parse_args()
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    found = figures(quick=wanted.quick)
+def measured(quick: bool) -> dict[str, float]:
+    """All figures, told with their aims."""
+    found = figures(quick=quick)
     for name, value in found.items():
         print(f"{name}: {value} (aim <= {AIMS[name]:g})")
-    if wanted.json:
-        wanted.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    return found
+
+
+def main() -> None:
+    run(__doc__, measured)
 
 
 if __name__ == "__main__":

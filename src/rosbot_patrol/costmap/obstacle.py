@@ -16,7 +16,7 @@ from rosbot_patrol.costmap.layer import Layer
 from rosbot_patrol.costmap.marks import MarkMemory, Seen
 from rosbot_patrol.costmap.observation import Observation, ObservationBuffer, observe
 from rosbot_patrol.costmap.params import ObstacleParams, SourceParams, VoxelParams
-from rosbot_patrol.costmap.scrolling import ScrollingCells
+from rosbot_patrol.costmap.scrolling import ScrollingCells, fill_outside
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.grid import GridInfo
 
@@ -164,16 +164,8 @@ class ObstacleLayer(Layer):
         """Forget what was sensed outside an area."""
         if self._info is None:
             return
-        width, height = self._info.width, self._info.height
-        keep, cells = keep.clipped(width, height), self._window.cells
-        if keep.is_empty:
-            cells.fill(self._default)
-        else:
-            cells[: keep.y0] = self._default
-            cells[keep.y1 :] = self._default
-            cells[keep.y0 : keep.y1, : keep.x0] = self._default
-            cells[keep.y0 : keep.y1, keep.x1 :] = self._default
-        self._dirty = Bounds(0, 0, width, height)
+        fill_outside(self._window.cells, keep, self._default)
+        self._dirty = Bounds(0, 0, self._info.width, self._info.height)
 
     def clear_inside(self, area: Bounds) -> None:
         """Forget what was sensed in an area."""

@@ -15,7 +15,7 @@ from rosbot_patrol.costmap.costs import FREE, LETHAL, UNKNOWN, CostCells
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.costmap.layer import Layer
 from rosbot_patrol.costmap.marks import MarkMemory
-from rosbot_patrol.costmap.scrolling import ScrollingCells
+from rosbot_patrol.costmap.scrolling import ScrollingCells, fill_outside
 from rosbot_patrol.costmap.sensor_params import RangeSensorParams
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.grid import GridInfo
@@ -190,13 +190,8 @@ class RangeSensorLayer(Layer):
         """Forget what was sensed outside an area."""
         if self._info is None:
             return
-        width, height = self._info.width, self._info.height
-        keep = keep.clipped(width, height)
-        outside = np.ones((height, width), bool)
-        if not keep.is_empty:
-            outside[keep.y0 : keep.y1, keep.x0 : keep.x1] = False
-        self._window.cells[outside] = _HALF
-        self._dirty = Bounds(0, 0, width, height)
+        fill_outside(self._window.cells, keep, _HALF)
+        self._dirty = Bounds(0, 0, self._info.width, self._info.height)
 
     def is_current(self, now: float) -> bool:
         """Whether readings are as fresh as `no_readings_timeout` demands."""

@@ -55,6 +55,18 @@ class ScrollingCells:
         self._memory, self._at = memory, self._slack
 
 
+def fill_outside(cells: CostCells, keep: Bounds, value: int) -> None:
+    """Set all cells but those in an area, which may lie partly or wholly off them."""
+    keep = keep.clipped(cells.shape[1], cells.shape[0])
+    if keep.is_empty:
+        cells.fill(value)
+        return
+    cells[: keep.y0] = value
+    cells[keep.y1 :] = value
+    cells[keep.y0 : keep.y1, : keep.x0] = value
+    cells[keep.y0 : keep.y1, keep.x1 :] = value
+
+
 def strips(width: int, height: int, dx: int, dy: int) -> list[Bounds]:
     """The cells that come into a window that moved by (dx, dy), as rectangles without a common cell."""
     dx, dy = max(-width, min(dx, width)), max(-height, min(dy, height))

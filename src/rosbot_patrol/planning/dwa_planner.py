@@ -176,13 +176,8 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
         if not len(samples):
             return None
         p, motion = self._driven, self._motion(horizon)
-        reach = motion.reach(samples, view.velocity)
-        around = self._obstacles.survey(view.costmap, view.pose, reach, growth=p.max_scaling_factor, bare=bare)
-        ends = np.empty((len(samples), 3))
-        danger = self._obstacles.drive(around, view.velocity, samples, motion, ends=ends)
-        # the base may follow at once, or as slowly as its accelerations say: both have to be free
         slowly = replace(motion, horizon=min(horizon, _SHORT), is_held=False)
-        danger = 0.5 * danger + 0.5 * self._obstacles.drive(around, view.velocity, samples, slowly, failed=danger)
+        danger, ends = self._dangers(view, samples, motion, slowly, growth=p.max_scaling_factor, bare=bare)
         free = np.isfinite(danger) & ~self._oscillation.forbidden(samples)
         if not free.any():
             return None

@@ -230,12 +230,8 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
             ControlError: some are free, but lead nowhere.
         """
         p, motion = self._driven, self._motion(horizon)
-        around = self._obstacles.survey(view.costmap, view.pose, motion.reach(samples, view.velocity), bare=bare)
-        ends = np.empty((len(samples), 3))
-        danger = self._obstacles.drive(around, view.velocity, samples, motion, ends=ends)
-        # the base may follow at once, or as slowly as its accelerations say: both have to be free
         at_once = replace(motion, horizon=min(horizon, _SHORT), accelerations=SUDDEN, judged_at=None)
-        danger = 0.5 * danger + 0.5 * self._obstacles.drive(around, view.velocity, samples, at_once, failed=danger)
+        danger, ends = self._dangers(view, samples, motion, at_once, bare=bare)
         free = np.isfinite(danger)
         if not free.any():
             return None

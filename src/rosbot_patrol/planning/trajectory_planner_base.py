@@ -13,7 +13,7 @@ import numpy as np
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.errors import ControlError
 from rosbot_patrol.geometry import Pose2D, Twist2D, angle_difference
-from rosbot_patrol.planning.critics import ObstacleCritic, OscillationCritic
+from rosbot_patrol.planning.critics import Motion, ObstacleCritic, OscillationCritic
 from rosbot_patrol.planning.interfaces import Array, LocalPlanner, LocalView
 from rosbot_patrol.planning.trajectory_planner_ground import Ground, survey_ground
 from rosbot_patrol.planning.trajectory_planner_stop import StopAndTurn, StopLimits
@@ -108,6 +108,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
     def fit(self, footprint: Footprint, *, resolution: float) -> None:
         """Drive with another padded outline of the robot, or on cells of another size [m]."""
         self._obstacles = ObstacleCritic(footprint, resolution=resolution)
+        self._radius = footprint.circumscribed_radius
         self._stop = StopAndTurn(self._obstacles)
 
     def limit_speed(self, trans: float, rot: float, *, distance: float) -> None:
@@ -176,3 +177,33 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         return survey_ground(
             view, self._visible, behind=self._track.behind, lookahead=max(lookahead, _LOOKAHEAD), radius=self._radius
         )
+
+    def _dangers(
+        self,
+        view: LocalView,
+        samples: Array,
+        motion: Motion,
+        other: Motion,
+        *,
+        growth: float = 0.0,
+        bare: bool = False,
+    ) -> tuple[Array, Array]:
+        """The mean cost of obstacles of two ways in which a base may take to velocities; both have to be free.
+
+        Args:
+            view: where the robot is and what it sees.
+            samples: velocities (vx, vy, wz), shape (K, 3).
+            motion: how it is expected to take to them.
+            other: how it might as well.
+            growth: of the footprint, at most.
+            bare: without its padding.
+
+        Returns:
+            Costs, shape (K,), inf for what is not free, and where `motion` ends, shape (K, 3).
+        """
+        reach = motion.reach(samples, view.velocity)
+        around = self._obstacles.survey(view.costmap, view.pose, reach, growth=growth, bare=bare)
+        ends = np.empty((len(samples), 3))
+        danger = self._obstacles.drive(around, view.velocity, samples, motion, ends=ends)
+        danger = 0.5 * danger + 0.5 * self._obstacles.drive(around, view.velocity, samples, other, failed=danger)
+        return danger, ends

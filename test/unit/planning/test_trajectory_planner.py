@@ -249,3 +249,17 @@ def test_pruning_only_shows():
     assert found[0][0, 0] == pytest.approx(0.0, abs=0.05)
     assert found[1][0, 0] == pytest.approx(-1.5, abs=0.05)
     assert found[0][-1].tolist() == found[1][-1].tolist()
+
+
+def test_a_larger_footprint_keeps_farther_from_what_stands_on_the_plan():
+    """Set while it drives: ways round things are looked for with the new radius."""
+    cells = block(empty(), 0.7, -0.3, 0.8, 0.3)
+    grown = CORNERS * 2.0
+    planner = make()
+    planner.fit(Footprint(padded(grown, 0.03), grown), resolution=0.05)
+    fresh = TrajectoryPlanner(planner.params, Footprint(padded(grown, 0.03), grown), resolution=0.05)
+    for each in (planner, fresh):
+        each.set_plan(line(0, 0, 1.8, 0))
+    seen = view(velocity=Twist2D(0.2), cells=cells)
+    assert planner.compute(seen) == fresh.compute(seen)
+    assert np.array_equal(planner.local_plan, fresh.local_plan)
