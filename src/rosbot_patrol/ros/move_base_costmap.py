@@ -42,15 +42,18 @@ class CostmapNode:
         config: parameters and layers.
         transforms: the node's tf listener.
         name: "global_costmap" or "local_costmap".
+        keeps_last: whether `last` is kept: for small costmaps that are looked at in each control cycle.
     """
 
-    def __init__(self, config: CostmapConfig, transforms: Transforms, name: str) -> None:
+    def __init__(self, config: CostmapConfig, transforms: Transforms, name: str, *, keeps_last: bool = False) -> None:
         self.name = name
         self.params = config.params
         self.frame = config.params.global_frame.lstrip("/")
         self.base_frame = config.params.robot_base_frame.lstrip("/")
         self.lock = threading.RLock()
         self.costmap = LayeredCostmap(config)
+        self._keeps_last = keeps_last
+        self._keep_last()
         self.problem = "has not been updated yet"
         self.updates = 0
         self._born = time.monotonic()
@@ -149,7 +152,11 @@ class CostmapNode:
 
     def configure(self, params: CostmapParams) -> None:
         """Take other parameters, `lock` being held; raises ParamError."""
+        before = self.costmap.info
         self.costmap.configure(params)
+        if self.costmap.info != before:
+            self.problem = "has another size and has not been updated yet"
+        self._keep_last()
         self.params = params
         self._loop.set_rate(params.update_frequency or 1.0)
 
@@ -167,6 +174,7 @@ class CostmapNode:
                 source.take(self._transforms, self.frame)
             self._place_maps()
             areas = self.costmap.update(now, pose)
+            self._keep_last()
             self.updates += 1
             for area in areas:
                 self._pending = self._pending.union(area)
@@ -192,9 +200,13 @@ class CostmapNode:
                     self._complain(str(err))
 
     def copy(self) -> Grid:
-        """Place and costs now."""
+        """Place and costs now; waits for an update that is under way."""
         with self.lock:
             return Grid(self.costmap.info, self.costmap.cells.copy())
+
+    def _keep_last(self) -> None:
+        if self._keeps_last:
+            self.last = Grid(self.costmap.info, self.costmap.cells.copy())  # nobody changes it, so nobody waits for it
 
     def is_current(self, now: float) -> bool:
         """Whether what drives by this costmap can trust it."""

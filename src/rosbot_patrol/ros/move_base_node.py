@@ -1,7 +1,8 @@
 """The node move_base (matches move_base 1.17 with costmap_2d, navfn and base_local_planner as their ROS interface).
 
 Differs:
-    - Planning runs on a copy of the global costmap: neither the control cycle nor the costmap waits for it.
+    - Planning runs on a copy of the global costmap: neither the control cycle nor the costmap waits for it. The control
+      cycle drives by the local costmap's last update, and does not wait for the one that is under way.
     - Cancelling works inside recovery behaviours, and at once whatever the controller's frequency.
     - When a node has died that the pose comes from (amcl, the base), the robot stands at once, not only when its last
       transform is too old; with `stop_without_map` it also stands while the map server is down.
@@ -71,7 +72,7 @@ class MoveBaseNode:
         self._cycle = threading.RLock()
         self._transforms = Transforms()
         self._global = self._make_costmap(tree, "global_costmap", name)
-        self._local = self._make_costmap(tree, "local_costmap", name)
+        self._local = self._make_costmap(tree, "local_costmap", name, keeps_last=True)
         p = self.params
         self._planner = make_global_planner(p.base_global_planner, tree, name=name)
         self._plans = ThreadedPlans(self._planner, self._global)
@@ -132,8 +133,9 @@ class MoveBaseNode:
                     return buffer.params.topic or key
         return ""
 
-    def _make_costmap(self, tree: dict[str, Any], key: str, name: str) -> CostmapNode:
-        return CostmapNode(read_costmap(_group(tree, key), name=f"{name}{key}/"), self._transforms, key)
+    def _make_costmap(self, tree: dict[str, Any], key: str, name: str, *, keeps_last: bool = False) -> CostmapNode:
+        config = read_costmap(_group(tree, key), name=f"{name}{key}/")
+        return CostmapNode(config, self._transforms, key, keeps_last=keeps_last)
 
     def _advertise(self) -> None:
         p = self.params
@@ -286,7 +288,7 @@ class MoveBaseNode:
             now=time,
             pose=pose_local,
             velocity=self._velocity.get() or STOP,
-            costmap=self._local.copy(),
+            costmap=self._local.last,
             local_from_plan=local_from_plan,
         )
         recovery = RecoveryView(
