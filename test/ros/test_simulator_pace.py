@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams
+from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
 
 TICK = 0.01
 
@@ -87,3 +87,54 @@ def test_who_has_never_spoken_is_not_waited_for() -> None:
     wall.run(5.0)
     assert wall.now == pytest.approx(0.5, abs=0.01)
     assert wall.lockstep.idle == ()
+
+
+class Lap:
+    """A wall clock that a pace sleeps on, and how long each step took on it."""
+
+    def __init__(self, rate: float) -> None:
+        self.now = 100.0
+        self.steps: list[float] = []
+        self._sim = 0.0
+        self.pace = Pace(rate, clock=lambda: self.now, sleep=self._sleep)
+
+    def _sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK)):
+            before = self.now
+            self._sim += TICK
+            self.pace.wait(self._sim)
+            self.steps.append(self.now - before)
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0, 4.0])
+def test_a_rate_is_held(rate):
+    lap = Lap(rate)
+    lap.run(1.0)
+    assert lap.steps == pytest.approx([TICK / rate] * 100)
+
+
+def test_after_a_short_stall_the_clock_catches_up_without_a_jump():
+    """A jump would look to other nodes as if they had been slow."""
+    lap = Lap(1.0)
+    lap.run(0.5)
+    lap.now += 0.2
+    lap.run(0.8)
+    assert lap.now == pytest.approx(101.3)
+    assert min(lap.steps[51:]) >= TICK / 1.5 - 1e-9  # the first after it is due at once
+
+
+def test_after_a_long_stall_it_goes_on_from_there():
+    lap = Lap(1.0)
+    lap.run(0.5)
+    lap.now += 2.0
+    lap.run(1.0)
+    assert lap.now == pytest.approx(103.5, abs=2 * TICK)
+
+
+def test_rate_0_waits_for_nothing():
+    lap = Lap(0.0)
+    lap.run(1.0)
+    assert lap.now == 100.0

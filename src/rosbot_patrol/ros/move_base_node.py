@@ -51,6 +51,7 @@ log = logging.getLogger(__name__)
 
 _SHOWN_POSES = 400
 _HEALTH_PERIOD = 1.0
+_CLOCK_NOISE = 1e-4  # of differences of times as floats [s]
 
 
 def _group(tree: dict[str, Any], key: str) -> dict[str, Any]:
@@ -341,7 +342,7 @@ class MoveBaseNode:
 
     def _watch_rate(self, time: float) -> None:
         took = now() - time
-        if took > 1.0 / self.params.controller_frequency:
+        if took > 1.0 / self.params.controller_frequency + _CLOCK_NOISE:
             self._slow_cycles += 1
             log.warning(
                 "Control loop missed its desired rate of %.4fHz... the loop actually took %.4f seconds",
@@ -375,4 +376,4 @@ class MoveBaseNode:
 def main() -> None:
     """Start the node."""
     give_back_large_blocks()
-    run_node("move_base", lambda: MoveBaseNode().run())
+    run_node("move_base", lambda: MoveBaseNode().run(), urgency=5)

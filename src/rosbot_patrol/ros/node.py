@@ -22,16 +22,20 @@ T = TypeVar("T")
 log = logging.getLogger(__name__)
 
 
-def run_node(name: str, body: Callable[[], None], **init_options: Any) -> None:
+def run_node(name: str, body: Callable[[], None], *, urgency: int = 0, **init_options: Any) -> None:
     """Start a node and run `body`; a PatrolError or a bad file is logged in one sentence and the program exits 1.
 
     Args:
         name: name of the node where the launch file gives none.
         body: builds and runs it; returns on shutdown.
+        urgency: by how much it goes before other processes, as of nice(1); only where the system permits that.
         init_options: further arguments of `rospy.init_node`.
     """
+    refused = _go_before_others(urgency)  # before there are other threads: they take after this one
     rospy.init_node(name, **init_options)
     logs.install()
+    if refused:
+        log.info("%s", refused)
     threading.excepthook = _end_with_worker
     ending = _Ending()
     try:
@@ -45,6 +49,17 @@ def run_node(name: str, body: Callable[[], None], **init_options: Any) -> None:
         os._exit(1)
     except rospy.ROSInterruptException:
         return
+
+
+def _go_before_others(urgency: int) -> str:
+    """Raise this process's priority; returns a sentence where that is not permitted."""
+    if urgency <= 0:
+        return ""
+    try:
+        os.nice(-urgency)
+    except PermissionError:
+        return f"not permitted to go before other processes (nice -{urgency}; see RLIMIT_NICE in limits.conf(5))"
+    return ""
 
 
 class _Ending:

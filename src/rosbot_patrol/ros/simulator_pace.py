@@ -15,6 +15,7 @@ from rosbot_patrol.params import param
 log = logging.getLogger(__name__)
 
 _BEHIND = 0.25  # what the clock has lost beyond this is not caught up [s]
+_CATCHING_UP = 1.5  # how much faster than its rate it may run to catch up; it never jumps
 _REPORT = 10.0
 _TF = "tf:"
 _LOOK = 0.0005
@@ -30,27 +31,44 @@ class LockstepParams:
 
 
 class Pace:
-    """Holds a real-time factor; 0 runs as fast as the consumers keep up."""
+    """Holds a real-time factor; 0 runs as fast as the consumers keep up.
 
-    def __init__(self, rate: float) -> None:
+    Args:
+        rate: simulated seconds in a second.
+        clock: wall time [s]; sleep: waits on it.
+    """
+
+    def __init__(
+        self,
+        rate: float,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         self._rate = rate
-        self._wall = time.monotonic()
-        self._sim = 0.0
+        self._clock = clock
+        self._sleep = sleep
+        self.restart(0.0)
 
     def restart(self, sim: float) -> None:
         """Begin anew at a simulated time."""
-        self._wall, self._sim = time.monotonic(), sim
+        self._wall, self._sim = self._clock(), sim
+        self._last_wall, self._last_sim = self._wall, sim
 
     def wait(self, sim: float) -> None:
         """Sleep until the wall has reached a simulated time."""
         if self._rate <= 0.0:
             return
         due = self._wall + (sim - self._sim) / self._rate
-        ahead = due - time.monotonic()
-        if ahead > 0.0:
-            time.sleep(ahead)
-        elif ahead < -_BEHIND:
+        earliest = self._last_wall + (sim - self._last_sim) / (self._rate * _CATCHING_UP)
+        now = self._clock()
+        if now - due > _BEHIND:
             self.restart(sim)
+            return
+        if max(due, earliest) > now:
+            self._sleep(max(due, earliest) - now)
+            now = max(due, earliest)
+        self._last_wall, self._last_sim = now, sim
 
 
 class Lockstep:
