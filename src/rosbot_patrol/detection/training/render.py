@@ -18,6 +18,7 @@ import numpy as np
 
 from rosbot_patrol.detection.training import scenes
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
+from rosbot_patrol.detection.training.test_set import SETS, WORLD, unseen_textures
 from rosbot_patrol.simulation.actors import person_body, person_pose_parts
 from rosbot_patrol.simulation.renderer import EglRenderer, Light
 from rosbot_patrol.simulation.scene import Intrinsics, Matrix
@@ -30,17 +31,15 @@ _FORWARD = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]]
 
 
 class Studio:
-    """A renderer with the textures of training, and the house."""
+    """A renderer with the textures of training, or with those that only tests have, and the house."""
 
-    def __init__(self, world: World | None) -> None:
-        textures = standard_textures()
-        painter = EglRenderer()
-        rng = np.random.default_rng(99)
-        for i, look in enumerate(scenes.poster_looks(rng)):
+    def __init__(self, world: World | None, *, unseen: bool = False) -> None:
+        textures = unseen_textures() if unseen else standard_textures()
+        painter = EglRenderer(textures=dict(textures))
+        rng = np.random.default_rng(100 if unseen else 99)
+        for i, look in enumerate(scenes.poster_looks(rng, reserved=unseen)):
             textures[f"poster{i}"] = _poster(painter, look, rng)
         painter.close()
-        for i in range(4):
-            textures.update({f"{k}{i}": v for k, v in standard_textures(100 + i).items() if k in ("picture", "books")})
         self.renderer = EglRenderer(textures=textures)
         self.world = world
 
@@ -226,7 +225,7 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
     cv2.setNumThreads(1)
     global _studio
     if _studio is None:
-        _studio = Studio(load_world(options.house) if options.house else None)
+        _studio = Studio(load_world(options.house) if options.house else None, unseen=options.test)
     pictures, boxes = _studio.shard(
         [options.seed, index, int(options.test)],
         PER_SHARD,
@@ -256,9 +255,14 @@ def main() -> None:
     parser.add_argument("--house-share", type=float, default=0.3)
     parser.add_argument("--plain", action="store_true", help="leave the house as it is")
     parser.add_argument("--pets", type=float, default=0.0, help="share of the pictures with cats or dogs")
-    parser.add_argument("--test", action="store_true", help="people whom training never draws")
+    parser.add_argument("--set", choices=SETS, help="draw these pictures of the tests, which test_set.py lays down")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
+    options.test = options.set is not None
+    if options.test:
+        chosen = SETS[options.set]
+        options.name, options.pictures, options.seed = options.set, chosen.pictures, chosen.seed
+        options.house, options.house_share, options.pets, options.plain = WORLD, chosen.house_share, chosen.pets, False
     options.folder.mkdir(parents=True, exist_ok=True)
     shards = -(-options.pictures // PER_SHARD)
     jobs = [(options, i) for i in range(shards)]

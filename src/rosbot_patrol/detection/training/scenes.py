@@ -197,8 +197,10 @@ def draw_reserved(rng: Rng) -> Look:
     return replace(look, top=tests[1].top, hair_style="hood")
 
 
-def poster_looks(rng: Rng) -> list[Look]:
+def poster_looks(rng: Rng, *, reserved: bool = False) -> list[Look]:
     """Who is on the posters on the walls: people as flat pictures, which are no people."""
+    if reserved:
+        return [draw_reserved(rng) for _ in range(POSTERS)]
     return [replace(draw_look(rng), height=float(rng.uniform(*HEIGHTS))) for _ in range(POSTERS)]
 
 
