@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import rospy
@@ -20,6 +21,8 @@ from rosbot_patrol.ros import logs
 T = TypeVar("T")
 
 log = logging.getLogger(__name__)
+
+_AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def run_node(name: str, body: Callable[[], None], *, urgency: int = 0, **init_options: Any) -> None:
@@ -52,13 +55,21 @@ def run_node(name: str, body: Callable[[], None], *, urgency: int = 0, **init_op
 
 
 def _go_before_others(urgency: int) -> str:
-    """Raise this process's priority; returns a sentence where that is not permitted."""
+    """Raise this process's priority; returns a sentence where that is not permitted.
+
+    Linux shares the processor between sessions first (sched(7), autogroup), and roslaunch gives each node its own: there
+    a nice value counts only among the node's own threads, and what counts is that of the session.
+    """
     if urgency <= 0:
         return ""
     try:
         os.nice(-urgency)
+        if _AUTOGROUP.exists() and os.getsid(0) == os.getpid():
+            _AUTOGROUP.write_text(str(-urgency), encoding="ascii")
     except PermissionError:
         return f"not permitted to go before other processes (nice -{urgency}; see RLIMIT_NICE in limits.conf(5))"
+    except OSError as err:
+        return f"its session does not go before others: {err}"
     return ""
 
 
