@@ -57,8 +57,8 @@ def run_node(name: str, body: Callable[[], None], *, urgency: int = 0, **init_op
 def _go_before_others(urgency: int) -> str:
     """Raise this process's priority; returns a sentence where that is not permitted.
 
-    Linux shares the processor between sessions first (sched(7), autogroup), and roslaunch gives each node its own: there
-    a nice value counts only among the node's own threads, and what counts is that of the session.
+    Linux shares the processor between sessions first (sched(7), autogroup), and roslaunch gives each node its own: a
+    nice value then counts only among the node's own threads, and what counts before others is that of the session.
     """
     if urgency <= 0:
         return ""
