@@ -13,121 +13,32 @@ Differs:
 
 from __future__ import annotations
 
-import enum
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rosbot_patrol.errors import ControlError, OutOfBounds, PlanningError
+from rosbot_patrol.errors import ControlError, OutOfBounds
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
+from rosbot_patrol.navigation.interfaces import (
+    OFF_MAP,
+    PLAN_REFUSED,
+    REACHED,
+    Array,
+    Command,
+    NavigatorView,
+    Outcome,
+    PlanResult,
+    PlanSource,
+    State,
+    Trigger,
+)
 from rosbot_patrol.navigation.params import MoveBaseParams
-from rosbot_patrol.planning.interfaces import LocalPlanner, LocalView, Recovery, RecoveryView
+from rosbot_patrol.planning.interfaces import LocalPlanner, Recovery
 
 log = logging.getLogger(__name__)
 
 _COAST = 0.35  # how long the last velocity may hold while a new goal is planned for [s]
-
-Array = NDArray[np.float64]
-
-
-class State(enum.Enum):
-    """What the navigator is doing."""
-
-    IDLE = "idle"
-    PLANNING = "planning"
-    CONTROLLING = "controlling"
-    CLEARING = "clearing"
-
-
-class Trigger(enum.Enum):
-    """Why it recovers, with upstream's result text for when that is no use."""
-
-    PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
-    CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
-    OSCILLATION = "Robot is oscillating. Even after executing recovery behaviors."
-
-
-REACHED = "Goal reached."
-BAD_QUATERNION = "Aborting on goal because it was sent with an invalid quaternion"
-OFF_MAP = "The goal sent to the {} planner is off the global costmap. Planning will always fail to this goal."
-PLAN_REFUSED = "Failed to pass global plan to the controller."
-
-
-@dataclass(frozen=True)
-class PlanResult:
-    """A plan, shape (N, 3), or why there is none."""
-
-    poses: Array | None = None
-    error: PlanningError | None = None
-
-
-class PlanSource(Protocol):
-    """Plans on request; at most one request is open."""
-
-    def request(self, goal: Pose2D) -> None:
-        """Begin to plan from where the robot is."""
-
-    def poll(self) -> PlanResult | None:
-        """The result of the last request, once; None while it is worked on or when there is none."""
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether a request is open."""
-
-    def drop(self) -> None:
-        """Forget the open request and its result."""
-
-
-def _never(_twist: Twist2D) -> str:
-    return ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class NavigatorView:
-    """What the navigator sees in a step.
-
-    Attributes:
-        local, recovery: the views of the planners and of the recovery behaviours.
-        is_current: whether the sensors can be trusted.
-        must_wait: for whom the robot has to stand still instead of driving a velocity, "" for nobody.
-    """
-
-    local: LocalView
-    recovery: RecoveryView
-    is_current: bool = True
-    must_wait: Callable[[Twist2D], str] = _never
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """How a goal ended."""
-
-    succeeded: bool
-    text: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Command:
-    """What a step wants done.
-
-    Attributes:
-        twist: velocity to send, None to send nothing.
-        outcome: set when the goal has ended.
-        plan: a new plan to show.
-        recovery: index, count and name of a behaviour that has just begun.
-        reason: why it does what it does, in one string.
-    """
-
-    twist: Twist2D | None = None
-    outcome: Outcome | None = None
-    plan: Array | None = None
-    recovery: tuple[int, int, str] | None = None
-    reason: str = ""
 
 
 @dataclass

@@ -13,7 +13,7 @@ from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedb
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.navigation.navigator import BAD_QUATERNION, Outcome
+from rosbot_patrol.navigation.interfaces import BAD_QUATERNION, Outcome
 from rosbot_patrol.ros.convert import pose_to_msg
 from rosbot_patrol.ros.transforms import Transforms
 

@@ -20,27 +20,25 @@ import threading
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import rospy
-from geometry_msgs.msg import Twist
-from move_base_msgs.msg import RecoveryStatus
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import Odometry
 from nav_msgs.srv import GetPlan, GetPlanRequest, GetPlanResponse
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import ParamError, PlanningError, TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
-from rosbot_patrol.navigation.navigator import Command, Navigator, NavigatorView, State
+from rosbot_patrol.navigation.interfaces import NavigatorView, State
+from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.planning.interfaces import LocalView, Recovery, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries, short_name
-from rosbot_patrol.ros.convert import path_to_msg, twist_from_msg, twist_to_msg
-from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.ros.convert import path_to_msg, twist_from_msg
 from rosbot_patrol.ros.heap import give_back_large_blocks
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
 from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_goal
+from rosbot_patrol.ros.move_base_outputs import HealthTeller, Outputs
 from rosbot_patrol.ros.move_base_plans import ThreadedPlans
 from rosbot_patrol.ros.move_base_tuning import Tuning
 from rosbot_patrol.ros.node import Loop, load_params, now, run_node
@@ -49,8 +47,6 @@ from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
 
-_SHOWN_POSES = 400
-_HEALTH_PERIOD = 1.0
 _CLOCK_NOISE = 1e-4  # of differences of times as floats [s]
 
 
@@ -91,7 +87,6 @@ class MoveBaseNode:
         self._velocity: Latest[Twist2D] = Latest()
         self._slow_cycles = 0
         self._said = ""
-        self._health_due = float("-inf")
         self._control = Loop(p.controller_frequency, self.step, name="control")
         self._advertise()
         self._offer_tuning()
@@ -141,12 +136,9 @@ class MoveBaseNode:
     def _advertise(self) -> None:
         p = self.params
         global_name, local_name = short_name(p.base_global_planner), short_name(p.base_local_planner)
-        self._pub_cmd = rospy.Publisher("cmd_vel", Twist, queue_size=1)
-        self._pub_plan = rospy.Publisher(f"~{global_name}/plan", Path, queue_size=1)
-        self._pub_global_plan = rospy.Publisher(f"~{local_name}/global_plan", Path, queue_size=1)
-        self._pub_local_plan = rospy.Publisher(f"~{local_name}/local_plan", Path, queue_size=1)
-        self._pub_recovery = rospy.Publisher("move_base/recovery_status", RecoveryStatus, queue_size=1)
-        self._health = Health()
+        frames = {"global_frame": self._global.frame, "local_frame": self._local.frame}
+        self._outputs = Outputs(global_name, local_name, **frames)
+        self._health = HealthTeller((self._global, self._local))
         self._goals = GoalServer(self._global.frame, self._transforms, self._control.hurry)
         rospy.Subscriber(p.odom_topic, Odometry, self._on_odom, queue_size=1, tcp_nodelay=True)
         rospy.Service("~make_plan", GetPlan, self._on_make_plan)
@@ -176,7 +168,7 @@ class MoveBaseNode:
 
     def _stop(self) -> None:
         if self._navigator.state is not State.IDLE:
-            self._pub_cmd.publish(Twist())
+            self._outputs.send(STOP)
 
     # ---- inputs
 
@@ -226,16 +218,16 @@ class MoveBaseNode:
         goal = self._goals.take(time)
         if goal is not None:
             if self._navigator.state is State.IDLE:
-                self._send(STOP)
+                self._outputs.send(STOP)
             self._navigator.set_goal(goal, time)
         if self._navigator.state is State.IDLE:
             self._tell(time)
             return
         if not self._goals.is_active:  # refused or replaced by one that was refused
-            self._publish(self._navigator.cancel(), time)
+            self._outputs.publish(self._navigator.cancel(), self._controller, time)
             return
         if self._goals.is_cancelled:
-            self._publish(self._navigator.cancel(), time)
+            self._outputs.publish(self._navigator.cancel(), self._controller, time)
             self._goals.preempt()
             return
         self._work(time)
@@ -248,7 +240,7 @@ class MoveBaseNode:
                 command = self._navigator.step(time, view)
         else:
             command = self._navigator.step(time, view)
-        self._publish(command, time)
+        self._outputs.publish(command, self._controller, time)
         self._say(problem or command.reason, succeeded=command.outcome is not None and command.outcome.succeeded)
         if view is not None:
             self._goals.feedback(view.recovery.pose_global, time)
@@ -310,36 +302,6 @@ class MoveBaseNode:
         )
         return view, problem
 
-    # ---- outputs
-
-    def _send(self, twist: Twist2D) -> None:
-        self._pub_cmd.publish(twist_to_msg(twist))
-
-    def _publish(self, command: Command, time: float) -> None:
-        if command.twist is not None:
-            self._send(command.twist)
-        if command.recovery is not None:
-            self._publish_recovery(command.recovery, time)
-        if command.plan is not None:
-            self._show(self._pub_plan, command.plan, self._global.frame, time)
-        if command.reason == "driving":
-            self._show(self._pub_global_plan, self._controller.visible_plan, self._local.frame, time)
-            self._show(self._pub_local_plan, self._controller.local_plan, self._local.frame, time)
-
-    def _show(self, publisher: rospy.Publisher, poses: np.ndarray, frame: str, time: float) -> None:
-        if publisher.get_num_connections() == 0:
-            return
-        if len(poses) > _SHOWN_POSES:
-            keep = np.linspace(0, len(poses) - 1, _SHOWN_POSES).astype(int)
-            poses = poses[keep]
-        publisher.publish(path_to_msg(poses, frame, time))
-
-    def _publish_recovery(self, recovery: tuple[int, int, str], time: float) -> None:
-        msg = RecoveryStatus()
-        msg.current_recovery_number, msg.total_number_of_recoveries, msg.recovery_behavior_name = recovery
-        msg.pose_stamped.header.stamp = rospy.Time.from_sec(time)
-        self._pub_recovery.publish(msg)
-
     def _watch_rate(self, time: float) -> None:
         took = now() - time
         if took > 1.0 / self.params.controller_frequency + _CLOCK_NOISE:
@@ -351,26 +313,7 @@ class MoveBaseNode:
             )
 
     def _tell(self, time: float) -> None:
-        if self._health_due - _HEALTH_PERIOD <= time < self._health_due:
-            return
-        self._health_due = time + _HEALTH_PERIOD
-        values = {
-            "state": self._navigator.state.value,
-            "reason": self._navigator.reason,
-            "slow cycles": self._slow_cycles,
-        }
-        troubles = [text for costmap in (self._global, self._local) for text in costmap.troubles(now())]
-        problems = [f"{c.name}: {c.problem}" for c in (self._global, self._local) if c.problem]
-        if problems:
-            level = WARN if self._navigator.state is State.IDLE else ERROR
-            self._health.set("", level, "; ".join(problems), values)
-        elif self._navigator.state is not State.IDLE and not self._local.is_current(time):
-            told = "; ".join(["sensor data is out of date", *troubles])
-            self._health.set("", ERROR, told, values)
-        elif troubles:
-            self._health.set("", WARN, "; ".join(troubles), values)
-        else:
-            self._health.set("", OK, self._navigator.state.value, values)
+        self._health.tell(time, self._navigator.state, self._navigator.reason, self._slow_cycles)
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ import threading
 
 from rosbot_patrol.errors import PatrolError, PlanningError, TransformError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.navigation.navigator import PlanResult
+from rosbot_patrol.navigation.interfaces import PlanResult
 from rosbot_patrol.planning.interfaces import Array, GlobalPlanner
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
 from rosbot_patrol.ros.node import Worker, now

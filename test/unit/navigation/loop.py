@@ -17,7 +17,8 @@ from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import PlanningError
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.navigation.navigator import Navigator, NavigatorView, Outcome, PlanResult
+from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome, PlanResult
+from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
 from rosbot_patrol.planning.interfaces import LocalView, RecoveryView

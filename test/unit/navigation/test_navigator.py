@@ -9,7 +9,8 @@ from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import ControlError, NoPath, OutOfBounds
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
-from rosbot_patrol.navigation.navigator import Navigator, NavigatorView, PlanResult, State
+from rosbot_patrol.navigation.interfaces import NavigatorView, PlanResult, State
+from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.planning.interfaces import LocalPlanner, LocalView, Recovery, RecoveryView
 
