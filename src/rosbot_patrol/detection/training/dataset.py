@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH, column
+from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH, column
+from rosbot_patrol.detection.training.overlay import lay_patterns
 
 MARGIN = 8
+OVERLAY = 0.5
+FAINT = 5.0
 NET_HEIGHT = HEIGHT + 2 * MARGIN
 
 
@@ -32,6 +35,8 @@ class Pictures:
         labels = []
         for file, shard in zip(files, shards, strict=True):
             rows = np.load(file.with_suffix(".npz"))["boxes"]
+            if rows.shape[1] < len(COLUMNS):  # a set of before the contrast was measured
+                rows = np.pad(rows, ((0, 0), (0, len(COLUMNS) - rows.shape[1])), constant_values=255)
             labels.append([rows[column(rows, "picture") == i] for i in range(len(shard))])
         return cls(shards, labels)
 
@@ -51,7 +56,8 @@ def asked(rows: np.ndarray) -> np.ndarray:
     """Whether a network is asked to find each: not the hardly visible, nor what is too dark or small to make out."""
     big = column(rows, "pixels") > np.where(column(rows, "distance") > 4.0, 150, 400)
     height = column(rows, "y1") - column(rows, "y0")
-    return big & (column(rows, "seen_of_part") > 0.25) & (column(rows, "light") > 6.0) & (height > 0.05)
+    clear = (column(rows, "light") > 6.0) & (column(rows, "contrast") > FAINT)
+    return big & (column(rows, "seen_of_part") > 0.25) & clear & (height > 0.05)
 
 
 def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
@@ -60,14 +66,18 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
     Args:
         pictures: the set.
         chosen: (shard, picture) of each, shape (B, 2).
-        rng: to mirror and to shift colours by chance; None for neither.
+        rng: to lay patterns over, to mirror and to shift colours by chance; None for none of it.
     """
     images = np.full((len(chosen), NET_HEIGHT, WIDTH, 3), 127, np.uint8)
     boxes = []
     for b, (shard, i) in enumerate(chosen):
-        images[b, MARGIN:-MARGIN] = pictures.shards[shard][i]
+        picture = pictures.shards[shard][i]
         rows = pictures.labels[shard][i]
         x0, y0, x1, y1 = (column(rows, k) for k in ("x0", "y0", "x1", "y1"))
+        if rng is not None and rng.random() < OVERLAY:
+            corners = np.stack([x0 * WIDTH, y0 * HEIGHT, x1 * WIDTH, y1 * HEIGHT], axis=1)
+            picture = lay_patterns(picture, corners, rng)
+        images[b, MARGIN:-MARGIN] = picture
         if rng is not None:
             if rng.random() < 0.5:
                 images[b] = images[b, :, ::-1]

@@ -265,12 +265,48 @@ def machine(rng: Rng) -> list[Piece]:
     ]
 
 
+def turned(rng: Rng) -> list[Piece]:
+    """One thing turned of any profile: vases, bags, figures, bollards, bottles."""
+    z, wide = float(rng.uniform(0.2, 1.9)), float(rng.uniform(0.06, 0.35))
+    heights = np.sort(rng.uniform(0, z, int(rng.integers(2, 7))))[::-1]
+    rings = [(float(h), *(float(wide * w) for w in rng.uniform(0.2, 1.0, 2)), 0.0) for h in (z, *heights, 0.0)]
+    colour = (float(rng.uniform(0.5, 0.95)), 0.1, 0.08) if rng.random() < 0.12 else any_colour(rng)
+    return [(loft(rings), (0, 0, 0), colour, str(rng.choice(CLOTHS)))]
+
+
+def junk(rng: Rng) -> list[Piece]:
+    """A heap or a tower of any shapes in any colours."""
+    pieces: list[Piece] = []
+    z, reach = 0.0, float(rng.uniform(0.02, 0.3))
+    for _ in range(int(rng.integers(2, 9))):
+        a, b, c = (float(v) for v in rng.uniform(0.03, 0.5, 3))
+        x, y = (float(v) for v in rng.uniform(-reach, reach, 2))
+        colour, texture, kind = any_colour(rng), str(rng.choice([*CLOTHS, *WOODS])), rng.random()
+        if kind < 0.35:
+            pieces.append((box(a, b, 1.5 * c), (x, y, z + 0.75 * c), colour, texture))
+        elif kind < 0.6:
+            pieces.append((tube(0.4 * a, 2 * c), (x, y, z + c), colour, texture))
+        elif kind < 0.8:
+            pieces.append((ellipsoid(0.6 * a, 0.6 * b, 0.6 * c, at=(x, y, z + 0.6 * c)), (0, 0, 0), colour, texture))
+        else:
+            rings = [(1.5 * c, 0.5 * a, 0.5 * b, 0.0), (0.0, 0.5 * b, 0.5 * a, 0.0)]
+            pieces.append((loft(rings), (x, y, z), colour, texture))
+        z += c * float(rng.choice([0.0, 0.6, 1.2]))
+        if z > 1.9:
+            break
+    return pieces
+
+
 MAKERS: tuple[Callable[[Rng], list[Piece]], ...] = (
     table, chair, chair, sofa, bed, cupboard, cupboard, shelf, floor_lamp, floor_lamp, coat_stand, coat_stand,
     coat_stand, plant, plant, post, post, post, poles, poles, boxes, boxes, curtain, ball, robot, pet, machine,
 )  # fmt: skip
 
 
-def draw_thing(rng: Rng, name: str, pose: Matrix) -> Body:
-    """A thing by chance at that place."""
-    return build(name, MAKERS[int(rng.integers(len(MAKERS)))](rng), pose)
+SHAPELESS = (turned, turned, junk)
+
+
+def draw_thing(rng: Rng, name: str, pose: Matrix, *, shapeless: float = 0.0) -> Body:
+    """A thing by chance at that place; with a chance of `shapeless` one that has no name."""
+    makers = SHAPELESS if shapeless and rng.random() < shapeless else MAKERS
+    return build(name, makers[int(rng.integers(len(makers)))](rng), pose)

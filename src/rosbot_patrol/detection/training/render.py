@@ -18,30 +18,41 @@ import numpy as np
 
 from rosbot_patrol.detection.training import scenes
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
+from rosbot_patrol.detection.training.patterns import draw_textures
 from rosbot_patrol.detection.training.test_set import SETS, WORLD, unseen_textures
 from rosbot_patrol.simulation.actors import person_body, person_pose_parts
 from rosbot_patrol.simulation.renderer import EglRenderer, Light
 from rosbot_patrol.simulation.scene import Intrinsics, Matrix
-from rosbot_patrol.simulation.textures import SIDE, Texture, standard_textures
+from rosbot_patrol.simulation.textures import SIDE, Texture
 from rosbot_patrol.simulation.world import World, load_world
 
 PER_SHARD = 500
 VIEWS = 5
+SHAPELESS = 0.3
 _FORWARD = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
 
 
 class Studio:
-    """A renderer with the textures of training, or with those that only tests have, and the house."""
+    """A renderer with textures of training, drawn anew for every shard, or with those that only tests have."""
 
     def __init__(self, world: World | None, *, unseen: bool = False) -> None:
-        textures = unseen_textures() if unseen else standard_textures()
+        self.world = world
+        self.unseen = unseen
+        self.shapeless = 0.0 if unseen else SHAPELESS
+        self.renderer: EglRenderer | None = None
+
+    def furnish(self, rng: np.random.Generator) -> None:
+        """Take textures, and posters that are made with them."""
+        if self.unseen:
+            rng = np.random.default_rng(100)
+        textures = unseen_textures() if self.unseen else draw_textures(rng)
         painter = EglRenderer(textures=dict(textures))
-        rng = np.random.default_rng(100 if unseen else 99)
-        for i, look in enumerate(scenes.poster_looks(rng, reserved=unseen)):
+        for i, look in enumerate(scenes.poster_looks(rng, reserved=self.unseen)):
             textures[f"poster{i}"] = _poster(painter, look, rng)
         painter.close()
+        if self.renderer is not None:
+            self.renderer.close()
         self.renderer = EglRenderer(textures=textures)
-        self.world = world
 
     def shard(
         self,
@@ -64,6 +75,8 @@ class Studio:
             pets: share of the pictures with cats or dogs.
         """
         rng = np.random.default_rng(seed)
+        self.furnish(np.random.default_rng([*seed, 1]))
+        assert self.renderer is not None
         pictures, rows = [], []
         while len(pictures) < count:
             scene = self._scene(rng, house_share, plain)
@@ -82,8 +95,8 @@ class Studio:
 
     def _scene(self, rng: np.random.Generator, house_share: float, plain: bool) -> scenes.Scene:
         if self.world and rng.random() < house_share:
-            return scenes.draw_house(rng, self.world, plain=plain)
-        return scenes.draw_room(rng)
+            return scenes.draw_house(rng, self.world, plain=plain, shapeless=self.shapeless)
+        return scenes.draw_room(rng, shapeless=self.shapeless)
 
     def _view(
         self,
@@ -93,6 +106,7 @@ class Studio:
         test: bool,
         pets: float = 0.0,
     ):
+        assert self.renderer is not None
         actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets)
         for i, actor in enumerate(actors):
             self.renderer.add(actor.body, label=i + 1)
@@ -105,15 +119,16 @@ class Studio:
         optical, intrinsics = _eye(camera, rng)
         picture = self.renderer.render(optical, intrinsics)[0]
         seen = self.renderer.labels()
+        finished = degrade(picture, rng)
         labels = [
-            _label(actor, seen == i + 1, optical, intrinsics, camera, float(picture.mean()), test)
+            _label(actor, seen == i + 1, optical, intrinsics, camera, picture, test, finished)
             for i, actor in enumerate(actors)
             if actor.body.kind != "pet"
         ]
         for actor in actors:
             for body in (actor.body, *actor.extra):
                 self.renderer.remove(body.name)
-        return degrade(picture, rng), [label for label in labels if label]
+        return finished, [label for label in labels if label]
 
 
 def degrade(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -166,7 +181,7 @@ def _eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[
     return scenes.placed(x, y, height, yaw) @ tilt @ _FORWARD, intrinsics
 
 
-def _label(actor, mask, optical: Matrix, intrinsics: Intrinsics, camera, light: float, test: bool):
+def _label(actor, mask, optical: Matrix, intrinsics: Intrinsics, camera, picture, test: bool, finished):
     pixels = int(mask.sum())
     if pixels < 12:
         return None
@@ -176,7 +191,29 @@ def _label(actor, mask, optical: Matrix, intrinsics: Intrinsics, camera, light: 
     kind = 0 if actor.body.kind == "person" else 1
     w, h = intrinsics.width, intrinsics.height
     corners = [columns[0] / w, rows[0] / h, (columns[-1] + 1) / w, (rows[-1] + 1) / h]
-    return [kind, *corners, distance, pixels / max(whole, pixels), pixels / max(part, pixels), pixels, light, test]
+    shares, light = (pixels / max(whole, pixels), pixels / max(part, pixels)), float(picture.mean())
+    return [kind, *corners, distance, *shares, pixels, light, test, contrast(finished, mask)]
+
+
+def contrast(picture: np.ndarray, mask: np.ndarray, *, reach: int = 9) -> float:
+    """By how much [levels] what lies inside of an outline differs from what lies beside it, at its clearer quarter.
+
+    Args:
+        picture: RGB, uint8, shape (240, 320, 3).
+        mask: where the figure is seen, of twice the size.
+        reach: size [px] of the neighbourhoods that are compared.
+    """
+    small = cv2.resize(mask.astype(np.uint8), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    grey, ones = picture.astype(np.float32).mean(axis=2), small.astype(np.float32)
+    size = (reach, reach)
+    edge = cv2.dilate(small, np.ones((3, 3), np.uint8)) != cv2.erode(small, np.ones((3, 3), np.uint8))
+    inside, there = cv2.boxFilter(grey * ones, -1, size), cv2.boxFilter(ones, -1, size)
+    outside, away = cv2.boxFilter(grey * (1 - ones), -1, size), cv2.boxFilter(1 - ones, -1, size)
+    good = edge & (there > 0.1) & (away > 0.1)
+    if not good.any():
+        return 0.0
+    gap = np.abs(inside[good] / there[good] - outside[good] / away[good])
+    return float(np.percentile(gap, 75))
 
 
 def _silhouette(actor, optical: Matrix, intrinsics: Intrinsics) -> tuple[int, int]:

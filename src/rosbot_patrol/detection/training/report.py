@@ -9,7 +9,6 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
@@ -19,47 +18,26 @@ from rosbot_patrol.detection import decode
 from rosbot_patrol.detection.darknet_cfg import read_cfg
 from rosbot_patrol.detection.darknet_weights import read_weights
 from rosbot_patrol.detection.letterbox import Letterbox
-from rosbot_patrol.detection.training.dataset import Pictures, asked, batch_of
+from rosbot_patrol.detection.network import load_network
+from rosbot_patrol.detection.training.dataset import MARGIN, Pictures, asked, batch_of
 from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH, column
+from rosbot_patrol.detection.training.scoring import KINDS, Found, average_precision, figures, groups, match, say
+from rosbot_patrol.images.encodings import Picture
 
-KINDS = ("person", "fire hydrant")
 FLOOR = 0.02
-HIT = 0.5
 Forward = Callable[[np.ndarray], list[np.ndarray]]
 
 
-@dataclass
-class Found:
-    """All detections of a set above `FLOOR`, and the labels.
-
-    Attributes:
-        boxes: picture, kind, probability, x0, y0, x1, y1, index of the label that it hits or -1, whether it lies on
-            something that is not asked for.
-        labels: rows of the labels with the picture's number in the whole set.
-        hit: the best probability with which each label was found, 0 if not.
-    """
-
-    boxes: np.ndarray
-    labels: np.ndarray
-    hit: np.ndarray
-    index: np.ndarray = field(repr=False)
-
-
-def torch_forward(cfg: Path, weights: Path) -> Forward:
-    """Runs a weights file by PyTorch."""
-    import torch
-
-    from rosbot_patrol.detection.training.network import Darknet
-
+def load_forward(cfg: Path, weights: Path, *, threads: int = 2) -> Forward:
+    """Runs a weights file as the node does, by the same run-time."""
     spec = read_cfg(str(cfg))
-    network = Darknet(spec).eval()
-    network.from_weights(read_weights(str(weights), spec))
+    network = load_network(spec, read_weights(str(weights), spec), threads=threads)
+    place = Letterbox(WIDTH, HEIGHT, spec.width, spec.height)
 
     def forward(images: np.ndarray) -> list[np.ndarray]:
-        inputs = torch.from_numpy(images).permute(0, 3, 1, 2).float() / 255.0
-        inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
-        with torch.inference_mode():
-            return [value.numpy() for value in network(inputs)]
+        inner = np.ascontiguousarray(images[:, MARGIN:-MARGIN])
+        answers = [network.run(Picture(picture, "rgb8"), place) for picture in inner]
+        return [np.stack(values) for values in zip(*answers, strict=True)]
 
     return forward
 
@@ -78,108 +56,20 @@ def find_all(pictures: Pictures, cfg: Path, forward: Forward, *, batch: int = 16
             rows[:, 0] = start + b
             mine = [value[b] for value in values]
             found = decode.decode(spec.heads, mine, place, threshold=FLOOR, iou_threshold=0.4)
-            got, hit = _match(start + b, found, rows, sum(len(h) for h in hits))
+            got, hit = match(start + b, found, rows, sum(len(h) for h in hits))
             boxes.append(got)
             labels.append(rows)
             hits.append(hit)
     return Found(np.concatenate(boxes), np.concatenate(labels), np.concatenate(hits), index)
 
 
-def _match(number: int, found: decode.Candidates, rows: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
-    low, high = found.boxes[:, :2] - found.boxes[:, 2:] / 2, found.boxes[:, :2] + found.boxes[:, 2:] / 2
-    corners = np.clip(np.concatenate([low, high], axis=1), 0, 1)
-    out = np.zeros((len(found), 9))
-    out[:, 0], out[:, 1] = number, found.probabilities.argmax(axis=1)
-    out[:, 2], out[:, 3:7], out[:, 7] = found.probabilities.max(axis=1), corners, -1
-    truth = rows[:, 2:6]
-    hit = np.zeros(len(rows))
-    taken = np.zeros(len(rows), bool)
-    for k in np.argsort(-out[:, 2]):
-        overlap = _iou(out[k, 3:7], truth) * (rows[:, 1] == out[k, 1])
-        free = np.where(taken, 0, overlap)
-        if len(rows) and free.max() >= HIT:
-            j = int(free.argmax())
-            taken[j], hit[j], out[k, 7] = True, out[k, 2], first + j
-        elif len(rows):
-            # on somebody who is hardly seen, or a second box on a group of people: no false alarm
-            inside = _inside(out[k, 3:7], truth)
-            same = rows[:, 1] == out[k, 1]
-            out[k, 8] = ((inside > 0.5) & same).any() or (overlap > 0.3).any()
-    return out, hit
-
-
-def average_precision(found: Found, kind: int) -> float:
-    """Area under the curve of precision over recall at IoU 0.5, of what is asked for."""
-    wanted = asked(found.labels) & (column(found.labels, "kind") == kind)
-    mine = found.boxes[found.boxes[:, 1] == kind]
-    matched = mine[:, 7].astype(int)
-    good = np.where(matched >= 0, wanted[matched], False)
-    counts = (matched < 0) & (mine[:, 8] == 0) | good
-    order = np.argsort(-mine[counts, 2])
-    hits = np.cumsum(good[counts][order])
-    precision = hits / np.arange(1, len(hits) + 1)
-    precision = np.maximum.accumulate(precision[::-1])[::-1]
-    recall = hits / max(wanted.sum(), 1)
-    return float(np.sum(np.diff(np.concatenate([[0], recall])) * precision))
-
-
-def figures(found: Found, threshold: float) -> dict[str, float]:
-    """Counts and shares at a threshold."""
-    labels, boxes = found.labels, found.boxes[found.boxes[:, 2] > threshold]
-    out: dict[str, float] = {"threshold": threshold, "pictures": len(found.index)}
-    distance, person = column(labels, "distance"), column(labels, "kind") == 0
-    half = column(labels, "seen_of_part") >= 0.5
-    lit = column(labels, "light") > 6.0
-    near = person & (distance >= 1) & (distance <= 6) & lit
-    sets = {
-        "persons 1-6 m, half of what is in the picture seen": near & half & asked(labels),
-        "persons 1-6 m, half of the whole figure seen": near & (column(labels, "seen_of_whole") >= 0.5),
-        "fire hydrants 1-6 m, half seen": ~person & (distance >= 1) & (distance <= 6) & half & lit,
-    }
-    for lo, hi in ((0.7, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 6), (6, 7), (7, 8.5)):
-        sets[f"persons {lo}-{hi} m, half seen"] = (
-            person & (distance >= lo) & (distance < hi) & half & lit & asked(labels)
-        )
-    for name, chosen in sets.items():
-        out[f"{name}: there"] = int(chosen.sum())
-        out[f"{name}: found"] = int((found.hit[chosen] > threshold).sum())
-    for kind, name in enumerate(KINDS):
-        mine = boxes[boxes[:, 1] == kind]
-        false = (mine[:, 7] < 0) & (mine[:, 8] == 0)
-        out[f"{name}: boxes"], out[f"{name}: false"] = len(mine), int(false.sum())
-        nobody = false & ~np.isin(mine[:, 0], column(labels, "picture")[column(labels, "kind") == kind])
-        out[f"{name}: false where there is none"] = int(nobody.sum())
-    return out
-
-
-def say(result: dict[str, float]) -> str:
-    """The figures as lines of text."""
-    lines = [f"threshold {result['threshold']}, {result['pictures']} pictures"]
-    for name, value in result.items():
-        if name.endswith(": there"):
-            stem = name[: -len(": there")]
-            hits = result[stem + ": found"]
-            share = f"{100 * hits / value:.2f} %" if value else "none"
-            lines.append(f"  recall, {stem}: {hits:.0f}/{value:.0f} = {share}")
-        elif name.endswith(": boxes"):
-            stem = name[: -len(": boxes")]
-            false = result[stem + ": false"]
-            share = f"{100 * (1 - false / value):.2f} %" if value else "none"
-            alone = result[stem + ": false where there is none"]
-            lines.append(
-                f"  precision, {stem}: {value - false:.0f}/{value:.0f} = {share} ({alone:.0f} false with none there)"
-            )
-    return "\n".join(lines)
-
-
 def draw_worst(pictures: Pictures, found: Found, threshold: float, target: Path, *, count: int = 10) -> None:
     """A picture of the worst misses (upper rows) and false alarms (lower rows)."""
     labels = found.labels
-    wanted = asked(labels) & (column(labels, "kind") == 0) & (column(labels, "seen_of_part") >= 0.5)
-    wanted &= column(labels, "distance") <= 6
+    wanted = groups(found)["persons 1-6 m, half of the figure seen"]
     missed = np.flatnonzero(wanted & (found.hit <= threshold))
     missed = missed[np.argsort(-column(labels, "pixels")[missed])][:count]
-    false = found.boxes[(found.boxes[:, 7] < 0) & (found.boxes[:, 8] == 0)]
+    false = found.boxes[found.false(0) | found.false(1)]
     false = false[np.argsort(-false[:, 2])][:count]
     tiles = [_tile(pictures, found, int(labels[i, 0]), labels[i, 2:6], (255, 0, 0), "missed") for i in missed]
     tiles += [_tile(pictures, found, int(b[0]), b[3:7], (255, 160, 0), f"{KINDS[int(b[1])]} {b[2]:.2f}") for b in false]
@@ -244,17 +134,6 @@ def _frame(picture: np.ndarray, box: np.ndarray, colour: tuple[int, int, int], t
     cv2.putText(picture, text, (x0, max(y0 - 3, 9)), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
 
 
-def _iou(box: np.ndarray, others: np.ndarray) -> np.ndarray:
-    shared = np.clip(np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2]), 0, None).prod(axis=1)
-    union = (box[2:] - box[:2]).prod() + (others[:, 2:] - others[:, :2]).prod(axis=1) - shared
-    return shared / np.maximum(union, 1e-9)
-
-
-def _inside(box: np.ndarray, others: np.ndarray) -> np.ndarray:
-    shared = np.clip(np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2]), 0, None).prod(axis=1)
-    return shared / max(float((box[2:] - box[:2]).prod()), 1e-9)
-
-
 def main() -> None:
     """Report on a set from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -267,7 +146,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     pictures = Pictures.open(options.data, options.name)
-    found = find_all(pictures, options.cfg, torch_forward(options.cfg, options.weights))
+    found = find_all(pictures, options.cfg, load_forward(options.cfg, options.weights))
     results = []
     for threshold in options.threshold:
         results.append(figures(found, threshold))

@@ -68,8 +68,8 @@ class Actor:
     extra: list[Body]
 
 
-def draw_room(rng: Rng) -> Scene:
-    """A room by chance."""
+def draw_room(rng: Rng, *, shapeless: float = 0.0) -> Scene:
+    """A room by chance; that share of its furniture is of no kind that has a name."""
     x, y, z = float(rng.uniform(3.5, 16.0)), float(rng.uniform(3.5, 12.0)), float(rng.uniform(2.1, 3.2))
     bodies = [_floor(rng)]
     places: list[Place] = []
@@ -96,11 +96,11 @@ def draw_room(rng: Rng) -> Scene:
         bodies.append(build("ceiling", [(ceiling, (0, 0, z), (level, level, level), "")], placed(0, 0)))
     bodies += _wall_things(rng, x, y, z)
     scene = Scene(bodies, _draw_light(rng, x, y, z), (-x / 2, x / 2, -y / 2, y / 2), places)
-    furnish(scene, rng, int(rng.integers(0, 16)))
+    furnish(scene, rng, int(rng.integers(0, 16)), shapeless=shapeless)
     return scene
 
 
-def draw_house(rng: Rng, world: World, *, plain: bool = False) -> Scene:
+def draw_house(rng: Rng, world: World, *, plain: bool = False, shapeless: float = 0.0) -> Scene:
     """The house of a world, in its own colours or painted by chance, with some more furniture; `plain`: as it is."""
     bodies = list(world.bodies)
     places = [p for b in bodies for p in _footprints(b)]
@@ -110,17 +110,18 @@ def draw_house(rng: Rng, world: World, *, plain: bool = False) -> Scene:
     low, high = walls.min(axis=0), walls.max(axis=0)
     light = _draw_light(rng, *(high - low), 2.5) if not plain and rng.random() < 0.6 else Light()
     scene = Scene(bodies, light, (low[0], high[0], low[1], high[1]), places)
-    furnish(scene, rng, 0 if plain else int(rng.integers(0, 25)))
+    furnish(scene, rng, 0 if plain else int(rng.integers(0, 25)), shapeless=shapeless)
     return scene
 
 
-def furnish(scene: Scene, rng: Rng, count: int) -> None:
+def furnish(scene: Scene, rng: Rng, count: int, *, shapeless: float = 0.0) -> None:
     """Put things by chance where there is room."""
     x0, x1, y0, y1 = scene.extent
     for i in range(count):
         x, y = float(rng.uniform(x0, x1)), float(rng.uniform(y0, y1))
         if scene.is_free(x, y, 0.35):
-            body = draw_thing(rng, f"thing{i}", placed(x, y, 0, float(rng.uniform(0, 2 * np.pi))))
+            pose = placed(x, y, 0, float(rng.uniform(0, 2 * np.pi)))
+            body = draw_thing(rng, f"thing{i}", pose, shapeless=shapeless)
             scene.bodies.append(body)
             scene.places += _footprints(body)
 

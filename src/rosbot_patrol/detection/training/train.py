@@ -41,6 +41,7 @@ class Trainer:
         self.network = Darknet(self.spec).to(self.device, memory_format=torch.channels_last)
         self.network.set_prior(0.01)
         self.mean = copy.deepcopy(self.network).eval()
+        self.run_network = torch.compile(self.network) if options.compile else self.network
         decayed = [p for p in self.network.parameters() if p.ndim > 1]
         plain = [p for p in self.network.parameters() if p.ndim <= 1]
         groups = [{"params": decayed, "weight_decay": 5e-3}, {"params": plain, "weight_decay": 0.0}]
@@ -64,6 +65,7 @@ class Trainer:
         index = self._share(pictures.index())
         batches = _ahead(pictures, index, self.options.batch, rng)
         self.network.train()
+        self._freeze()
         sums: dict[str, float] = {}
         bar = tqdm(batches, total=self.steps_each, desc=f"epoch {self.epoch + 1}/{self.options.epochs}", mininterval=5)
         for done, (images, rows) in enumerate(bar, 1):
@@ -74,6 +76,11 @@ class Trainer:
         means = ", ".join(f"{k} {v / self.steps_each:.4f}" for k, v in sums.items())
         sys.stdout.write(f"\n{time.strftime('%H:%M:%S')} epoch {self.epoch + 1}: {means}\n")
         sys.stdout.flush()
+
+    def _freeze(self) -> None:
+        """Let the first layers be as they are: nothing goes back through them, the costliest part of a step."""
+        for block in self.network.blocks[: self.options.freeze]:
+            block.requires_grad_(False).eval()
 
     def _share(self, index: np.ndarray) -> np.ndarray:
         """This epoch's pictures: each picture comes once before any comes again."""
@@ -86,14 +93,14 @@ class Trainer:
 
     def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
         for group in self.optimiser.param_groups:
-            group["lr"] = self.options.rate * _schedule(self.step, self.total)
+            group["lr"] = self.options.rate * _schedule(self.step, self.total, self.options.cool)
         inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
         inputs = inputs.contiguous(memory_format=torch.channels_last)
         boxes = torch.from_numpy(rows)
         truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.options.bf16):
-            values = [value.float().cpu() for value in self.network(inputs)]
+            values = [value.float().cpu() for value in self.run_network(inputs)]
         parts = yolo_loss(self.spec.heads, values, truth, self.spec.width)  # type: ignore[arg-type]
         self.optimiser.zero_grad(set_to_none=True)
         sum(parts.values()).backward()  # type: ignore[union-attr]
@@ -148,9 +155,15 @@ class Trainer:
         self.mean.load_state_dict(self.network.state_dict())
 
 
-def _schedule(step: int, total: int) -> float:
+def _schedule(step: int, total: int, cool: float) -> float:
+    """Share of the learning rate: up in 200 steps, level, and down as a cosine in the last `cool` of all steps.
+
+    Level for long, so that a training can be made longer after its start ("Scaling Laws and Compute-Optimal Training
+    Beyond Fixed Training Durations", Haegele et al. 2024).
+    """
     warm = min(1.0, (step + 1) / 200)
-    return warm * (0.02 + 0.98 * 0.5 * (1 + math.cos(math.pi * min(step / total, 1.0))))
+    left = min(max(total - step, 0) / max(cool * total, 1.0), 1.0)
+    return warm * (0.02 + 0.98 * 0.5 * (1 - math.cos(math.pi * left)))
 
 
 def _ahead(pictures: Pictures, index: np.ndarray, batch: int, rng: np.random.Generator):
@@ -180,9 +193,12 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=10000, help="pictures of an epoch")
     parser.add_argument("--batch", type=int, default=24)
     parser.add_argument("--rate", type=float, default=2e-3)
+    parser.add_argument("--cool", type=float, default=0.5, help="share of the steps in which the rate falls")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--bf16", action="store_true")
+    parser.add_argument("--freeze", type=int, default=0, help="so many of the first layers keep their numbers")
+    parser.add_argument("--compile", action="store_true", help="compile the network first; needs a C++ compiler")
     parser.add_argument("--anchors", action="store_true", help="find anchors and put them into the cfg file first")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)

@@ -9,10 +9,12 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg  # noqa: E402
+from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg  # noqa: E402
 from rosbot_patrol.detection.darknet_weights import format_weights, parse_weights, weights_size  # noqa: E402
+from rosbot_patrol.detection.training.grow import grow  # noqa: E402
 from rosbot_patrol.detection.training.loss import Truth, yolo_loss  # noqa: E402
 from rosbot_patrol.detection.training.network import Darknet  # noqa: E402
+from rosbot_patrol.detection.training.train import _schedule  # noqa: E402
 
 SPEC = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
 
@@ -23,12 +25,98 @@ def test_weights_go_out_and_in_again() -> None:
     network.train()
     network(torch.rand(4, 3, 256, 320))
     data = format_weights(SPEC, network.to_weights(), seen=5)
-    assert len(data) == weights_size(SPEC) < 2_000_000
+    assert len(data) == weights_size(SPEC) < 5_000_000
     other.from_weights(parse_weights(data, SPEC))
     picture = torch.rand(1, 3, 256, 320)
     with torch.inference_mode():
         pairs = zip(network.eval()(picture), other.eval()(picture), strict=True)
         assert all(torch.allclose(a, b, atol=1e-4) for a, b in pairs)
+
+
+SMALL = """
+[net]
+width=64
+height=32
+channels=3
+[convolutional]
+batch_normalize=1
+filters=4
+size=3
+stride=2
+pad=1
+activation=leaky
+[convolutional]
+filters=7
+size=1
+activation=linear
+[yolo]
+mask=0
+anchors=10,20
+classes=2
+num=1
+"""
+LARGE = """
+[net]
+width=64
+height=32
+channels=3
+[convolutional]
+batch_normalize=1
+filters=6
+size=3
+stride=2
+pad=1
+activation=leaky
+[convolutional]
+batch_normalize=1
+filters=3
+size=1
+activation=leaky
+[convolutional]
+batch_normalize=1
+filters=6
+size=3
+pad=1
+activation=leaky
+[shortcut]
+from=-3
+activation=linear
+[convolutional]
+filters=7
+size=1
+activation=linear
+[yolo]
+mask=0
+anchors=10,20
+classes=2
+num=1
+"""
+
+
+def test_a_grown_network_answers_as_the_small_one_did() -> None:
+    torch.manual_seed(3)
+    small, large = parse_cfg(SMALL, "small"), parse_cfg(LARGE, "large")
+    before = Darknet(small)
+    before.train()
+    before(torch.rand(8, 3, 32, 64))
+    after = grow(small, before.to_weights(), large, {0: 0, 4: 1}).eval()
+    picture = torch.rand(2, 3, 32, 64)
+    with torch.inference_mode():
+        assert torch.allclose(before.eval()(picture)[0], after(picture)[0], atol=1e-5)
+    values = after.train()(picture)[0]
+    values.square().sum().backward()
+    assert all(float(p.grad.abs().max()) > 0 for p in after.blocks[2][1].parameters())
+
+
+def test_a_pair_that_does_not_fit_is_refused() -> None:
+    small, large = parse_cfg(SMALL, "small"), parse_cfg(LARGE, "large")
+    with pytest.raises(ValueError, match="channels in"):
+        grow(small, Darknet(small).to_weights(), large, {0: 0, 4: 0})
+
+
+def test_the_rate_rises_stays_and_falls() -> None:
+    shares = [_schedule(step, 1000, 0.4) for step in (0, 300, 599, 800, 999, 1500)]
+    assert shares == pytest.approx([1 / 200, 1.0, 1.0, 0.51, 0.02, 0.02], abs=2e-3)
 
 
 def test_the_loss_is_least_for_the_right_values_and_leads_there() -> None:

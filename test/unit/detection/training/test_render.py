@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.detection.letterbox import Letterbox
-from rosbot_patrol.detection.training import render
+from rosbot_patrol.detection.training import overlay, patterns, render
 from rosbot_patrol.detection.training.furniture import box, build, placed
 from rosbot_patrol.detection.training.labels import COLUMNS, column
 from rosbot_patrol.detection.training.scenes import Actor, Scene
@@ -17,7 +17,9 @@ from rosbot_patrol.simulation.renderer import EglRenderer, Light
 
 @pytest.fixture(scope="module")
 def studio() -> render.Studio:
-    return render.Studio(None)
+    made = render.Studio(None)
+    made.furnish(np.random.default_rng(0))
+    return made
 
 
 def look_at(studio: render.Studio, monkeypatch: pytest.MonkeyPatch, distance: float, *others) -> np.ndarray:
@@ -97,6 +99,35 @@ def test_degrading_keeps_size_and_kind() -> None:
         assert out.shape == (240, 320, 3)
         assert out.dtype == np.uint8
     assert render._noise(rng, 5.0).std() == pytest.approx(5.0, rel=0.1)
+
+
+def test_contrast_is_the_step_at_the_outline() -> None:
+    picture = np.full((240, 320, 3), 60, np.uint8)
+    mask = np.zeros((480, 640), bool)
+    mask[100:300, 200:400] = True
+    picture[50:150, 100:200] = 100
+    assert render.contrast(picture, mask) == pytest.approx(40, abs=4)
+    assert render.contrast(np.full((240, 320, 3), 60, np.uint8), mask) == pytest.approx(0, abs=0.1)
+
+
+def test_training_and_tests_have_other_textures() -> None:
+    drawn = patterns.draw_textures(np.random.default_rng(1))
+    again = patterns.draw_textures(np.random.default_rng(1))
+    other = patterns.draw_textures(np.random.default_rng(2))
+    assert list(drawn) == list(other)
+    assert all((drawn[k].pixels == again[k].pixels).all() for k in drawn)
+    assert all((drawn[k].pixels != other[k].pixels).any() for k in drawn)
+
+
+def test_patterns_are_laid_only_beside_people() -> None:
+    picture = np.random.default_rng(0).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+    box = np.array([[100.0, 40.0, 180.0, 239.0]])
+    changed = np.zeros((240, 320), bool)
+    for seed in range(30):
+        out = overlay.lay_patterns(picture, box, np.random.default_rng(seed))
+        changed |= (out != picture).any(axis=2)
+    assert not changed[40:239, 100:180].any()
+    assert changed.mean() > 0.2
 
 
 def test_labels_tell_bodies_apart() -> None:

@@ -5,15 +5,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rosbot_patrol.detection.training import report
+from rosbot_patrol.detection.training import report, scoring
 from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
-from rosbot_patrol.detection.training.dataset import Pictures, asked, batch_of
+from rosbot_patrol.detection.training.dataset import OVERLAY, Pictures, asked, batch_of
 
 CFG = Path(__file__).parents[4] / "models" / "house.cfg"
 
 
-def row(picture=0, kind=0, box=(0.2, 0.1, 0.4, 0.9), distance=3.0, whole=1.0, part=1.0, pixels=9000, light=100.0):
-    return [picture, kind, *box, distance, whole, part, pixels, light, 0]
+def row(
+    picture=0,
+    kind=0,
+    box=(0.2, 0.1, 0.4, 0.9),
+    distance=3.0,
+    whole=1.0,
+    part=1.0,
+    pixels=9000,
+    light=100.0,
+    contrast=50.0,
+):
+    return [picture, kind, *box, distance, whole, part, pixels, light, 0, contrast]
 
 
 @pytest.fixture
@@ -37,6 +47,8 @@ def test_a_batch_lies_in_the_letterbox_with_its_boxes(pictures: Pictures) -> Non
 def test_a_mirrored_picture_has_mirrored_boxes(pictures: Pictures) -> None:
     seen = set()
     for seed in range(12):
+        if np.random.default_rng(seed).random() < OVERLAY:
+            continue  # this one is covered with patterns
         images, rows = batch_of(pictures, pictures.index()[:1], np.random.default_rng(seed))
         x, y = int(rows[0, 2]), int(rows[0, 3])
         seen.add(x)
@@ -47,7 +59,8 @@ def test_a_mirrored_picture_has_mirrored_boxes(pictures: Pictures) -> None:
 
 def test_hardly_seen_people_are_not_asked_for() -> None:
     rows = np.array([row(), row(part=0.1), row(pixels=50), row(light=2.0), row(box=(0.5, 0.5, 0.51, 0.52))])
-    assert asked(rows).tolist() == [True, False, False, False, False]
+    rows = np.vstack([rows, row(contrast=3.0)])
+    assert asked(rows).tolist() == [True, False, False, False, False, False]
 
 
 def test_a_folder_without_pictures_is_named(tmp_path: Path) -> None:
@@ -94,27 +107,57 @@ GOOD = (96 / 320, 128 / 256, 64 / 320, 192 / 256, 0)
 
 def test_a_found_person_counts_once(pictures: Pictures) -> None:
     found = report.find_all(pictures, CFG, forward_of(GOOD))
-    result = report.figures(found, 0.5)
-    assert result["persons 1-6 m, half of the whole figure seen: there"] == 1
-    assert result["persons 1-6 m, half of the whole figure seen: found"] == 1
+    result = scoring.figures(found, 0.5)
+    assert result["persons 1-6 m, half of the figure seen: there"] == 1
+    assert result["persons 1-6 m, half of the figure seen: found"] == 1
     assert (result["person: boxes"], result["person: false"]) == (1, 0)
-    assert report.average_precision(found, 0) == pytest.approx(1.0)
-    assert "1/1 = 100.00 %" in report.say(result)
+    assert scoring.average_precision(found, 0) == pytest.approx(1.0)
+    assert "1/1 = 100.00 %" in scoring.say(result)
 
 
 def test_a_box_beside_the_person_is_a_miss_and_a_false_alarm(pictures: Pictures) -> None:
     found = report.find_all(pictures, CFG, forward_of((0.8, 0.5, 0.2, 0.7, 0)))
-    result = report.figures(found, 0.5)
-    assert result["persons 1-6 m, half of the whole figure seen: found"] == 0
+    result = scoring.figures(found, 0.5)
+    assert result["persons 1-6 m, half of the figure seen: found"] == 0
     assert (result["person: boxes"], result["person: false"]) == (1, 1)
     assert result["person: false where there is none"] == 0
-    assert report.average_precision(found, 0) == 0.0
+    assert scoring.average_precision(found, 0) == 0.0
 
 
 def test_a_person_taken_for_a_hydrant_is_false(pictures: Pictures) -> None:
-    result = report.figures(report.find_all(pictures, CFG, forward_of((*GOOD[:4], 1))), 0.5)
+    result = scoring.figures(report.find_all(pictures, CFG, forward_of((*GOOD[:4], 1))), 0.5)
     assert result["fire hydrant: false where there is none"] == 1
-    assert result["persons 1-6 m, half of the whole figure seen: found"] == 0
+    assert result["persons 1-6 m, half of the figure seen: found"] == 0
+
+
+def test_a_second_box_on_somebody_is_false(pictures: Pictures) -> None:
+    low = (96 / 320, 0.65, 50 / 320, 80 / 256, 0)
+    found = report.find_all(pictures, CFG, forward_of(GOOD, low))
+    result = scoring.figures(found, 0.5)
+    assert (result["person: boxes"], result["person: false"]) == (2, 1)
+    assert result["person: false where there is none"] == 0
+    assert scoring.average_precision(found, 0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("box", [GOOD, (96 / 320, 150 / 256, 50 / 320, 100 / 256, 0)])
+def test_a_box_on_somebody_hardly_seen_is_left_out(tmp_path: Path, box) -> None:
+    np.save(tmp_path / "set-0000.npy", np.zeros((1, 240, 320, 3), np.uint8))
+    np.savez(tmp_path / "set-0000.npz", boxes=np.array([row(part=0.1)], np.float32))
+    result = scoring.figures(report.find_all(Pictures.open(tmp_path, "set"), CFG, forward_of(box)), 0.5)
+    assert result["persons 1-6 m, half of the figure seen: there"] == 0
+    assert result["person: boxes"] == 0
+
+
+def test_a_set_without_contrast_is_taken_as_clear(tmp_path: Path) -> None:
+    np.save(tmp_path / "old-0000.npy", np.zeros((1, 240, 320, 3), np.uint8))
+    np.savez(tmp_path / "old-0000.npz", boxes=np.array([row()[:-1]], np.float32))
+    assert asked(Pictures.open(tmp_path, "old").labels[0][0]).tolist() == [True]
+
+
+def test_the_interval_is_wilson_s() -> None:
+    # Newcombe 1998, table I: 81 of 263, and 0 of 20
+    assert np.allclose(scoring.wilson(81, 263), (0.2553, 0.3662), atol=5e-5)
+    assert np.allclose(scoring.wilson(0, 20), (0.0, 0.1611), atol=5e-5)
 
 
 def test_sheets_are_drawn(pictures: Pictures, tmp_path: Path) -> None:

@@ -1,0 +1,185 @@
+"""What counts as found, as missed and as false, and the figures and tables made of it.
+
+A detection hits the person (or hydrant) of its kind that it overlaps most, where that is an IoU of 0.5 or more; each is
+hit once, by the most probable. Everything else is **false**: a box where nobody is, a second box on somebody, a box of
+the wrong size. One exception, as in the Caltech pedestrian benchmark (Dollar et al. 2012): somebody there who is not
+asked for (`dataset.asked`: hardly seen, or not to be made out) is neither missed nor false; a detection that overlaps
+him by 0.5, or lies by more than half inside his box, is left out of the count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rosbot_patrol.detection import decode
+from rosbot_patrol.detection.training.dataset import asked
+from rosbot_patrol.detection.training.labels import column
+
+KINDS = ("person", "fire hydrant")
+HIT = 0.5
+INSIDE = 0.5
+
+
+@dataclass
+class Found:
+    """All detections of a set, and the labels.
+
+    Attributes:
+        boxes: picture, kind, probability, x0, y0, x1, y1, index of the label that it hits or -1, whether it is left
+            out of the count; shape (N, 9).
+        labels: rows of the labels with the picture's number in the whole set.
+        hit: the best probability with which each label was found, 0 if not.
+        index: (shard, picture) of each picture.
+    """
+
+    boxes: np.ndarray
+    labels: np.ndarray
+    hit: np.ndarray
+    index: np.ndarray = field(repr=False)
+
+    @property
+    def wanted(self) -> np.ndarray:
+        """Which labels are asked for."""
+        return asked(self.labels)
+
+    def false(self, kind: int) -> np.ndarray:
+        """Which detections are false alarms of that kind."""
+        return (self.boxes[:, 1] == kind) & (self.boxes[:, 7] < 0) & (self.boxes[:, 8] == 0)
+
+    def good(self, kind: int) -> np.ndarray:
+        """Which detections of that kind hit what is asked for."""
+        at = self.boxes[:, 7].astype(int)
+        return (self.boxes[:, 1] == kind) & (at >= 0) & (self.wanted[at] if len(self.labels) else False)
+
+
+def match(number: int, found: decode.Candidates, rows: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of `Found.boxes` of one picture, and with which probability each of its labels was found.
+
+    Args:
+        number: of the picture.
+        found: its detections.
+        rows: its labels.
+        first: index of the first of them among all labels.
+    """
+    low, high = found.boxes[:, :2] - found.boxes[:, 2:] / 2, found.boxes[:, :2] + found.boxes[:, 2:] / 2
+    out = np.zeros((len(found), 9))
+    out[:, 0], out[:, 1] = number, found.probabilities.argmax(axis=1)
+    out[:, 2], out[:, 3:7], out[:, 7] = found.probabilities.max(axis=1), np.clip(np.hstack([low, high]), 0, 1), -1
+    truth, wanted, hit = rows[:, 2:6], asked(rows), np.zeros(len(rows))
+    for k in np.argsort(-out[:, 2], kind="stable") if len(rows) else ():
+        same = rows[:, 1] == out[k, 1]
+        overlap = _iou(out[k, 3:7], truth) * same
+        for group in (wanted, ~wanted):
+            free = np.where((hit == 0) & group, overlap, 0)
+            if free.max() >= HIT:
+                j = int(free.argmax())
+                hit[j], out[k, 7], out[k, 8] = out[k, 2], first + j, not wanted[j]
+                break
+        else:
+            out[k, 8] = ((_inside(out[k, 3:7], truth) > INSIDE) & same & ~wanted).any()
+    return out, hit
+
+
+def average_precision(found: Found, kind: int) -> float:
+    """Area under the curve of precision over recall at IoU 0.5, of what is asked for."""
+    good, false = found.good(kind), found.false(kind)
+    counts = good | false
+    order = np.argsort(-found.boxes[counts, 2], kind="stable")
+    hits = np.cumsum(good[counts][order])
+    precision = hits / np.arange(1, len(hits) + 1)
+    precision = np.maximum.accumulate(precision[::-1])[::-1]
+    recall = hits / max(int((found.wanted & (column(found.labels, "kind") == kind)).sum()), 1)
+    return float(np.sum(np.diff(np.concatenate([[0], recall])) * precision))
+
+
+def groups(found: Found) -> dict[str, np.ndarray]:
+    """The sets of labels whose recall is told, the one that is aimed at first."""
+    rows = found.labels
+    person, distance = column(rows, "kind") == 0, column(rows, "distance")
+    whole, part, light = column(rows, "seen_of_whole"), column(rows, "seen_of_part"), column(rows, "light")
+    wanted = found.wanted
+    near = (distance >= 1) & (distance <= 6) & wanted
+    aimed = person & near & (whole >= 0.5)
+    edge = (column(rows, "x0") < 0.01) | (column(rows, "x1") > 0.99)
+    sets = {
+        "persons 1-6 m, half of the figure seen": aimed,
+        "persons 1-6 m, half of what is inside the picture seen": person & near & (part >= 0.5),
+        "fire hydrants 1-6 m, half seen": ~person & near & (part >= 0.5),
+    }
+    for low, high in ((0.7, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 6), (6, 7), (7, 8.6)):
+        there = person & wanted & (distance >= low) & (distance < high)
+        sets[f"distance {low:g}-{high:g} m, half of what is inside the picture seen"] = there & (part >= 0.5)
+    for low, high in ((0.1, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.01)):
+        sets[f"1-6 m, {low:.0%} to {min(high, 1):.0%} of the figure seen"] = (
+            person & near & (whole >= low) & (whole < high)
+        )
+    for low, high, name in ((0, 25, "dark"), (25, 60, "dim"), (60, 130, "usual"), (130, 256, "bright")):
+        sets[f"1-6 m, half of the figure seen, {name} (mean level {low}-{min(high, 255)})"] = (
+            aimed & (light >= low) & (light < high)
+        )
+    sets["1-6 m, half of the figure seen, outline of 15 levels or less"] = aimed & (column(rows, "contrast") <= 15)
+    sets["1-6 m, half of the figure seen, at the picture's edge"] = aimed & edge
+    sets["1-6 m, half of the figure seen, away from the edge"] = aimed & ~edge
+    return sets
+
+
+def figures(found: Found, threshold: float) -> dict[str, float]:
+    """Counts at a threshold."""
+    out: dict[str, float] = {"threshold": threshold, "pictures": len(found.index)}
+    for name, chosen in groups(found).items():
+        out[f"{name}: there"], out[f"{name}: found"] = int(chosen.sum()), int((found.hit[chosen] > threshold).sum())
+    sure = found.boxes[:, 2] > threshold
+    for kind, name in enumerate(KINDS):
+        false, good = found.false(kind) & sure, found.good(kind) & sure
+        there = np.isin(found.boxes[:, 0], column(found.labels, "picture")[column(found.labels, "kind") == kind])
+        out[f"{name}: boxes"], out[f"{name}: false"] = int((false | good).sum()), int(false.sum())
+        out[f"{name}: false where there is none"] = int((false & ~there).sum())
+    return out
+
+
+def wilson(hits: float, count: float) -> tuple[float, float]:
+    """The 95 % interval of a share (Wilson 1927)."""
+    if not count:
+        return 0.0, 1.0
+    z, share = 1.959964, hits / count
+    middle = (share + z * z / (2 * count)) / (1 + z * z / count)
+    half = z * np.sqrt(share * (1 - share) / count + z * z / (4 * count * count)) / (1 + z * z / count)
+    return float(middle - half), float(middle + half)
+
+
+def say(result: dict[str, float]) -> str:
+    """The figures as lines of text."""
+    lines = [f"threshold {result['threshold']:g}, {result['pictures']:.0f} pictures"]
+    for name, value in result.items():
+        stem, _, what = name.rpartition(": ")
+        if what == "there":
+            lines.append(f"  recall, {stem}: {_share(result[stem + ': found'], value)}")
+        elif what == "boxes":
+            share = _share(value - result[stem + ": false"], value)
+            alone = result[stem + ": false where there is none"]
+            lines.append(f"  precision, {stem}: {share} ({alone:.0f} false with none there)")
+    return "\n".join(lines)
+
+
+def _share(hits: float, count: float) -> str:
+    if not count:
+        return "none there"
+    low, high = wilson(hits, count)
+    return f"{hits:.0f}/{count:.0f} = {100 * hits / count:.2f} % (95 %: {100 * low:.1f} to {100 * high:.1f})"
+
+
+def _iou(box: np.ndarray, others: np.ndarray) -> np.ndarray:
+    shared = _shared(box, others)
+    union = (box[2:] - box[:2]).prod() + (others[:, 2:] - others[:, :2]).prod(axis=1) - shared
+    return shared / np.maximum(union, 1e-9)
+
+
+def _inside(box: np.ndarray, others: np.ndarray) -> np.ndarray:
+    return _shared(box, others) / max(float((box[2:] - box[:2]).prod()), 1e-9)
+
+
+def _shared(box: np.ndarray, others: np.ndarray) -> np.ndarray:
+    corners = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
+    return np.asarray(np.clip(corners, 0, None).prod(axis=1))

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rosbot_patrol.detection.training import mine
+from rosbot_patrol.detection.training.dataset import Pictures
+from rosbot_patrol.detection.training.scoring import Found
+
+
+def label(picture: int, **change: float) -> list[float]:
+    return [picture, 0, 0.2, 0.1, 0.4, 0.9, 3.0, 1.0, change.get("part", 1.0), 9000, 100, 0, 50]
+
+
+def test_misses_and_false_alarms_count_by_their_size() -> None:
+    box = [0.5, 0.1, 0.7, 0.9]
+    found = Found(
+        boxes=np.array([[0, 0, 0.9, *box, 0, 0], [1, 0, 0.7, *box, -1, 0], [3, 0, 0.9, *box, -1, 1]]),
+        labels=np.array([label(0), label(2), label(3, part=0.1)]),
+        hit=np.array([0.9, 0.3, 0.0]),
+        index=np.zeros((4, 2), int),
+    )
+    assert mine.errors(found, 0.2) == pytest.approx([0.0, 0.7, 0.5, 0.0])
+
+
+def test_what_is_picked_is_a_set_like_any_other(tmp_path: Path) -> None:
+    shots = np.random.default_rng(0).integers(0, 255, (3, 240, 320, 3), dtype=np.uint8)
+    np.save(tmp_path / "a-0000.npy", shots)
+    np.savez(tmp_path / "a-0000.npz", boxes=np.array([label(0), label(2)], np.float32))
+    mine.write_set(Pictures.open(tmp_path, "a"), np.array([[0, 1], [0, 2]]), tmp_path, "hard")
+    picked = Pictures.open(tmp_path, "hard")
+    assert (picked.picture(0, 0) == shots[1]).all()
+    assert (picked.picture(0, 1) == shots[2]).all()
+    assert [len(rows) for rows in picked.labels[0]] == [0, 1]
+
+
+def test_test_pictures_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    files = ["--data", str(tmp_path), "--cfg", "x", "--weights", "x"]
+    monkeypatch.setattr("sys.argv", ["mine", *files, "--name", "vary,test"])
+    with pytest.raises(SystemExit):
+        mine.main()
+    assert "not for training" in capsys.readouterr().err
