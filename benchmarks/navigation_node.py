@@ -5,7 +5,7 @@
 
 For each profile the whole house runs at real time without the detector, and the robot is sent from room to room.
 CPU of the process counts while the robot drives, as a share of one core; memory is what is resident at the end.
-`--busy N` lets N other processes run without a pause meanwhile. `missed` counts the lines "missed its desired rate"
+`--busy N` lets N other processes run without a pause meanwhile, in sessions of their own. `missed` counts the lines "missed its desired rate"
 since the start. Where the package path has the original move_base instead of ours, it is the one that is measured, and
 said so.
 """
@@ -127,7 +127,9 @@ def main() -> int:
     elf = original()
     print(f"measured: {elf or 'move_base of rosbot_patrol; the original is not on the package path'}", flush=True)
     costs: dict[str, Cost] = {}
-    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(options.busy)]
+    spin = [sys.executable, "-c", "while True: pass"]
+    # each in a session of its own: Linux shares the processor between sessions first, as between the nodes
+    busy = [subprocess.Popen(spin, start_new_session=True) for _ in range(options.busy)]
     with tempfile.TemporaryDirectory(prefix="navigation-node-") as name:
         master = Master(Path(name) / "roscore.log")
         try:

@@ -124,14 +124,14 @@ class CollisionGuard:
         place = transform_points(sensor, np.array([[distance, 0.0]]))[0]
         met = _Met(float(place[0]), float(place[1]), odom_from_base, now)
         self._last_met[name] = met
-        if before is None or not 0.0 <= now - before.stamp <= self._params.stale_after:
+        if before is None or abs(now - before.stamp) > self._params.stale_after:
             return
         if float(np.hypot(*(before.now_in(odom_from_base)[0] - place))) <= _AGREE:
             self._met.append(met)
 
     def _is_past(self, met: _Met, sensor: Pose2D, seen_to: float, now: float, odom_from_base: Pose2D | None) -> bool:
         """Whether a place is forgotten, or lies where a sensor has just looked: told anew, or nothing there."""
-        if not 0.0 <= now - met.stamp <= self._params.range_memory:
+        if abs(now - met.stamp) > self._params.range_memory:
             return True
         x, y = transform_points(invert(sensor), met.now_in(odom_from_base))[0].tolist()
         return math.hypot(x, y) < seen_to + _AGREE and abs(math.atan2(y, x)) < _BESIDE
@@ -140,7 +140,7 @@ class CollisionGuard:
         """The part of a commanded velocity that is safe."""
         if wish == STOP:
             return Verdict(STOP, 1.0, "")
-        if not 0.0 <= now - self._stamp <= self._params.stale_after:
+        if abs(now - self._stamp) > self._params.stale_after:  # it may have come after `now` was read
             return self._without_sight(wish, now)
         points = self._points(now, odom_from_base)
         scale = self._free_part(wish, points)
@@ -180,7 +180,7 @@ class CollisionGuard:
             if len(self._blind):
                 parts.append(transform_points(base_from_odom, self._blind))
         for met in self._met:
-            if 0.0 <= now - met.stamp <= p.range_memory:
+            if abs(now - met.stamp) <= p.range_memory:
                 parts.append(np.repeat(met.now_in(odom_from_base), p.min_points, axis=0))
         return np.vstack(parts)
 

@@ -81,7 +81,7 @@ class Watch:
 
     def candidate(self, now: float, recent: float = 0.6) -> bool:
         """Whether a picture that came lately shows something that may become an intruder."""
-        return any(view.boxes and 0.0 <= now - view.arrived <= recent for view in self._views)
+        return any(view.boxes and abs(now - view.arrived) <= recent for view in self._views)
 
     def _is_plausible(self, box: Box) -> bool:
         if box.label not in self._classes or not 0.0 < box.probability <= 1.0:

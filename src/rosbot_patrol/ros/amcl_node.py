@@ -312,4 +312,4 @@ def body() -> None:
 
 def main() -> None:
     """The program."""
-    run_node("amcl", body, urgency=5)
+    run_node("amcl", body, urgency=15)

@@ -43,5 +43,8 @@ class Latest(Generic[T]):
         return self._count
 
     def fresh(self, now: float, timeout: float) -> bool:
-        """Whether the newest value is at most `timeout` [s] old. A clock that went back counts as stale."""
-        return self._value is not None and 0.0 <= now - self._stamp <= timeout
+        """Whether the newest value is at most `timeout` [s] old.
+
+        One that came after `now` was read is fresh; a clock that went back by more than the time-out counts as stale.
+        """
+        return self._value is not None and abs(now - self._stamp) <= timeout

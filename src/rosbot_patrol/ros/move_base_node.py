@@ -319,4 +319,4 @@ class MoveBaseNode:
 def main() -> None:
     """Start the node."""
     give_back_large_blocks()
-    run_node("move_base", lambda: MoveBaseNode().run(), urgency=5)
+    run_node("move_base", lambda: MoveBaseNode().run(), urgency=15)

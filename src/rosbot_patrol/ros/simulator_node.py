@@ -229,4 +229,4 @@ def _description(p: SimulatorParams) -> RobotDescription:
 
 def main() -> None:
     """Load parameters, world and robot; simulate."""
-    run_node("simulator", lambda: Simulator(load_params(SimulatorParams)).run())
+    run_node("simulator", lambda: Simulator(load_params(SimulatorParams)).run(), urgency=5)

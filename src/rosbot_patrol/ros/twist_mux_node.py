@@ -250,4 +250,4 @@ def body() -> None:
 
 def main() -> None:
     """Run the node."""
-    run_node("twist_mux", body, urgency=5)
+    run_node("twist_mux", body, urgency=15)

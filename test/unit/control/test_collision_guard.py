@@ -164,6 +164,12 @@ def test_without_a_fresh_scan_it_creeps_and_says_so():
     assert guard.limit(AHEAD, -5.0).scale < 1.0  # the clock went back
 
 
+def test_a_scan_that_comes_while_a_command_is_looked_at_is_fresh():
+    guard = CollisionGuard(GuardParams())
+    guard.see(cast(wall_ahead(3.0), Pose2D()), BASE_FROM_LASER, 10.02)
+    assert guard.limit(AHEAD, 10.0).scale == 1.0
+
+
 def test_moves_between_scans_are_accounted_for():
     guard = guard_at(wall_ahead(0.5))
     assert guard.limit(AHEAD, 0.2, Pose2D(0.3, 0.0, 0.0)).scale < guard.limit(AHEAD, 0.2, Pose2D()).scale
