@@ -5,9 +5,9 @@
 
 For each profile the whole house runs at real time without the detector, and the robot is sent from room to room.
 CPU of the process counts while the robot drives, as a share of one core; memory is what is resident at the end.
-`--busy N` lets N other processes run without a pause meanwhile, in sessions of their own. `missed` counts the lines "missed its desired rate"
-since the start. Where the package path has the original move_base instead of ours, it is the one that is measured, and
-said so.
+`--busy N` lets N other processes run without a pause meanwhile, in sessions of their own. `missed` counts the lines
+"missed its desired rate" since the start. Where the package path has the original move_base instead of ours, it is the
+one that is measured, and said so.
 """
 
 from __future__ import annotations
