@@ -11,8 +11,11 @@ import sys
 import time
 
 import actionlib
+import cv2
 import numpy as np
+import roslib.message
 import rospy
+import rosservice
 from actionlib_msgs.msg import GoalStatus
 from darknet_ros_msgs.msg import BoundingBoxes, CheckForObjectsAction, CheckForObjectsGoal, ObjectCount
 from diagnostic_msgs.msg import DiagnosticArray
@@ -21,7 +24,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from rosbot_patrol.images.compressed import CompressedParams, compress
-from rosbot_patrol.images.encodings import Picture
+from rosbot_patrol.images.encodings import ENCODINGS, Picture
 from rosbot_patrol.ros.convert_images import picture_from_msg, picture_to_msg
 
 CAMERA = "/camera/rgb/image_raw"
@@ -33,15 +36,28 @@ def say(**what):
 
 
 def make_picture(colour="red", encoding="rgb8"):
-    """Black but for 8 x 8 pixels at (16, 24)."""
+    """Black but for 10 x 10 pixels at (14, 22): the network looks at each eighth pixel, here at (16, 24)."""
     pixels = np.zeros((64, 64, 3), dtype=np.uint8)
-    pixels[24:32, 16:24] = COLOURS[colour]
-    if encoding in ("rgba8", "bgra8"):
-        order = [0, 1, 2] if encoding == "rgba8" else [2, 1, 0]
-        return Picture(np.concatenate([pixels[:, :, order], pixels[:, :, :1]], axis=2), encoding)
-    if encoding == "mono16":
-        return Picture(pixels[:, :, :1].astype(np.uint16) * 257, encoding)
-    return Picture(pixels, "rgb8").to(encoding)
+    pixels[22:32, 14:24] = COLOURS[colour]
+    if encoding in ("mono8", "rgb8", "bgr8"):
+        return Picture(pixels, "rgb8").to(encoding)
+    known = ENCODINGS[encoding]
+    scale = 257 if known.dtype == "u2" else 1
+    if encoding.startswith("bayer"):
+        tile = np.array(["rgb".index(letter) for letter in encoding[6:10]]).reshape(2, 2)
+        mosaic = np.take_along_axis(pixels, np.tile(tile, (32, 32))[:, :, None], axis=2)
+        return Picture(mosaic.astype(known.dtype) * scale, encoding)
+    if encoding.startswith("yuv"):
+        y, u, v = cv2.split(cv2.cvtColor(pixels, cv2.COLOR_RGB2YUV))
+        # OpenCV's YUV spans 0 to 255, a camera's 16 to 235; colours stay the same
+        y, u, v = (16 + y * 0.859).astype(np.uint8), u[:, ::2], v[:, ::2]
+        pairs = np.stack([u, y[:, ::2], v, y[:, 1::2]] if encoding == "yuv422" else [y[:, ::2], u, y[:, 1::2], v], 2)
+        return Picture(pairs.reshape(64, 64, 2), encoding)
+    if known.channels == 1:
+        return Picture(pixels[:, :, :1].astype(known.dtype) * scale, encoding)
+    picture = np.zeros((64, 64, known.channels), dtype=known.dtype)
+    picture[:, :, list(known.order)] = pixels.astype(known.dtype) * scale
+    return Picture(picture, encoding)
 
 
 def make_message(stamp, colour="red", encoding="rgb8"):
@@ -120,25 +136,89 @@ def empty():
 
 def encodings():
     client = Client()
-    for i, encoding in enumerate(("rgb8", "bgr8", "rgba8", "bgra8", "mono8", "mono16")):
-        counts, found = client.look(make_message(100 + i, "blue", encoding))
-        say(encoding=encoding, counts=[c.count for c in counts], boxes=[describe(m) for m in found])
-    broken = make_message(200)
-    broken.encoding = "yuv422"
-    client.look(broken)
-    broken = make_message(201)
-    broken.data = broken.data[:100]
-    client.look(broken)
-    part = [s for m in client.heard["health"] for s in m.status if s.name.endswith("camera")]
-    say(health=[[s.level, s.message] for s in part if "bytes" in s.message or "yuv" in s.message][:1])
+    for i, encoding in enumerate(ENCODINGS):
+        if encoding not in ("16UC1", "32FC1"):
+            counts, found = client.look(make_message(100 + i, "blue", encoding))
+            say(encoding=encoding, counts=[c.count for c in counts], boxes=[describe(m) for m in found])
+
+
+def nonsense():
+    """Pictures that make no sense, one after the other, and then one that does."""
+    client = Client()
+    broken = [make_message(200 + i) for i in range(8)]
+    broken[0].encoding = "nv21"
+    broken[1].data = broken[1].data[:100]
+    broken[2].step = 7
+    broken[3].width = 0
+    broken[4] = make_message(204, encoding="32FC1")
+    broken[4].data = np.full(64 * 64, np.nan, np.float32).tobytes()
+    broken[5].width, broken[5].height, broken[5].step, broken[5].data = 1, 1, 3, b"\xff\x00\x00"
+    broken[6].height = 2**32 - 1
+    broken[7].encoding = ""
+    for message in broken:
+        counts, found = client.look(message)
+        part = [s for m in client.heard["health"] for s in m.status if s.name.endswith("camera")]
+        say(counts=[c.count for c in counts], boxes=len(found), health=[part[-1].level, part[-1].message])
     say(alive=[describe(m) for m in client.look(make_message(300, "blue"))[1]])
 
 
+def contract():
+    """What others see of the node's topics."""
+    Client(drawn=True)
+    topics = dict(rospy.get_published_topics("/darknet_ros"))
+    say(topics={name: [kind, roslib.message.get_message_class(kind)._md5sum] for name, kind in topics.items()})
+    say(services=[name for name in rosservice.get_service_list("/darknet_ros") if not name.endswith("_logger_level")])
+
+
+def latching():
+    """What somebody hears who comes when all is over."""
+    client = Client(drawn=True)
+    client.look(make_message(100))
+    client.wait(lambda: client.heard["drawn"])
+    late = Client(drawn=True)
+    time.sleep(0.5)
+    say(late={name: [m.header.stamp.secs for m in late.heard[name]] for name in ("boxes", "count", "drawn")})
+    say(ok=[m.data for m in late.heard["ok"]])
+
+
+def undrawn():
+    """A picture that nobody wanted to see drawn is not there for who comes later."""
+    client = Client()
+    client.look(make_message(100))
+    late = Client(drawn=True)
+    time.sleep(0.5)
+    say(late=len(late.heard["drawn"]))
+
+
+def hog():
+    """Somebody who stands, drawn into a room, and nobody."""
+    client = Client()
+    for stamp, people in ((100, 1), (101, 0)):
+        room = np.full((480, 640, 3), 190, dtype=np.uint8)
+        if people:
+            for start, end, thick in (
+                ((0, 45), (0, 120), 44),
+                ((-12, 120), (-18, 235), 22),
+                ((12, 120), (18, 235), 22),
+            ):
+                cv2.line(room, (400 + start[0], 150 + start[1]), (400 + end[0], 150 + end[1]), (40, 40, 50), thick)
+            cv2.circle(room, (400, 168), 16, (70, 80, 120), -1)
+        message = picture_to_msg(Picture(room, "rgb8"), rospy.Header())
+        message.header.stamp = rospy.Time(stamp)
+        counts, found = client.look(message)
+        say(counts=[c.count for c in counts], boxes=[describe(m) for m in found])
+
+
 def compressed():
+    """A jpeg that is none, one that ends too soon, then a good one."""
     client = Client(topic=CAMERA + "/compressed", kind=CompressedImage)
     text, data = compress(make_picture(), CompressedParams(format="png"))
     message = CompressedImage(format=text, data=b"\xff\xd8 broken")
     message.header.stamp = rospy.Time(90)
+    client.look(message)
+    _, jpeg = compress(make_picture(), CompressedParams())
+    message = CompressedImage(format="rgb8; jpeg compressed bgr8", data=jpeg[: len(jpeg) // 3])
+    message.header.stamp = rospy.Time(91)
     client.look(message)
     message = CompressedImage(format=text, data=data)
     message.header.stamp = rospy.Time(100)

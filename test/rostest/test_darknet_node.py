@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,7 @@ def models(tmp_path_factory):
         format_weights(parse_cfg(CFG), [ConvWeights(weights=weights, biases=biases)])
     )
     (folder / "colours.names").write_text("person\nfire hydrant\n")
+    (folder / "odd.cfg").write_text(CFG.replace("[convolutional]", "[lstm]"))
     (folder / "short.weights").write_bytes((folder / "colours.weights").read_bytes()[:-8])
     return folder
 
@@ -97,22 +99,90 @@ def test_publish_empty(ros, models):
     assert play(ros, "empty") == [{"messages": [[]]}]
 
 
-def test_encodings_and_pictures_that_make_no_sense(ros, models):
+def test_encodings(ros, models):
+    start(ros, models)
+    said = play(ros, "encodings")
+    assert len(said) == 23
+    for line in said:
+        grey = line["encoding"] in ("mono8", "mono16", "8UC1")
+        assert line["boxes"] == ([] if grey else [[HYDRANT]]), line
+        assert line["counts"] == [0 if grey else 1], line
+
+
+def test_pictures_that_make_no_sense(ros, models):
     node = start(ros, models)
-    *said, health, alive = play(ros, "encodings")
-    for line in said[:4]:
-        assert line["boxes"] == [[HYDRANT]], line
-    assert [line["counts"] for line in said[4:]] == [[0], [0]]  # grey is neither
-    node.says("'yuv422' is not known here")
-    node.says("needs 12288 bytes, it has 100")
-    assert health["health"][0][0] == 2
+    *said, alive = play(ros, "nonsense")
+    sentences = [
+        "the encoding 'nv21' is not known here, expected one of mono8",
+        "a picture of 64x64 rgb8 with rows of 192 bytes needs 12288 bytes, it has 100",
+        "a picture of 64x64 rgb8 with rows of 7 bytes needs 12288 bytes, it has 12288",
+        "a picture of 0x64 pixels is empty",
+        "a picture of encoding 32FC1 has no colours",
+        None,  # 1 x 1 is a picture; nothing is seen in it
+        "a picture of 64x4294967295 rgb8 with rows of 192 bytes needs",
+        "the encoding '' is not known here",
+    ]
+    for line, sentence in zip(said, sentences, strict=True):
+        if sentence is None:
+            assert line["counts"] != []
+            continue
+        assert (line["counts"], line["boxes"], line["health"][0]) == ([], 0, 2)
+        assert sentence in line["health"][1]
+        node.says(sentence)
     assert alive == {"alive": [[HYDRANT]]}
+    assert "Traceback" not in node.output
+
+
+def test_types_and_sums(ros, models):
+    start(ros, models)
+    topics, services = play(ros, "contract")
+    boxes, count = "004f6f4f48a741582d10735997905846", "123675bf4420958597b5a78cb3800a1f"
+    assert topics["topics"]["/darknet_ros/bounding_boxes"] == ["darknet_ros_msgs/BoundingBoxes", boxes]
+    assert topics["topics"]["/darknet_ros/found_object"] == ["darknet_ros_msgs/ObjectCount", count]
+    assert topics["topics"]["/darknet_ros/detection_image"][0] == "sensor_msgs/Image"
+    action = {name.rpartition("/")[2]: kind[0] for name, kind in topics["topics"].items() if "check_for" in name}
+    assert action == {
+        "status": "actionlib_msgs/GoalStatusArray",
+        "result": "darknet_ros_msgs/CheckForObjectsActionResult",
+        "feedback": "darknet_ros_msgs/CheckForObjectsActionFeedback",
+    }
+    assert "/darknet_ros/enable" in services["services"]
+
+
+def test_only_the_drawn_picture_is_latched(ros, models):
+    start(ros, models)
+    late, ok = play(ros, "latching")
+    assert late["late"] == {"boxes": [], "count": [], "drawn": [100]}
+    assert ok == {"ok": [True]}
+
+
+def test_latching_by_parameter(ros, models):
+    latch = {f"publishers/{name}/latch": "true" for name in ("bounding_boxes", "object_detector")}
+    start(ros, models, **latch, **{"publishers/detection_image/latch": "false"})
+    assert play(ros, "latching")[0]["late"] == {"boxes": [100], "count": [100], "drawn": []}
+
+
+def test_nothing_is_drawn_for_nobody(ros, models):
+    start(ros, models)
+    assert play(ros, "undrawn") == [{"late": 0}]
+
+
+def test_people_without_weights(ros, models):
+    start(ros, models, network="hog", **{"yolo_model/weight_file/name": "none.weights"})
+    seen, nobody = play(ros, "hog")
+    assert seen["counts"] == [1]
+    name, number, xmin, ymin, xmax, ymax, _ = seen["boxes"][0][0]
+    assert (name, number) == ("person", 0)
+    assert xmin < 400 < xmax
+    assert ymin < 200
+    assert ymax > 330
+    assert nobody == {"counts": [0], "boxes": []}
 
 
 def test_compressed_input(ros, models):
     node = start(ros, models, image_transport="compressed")
     assert play(ros, "compressed") == [{"boxes": [[PERSON]]}]
-    node.says("are no picture that can be read")
+    node.says("9 bytes of the format 'rgb8; png compressed bgr8' are no picture that can be read")
 
 
 def test_action_answers_with_the_boxes_of_its_own_picture(ros, models):
@@ -158,6 +228,25 @@ def test_newest_picture_only(ros, models):
 def test_says_what_it_waits_for(ros, models):
     node = start(ros, models)
     node.says("waiting for pictures on /camera/rgb/image_raw (sensor_msgs/Image): nobody publishes it")
+    assert "there are pictures on" not in node.output
+
+
+def test_says_where_there_are_pictures_instead_and_what_comes(ros, models):
+    probe = ros.probe()
+    probe.tell(advertise=["/usb_cam/image_raw", "sensor_msgs/Image"])
+    probe.tell(advertise=["/typed", "sensor_msgs/CompressedImage"])
+    node = start(ros, models)
+    other = ros.node("republish", "raw", "in:=/typed", "compressed", "out:=/nowhere", "__name:=other")
+    node.says("nobody publishes it; there are pictures on")
+    assert "/usb_cam/image_raw (sensor_msgs/Image)" in node.output
+    other.says("published by /probe")
+    other.says("as sensor_msgs/CompressedImage, which is another type")
+    probe.tell(advertise=["/camera/rgb/image_raw", "sensor_msgs/Image"])
+    until = time.monotonic() + 10.0
+    while "come in," not in node.output and time.monotonic() < until:
+        probe.tell(publish=["/camera/rgb/image_raw", {"height": 1, "width": 1, "encoding": "mono8", "data": [7]}])
+        time.sleep(0.2)
+    node.says("/camera/rgb/image_raw: pictures of 1x1 mono8 come in, ")
 
 
 @pytest.mark.parametrize(
@@ -166,6 +255,7 @@ def test_says_what_it_waits_for(ros, models):
         ({"yolo_model/weight_file/name": "none.weights"}, "none.weights is not there: put the file of"),
         ({"yolo_model/weight_file/name": "short.weights"}, "is cut short: it has 124 bytes"),
         ({"yolo_model/config_file/name": "none.cfg"}, "none.cfg cannot be read"),
+        ({"yolo_model/config_file/name": "odd.cfg"}, "odd.cfg, line 5: [lstm] is a layer that is not known here"),
         ({"yolo_model/detection_classes/names": "[a, b, c]"}, "3 class names are given"),
         ({"yolo_model/threshold/value": "2.5"}, "/darknet_ros/yolo_model/threshold/value: is 2.5, expected at most 1"),
     ],

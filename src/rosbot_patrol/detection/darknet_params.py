@@ -126,6 +126,7 @@ class DarknetParams:
     yolo_model: YoloModel = field(default_factory=YoloModel)
     weights_path: str = param("", doc="folder of the weights file")
     config_path: str = param("", doc="folder of the network file")
+    network: str = param("darknet", choices=("darknet", "hog"), doc="hog: OpenCV's people detector, without any files")
     image_transport: str = param("raw", choices=("raw", "compressed"), doc="how pictures come in")
     publish_empty: bool = param(False, doc="send bounding_boxes also of pictures in which nothing is seen")
     enabled: bool = param(True, doc="look from the start; the service ~enable switches it")

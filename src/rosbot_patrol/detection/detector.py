@@ -56,6 +56,10 @@ class Detector(Protocol):
     def names(self) -> tuple[str, ...]:
         """The classes it knows."""
 
+    @property
+    def runtime(self) -> str:
+        """What computes it, for logs."""
+
     def detect(self, picture: Picture) -> list[Detection]:
         """What is seen in one picture.
 

@@ -4,7 +4,8 @@ Matches compressed_image_transport (noetic-devel): the format "rgb8; jpeg compre
 as blue, green, red, the source's encoding restored on the way back.
 
 Differs: 16-bit pictures become jpegs with their values scaled to 8 bits, where upstream cuts them off at 255; `mode`
-gray gives mono8 for jpeg too; a depth picture as jpeg is refused.
+gray gives mono8 for jpeg too; a depth picture as jpeg is refused; colours of 16 bits and yuv422 travel as 8 bits a
+colour.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ def compress(picture: Picture, params: CompressedParams) -> tuple[str, bytes]:
     Raises:
         ImageError: this encoding cannot be compressed that way.
     """
+    if _has_no_place(picture, params.format):
+        picture = picture.eight_bits()
     colour = picture.encoding in COLOURS
     pixels = _blue_first(picture) if colour else picture.pixels
     if pixels.dtype != np.uint8 and params.format == "jpeg":
@@ -87,6 +90,13 @@ def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
     return _restore(pixels.reshape(*pixels.shape[:2], -1), encoding, mode)
 
 
+def _has_no_place(picture: Picture, name: str) -> bool:
+    """Whether a file of that format cannot hold its values as they are, or a reader would take them for others."""
+    known = ENCODINGS[picture.encoding]
+    deep = picture.pixels.dtype == np.uint16
+    return known.channels == 2 or (deep and (known.channels > 1 or (known.raw and name == "jpeg")))
+
+
 def _blue_first(picture: Picture) -> np.ndarray:
     codes = {"rgb8": cv2.COLOR_RGB2BGR, "rgba8": cv2.COLOR_RGBA2BGR, "bgra8": cv2.COLOR_BGRA2BGR}
     code = codes.get(picture.encoding, cv2.COLOR_BGRA2BGR if picture.pixels.shape[2] == 4 else None)
@@ -98,8 +108,10 @@ def _restore(pixels: np.ndarray, encoding: str, mode: str) -> Picture:
     if channels == 1:
         if pixels.dtype == np.uint8 and encoding == "mono16":  # a jpeg of it
             return Picture(pixels.astype(np.uint16) * 257, encoding)
-        deep = encoding if encoding in ("mono16", "16UC1") else "mono16"
-        return Picture(pixels, "mono8" if pixels.dtype == np.uint8 else deep)
+        known = ENCODINGS.get(encoding)
+        if known is not None and known.channels == 1 and np.dtype(known.dtype) == pixels.dtype:
+            return Picture(pixels, encoding)
+        return Picture(pixels, "mono8" if pixels.dtype == np.uint8 else "mono16")
     if pixels.dtype != np.uint8:
         raise ImageError(f"a colour picture of {pixels.dtype.itemsize * 8} bits a value is not supported")
     codes = {

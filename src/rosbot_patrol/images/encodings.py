@@ -1,11 +1,12 @@
 """Pictures in the encodings of sensor_msgs/Image, as numpy arrays.
 
-Matches what cv_bridge makes of mono8, mono16, rgb8, bgr8, rgba8, bgra8, their 8UC and 16UC names and 32FC1, without
-OpenCV (98 MB in a process that only has to look at pixels).
+Matches what cv_bridge makes of mono, rgb, bgr, rgba and bgra of 8 and 16 bits, their 8UC and 16UC names, 32FC1, and a
+camera's own bayer mosaics and yuv422. Only the last two need OpenCV (98 MB in a process that only looks at pixels).
 """
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +16,19 @@ from rosbot_patrol.errors import ImageError
 
 @dataclass(frozen=True)
 class Encoding:
-    """Type and number of the values of a pixel; `order` says which are red, green and blue, () where none is."""
+    """Type and number of the values of a pixel.
+
+    Args:
+        dtype: numpy's name of the type, without byte order.
+        channels: values of a pixel.
+        order: which are red, green and blue, () where none is.
+        raw: as a camera's chip or driver gives it, to be developed into colours (`raw_colours`).
+    """
 
     dtype: str
     channels: int
     order: tuple[int, ...] = ()
+    raw: bool = False
 
 
 ENCODINGS = {
@@ -29,11 +38,22 @@ ENCODINGS = {
     "rgba8": Encoding("u1", 4, (0, 1, 2)),
     "bgra8": Encoding("u1", 4, (2, 1, 0)),
     "mono16": Encoding("u2", 1, (0, 0, 0)),
+    "rgb16": Encoding("u2", 3, (0, 1, 2)),
+    "bgr16": Encoding("u2", 3, (2, 1, 0)),
+    "rgba16": Encoding("u2", 4, (0, 1, 2)),
+    "bgra16": Encoding("u2", 4, (2, 1, 0)),
     "8UC1": Encoding("u1", 1, (0, 0, 0)),
     "8UC3": Encoding("u1", 3, (2, 1, 0)),
     "8UC4": Encoding("u1", 4, (2, 1, 0)),
     "16UC1": Encoding("u2", 1),
     "32FC1": Encoding("f4", 1),
+    **{
+        f"bayer_{pattern}{bits}": Encoding(dtype, 1, raw=True)
+        for pattern in ("rggb", "bggr", "gbrg", "grbg")
+        for bits, dtype in ((8, "u1"), (16, "u2"))
+    },
+    "yuv422": Encoding("u1", 2, raw=True),
+    "yuv422_yuy2": Encoding("u1", 2, raw=True),
 }
 
 
@@ -68,17 +88,21 @@ class Picture:
         """
         order = ENCODINGS[self.encoding].order
         if not order:
-            colours = ", ".join(name for name, known in ENCODINGS.items() if known.order)
-            raise ImageError(f"a picture of encoding {self.encoding} has no colours, expected one of {colours}")
+            raise self._no_colours()
         return order
 
     def eight_bits(self) -> Picture:
-        """The same with 8 bits a value; 16 bits are scaled as cv_bridge does."""
+        """The same with 8 bits a value and in colours or grey; 16 bits are scaled as cv_bridge does."""
+        if ENCODINGS[self.encoding].raw:
+            develop = importlib.import_module("rosbot_patrol.images.raw_colours").develop
+            developed: Picture = develop(self)
+            return developed.eight_bits()
         if self.pixels.dtype == np.uint8:
             return self
-        order = self.order  # refuses depth
+        if not ENCODINGS[self.encoding].order:
+            raise self._no_colours()
         scaled = ((self.pixels.astype(np.uint32) * 255 + 32767) // 65535).astype(np.uint8)
-        return Picture(scaled, "mono8" if len(order) == 3 and self.pixels.shape[2] == 1 else self.encoding)
+        return Picture(scaled, self.encoding.replace("16", "8"))
 
     def to(self, encoding: str) -> Picture:
         """The same in mono8, rgb8 or bgr8; the pixels may be shared with this one."""
@@ -93,6 +117,10 @@ class Picture:
         if source.pixels.shape[2] == 3 and order == (0, 1, 2):
             return Picture(source.pixels, encoding)
         return Picture(np.ascontiguousarray(source.pixels[:, :, list(order)]), encoding)
+
+    def _no_colours(self) -> ImageError:
+        colours = ", ".join(name for name, known in ENCODINGS.items() if known.order or known.raw)
+        return ImageError(f"a picture of encoding {self.encoding} has no colours, expected one of {colours}")
 
     def _grey(self) -> np.ndarray:
         if self.pixels.shape[2] == 1:

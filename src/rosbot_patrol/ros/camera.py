@@ -24,7 +24,9 @@ log = logging.getLogger(__name__)
 PART = "camera"
 WATCH_PERIOD = 0.5
 FIRST_WAIT = 2.0
+RATE_WAIT = 1.5
 WAIT_REPEAT = 10.0
+MOST_NAMED = 5
 BUFFER_SIZE = 16 * 2**20
 
 
@@ -61,6 +63,7 @@ class Camera:
         self._last_stamp = rospy.Time(0)
         self._watch = StreamWatch(timeout, frozen_timeout)
         self._refused = ""
+        self._seen = ""
         self._health = health
         self._notify = notify
         self._once = once
@@ -107,10 +110,12 @@ class Camera:
                 return  # the same picture again
             self._last_stamp = stamp
             self._newest = message
+            self._seen = _describe(message)
         self._notify()
 
     def _run(self) -> None:
         before: Stream | None = None
+        seen, flows_since = "", 0.0
         tell = time.monotonic() + FIRST_WAIT
         while not rospy.is_shutdown():
             now = time.monotonic()
@@ -118,10 +123,13 @@ class Camera:
                 state, silent, rate = self._watch.state(now), self._watch.silent_for(now), self._watch.rate
             if state is not before:
                 self._changed(state, before, silent)
-                before = state
+                before, flows_since = state, now
             if state is Stream.WAITING and now >= tell:
                 log.warning("waiting for pictures on %s (%s): %s", self._topic, self._kind._type, self._who_publishes())
                 tell = now + WAIT_REPEAT
+            if state is Stream.FLOWING and self._seen != seen and now - flows_since >= RATE_WAIT:
+                log.info("%s: pictures of %s come in, %.1f a second", self._topic, self._seen, rate)
+                seen = self._seen
             self._tell_health(state, silent, rate)
             time.sleep(WATCH_PERIOD)
 
@@ -132,11 +140,17 @@ class Camera:
             log.error("%s: the camera has been silent for %.1f s: %s", self._topic, silent, self._who_publishes())
         elif state is Stream.FROZEN:
             log.error("%s: the camera is frozen, it sends the same picture again and again", self._topic)
-        elif before is not None:
-            log.info("%s: %s", self._topic, state.value)
+        elif before in (Stream.STOPPED, Stream.FROZEN):
+            log.info("%s: %s again", self._topic, state.value)
 
     def _tell_health(self, state: Stream, silent: float, rate: float) -> None:
-        values = {"topic": self._topic, "rate": f"{rate:.1f}", "seconds since the last picture": f"{silent:.1f}"}
+        values = {
+            "topic": self._topic,
+            "type": self._kind._type,
+            "pictures": self._seen or "none yet",
+            "rate": f"{rate:.1f}",
+            "seconds since the last picture": f"{silent:.1f}",
+        }
         if self._refused:
             self._health.set(PART, diagnostics.ERROR, self._refused, values)
             return
@@ -144,14 +158,29 @@ class Camera:
         self._health.set(PART, level, state.value, values)
 
     def _who_publishes(self) -> str:
-        """Who publishes the topic, and as what type."""
+        """Who publishes the topic and as what type, or where there are pictures instead."""
         try:
             master = rosgraph.Master(rospy.get_name())
-            publishers = dict(master.getSystemState()[0]).get(self._topic, [])
-            kind = dict(master.getTopicTypes()).get(self._topic, "")
+            publishers = dict(master.getSystemState()[0])
+            kinds = dict(master.getTopicTypes())
         except (OSError, rosgraph.MasterException) as err:
             return f"the master does not say who publishes it ({err})"
-        if not publishers:
-            return "nobody publishes it"
-        text = f"published by {', '.join(publishers)}"
-        return f"{text} as {kind}, which is another type" if kind not in ("", "*", self._kind._type) else text
+        mine, kind = publishers.get(self._topic, []), kinds.get(self._topic, "")
+        if mine:
+            text = f"published by {', '.join(mine)}"
+            if kind not in ("", "*", self._kind._type):
+                return f"{text} as {kind}, which is another type"
+            return f"{text}, but none has come"
+        others = [f"{t} ({kinds[t]})" for t in sorted(publishers) if self._may_be_meant(t, kinds.get(t, ""))]
+        return "nobody publishes it" + (f"; there are pictures on {', '.join(others[:MOST_NAMED])}" if others else "")
+
+    def _may_be_meant(self, topic: str, kind: str) -> bool:
+        own = topic.startswith(rospy.get_name() + "/")
+        return kind in (Image._type, CompressedImage._type) and not own
+
+
+def _describe(message: Image | CompressedImage) -> str:
+    """Size and encoding of a picture, as far as its message says."""
+    if isinstance(message, CompressedImage):
+        return f"'{message.format}'"
+    return f"{message.width}x{message.height} {message.encoding}"

@@ -9,8 +9,11 @@ Differs:
 - rgb8 and bgr8 both come out right; upstream swaps the colours of bgr8.
 - The action answers with the boxes of the picture that it was sent, each goal its own.
 - Of more than 100 boxes the 100 most probable are sent; upstream sends none.
-- Further: compressed input (`~image_transport`), `~publish_empty`, `~max_rate`, `~threads`, the service `~enable`,
-  `~camera_ok` (std_msgs/Bool, latched) and /diagnostics, which know a camera that has stopped or is frozen.
+- More encodings (`rosbot_patrol.images.encodings`); upstream takes mono8, mono16, rgb8, bgr8, rgba8 and bgra8.
+- Weights that do not fit the network, and class names that do not, end it in a sentence; upstream goes on.
+- Further: compressed input (`~image_transport`), `~network` hog, `~publish_empty`, `~max_rate`, `~threads`, the service
+  `~enable`, `~camera_ok` (std_msgs/Bool, latched) and /diagnostics, which know a camera that has stopped or is frozen.
+- There is no nodelet: Python has none.
 """
 
 from __future__ import annotations
@@ -31,7 +34,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 from rosbot_patrol.detection.darknet_params import DarknetParams
-from rosbot_patrol.detection.detector import DarknetDetector, Detection, load_detector
+from rosbot_patrol.detection.detector import Detection, Detector, load_detector
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.ros import diagnostics
@@ -56,13 +59,23 @@ def main() -> None:
 def _body() -> None:
     params = load_params(DarknetParams)
     models = os.path.join(rospkg.RosPack().get_path("rosbot_patrol"), "models")
-    cfg, weights = params.network_files(models)
-    model = params.yolo_model
-    detector = load_detector(
-        cfg, weights, model.detection_classes.names, threshold=model.threshold.value, threads=params.threads
-    )
-    log.info("%s, %d classes, by %s", cfg, len(detector.names), detector.runtime)
+    detector = make_detector(params, models)
     DarknetNode(params, detector).run()
+
+
+def make_detector(params: DarknetParams, own_models: str) -> Detector:
+    """The detector that the parameters name; DetectorError where its files are missing, damaged or do not fit."""
+    threshold = params.yolo_model.threshold.value
+    if params.network == "hog":
+        hog = importlib.import_module("rosbot_patrol.detection.hog")  # brings OpenCV, 98 MB
+        found: Detector = hog.HogDetector(threshold=threshold, threads=params.threads)
+        log.info("people by %s", found.runtime)
+        return found
+    cfg, weights = params.network_files(own_models)
+    names = params.yolo_model.detection_classes.names
+    detector = load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
+    log.info("%s, %d classes, by %s", cfg, len(detector.names), detector.runtime)
+    return detector
 
 
 def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBoxes:
@@ -91,7 +104,7 @@ class DarknetNode:
         detector: ready to run.
     """
 
-    def __init__(self, params: DarknetParams, detector: DarknetDetector) -> None:
+    def __init__(self, params: DarknetParams, detector: Detector) -> None:
         self._params = params
         self._detector = detector
         self._enabled = params.enabled

@@ -26,7 +26,9 @@ def test_jpeg_round_trip_keeps_encoding_and_colours(encoding):
     assert np.abs(difference).mean() < 4
 
 
-@pytest.mark.parametrize("encoding", ["rgb8", "bgr8", "mono8", "mono16", "16UC1"])
+@pytest.mark.parametrize(
+    "encoding", ["rgb8", "bgr8", "mono8", "mono16", "16UC1", "bayer_grbg8", "bayer_rggb16", "8UC1"]
+)
 def test_png_round_trip_loses_nothing(encoding):
     picture = make_picture(encoding)
     text, data = compress(picture, CompressedParams(format="png", png_level=1))
@@ -45,6 +47,15 @@ def test_mono16_as_jpeg_keeps_its_range():
     back = decompress(text, data)
     assert back.encoding == "mono16"
     assert np.abs(back.pixels.astype(int) - make_picture("mono16").pixels).mean() < 4 * 257
+
+
+@pytest.mark.parametrize("encoding", ["rgb16", "bgra16", "yuv422", "bayer_rggb16"])
+def test_what_no_jpeg_can_hold_travels_as_8_bits_a_colour(encoding):
+    picture = make_picture(encoding)
+    text, data = compress(picture, CompressedParams(jpeg_quality=95))
+    assert text.partition(";")[0] in COLOURS
+    difference = decompress(text, data).to("rgb8").pixels.astype(int) - picture.to("rgb8").pixels
+    assert np.abs(difference).mean() < 6
 
 
 def test_modes():

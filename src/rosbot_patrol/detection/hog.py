@@ -1,0 +1,76 @@
+"""People by OpenCV's built-in detector, for a real camera before there are any weights.
+
+Histograms of oriented gradients and a linear support vector machine (Dalal and Triggs, CVPR 2005), trained by them on
+standing and walking people seen whole. It finds no one who sits, lies, is cut off by the picture's edge or is nearer
+than about 2.5 m before a usual camera; furniture and door frames may pass for people.
+
+The probability is 1 / (1 + exp(-2 margin)) of the machine's margin: it grows with it, and is not calibrated.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from rosbot_patrol.detection.decode import Candidates, suppress_by_objectness
+from rosbot_patrol.detection.detector import IOU_THRESHOLD, Detection, to_detections
+from rosbot_patrol.images.encodings import Picture
+
+NAMES = ("person",)
+WINDOW = (64, 128)
+"""Width and height of what it looks at [px]; the person in it is about half as wide and three quarters as high."""
+PERSON_SHARE = (0.6, 0.8)
+STRIDE = (8, 8)
+PADDING = (16, 16)
+SCALE_STEP = 1.05
+MOST_PIXELS = 480 * 360
+"""Larger pictures are shrunk: a person at 7 m before a usual camera is still as high as it needs."""
+
+
+class HogDetector:
+    """Finds people without any files.
+
+    Args:
+        threshold: least probability, 0 to 1.
+        threads: how many cores it may use; OpenCV counts for the whole process.
+    """
+
+    def __init__(self, *, threshold: float = 0.7, threads: int = 1) -> None:
+        self._hog = cv2.HOGDescriptor()
+        self._hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
+        self._threshold = threshold
+        cv2.setNumThreads(threads)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The classes it knows."""
+        return NAMES
+
+    @property
+    def runtime(self) -> str:
+        """What computes it."""
+        return f"OpenCV {cv2.__version__} HOG"
+
+    def detect(self, picture: Picture) -> list[Detection]:
+        """What is seen in one picture; ImageError where it has no colours to look at."""
+        pixels = picture.to("bgr8").pixels
+        shrink = min(1.0, (MOST_PIXELS / (picture.width * picture.height)) ** 0.5)
+        if shrink < 1.0:
+            pixels = cv2.resize(pixels, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+        if pixels.shape[1] < WINDOW[0] or pixels.shape[0] < WINDOW[1]:
+            return []
+        found, margins = self._hog.detectMultiScale(pixels, winStride=STRIDE, padding=PADDING, scale=SCALE_STEP)
+        if not len(found):
+            return []
+        boxes = _people(np.asarray(found, dtype=np.float64), pixels.shape[1], pixels.shape[0])
+        likely = (1.0 / (1.0 + np.exp(-2.0 * np.asarray(margins, dtype=np.float64)))).reshape(-1)
+        keep = likely > self._threshold
+        best = Candidates(boxes[keep], likely[keep], likely[keep, None])
+        return to_detections(suppress_by_objectness(best, IOU_THRESHOLD), NAMES, picture.width, picture.height)
+
+
+def _people(windows: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The people in windows (left, top, width, height [px], shape (N, 4)): centres and sizes as shares."""
+    size = np.array([width, height], dtype=np.float64)
+    centres = (windows[:, :2] + windows[:, 2:] / 2.0) / size
+    return np.concatenate([centres, windows[:, 2:] * PERSON_SHARE / size], axis=1)
