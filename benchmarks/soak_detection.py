@@ -3,11 +3,11 @@
 
     . scripts/env; python3 benchmarks/soak_detection.py [--minutes 60] [--rate 30] [--json FILE] [--log FILE]
 
-Starts a master on a free port, the node darknet_ros with our network, and two republish (to jpeg and back) before it, as
-in the tutorial; sends 640x480 rgb8 pictures with people at the rate, has somebody listen to all that the nodes publish
-(the drawn picture too, 20 seconds in ten minutes), sends goals to the action and switches the detector off and on now and
-then, and once a minute notes each node's memory. Flat: the straight line through a node's memory after the first ten
-minutes rises by less than 2 MB an hour.
+Starts a master on a free port, the node darknet_ros with our network, and two republish (to jpeg and back) before it,
+as in the tutorial; sends 640x480 rgb8 pictures with people at the rate, has somebody listen to all that the nodes
+publish (the drawn picture too, 20 seconds in ten minutes), sends goals to the action and switches the detector off and
+on now and then, and once a minute notes each node's memory. Flat: the straight line through a node's memory after the
+first ten minutes rises by less than 2 MB an hour.
 """
 
 from __future__ import annotations

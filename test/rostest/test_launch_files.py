@@ -90,6 +90,33 @@ def test_detector_on_the_pc() -> None:
     assert set(computer) == {"rgb_decompress", "darknet_ros", "esp_client1", "esp_client2", "esp_client3"}
 
 
+def network_of(launch: str, *arguments: str, robot: bool = False) -> tuple[str, str, str]:
+    """What the detector computes, its cfg's name, and the folder of the weights below the package."""
+    config = parse(ROOT / "launch" / launch, *arguments, robot=robot)
+    given = {name: value.value for name, value in config.params.items()}
+    cfg = given.get("/darknet_ros/yolo_model/config_file/name", "")
+    return given["/darknet_ros/network"], cfg, Path(given["/darknet_ros/weights_path"]).parts[-1]
+
+
+def test_networks_by_name() -> None:
+    house, hog = ("darknet", "house.cfg", "models"), ("hog", "", "weights")
+    tiny = ("darknet", "yolov2-tiny.cfg", "weights")
+    assert network_of("rosbot_patrol.launch") == house
+    assert network_of("rosbot_patrol.launch", robot=True) == hog
+    assert network_of("rosbot_patrol.launch", "network:=yolov2-tiny") == tiny
+    assert network_of("rosbot_patrol_pc.launch") == hog
+    assert network_of("rosbot_patrol_pc.launch", "network:=house") == house
+    assert network_of("darknet_yolo_simulation_only.launch") == house
+    assert network_of("darknet_yolo_only.launch", "network:=hog") == hog
+    yaml = ROOT / "drop_in/darknet_ros/config/yolov2-tiny.yaml"
+    assert network_of("rosbot_patrol.launch", f"network_param_file:={yaml}", robot=True) == tiny
+
+
+def test_an_unknown_network_names_the_file_that_is_not_there() -> None:
+    with pytest.raises(Exception, match=r"config/yolov9\.yaml"):
+        parse(ROOT / "launch" / "darknet_yolo_only.launch", "network:=yolov9")
+
+
 @pytest.mark.parametrize("profile", ["tuned", "tutorial"])
 @pytest.mark.parametrize("simulation", ["true", "false"])
 def test_profiles(profile: str, simulation: str) -> None:
