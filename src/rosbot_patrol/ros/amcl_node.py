@@ -46,6 +46,7 @@ from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.grids import GetMapFast, GridMsg, SetMapFast
 from rosbot_patrol.ros.node import Loop, Worker, load_params, now, run_node
 from rosbot_patrol.ros.pose_arrays import pose_array_to_msg
+from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
 from rosbot_patrol.ros.transforms import Transforms
 
@@ -312,4 +313,4 @@ def body() -> None:
 
 def main() -> None:
     """The program."""
-    run_node("amcl", body, urgency=15)
+    run_node("amcl", body, priority=Priority.CONTROL)

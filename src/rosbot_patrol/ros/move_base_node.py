@@ -43,6 +43,7 @@ from rosbot_patrol.ros.move_base_plans import ThreadedPlans
 from rosbot_patrol.ros.move_base_tuning import Tuning
 from rosbot_patrol.ros.node import Loop, load_params, now, run_node
 from rosbot_patrol.ros.people import People
+from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
@@ -319,4 +320,4 @@ class MoveBaseNode:
 def main() -> None:
     """Start the node."""
     give_back_large_blocks()
-    run_node("move_base", lambda: MoveBaseNode().run(), urgency=15)
+    run_node("move_base", lambda: MoveBaseNode().run(), priority=Priority.CONTROL)

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import rospy
@@ -17,24 +16,25 @@ import rospy
 from rosbot_patrol import params
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.ros import logs
+from rosbot_patrol.ros.priority import Priority, take
 
 T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-_AUTOGROUP = Path("/proc/self/autogroup")
 
-
-def run_node(name: str, body: Callable[[], None], *, urgency: int = 0, **init_options: Any) -> None:
+def run_node(
+    name: str, body: Callable[[], None], *, priority: Priority = Priority.ORDINARY, **init_options: Any
+) -> None:
     """Start a node and run `body`; a PatrolError or a bad file is logged in one sentence and the program exits 1.
 
     Args:
         name: name of the node where the launch file gives none.
         body: builds and runs it; returns on shutdown.
-        urgency: by how much it goes before other processes, as of nice(1); only where the system permits that.
+        priority: among the processes of the machine, as far as the system permits it.
         init_options: further arguments of `rospy.init_node`.
     """
-    refused = _go_before_others(urgency)  # before there are other threads: they take after this one
+    refused = take(priority)  # before there are other threads: they take after this one
     rospy.init_node(name, **init_options)
     logs.install()
     if refused:
@@ -52,25 +52,6 @@ def run_node(name: str, body: Callable[[], None], *, urgency: int = 0, **init_op
         os._exit(1)
     except rospy.ROSInterruptException:
         return
-
-
-def _go_before_others(urgency: int) -> str:
-    """Raise this process's priority; returns a sentence where that is not permitted.
-
-    Linux shares the processor between sessions first (sched(7), autogroup), and roslaunch gives each node its own: a
-    nice value then counts only among the node's own threads, and what counts before others is that of the session.
-    """
-    if urgency <= 0:
-        return ""
-    try:
-        os.nice(-urgency)
-        if _AUTOGROUP.exists() and os.getsid(0) == os.getpid():
-            _AUTOGROUP.write_text(str(-urgency), encoding="ascii")
-    except PermissionError:
-        return f"not permitted to go before other processes (nice -{urgency}; see RLIMIT_NICE in limits.conf(5))"
-    except OSError as err:
-        return f"its session does not go before others: {err}"
-    return ""
 
 
 class _Ending:

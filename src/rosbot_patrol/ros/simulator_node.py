@@ -30,6 +30,7 @@ from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import load_params, run_node
 from rosbot_patrol.ros.packages import model_folders, package_finder
+from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.simulator_doors import DoorServices
 from rosbot_patrol.ros.simulator_faults import FaultServices
 from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RateParams
@@ -229,4 +230,4 @@ def _description(p: SimulatorParams) -> RobotDescription:
 
 def main() -> None:
     """Load parameters, world and robot; simulate."""
-    run_node("simulator", lambda: Simulator(load_params(SimulatorParams)).run(), urgency=5)
+    run_node("simulator", lambda: Simulator(load_params(SimulatorParams)).run(), priority=Priority.RAISED)

@@ -39,6 +39,7 @@ from rosbot_patrol.ros.convert import scan_from_msg, twist_from_msg, twist_to_ms
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import load_params, now, run_node
+from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
@@ -250,4 +251,4 @@ def body() -> None:
 
 def main() -> None:
     """Run the node."""
-    run_node("twist_mux", body, urgency=15)
+    run_node("twist_mux", body, priority=Priority.CONTROL)
