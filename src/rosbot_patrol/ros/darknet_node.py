@@ -42,6 +42,7 @@ from rosbot_patrol.ros.camera import Camera
 from rosbot_patrol.ros.check_for_objects import CheckForObjects
 from rosbot_patrol.ros.convert_images import picture_to_msg
 from rosbot_patrol.ros.display import display_problem
+from rosbot_patrol.ros.heap import share_one_heap
 from rosbot_patrol.ros.node import Worker, load_params, run_node
 
 log = logging.getLogger(__name__)
@@ -53,6 +54,7 @@ CONSOLE_REPEAT = 10.0
 
 def main() -> None:
     """Run the node."""
+    share_one_heap()
     run_node("darknet_ros", _body)
 
 

@@ -1,4 +1,4 @@
-"""The memory of a node that works on large arrays in several threads."""
+"""The memory of a node that works on large arrays, or pictures, in several threads."""
 
 from __future__ import annotations
 
@@ -7,8 +7,18 @@ import logging
 
 log = logging.getLogger(__name__)
 
-_M_MMAP_THRESHOLD = -3  # of mallopt(3)
+_M_MMAP_THRESHOLD, _M_ARENA_MAX = -3, -8  # of mallopt(3)
 LARGE = 1 << 20  # [bytes]
+
+
+def share_one_heap() -> bool:
+    """Let all threads take their memory from one place; before there are any.
+
+    Otherwise glibc gives threads places of their own, each of which keeps what it has ever used: a node that handles
+    pictures in a thread for each connection grew by 10 MB with every few of them. Python's lock keeps the threads from
+    waiting for one another there. Returns whether the C library knows of it.
+    """
+    return _set_option(_M_ARENA_MAX, 1)
 
 
 def give_back_large_blocks(size: int = LARGE) -> bool:
@@ -17,10 +27,14 @@ def give_back_large_blocks(size: int = LARGE) -> bool:
     Otherwise glibc raises that bound to 32 MB by itself, and each thread keeps what it has ever used: the copies of a
     costmap of 12 million cells came to 600 MB. Returns whether the C library knows of it.
     """
-    try:
-        done = bool(ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, size))
-    except AttributeError:
-        done = False
+    done = _set_option(_M_MMAP_THRESHOLD, size)
     if not done:
         log.info("this C library keeps freed memory: nodes with large costmaps take more of it")
     return done
+
+
+def _set_option(option: int, value: int) -> bool:
+    try:
+        return bool(ctypes.CDLL(None).mallopt(option, value))
+    except AttributeError:
+        return False

@@ -27,6 +27,7 @@ from rosbot_patrol.params import param
 from rosbot_patrol.ros import diagnostics
 from rosbot_patrol.ros.camera import Camera
 from rosbot_patrol.ros.convert_images import picture_to_msg
+from rosbot_patrol.ros.heap import share_one_heap
 from rosbot_patrol.ros.node import load_params, run_node
 
 log = logging.getLogger(__name__)
@@ -56,6 +57,7 @@ class RepublishParams:
 
 def main() -> None:
     """Run the node."""
+    share_one_heap()
     run_node("image_republisher", _body, anonymous=True)
 
 
