@@ -12,6 +12,7 @@ import time
 
 import actionlib
 import cv2
+import dynamic_reconfigure.client
 import numpy as np
 import roslib.message
 import rospy
@@ -310,6 +311,43 @@ def republish():
         say(kind=kind, text=text, stamp=message.header.stamp.secs, frame=message.header.frame_id)
     pixel = picture_from_msg(next(m for k, m in heard if k == "raw")).pixels[28, 20]
     say(pixel=pixel.tolist(), start=next(m for k, m in heard if k == "compressed").data[:4].hex())
+
+
+def depth():
+    """A depth picture into /in, and what comes out of /deep/compressedDepth and /out."""
+    heard = {}
+    rospy.Subscriber("/deep/compressedDepth", CompressedImage, lambda m: heard.setdefault("compressed", m))
+    rospy.Subscriber("/out", Image, lambda m: heard.setdefault("raw", m))
+    source = rospy.Publisher("/in", Image, queue_size=1)
+    values = np.linspace(0.5, 9.0, 64 * 64, dtype=np.float32).reshape(64, 64, 1)
+    values[0, 0] = np.nan
+    message = picture_to_msg(Picture(values, "32FC1"), rospy.Header(stamp=rospy.Time(100)))
+    until = time.monotonic() + 15.0
+    while len(heard) < 2 and time.monotonic() < until:
+        source.publish(message)
+        time.sleep(0.1)
+    back = picture_from_msg(heard["raw"])
+    worst = float(np.nanmax(np.abs(back.pixels - values)))
+    say(text=heard["compressed"].format, encoding=back.encoding, worst=worst, unknown=int(np.isnan(back.pixels).sum()))
+
+
+def tuning():
+    """The quality of a jpeg, changed while it runs; and a colour picture as depth."""
+    heard = []
+    rospy.Subscriber("/middle/compressed", CompressedImage, heard.append)
+    rospy.Subscriber("/middle/compressedDepth", CompressedImage, lambda _: None)
+    source = rospy.Publisher("/in", Image, queue_size=1)
+    pixels = np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)
+    message = picture_to_msg(Picture(pixels, "rgb8"), rospy.Header())
+    client = dynamic_reconfigure.client.Client("/middle/compressed", timeout=10.0)
+    for quality in (90, 5):
+        client.update_configuration({"jpeg_quality": quality})
+        heard.clear()
+        until = time.monotonic() + 10.0
+        while len(heard) < 3 and time.monotonic() < until:
+            source.publish(message)
+            time.sleep(0.1)
+        say(quality=quality, bytes=len(heard[-1].data))
 
 
 if __name__ == "__main__":

@@ -293,6 +293,25 @@ def test_republish_with_parameters_of_the_topic(ros):
     subprocess.run(["rosparam", "delete", "/middle"], env=ros.env, check=True)
 
 
+def test_republish_depth_there_and_back(ros):
+    subprocess.run(["rosparam", "set", "/deep/compressedDepth/format", "rvl"], env=ros.env, check=True)
+    ros.node("republish", "raw", "in:=/in", "compressedDepth", "out:=/deep")
+    ros.node("republish", "compressedDepth", "in:=/deep", "raw", "out:=/out")
+    (said,) = play(ros, "depth")
+    assert (said["text"], said["encoding"], said["unknown"]) == ("32FC1; compressedDepth rvl", "32FC1", 1)
+    assert said["worst"] < 0.01
+    subprocess.run(["rosparam", "delete", "/deep"], env=ros.env, check=True)
+
+
+def test_republish_to_all_and_tuned_while_it_runs(ros):
+    node = ros.node("republish", "raw", "in:=/in", "out:=/middle")
+    fine, coarse = play(ros, "tuning")
+    assert fine["bytes"] > 3 * coarse["bytes"]
+    node.says("a picture of encoding rgb8 is no depth, expected 32FC1")
+    assert node.output.count("is no depth") == 1
+    subprocess.run(["rosparam", "delete", "/middle"], env=ros.env, check=True)
+
+
 @pytest.mark.parametrize("arguments", [["theora", "in:=/in", "raw", "out:=/out"], []])
 def test_republish_refuses(ros, arguments):
     node = ros.node("republish", *arguments)

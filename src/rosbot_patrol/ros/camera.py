@@ -35,7 +35,7 @@ class Camera:
 
     Args:
         topic: base name of the topic.
-        transport: raw or compressed.
+        transport: raw, compressed or compressedDepth.
         timeout: silence that means it has stopped [s] of wall time.
         frozen_timeout: sameness that means it is frozen [s] of wall time, 0 for never.
         health: where to tell.
@@ -56,7 +56,8 @@ class Camera:
         once: bool = True,
         mode: str = "unchanged",
     ) -> None:
-        self._kind = CompressedImage if transport == "compressed" else Image
+        self._kind = Image if transport == "raw" else CompressedImage
+        self._transport = transport
         self._topic = rospy.resolve_name(topic if transport == "raw" else f"{topic}/{transport}")
         self._lock = threading.Lock()
         self._newest: Image | CompressedImage | None = None
@@ -87,13 +88,20 @@ class Camera:
 
     def decode(self, message: Image | CompressedImage) -> Picture:
         """The picture in a message; ImageError where it cannot be read."""
-        if isinstance(message, CompressedImage):
-            codec = importlib.import_module("rosbot_patrol.images.compressed")
-            picture: Picture = codec.decompress(message.format, message.data, mode=self._mode)
-        else:
+        picture: Picture
+        if not isinstance(message, CompressedImage):
             picture = picture_from_msg(message)
-        self._refused = ""
+        elif self._transport == "compressedDepth":
+            codec = importlib.import_module("rosbot_patrol.images.compressed_depth")
+            picture = codec.decompress_depth(message.format, message.data)
+        else:
+            codec = importlib.import_module("rosbot_patrol.images.compressed")
+            picture = codec.decompress(message.format, message.data, mode=self._mode)
         return picture
+
+    def accept(self) -> None:
+        """State that a picture could be looked at."""
+        self._refused = ""
 
     def refuse(self, problem: str) -> None:
         """State that a picture could not be looked at; said once for the same reason."""

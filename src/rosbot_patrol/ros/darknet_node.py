@@ -151,6 +151,7 @@ class DarknetNode:
         except ImageError as err:
             self._camera.refuse(str(err))
             return True
+        self._camera.accept()
         self._publish(picture, message.header, found)
         self._report(found, time.monotonic() - started)
         return True

@@ -20,6 +20,8 @@ from rosbot_patrol.costmap.params import (
 )
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.images.compressed import CompressedParams
+from rosbot_patrol.images.compressed_depth import CompressedDepthParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import declared, table
 from rosbot_patrol.patrol.drive import DriveParams
@@ -72,7 +74,14 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("amcl", [("", AmclParams)]),
     ("map_server", [("", MapServerParams)]),
     ("darknet_ros", [("", DarknetParams)]),
-    ("republish", [("", RepublishParams)]),
+    (
+        "republish",
+        [
+            ("", RepublishParams),
+            ("/<out>/compressed/", CompressedParams),
+            ("/<out>/compressedDepth/", CompressedDepthParams),
+        ],
+    ),
     ("serial_node.py", [("", SerialNodeParams)]),
     ("twist_mux", [("", TwistMuxParams)]),
     ("teleop_twist_keyboard.py", [("", TeleopParams)]),
@@ -120,7 +129,8 @@ def document() -> str:
             for namespace, group in _groups(prefix, cls):
                 rows = table(group)
                 if rows.count("\n") > 1:
-                    lines += ["", *([f"`~{namespace}`", ""] if namespace else []), rows]
+                    place = namespace if namespace.startswith("/") else f"~{namespace}"
+                    lines += ["", *([f"`{place}`", ""] if namespace else []), rows]
     lines += ["", "## scenario file"]
     for place, cls in SCENARIO:
         lines += ["", *([f"`{place}`", ""] if place else []), table(cls)]

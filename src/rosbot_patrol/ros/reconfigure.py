@@ -51,7 +51,7 @@ class ReconfigureServer:
     """One namespace of parameters.
 
     Args:
-        namespace: under the node's own, "" for the node itself.
+        namespace: under the node's own, "" for the node itself; one that begins with a slash stands for itself.
         params: the parameters as they are, a dataclass.
         names: of those that can be changed.
         apply: takes the values that change, returns all parameters as they are then; raises ParamError.
@@ -60,7 +60,7 @@ class ReconfigureServer:
     def __init__(
         self, namespace: str, params: Any, names: Iterable[str], apply: Callable[[dict[str, Any]], Any]
     ) -> None:
-        self._space = rospy.resolve_name(f"~{namespace}").rstrip("/")
+        self._space = rospy.resolve_name(namespace if namespace.startswith("/") else f"~{namespace}").rstrip("/")
         self._entries = {entry.name: entry for entry in tunable(type(params), [n for n in names if n != RESTORE])}
         self._apply = apply
         self._lock = threading.Lock()

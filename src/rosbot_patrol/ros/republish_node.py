@@ -2,11 +2,13 @@
 
     republish IN_TRANSPORT in:=BASE [OUT_TRANSPORT] out:=BASE
 
-Matches image_transport's republish (image_common, noetic-devel) with the transports raw and compressed: names of topics
-(`BASE` for raw, `BASE/compressed`), parameters of the compressed publisher under its topic, of the subscriber under the
-node, `~image_transport`, anonymous unless named, always subscribed. Without an out transport it sends both.
+Matches image_transport's republish (image_common, noetic-devel) with the transports raw, compressed (jpeg, png) and
+compressedDepth (png, rvl): names of topics (`BASE` for raw, `BASE/TRANSPORT`), parameters of a publisher under its
+topic (and by dynamic_reconfigure there), of the subscriber under the node, `~image_transport`, anonymous unless named,
+always subscribed. Without an out transport it sends each that somebody listens to.
 
-Differs: a picture that cannot be read is reported and left out; says what it waits for; /diagnostics.
+Differs: compresses only while somebody listens; a picture that cannot be read is reported and left out; says what it
+waits for; /diagnostics; theora is not known.
 """
 
 from __future__ import annotations
@@ -14,8 +16,9 @@ from __future__ import annotations
 import logging
 import sys
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
@@ -23,19 +26,23 @@ from sensor_msgs.msg import CompressedImage, Image
 from rosbot_patrol import params as parameters
 from rosbot_patrol.errors import ImageError, ParamError
 from rosbot_patrol.images.compressed import CompressedParams, compress
+from rosbot_patrol.images.compressed_depth import CompressedDepthParams, compress_depth
+from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import param
+from rosbot_patrol.planning.tunable import changed
 from rosbot_patrol.ros import diagnostics
 from rosbot_patrol.ros.camera import Camera
 from rosbot_patrol.ros.convert_images import picture_to_msg
 from rosbot_patrol.ros.heap import share_one_heap
 from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.reconfigure import ReconfigureServer
 
 log = logging.getLogger(__name__)
 
-TRANSPORTS = ("raw", "compressed")
-USAGE = "usage: republish IN_TRANSPORT in:=BASE [OUT_TRANSPORT] out:=BASE, transports raw and compressed"
+TRANSPORTS = ("raw", "compressed", "compressedDepth")
+USAGE = f"usage: republish IN_TRANSPORT in:=BASE [OUT_TRANSPORT] out:=BASE, transports {', '.join(TRANSPORTS)}"
 IDLE_WAIT = 0.25
-# of compressed_image_transport's publisher: read by rospy's side or without a meaning here
+# of upstream's publishers: without a meaning here
 FOREIGN_KEYS = ("enable",)
 
 
@@ -84,6 +91,54 @@ def _body() -> None:
     Republisher(params, source, targets).run()
 
 
+class Output:
+    """One topic that pictures go out on, while somebody listens.
+
+    Args:
+        topic: its full name.
+        kind: of its messages.
+    """
+
+    def __init__(self, topic: str, kind: type) -> None:
+        self._publisher = rospy.Publisher(topic, kind, queue_size=1)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether somebody listens."""
+        return bool(self._publisher.get_num_connections())
+
+    def send(self, picture: Picture, message: Image | CompressedImage) -> None:
+        """Send a picture with the header of the message it came in; ImageError where it cannot be."""
+        self._publisher.publish(message if isinstance(message, Image) else picture_to_msg(picture, message.header))
+
+
+class CompressedOutput(Output):
+    """One that compresses; its parameters lie under its topic, and can be changed while it runs.
+
+    Args:
+        topic: its full name.
+        params: how they are declared.
+        codec: makes format text and bytes of a picture.
+    """
+
+    def __init__(self, topic: str, params: type[Any], codec: Callable[[Picture, Any], tuple[str, bytes]]) -> None:
+        super().__init__(topic, CompressedImage)
+        self._params = parameters.load(params, rospy.get_param(topic, {}), name=topic + "/", ignore=FOREIGN_KEYS)
+        self._codec = codec
+        self._names = [field.name for field in fields(params)]
+        self._topic = topic
+        ReconfigureServer(topic, self._params, self._names, self._change)
+
+    def send(self, picture: Picture, message: Image | CompressedImage) -> None:
+        """As of any output."""
+        text, data = self._codec(picture, self._params)
+        self._publisher.publish(CompressedImage(header=message.header, format=text, data=data))
+
+    def _change(self, changes: dict[str, Any]) -> Any:
+        self._params = changed(self._params, changes, self._names, name=self._topic + "/")
+        return self._params
+
+
 class Republisher:
     """One input, one or more outputs.
 
@@ -95,13 +150,7 @@ class Republisher:
 
     def __init__(self, params: RepublishParams, source: str, targets: Sequence[str]) -> None:
         base = rospy.resolve_name("out")
-        self._raw = rospy.Publisher(base, Image, queue_size=1) if "raw" in targets else None
-        self._compressed = None
-        if "compressed" in targets:
-            topic = f"{base}/compressed"
-            tree = rospy.get_param(topic, {})
-            self._codec = parameters.load(CompressedParams, tree, name=topic + "/", ignore=FOREIGN_KEYS)
-            self._compressed = rospy.Publisher(topic, CompressedImage, queue_size=1)
+        self._outputs = [_make_output(base, target) for target in targets]
         self._wake = threading.Event()
         self._health = diagnostics.Health()
         self._input = Camera(
@@ -129,17 +178,23 @@ class Republisher:
     def step(self) -> None:
         """Send the newest picture on."""
         message = self._input.take()
-        if message is None:
+        heard = [output for output in self._outputs if output.is_heard]
+        if message is None or not heard:
             return
         try:
-            self._send(message)
+            picture = self._input.decode(message)
+            for output in heard:
+                output.send(picture, message)
         except ImageError as err:
             self._input.refuse(str(err))
+        else:
+            self._input.accept()
 
-    def _send(self, message: Image | CompressedImage) -> None:
-        picture = self._input.decode(message)
-        if self._raw is not None:
-            self._raw.publish(message if isinstance(message, Image) else picture_to_msg(picture, message.header))
-        if self._compressed is not None:
-            text, data = compress(picture, self._codec)
-            self._compressed.publish(CompressedImage(header=message.header, format=text, data=data))
+
+def _make_output(base: str, transport: str) -> Output:
+    if transport == "raw":
+        return Output(base, Image)
+    topic = f"{base}/{transport}"
+    if transport == "compressed":
+        return CompressedOutput(topic, CompressedParams, compress)
+    return CompressedOutput(topic, CompressedDepthParams, compress_depth)
