@@ -2,8 +2,9 @@
 
 A beam that ends where, a moment ago, beams passed through has hit something that came there (free-space violation, as
 in Wang, Thorpe, Thrun 2003). Such points are put together to things, a thing is followed from sweep to sweep, and its
-velocity is the slope of a line through its last places. What stands still for a while becomes an obstacle like any
-other. No map is needed; odometry has to hold for `memory` seconds only.
+velocity is the slope of a line through its last places. It moves if it has left where it was first seen: a leg of a
+chair or the end of a wall that comes into view bit by bit has not. What stands still for a while becomes an obstacle
+like any other. No map is needed; odometry has to hold for `memory` seconds only.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import Pose2D, transform_points
+from rosbot_patrol.geometry import Pose2D, invert, transform_points
 from rosbot_patrol.params import param
 from rosbot_patrol.scan import LaserScan
 
@@ -28,6 +29,8 @@ _AROUND = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1)]
 _MOSTLY = 7  # of the nine cells around a hit were free: it is no edge of a wall
 _SLIPPED = 0.3  # where so many of the hits are new, it is the odometry that has moved
 _SIGHTINGS = 4  # within the window; less is a flicker
+_THERE = 0.07  # a beam as long as a point is far off, but for this, has hit it again: noise and odometry [m]
+_LEFT = 0.7  # of the points of a thing; where more are hit again, it is still there
 _NEVER = -math.inf
 
 
@@ -64,10 +67,41 @@ class Mover(NamedTuple):
         return self.x + self.vx * seconds, self.y + self.vy * seconds
 
 
+@dataclass(frozen=True)
+class _Thing:
+    points: Array
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        return float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0
+
+
 @dataclass
 class _Track:
     places: list[tuple[float, float, float]] = field(default_factory=list)  # time, x, y
+    things: list[_Thing] = field(default_factory=list)  # at these places
     since: float = 0.0
+    moved_at: float = _NEVER
+
+    def add(self, now: float, thing: _Thing, window: float) -> None:
+        """One more sighting; those that are older than the window are forgotten."""
+        self.places.append((now, *thing.middle))
+        self.things.append(thing)
+        while self.places[0][0] <= now - window:
+            del self.places[0], self.things[0]
+
+    def look_back(self, scan: LaserScan, laser_from_odom: Pose2D, now: float) -> None:
+        """Note whether it has left the oldest of its places: beams now go on there, or end before."""
+        points = transform_points(laser_from_odom, self.things[0].points)
+        distances = np.hypot(*points.T)
+        turned = (np.arctan2(points[:, 1], points[:, 0]) - scan.angle_min) * np.sign(scan.angle_increment)
+        beams = np.rint(turned % math.tau / abs(scan.angle_increment)).astype(int)
+        ranges = np.where(scan.is_hit, scan.ranges, scan.range_max)
+        beside = ranges[(beams[:, None] + [-1, 0, 1]).clip(0, len(ranges) - 1)]  # along a wall they differ by much
+        is_there = (distances > beside.min(axis=1) - _THERE) & (distances < beside.max(axis=1) + _THERE)
+        if (is_there | (beams >= len(ranges))).mean() <= _LEFT:  # what it cannot see may be there
+            self.moved_at = now
 
     def velocity(self) -> tuple[float, float]:
         if len(self.places) < 2:
@@ -129,7 +163,7 @@ class MoverWatch:
         moving = hits[is_new]
         self._mark_hits(hits, now)
         self._mark_free(scan, units, odom_from_laser, now)
-        self._follow(_things(moving, self._params.gap, self._params.min_points), now)
+        self._follow(_things(moving, self._params.gap, self._params.min_points), scan, odom_from_laser)
         return self.movers(now)
 
     def movers(self, now: float) -> list[Mover]:
@@ -138,7 +172,7 @@ class MoverWatch:
         if 0.0 <= now - self._slipped_at < self._params.memory:
             return found
         for track in self._tracks:
-            if len(track.places) < _SIGHTINGS:
+            if len(track.places) < _SIGHTINGS or track.moved_at < self._now - self._params.still_after:
                 continue
             x, y = track.expected(now)
             found.append(Mover(x, y, *track.velocity(), now - track.since))
@@ -203,14 +237,14 @@ class MoverWatch:
 
     # Things ----------------------------------------------------------------------------------------------------------
 
-    def _follow(self, things: list[tuple[float, float]], now: float) -> None:
-        p = self._params
+    def _follow(self, things: list[_Thing], scan: LaserScan, odom_from_laser: Pose2D) -> None:
+        p, now, laser_from_odom = self._params, scan.stamp, invert(odom_from_laser)
         expected = [track.expected(now) for track in self._tracks]
         pairs = sorted(
-            (math.dist(place, thing), i, k)
+            (math.dist(place, thing.middle), i, k)
             for i, place in enumerate(expected)
             for k, thing in enumerate(things)
-            if math.dist(place, thing) < p.jump
+            if math.dist(place, thing.middle) < p.jump
         )
         taken_tracks: set[int] = set()
         taken_things: set[int] = set()
@@ -219,17 +253,17 @@ class MoverWatch:
                 continue
             taken_tracks.add(i)
             taken_things.add(k)
-            self._tracks[i].places.append((now, *things[k]))
+            self._tracks[i].add(now, things[k], p.window)
+            self._tracks[i].look_back(scan, laser_from_odom, now)
         for k, thing in enumerate(things):
             if k not in taken_things:
-                self._tracks.append(_Track([(now, *thing)], now))
-        for track in self._tracks:
-            track.places = [place for place in track.places if place[0] > now - p.window] or track.places[-1:]
+                self._tracks.append(_Track(since=now))
+                self._tracks[-1].add(now, thing, p.window)
         self._tracks = [track for track in self._tracks if track.places[-1][0] >= now - p.coast]
 
 
-def _things(points: Array, gap: float, least: int) -> list[tuple[float, float]]:
-    """Middles of groups of points that are nearer to each other than a gap."""
+def _things(points: Array, gap: float, least: int) -> list[_Thing]:
+    """Groups of points that are nearer to each other than a gap."""
     found = []
     left = list(range(len(points)))
     while left:
@@ -241,6 +275,5 @@ def _things(points: Array, gap: float, least: int) -> list[tuple[float, float]]:
             left = [k for k in left if k not in close]
             queue += close
         if len(group) >= least:
-            low, high = points[group].min(axis=0), points[group].max(axis=0)
-            found.append((float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0))
+            found.append(_Thing(points[group]))
     return found

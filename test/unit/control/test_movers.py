@@ -89,6 +89,19 @@ def test_who_stops_is_forgotten_and_who_goes_on_is_found_again(house):
     assert any(movers for _, movers, _ in play(house, watch, 1.5))
 
 
+@pytest.mark.parametrize("world", ["house", "flat", "office"])
+def test_furniture_that_comes_into_view_bit_by_bit_does_not_move(world):
+    """Legs of chairs, and ends of walls behind them, as the robot drives slowly by."""
+    engine = Engine(load_world(ROOT / "worlds" / f"{world}.world"), EngineParams(seed=5))
+    engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
+    watch = MoverWatch()
+    steps = play(engine, watch, 40.0, lambda now: Twist2D(0.1, 0.0, 0.4 * math.sin(0.2 * now)))
+    way = math.hypot(*engine.pose[:2])
+    engine.close()
+    assert way > 0.5
+    assert [(round(now, 1), seen) for now, seen, _ in steps if seen] == []
+
+
 def ring(stamp, radius, shift=0.0):
     angles = -math.pi + np.arange(360) * math.tau / 360
     ranges = np.full(360, radius) - shift * np.cos(angles)
