@@ -100,8 +100,9 @@ class Camera:
     """Sends pictures at a rate, and counts what comes back."""
 
     def __init__(self, rate: float) -> None:
+        import actionlib
         import rospy
-        from darknet_ros_msgs.msg import BoundingBoxes, ObjectCount
+        from darknet_ros_msgs.msg import BoundingBoxes, CheckForObjectsAction, ObjectCount
         from sensor_msgs.msg import Image
         from std_msgs.msg import Header
 
@@ -117,6 +118,8 @@ class Camera:
         self._publisher = rospy.Publisher("/camera", Image, queue_size=1)
         rospy.Subscriber("/darknet_ros/found_object", ObjectCount, self._on_count)
         rospy.Subscriber("/darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes)
+        self.action = actionlib.SimpleActionClient("/darknet_ros/check_for_objects", CheckForObjectsAction)
+        self.action.wait_for_server()
         threading.Thread(target=self._send, daemon=True).start()
 
     def _send(self) -> None:
@@ -150,9 +153,8 @@ class Camera:
 
 def disturb(camera: Camera, minute: int) -> None:
     """What happens now and then: somebody looks at the drawn picture, asks by the action, switches off and on."""
-    import actionlib
     import rospy
-    from darknet_ros_msgs.msg import CheckForObjectsAction, CheckForObjectsGoal
+    from darknet_ros_msgs.msg import CheckForObjectsGoal
     from sensor_msgs.msg import Image
     from std_srvs.srv import SetBool
 
@@ -161,10 +163,8 @@ def disturb(camera: Camera, minute: int) -> None:
         time.sleep(20.0)
         looking.unregister()
     elif minute % 10 == 6:
-        client = actionlib.SimpleActionClient("/darknet_ros/check_for_objects", CheckForObjectsAction)
-        client.wait_for_server(rospy.Duration(5.0))
         for i in range(20):
-            client.send_goal_and_wait(CheckForObjectsGoal(id=i, image=camera.messages[i]), rospy.Duration(5.0))
+            camera.action.send_goal_and_wait(CheckForObjectsGoal(id=i, image=camera.messages[i]), rospy.Duration(5.0))
     elif minute % 10 == 8:
         enable = rospy.ServiceProxy("/darknet_ros/enable", SetBool)
         enable(False)

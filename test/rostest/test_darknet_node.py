@@ -100,8 +100,9 @@ def test_publish_empty(ros, models):
 
 
 def test_encodings(ros, models):
-    start(ros, models)
+    node = start(ros, models)
     said = play(ros, "encodings")
+    node.says("pictures a second; seen: fire hydrant 99%")  # enable_console_output
     assert len(said) == 23
     for line in said:
         grey = line["encoding"] in ("mono8", "mono16", "8UC1")

@@ -36,24 +36,24 @@ class Goal:
     def finish(self, boxes: BoundingBoxes) -> None:
         """Answer; nothing where it was cancelled meanwhile."""
         result = CheckForObjectsResult(id=self._handle.get_goal().id, bounding_boxes=boxes)
-        with self._lock:
-            if not self._over:
-                self._over = True
-                self._handle.set_succeeded(result)
+        self._end(lambda: self._handle.set_succeeded(result))
 
     def abort(self, reason: str) -> None:
         """Answer that it cannot be done."""
-        with self._lock:
-            if not self._over:
-                self._over = True
-                self._handle.set_aborted(text=reason)
+        self._end(lambda: self._handle.set_aborted(text=reason))
 
     def cancel(self) -> None:
         """The client wants no answer any more: preempted."""
+        self._end(self._handle.set_canceled)
+
+    def _end(self, answer: Callable[[], None]) -> None:
         with self._lock:
-            if not self._over:
-                self._over = True
-                self._handle.set_canceled()
+            if self._over:
+                return
+            self._over = True
+            answer()
+            # actionlib keeps a goal in a cycle of references until Python collects those: 1 MB each with its picture
+            self._handle.get_goal().image.data = b""
 
     @property
     def over(self) -> bool:
