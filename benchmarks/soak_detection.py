@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -187,6 +188,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path, metavar="FILE")
     parser.add_argument("--log", type=Path, metavar="FILE", help="what the nodes print; default: a temporary file")
     wanted = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # so that the nodes end too
     log = wanted.log or Path(tempfile.mkstemp(prefix="soak_", suffix=".log")[1])
     house = House(log)
     minutes: list[float] = []
