@@ -26,11 +26,13 @@ _CELL = 0.1  # [m]
 _PERIOD = 0.045  # scans that follow faster are left out [s]
 _MARGIN = 0.15  # the last of a beam that tells nothing: noise and drift of the odometry [m]
 _AROUND = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1)]
+_VEIL = 0.1  # a beam that is longer by this than the one before, and shorter than the next, was split by an edge [m]
 _MOSTLY = 7  # of the nine cells around a hit were free: it is no edge of a wall
 _SLIPPED = 0.3  # where so many of the hits are new, it is the odometry that has moved
 _SIGHTINGS = 4  # within the window; less is a flicker
 _THERE = 0.07  # a beam as long as a point is far off, but for this, has hit it again: noise and odometry [m]
-_LEFT = 0.7  # of the points of a thing; where more are hit again, it is still there
+_SAME = 0.3  # so near to a thing, a beam's end is of it [m]
+_STAYS = 0.7  # of the points of a thing; where more are hit again, it is still there
 _NEVER = -math.inf
 
 
@@ -92,15 +94,24 @@ class _Track:
             del self.places[0], self.things[0]
 
     def look_back(self, scan: LaserScan, laser_from_odom: Pose2D, now: float) -> None:
-        """Note whether it has left the oldest of its places: beams now go on there, or end before."""
-        points = transform_points(laser_from_odom, self.things[0].points)
+        """Note whether it has left the oldest of its places: beams now go on there, or end at where it is now.
+
+        Where they end at something else, or there are none, it may still be there.
+        """
+        points, is_now = (
+            transform_points(laser_from_odom, thing.points) for thing in (self.things[0], self.things[-1])
+        )
         distances = np.hypot(*points.T)
         turned = (np.arctan2(points[:, 1], points[:, 0]) - scan.angle_min) * np.sign(scan.angle_increment)
         beams = np.rint(turned % math.tau / abs(scan.angle_increment)).astype(int)
         ranges = np.where(scan.is_hit, scan.ranges, scan.range_max)
         beside = ranges[(beams[:, None] + [-1, 0, 1]).clip(0, len(ranges) - 1)]  # along a wall they differ by much
-        is_there = (distances > beside.min(axis=1) - _THERE) & (distances < beside.max(axis=1) + _THERE)
-        if (is_there | (beams >= len(ranges))).mean() <= _LEFT:  # what it cannot see may be there
+        is_through = distances < beside.min(axis=1) - _THERE
+        is_before = distances > beside.max(axis=1) + _THERE
+        ends = points * (beside[:, 1] / np.maximum(distances, 1e-6))[:, None]
+        gaps = np.hypot(ends[:, None, 0] - is_now[None, :, 0], ends[:, None, 1] - is_now[None, :, 1]).min(axis=1)
+        has_left = (is_through | (is_before & (gaps < _SAME))) & (beams < len(ranges))
+        if has_left.mean() >= 1.0 - _STAYS:
             self.moved_at = now
 
     def velocity(self) -> tuple[float, float]:
@@ -156,7 +167,7 @@ class MoverWatch:
         angles = scan.angles
         units = np.column_stack((np.cos(angles), np.sin(angles)))
         hits = transform_points(odom_from_laser, units[near] * scan.ranges[near, None])
-        is_new = self._are_new(hits, now)
+        is_new = self._are_new(hits, now) & ~_is_veil(scan)[near]
         if len(hits) and is_new.mean() > _SLIPPED:
             self._forget()
             self._now, self._slipped_at, is_new = now, now, np.zeros(len(hits), bool)
@@ -260,6 +271,17 @@ class MoverWatch:
                 self._tracks.append(_Track(since=now))
                 self._tracks[-1].add(now, thing, p.window)
         self._tracks = [track for track in self._tracks if track.places[-1][0] >= now - p.coast]
+
+
+def _is_veil(scan: LaserScan) -> NDArray[np.bool_]:
+    """Which beams end in the air between an edge and what is behind it, or graze a wall, shape (N,).
+
+    Such points wander with the robot; laser_filters' ScanShadowsFilter takes them out by the same sign.
+    """
+    ranges = np.where(scan.is_hit, scan.ranges, scan.range_max)
+    steps = np.diff(ranges, prepend=ranges[:1], append=ranges[-1:])
+    before, after = steps[:-1], steps[1:]
+    return ((before > _VEIL) & (after > _VEIL)) | ((before < -_VEIL) & (after < -_VEIL))
 
 
 def _things(points: Array, gap: float, least: int) -> list[_Thing]:

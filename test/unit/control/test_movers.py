@@ -95,7 +95,8 @@ def test_furniture_that_comes_into_view_bit_by_bit_does_not_move(world):
     engine = Engine(load_world(ROOT / "worlds" / f"{world}.world"), EngineParams(seed=5))
     engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
     watch = MoverWatch()
-    steps = play(engine, watch, 40.0, lambda now: Twist2D(0.1, 0.0, 0.4 * math.sin(0.2 * now)))
+    steps = play(engine, watch, 30.0, lambda now: Twist2D(0.1, 0.0, 0.4 * math.sin(0.2 * now)))
+    assert not engine.touches()
     way = math.hypot(*engine.pose[:2])
     engine.close()
     assert way > 0.5
