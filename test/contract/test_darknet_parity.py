@@ -243,7 +243,7 @@ def test_our_own_network_as_darknet(tmp_path):
     (tmp_path / "case.cfg").write_text(spec.text)
     (tmp_path / "case.weights").write_bytes((ROOT / "models/house.weights").read_bytes())
     cv2.imwrite(str(tmp_path / "case.png"), pixels[:, :, ::-1])
-    for threshold in (0.05, 0.4):
+    for threshold in (0.01, 0.1):
         assert_same(ask_darknet(tmp_path, spec, threshold), seen(spec, load_network(spec, weights), pixels, threshold))
 
 
