@@ -118,6 +118,19 @@ def test_networks_by_name() -> None:
     assert network_of("rosbot_patrol.launch", f"network_param_file:={yaml}", robot=True) == tiny
 
 
+def test_another_camera() -> None:
+    topic = "/darknet_ros/subscribers/camera_reading/topic"
+    plain, other = (
+        {
+            name: value.value
+            for name, value in parse(ROOT / "launch" / "darknet_yolo_only.launch", *words).params.items()
+        }
+        for words in ((), ("camera:=/usb_cam/image_raw", "image_transport:=compressed"))
+    )
+    assert (plain[topic], plain["/darknet_ros/image_transport"]) == ("/rgb_raw", "raw")
+    assert (other[topic], other["/darknet_ros/image_transport"]) == ("/usb_cam/image_raw", "compressed")
+
+
 def test_an_unknown_network_names_the_file_that_is_not_there() -> None:
     with pytest.raises(Exception, match=r"config/yolov9\.yaml"):
         parse(ROOT / "launch" / "darknet_yolo_only.launch", "network:=yolov9")
