@@ -97,6 +97,10 @@ def test_networks_of_darknet_ros(name: str) -> None:
     if name == "hog.yaml":
         assert loaded.network == "hog"
         return
+    if name == "ros.yaml":
+        assert loaded.subscribers.camera_reading.topic == "/camera/rgb/image_raw"
+        assert loaded.publishers.detection_image.latch
+        return
     assert loaded.yolo_model.weight_file.name.endswith(".weights")
     assert "person" in loaded.yolo_model.detection_classes.names
 

@@ -118,6 +118,18 @@ def test_networks_by_name() -> None:
     assert network_of("rosbot_patrol.launch", f"network_param_file:={yaml}", robot=True) == tiny
 
 
+def test_darknet_ros_own_launch_files() -> None:
+    folder = ROOT / "drop_in" / "darknet_ros" / "launch"
+    for name, cfg in (("darknet_ros", "yolov2-tiny.cfg"), ("yolo_v3", "yolov3.cfg")):
+        config = parse(folder / f"{name}.launch", "image:=/usb_cam/image_raw")
+        given = {key: value.value for key, value in config.params.items()}
+        assert given["/darknet_ros/yolo_model/config_file/name"] == cfg
+        assert given["/darknet_ros/config_path"].endswith("darknet_ros/yolo_network_config/cfg")
+        (node,) = config.nodes
+        assert ("/camera/rgb/image_raw", "/usb_cam/image_raw") in [tuple(pair) for pair in node.remap_args]
+        assert given["/darknet_ros/subscribers/camera_reading/topic"] == "/camera/rgb/image_raw"
+
+
 def test_another_camera() -> None:
     topic = "/darknet_ros/subscribers/camera_reading/topic"
     plain, other = (
