@@ -32,7 +32,7 @@ class GiveWayParams:
     least_speed: float = param(0.15, lo=0.0, unit="m/s", doc="who is slower is an obstacle like others")
     least_age: float = param(0.25, lo=0.0, unit="s", doc="who was followed for less is not believed, unless near")
     hold: float = param(0.5, lo=0.0, unit="s", doc="it stands at least so long")
-    hold_beside: float = param(1.5, lo=0.0, unit="s", doc="the same after somebody was beside it, whom it may not see")
+    hold_near: float = param(1.5, lo=0.0, unit="s", doc="the same after somebody was near, who may go on at once")
 
 
 class GiveWay:
@@ -53,9 +53,9 @@ class GiveWay:
                 continue
             is_sudden = away < p.near and mover.age < _SUDDEN  # where legs that begin to walk will go is not known yet
             if is_sudden or self._meets(wish, mover, odom_from_base, away):
-                self._until = now + (p.hold_beside if away < p.clearance else p.hold)
+                self._until = now + (p.hold_near if away < p.near else p.hold)
                 return f"someone comes this way, {away:.1f} m off"
-        if now < self._until <= now + max(p.hold, p.hold_beside):
+        if now < self._until <= now + max(p.hold, p.hold_near):
             return "someone has just passed"
         return ""
 
