@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.detection.letterbox import Letterbox
-from rosbot_patrol.detection.training import overlay, patterns, render
+from rosbot_patrol.detection.training import overlay, patterns, render, visibility
 from rosbot_patrol.detection.training.furniture import box, build, placed
 from rosbot_patrol.detection.training.labels import COLUMNS, column
 from rosbot_patrol.detection.training.scenes import Actor, Scene
@@ -106,8 +106,8 @@ def test_contrast_is_the_step_at_the_outline() -> None:
     mask = np.zeros((480, 640), bool)
     mask[100:300, 200:400] = True
     picture[50:150, 100:200] = 100
-    assert render.contrast(picture, mask) == pytest.approx(40, abs=4)
-    assert render.contrast(np.full((240, 320, 3), 60, np.uint8), mask) == pytest.approx(0, abs=0.1)
+    assert visibility.contrast(picture, mask) == pytest.approx(40, abs=4)
+    assert visibility.contrast(np.full((240, 320, 3), 60, np.uint8), mask) == pytest.approx(0, abs=0.1)
 
 
 def test_training_and_tests_have_other_textures() -> None:
