@@ -50,11 +50,13 @@ class Trainer:
         self.total = self.steps_each * options.epochs
         self.step = 0
         self.epoch = 0
+        self.begun = time.monotonic()
 
     def run(self) -> None:
         """Train all epochs that are left."""
         self._resume()
-        while self.epoch < self.options.epochs:
+        self.begun = time.monotonic()
+        while self.epoch < self.options.epochs and self._spent() < 1:
             self._epoch()
             self.epoch += 1
             self._save()
@@ -73,7 +75,9 @@ class Trainer:
             for name, value in parts.items():
                 sums[name] = sums.get(name, 0.0) + value
             bar.set_postfix({k: f"{v / done:.3f}" for k, v in sums.items()}, refresh=False)
-        means = ", ".join(f"{k} {v / self.steps_each:.4f}" for k, v in sums.items())
+            if self._spent() >= 1:
+                break
+        means = ", ".join(f"{k} {v / done:.4f}" for k, v in sums.items())
         sys.stdout.write(f"\n{time.strftime('%H:%M:%S')} epoch {self.epoch + 1}: {means}\n")
         sys.stdout.flush()
 
@@ -81,6 +85,10 @@ class Trainer:
         """Let the first layers be as they are: nothing goes back through them, the costliest part of a step."""
         for block in self.network.blocks[: self.options.freeze]:
             block.requires_grad_(False).eval()
+
+    def _spent(self) -> float:
+        """Share of the minutes of this run that are over; 0 where it may take as long as it does."""
+        return (time.monotonic() - self.begun) / 60 / self.options.minutes if self.options.minutes else 0.0
 
     def _share(self, index: np.ndarray) -> np.ndarray:
         """This epoch's pictures: each picture comes once before any comes again."""
@@ -93,7 +101,7 @@ class Trainer:
 
     def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
         for group in self.optimiser.param_groups:
-            group["lr"] = self.options.rate * _schedule(self.step, self.total, self.options.cool)
+            group["lr"] = self.options.rate * _schedule(max(self.step / self.total, self._spent()), self.step, self.options.cool)
         inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
         inputs = inputs.contiguous(memory_format=torch.channels_last)
@@ -155,14 +163,14 @@ class Trainer:
         self.mean.load_state_dict(self.network.state_dict())
 
 
-def _schedule(step: int, total: int, cool: float) -> float:
-    """Share of the learning rate: up in 200 steps, level, and down as a cosine in the last `cool` of all steps.
+def _schedule(done: float, step: int, cool: float) -> float:
+    """Share of the learning rate: up in 200 steps, level, and down as a cosine in the last `cool` of all.
 
     Level for long, so that a training can be made longer after its start ("Scaling Laws and Compute-Optimal Training
     Beyond Fixed Training Durations", Haegele et al. 2024).
     """
     warm = min(1.0, (step + 1) / 200)
-    left = min(max(total - step, 0) / max(cool * total, 1.0), 1.0)
+    left = min(max(1 - done, 0.0) / max(cool, 1e-9), 1.0)
     return warm * (0.02 + 0.98 * 0.5 * (1 - math.cos(math.pi * left)))
 
 
@@ -194,6 +202,7 @@ def main() -> None:
     parser.add_argument("--batch", type=int, default=24)
     parser.add_argument("--rate", type=float, default=2e-3)
     parser.add_argument("--cool", type=float, default=0.5, help="share of the steps in which the rate falls")
+    parser.add_argument("--minutes", type=float, help="end after so long, with the rate fallen, whatever the epochs")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--bf16", action="store_true")

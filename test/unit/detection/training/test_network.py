@@ -115,7 +115,7 @@ def test_a_pair_that_does_not_fit_is_refused() -> None:
 
 
 def test_the_rate_rises_stays_and_falls() -> None:
-    shares = [_schedule(step, 1000, 0.4) for step in (0, 300, 599, 800, 999, 1500)]
+    shares = [_schedule(step / 1000, step, 0.4) for step in (0, 300, 599, 800, 999, 1500)]
     assert shares == pytest.approx([1 / 200, 1.0, 1.0, 0.51, 0.02, 0.02], abs=2e-3)
 
 
