@@ -100,8 +100,9 @@ class Trainer:
         return index[np.concatenate(orders)[start : start + count]]
 
     def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
+        share = _schedule(max(self.step / self.total, self._spent()), self.step, self.options.cool)
         for group in self.optimiser.param_groups:
-            group["lr"] = self.options.rate * _schedule(max(self.step / self.total, self._spent()), self.step, self.options.cool)
+            group["lr"] = self.options.rate * share
         inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
         inputs = inputs.contiguous(memory_format=torch.channels_last)
