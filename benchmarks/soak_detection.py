@@ -210,7 +210,7 @@ def main() -> int:
             minutes.append((now - start) / 60.0)
             for name in NODES:
                 rows[name].append(memory[name])
-            span = max(now - last[3], 1e-9)
+            span = max(now - last[3], 1.0)
             waits, camera.waits = camera.waits, []
             print(
                 f"| {minute} | "
