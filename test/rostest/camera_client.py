@@ -176,6 +176,7 @@ def latching():
     client = Client(drawn=True)
     client.look(make_message(100))
     client.wait(lambda: client.heard["drawn"])
+    client.wait(lambda: any(m.data for m in client.heard["ok"]))  # the camera is looked at twice a second
     late = Client(drawn=True)
     time.sleep(0.5)
     say(late={name: [m.header.stamp.secs for m in late.heard[name]] for name in ("boxes", "count", "drawn")})
