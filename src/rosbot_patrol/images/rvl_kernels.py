@@ -53,42 +53,38 @@ def encode(values, out):
     return at
 
 
+@kernel("UniTuple(int64, 2)(uint8[::1], int64)")
+def read_number(data, at):
+    """The number that begins at a nibble, and the nibble after it; -1 for that where the data end or make no sense."""
+    nibbles = (len(data) // 4) * 8
+    number, shift = 0, 0
+    while at < nibbles and shift <= 30:
+        nibble = (data[4 * (at // 8) + 3 - (at % 8) // 2] >> (4 if at % 2 == 0 else 0)) & 15
+        at += 1
+        number |= (nibble & 7) << shift
+        shift += 3
+        if nibble < 8:
+            return number, at
+    return number, -1
+
+
 @kernel("int64(uint8[::1], uint16[::1])")
 def decode(data, out):
     """Read values into `out`; returns how many there were, -1 where the data end too soon or make no sense."""
-    nibbles = (len(data) // 4) * 8
     at, done, previous, count = 0, 0, 0, len(out)
     while done < count:
         for part in range(2):
-            length, shift = 0, 0
-            while True:
-                if at >= nibbles or shift > 30:
-                    return -1
-                nibble = (data[4 * (at // 8) + 3 - (at % 8) // 2] >> (4 if at % 2 == 0 else 0)) & 15
-                at += 1
-                length |= (nibble & 7) << shift
-                shift += 3
-                if nibble < 8:
-                    break
-            if length > count - done:
+            length, at = read_number(data, at)
+            if at < 0 or length > count - done:
                 return -1
-            if part == 0:
-                for _ in range(length):
-                    out[done] = 0
-                    done += 1
-                continue
             for _ in range(length):
-                number, shift = 0, 0
-                while True:
-                    if at >= nibbles or shift > 30:
+                if part == 0:
+                    out[done] = 0
+                else:
+                    number, at = read_number(data, at)
+                    if at < 0:
                         return -1
-                    nibble = (data[4 * (at // 8) + 3 - (at % 8) // 2] >> (4 if at % 2 == 0 else 0)) & 15
-                    at += 1
-                    number |= (nibble & 7) << shift
-                    shift += 3
-                    if nibble < 8:
-                        break
-                previous += (number + 1) // -2 if number & 1 else number // 2
-                out[done] = previous & 65535
+                    previous += (number + 1) // -2 if number & 1 else number // 2
+                    out[done] = previous & 65535
                 done += 1
     return done

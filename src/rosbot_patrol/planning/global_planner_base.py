@@ -34,7 +34,7 @@ from rosbot_patrol.planning.global_planner_obstacles import (
 )
 from rosbot_patrol.planning.global_planner_search import Descend, descend_smoothly, find_way
 from rosbot_patrol.planning.interfaces import Array, GlobalPlanner
-from rosbot_patrol.planning.tunable import changed
+from rosbot_patrol.tunable import changed
 
 P = TypeVar("P")
 

@@ -25,7 +25,7 @@ from rosbot_patrol.planning.recoveries import (
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner
 from rosbot_patrol.planning.trajectory_planner_base import SamplingPlanner
 from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
-from rosbot_patrol.planning.tunable import tunable
+from rosbot_patrol.tunable import tunable
 
 NAVFN, GLOBAL_PLANNER = "navfn/NavfnROS", "global_planner/GlobalPlanner"
 GLOBAL_PLANNERS = (NAVFN, GLOBAL_PLANNER)

@@ -18,7 +18,7 @@ from rosbot_patrol.planning.interfaces import Array, LocalPlanner, LocalView
 from rosbot_patrol.planning.trajectory_planner_ground import Ground, survey_ground
 from rosbot_patrol.planning.trajectory_planner_stop import StopAndTurn, StopLimits
 from rosbot_patrol.planning.trajectory_planner_track import Track
-from rosbot_patrol.planning.tunable import changed
+from rosbot_patrol.tunable import changed
 
 P = TypeVar("P")
 

@@ -21,9 +21,9 @@ from rosbot_patrol.costmap.params import (
 )
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.planning.interfaces import GlobalPlanner, LocalPlanner
-from rosbot_patrol.planning.tunable import changed
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
 from rosbot_patrol.ros.reconfigure import ReconfigureServer
+from rosbot_patrol.tunable import changed
 
 MOVE_BASE = (
     "planner_frequency",

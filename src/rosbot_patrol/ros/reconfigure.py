@@ -26,7 +26,7 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest, Reconfigure
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import unknown_name
-from rosbot_patrol.planning.tunable import Tunable, tunable
+from rosbot_patrol.tunable import Tunable, tunable
 
 log = logging.getLogger(__name__)
 

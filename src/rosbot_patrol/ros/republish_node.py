@@ -29,13 +29,13 @@ from rosbot_patrol.images.compressed import CompressedParams, compress
 from rosbot_patrol.images.compressed_depth import CompressedDepthParams, compress_depth
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import param
-from rosbot_patrol.planning.tunable import changed
 from rosbot_patrol.ros import diagnostics
 from rosbot_patrol.ros.camera import Camera
 from rosbot_patrol.ros.convert_images import picture_to_msg
 from rosbot_patrol.ros.heap import share_one_heap
 from rosbot_patrol.ros.node import load_params, run_node
 from rosbot_patrol.ros.reconfigure import ReconfigureServer
+from rosbot_patrol.tunable import changed
 
 log = logging.getLogger(__name__)
 
