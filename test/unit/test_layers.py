@@ -14,7 +14,7 @@ SRC = ROOT / "src" / "rosbot_patrol"
 ROWS: list[set[str]] = [
     {"errors", "kernels"},
     {"params", "files", "yaml_files"},
-    {"geometry"},
+    {"geometry", "tunable"},
     {"grid", "scan"},
     {"maps", "images"},
     {"costmap"},
