@@ -1,0 +1,222 @@
+#!/usr/bin/env python3
+"""Motion sensors by the hundred in one process, for rosserial.py: JSON commands by line on stdin, answers on stdout.
+
+    {"connect": N, "port": P}           N sensors, each from a loopback address of its own; until all are negotiated
+    {"steady": SECONDS, "save": FILE}   each sends a heartbeat every 0.5 s, at phases by chance (seeded)
+    {"flood": COUNT}                    each sends so many heartbeats as fast as the bridge takes them
+    {"reconnect": SECONDS}              all drop their links at once, come back and report; until all have, or the time is up
+    {"bye": true}                       all hang up
+
+Times are CLOCK_MONOTONIC in ns, the same clock in all processes of a machine.
+"""
+
+from __future__ import annotations
+
+import heapq
+import json
+import random
+import selectors
+import socket
+import struct
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from rosbot_patrol.rosserial.client_session import DeviceSession
+from rosbot_patrol.rosserial.packet import encode
+from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicInfo, pack_esp_trigger
+
+INFO = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=ESP_TRIGGER_MD5)
+PERIOD = 0.5
+IDS = 250  # the sensors beyond that share an id with another one, at another address
+
+
+class Sensor:
+    """One client. What it waits to send lies in `waiting`."""
+
+    def __init__(self, number: int) -> None:
+        self.sensor_id = number % IDS
+        self.key = self.sensor_id | (number // IDS % 2) << 8  # id and `move`: which of 500 it is
+        self.source = f"127.1.{number // 200}.{number % 200 + 1}"
+        self.link: socket.socket | None = None
+        self.session = DeviceSession([INFO])
+        self.waiting = b""
+        self.retry_at = 0.0
+        self.answered = False  # the bridge has told the time after the topics: it knows them
+
+    def frame(self, *, move: bool = False) -> bytes:
+        return encode(INFO.topic_id, pack_esp_trigger(self.sensor_id, move))
+
+
+class Fleet:
+    """All sensors and one selector."""
+
+    def __init__(self) -> None:
+        self.sensors: list[Sensor] = []
+        self.port = 0
+        self._selector = selectors.DefaultSelector()
+
+    def open(self, sensor: Sensor) -> None:
+        """Begin to connect."""
+        link = socket.socket()
+        link.setblocking(False)
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        link.bind((sensor.source, 0))
+        link.connect_ex(("127.0.0.1", self.port))
+        sensor.link, sensor.session, sensor.waiting, sensor.answered = link, DeviceSession([INFO]), b"", False
+        self._selector.register(link, selectors.EVENT_READ, sensor)
+
+    def drop(self, sensor: Sensor, *, abruptly: bool = False) -> None:
+        """Close a link, by a reset where `abruptly`."""
+        if sensor.link is None:
+            return
+        self._selector.unregister(sensor.link)
+        if abruptly:
+            sensor.link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        sensor.link.close()
+        sensor.link = None
+
+    def serve(self, timeout: float) -> None:
+        """Read and answer once; a link that broke is opened again 0.2 s later."""
+        now = time.monotonic()
+        for key, _ in self._selector.select(max(timeout, 0.0)):
+            self._read(key.data, now)
+        for sensor in self.sensors:
+            if sensor.link is None and now >= sensor.retry_at:
+                self.open(sensor)
+
+    def tick(self) -> None:
+        """Ask for the time where it is due."""
+        now = time.monotonic()
+        for sensor in self.sensors:
+            if sensor.link is not None:
+                sensor.session.tick(now)
+                self.flush(sensor)
+
+    def flush(self, sensor: Sensor) -> None:
+        """Send what the link takes."""
+        sensor.waiting += b"".join(sensor.session.take_output())
+        if not sensor.waiting or sensor.link is None:
+            return
+        try:
+            sensor.waiting = sensor.waiting[sensor.link.send(sensor.waiting) :]
+        except BlockingIOError:
+            return
+        except OSError:
+            self._broken(sensor)
+
+    def _read(self, sensor: Sensor, now: float) -> None:
+        if sensor.link is None:
+            return
+        try:
+            data = sensor.link.recv(4096)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._broken(sensor)
+            return
+        sensor.session.receive(data, now)
+        sensor.answered |= sensor.session.server_time(now) is not None
+        self.flush(sensor)
+
+    def _broken(self, sensor: Sensor) -> None:
+        self.drop(sensor)
+        sensor.retry_at = time.monotonic() + 0.2
+
+    def wait_all(self, seconds: float) -> int:
+        """Serve until the bridge knows all; how many it knows."""
+        until = time.monotonic() + seconds
+        while (known := sum(s.answered for s in self.sensors)) < len(self.sensors) and time.monotonic() < until:
+            self.serve(0.05)
+        return known
+
+
+def connect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
+    fleet.port = command["port"]
+    fleet.sensors = [Sensor(number) for number in range(command["connect"])]
+    for sensor in fleet.sensors:
+        fleet.open(sensor)
+    return {"known": fleet.wait_all(30.0)}
+
+
+def steady(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
+    """Heartbeats; saves when each was given to the kernel, and of which id."""
+    rng = random.Random(6)
+    begin = time.monotonic()
+    due = [(begin + rng.uniform(0.0, PERIOD), n) for n in range(len(fleet.sensors))]
+    heapq.heapify(due)
+    sent: list[tuple[int, int]] = []
+    end, tick_due, late = begin + command["steady"], begin, 0.0
+    while (now := time.monotonic()) < end:
+        while due[0][0] <= now:
+            at, number = due[0]
+            heapq.heapreplace(due, (at + PERIOD, number))
+            sensor = fleet.sensors[number]
+            if sensor.link is not None and sensor.answered:
+                late = max(late, now - at)
+                sensor.waiting += sensor.frame()
+                sent.append((time.monotonic_ns(), sensor.sensor_id))
+                fleet.flush(sensor)
+            now = time.monotonic()
+        if now >= tick_due:
+            tick_due = now + 0.5
+            fleet.tick()
+        fleet.serve(min(due[0][0] - time.monotonic(), 0.1))
+    np.save(command["save"], np.array(sent, dtype=np.int64))
+    return {"sent": len(sent), "late_ms": 1e3 * late, "linked": sum(s.link is not None for s in fleet.sensors)}
+
+
+def flood(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
+    """As fast as the bridge reads."""
+    for sensor in fleet.sensors:
+        sensor.waiting += sensor.frame() * command["flood"]
+    began = time.monotonic_ns()
+    while any(s.waiting for s in fleet.sensors):
+        for sensor in fleet.sensors:
+            fleet.flush(sensor)
+        fleet.serve(0.0)
+    return {"began": began, "sent": len(fleet.sensors) * command["flood"]}
+
+
+def reconnect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
+    """Drop all links at once and come back; each sends one message as soon as the bridge knows it."""
+    for sensor in fleet.sensors:
+        fleet.drop(sensor, abruptly=True)
+    began = time.monotonic_ns()
+    for sensor in fleet.sensors:
+        fleet.open(sensor)
+    waiting = list(fleet.sensors)
+    until = time.monotonic() + command["reconnect"]
+    while waiting and time.monotonic() < until:
+        fleet.serve(0.05)
+        for sensor in waiting:
+            if sensor.answered:
+                sensor.waiting += sensor.frame(move=bool(sensor.key >> 8))
+                fleet.flush(sensor)
+        waiting = [sensor for sensor in waiting if not sensor.answered]
+    return {"began": began, "known": len(fleet.sensors) - len(waiting)}
+
+
+def bye(fleet: Fleet, _command: dict[str, Any]) -> dict[str, Any]:
+    for sensor in fleet.sensors:
+        fleet.drop(sensor)
+    fleet.sensors = []
+    return {}
+
+
+def main() -> int:
+    fleet = Fleet()
+    does = {"connect": connect, "steady": steady, "flood": flood, "reconnect": reconnect, "bye": bye}
+    for line in sys.stdin:
+        command = json.loads(line)
+        act = next(function for name, function in does.items() if name in command)
+        print(json.dumps(act(fleet, command)), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
