@@ -4,9 +4,9 @@
     . scripts/env; .ws/venv/bin/python benchmarks/rosserial.py [--json FILE] [--quick] [--sensors 500] [--seconds 60]
 
 The sensors (rosserial_fleet.py) and those who listen (rosserial_ear.py) are processes of their own and do not count.
-CPU is the bridge's, of one core, with one rospy subscriber, diagnostics and all. Memory is read at the end of all that:
+CPU is the bridge's, of one core, with one rospy subscriber, diagnostics and all. Memory is read after that:
 RSS is all that is resident, PSS shares what other Python processes use too. Latency is from the `send` of a heartbeat's
-last byte to its arrival at a subscriber: a rospy one, and a bare TCPROS socket, which leaves rospy's receiving side out.
+last byte to its arrival at a subscriber: a rospy one, and a bare TCPROS socket, which leaves rospy's receiver out.
 The flood is sent as fast as the bridge reads, without its limit of 200 frames a second and client, to the bare
 socket; nothing may be missing. Where the package path has the original rosserial_python, its flood is measured too.
 """
@@ -40,6 +40,7 @@ class Child:
         )
 
     def hear(self) -> dict[str, Any]:
+        """Its next answer."""
         assert self.popen.stdout is not None
         while not (line := self.popen.stdout.readline()).startswith("{"):
             if not line:
@@ -47,15 +48,18 @@ class Child:
         return json.loads(line)
 
     def tell(self, **command: object) -> None:
+        """Command without waiting."""
         assert self.popen.stdin is not None
         self.popen.stdin.write(json.dumps(command) + "\n")
         self.popen.stdin.flush()
 
     def ask(self, **command: object) -> dict[str, Any]:
+        """Command, and wait for the answer."""
         self.tell(**command)
         return self.hear()
 
     def stop(self) -> None:
+        """End it."""
         self.popen.kill()
         self.popen.wait()
 
@@ -76,12 +80,11 @@ def program() -> str:
 
 
 def upstream() -> str:
-    """Upstream's serial_node.py, "" where the package path has none (ours stands in under its name)."""
+    """Upstream's serial_node.py, "" where the package path has none (ours stands in for it)."""
     found = subprocess.run(["rospack", "find", "rosserial_python"], capture_output=True, text=True, check=False)
     folder = Path(found.stdout.strip() or "/nonexistent")
-    return (
-        str(folder / "nodes" / "serial_node.py") if (folder / "src/rosserial_python/SerialClient.py").exists() else ""
-    )
+    is_upstream = (folder / "src/rosserial_python/SerialClient.py").exists()
+    return str(folder / "nodes" / "serial_node.py") if is_upstream else ""
 
 
 class Bridge:
@@ -102,16 +105,19 @@ class Bridge:
             time.sleep(0.1)
 
     def cpu_seconds(self) -> float:
+        """User and system time so far."""
         fields = Path(f"/proc/{self.popen.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / TICKS
 
     def megabytes(self, key: str) -> float:
+        """Memory by `key`, Rss or Pss."""
         for line in Path(f"/proc/{self.popen.pid}/smaps_rollup").read_text().splitlines():
             if line.startswith(key + ":"):
                 return int(line.split()[1]) / 1024.0
         raise OSError(f"smaps_rollup has no {key}")
 
     def stop(self) -> None:
+        """Interrupt it."""
         self.popen.send_signal(signal.SIGINT)
         self.popen.wait(20.0)
         self._out.close()
@@ -212,9 +218,7 @@ def measure(folder: Path, options: argparse.Namespace) -> dict[str, float]:
         if "flood" in options.parts:
             for name, path in (("", program()), ("_upstream", upstream())):
                 if not path:
-                    print(
-                        "flood of upstream's rosserial_python: not on the package path (ours stands in under its name)"
-                    )
+                    print("flood of upstream's rosserial_python: not on the package path (ours stands in for it)")
                     continue
                 port = free_port()
                 bridge = Bridge(path, port, folder / "flood.log", **({} if name else {"max_rate": 0}))

@@ -54,6 +54,7 @@ class RawEar:
             self.count = self._offset // FRAME
 
     def clear(self) -> None:
+        """Forget what came."""
         self._pieces.clear()
         self._offset = self.count = 0
 
@@ -86,12 +87,15 @@ class RospyEar:
 
     @property
     def count(self) -> int:
+        """Messages so far."""
         return len(self._heard)
 
     def clear(self) -> None:
+        """Forget what came."""
         self._heard.clear()
 
     def arrivals(self) -> np.ndarray:
+        """Time and key of each message."""
         return np.array(self._heard, dtype=np.int64).reshape(-1, 2)
 
 

@@ -4,7 +4,7 @@
     {"connect": N, "port": P}           N sensors, each from a loopback address of its own; until all are negotiated
     {"steady": SECONDS, "save": FILE}   each sends a heartbeat every 0.5 s, at phases by chance (seeded)
     {"flood": COUNT}                    each sends so many heartbeats as fast as the bridge takes them
-    {"reconnect": SECONDS}              all drop their links at once, come back and report; until all have, or the time is up
+    {"reconnect": SECONDS}              all drop their links at once, come back and report
     {"bye": true}                       all hang up
 
 Times are CLOCK_MONOTONIC in ns, the same clock in all processes of a machine.
@@ -47,6 +47,7 @@ class Sensor:
         self.answered = False  # the bridge has told the time after the topics: it knows them
 
     def frame(self, *, move: bool = False) -> bytes:
+        """Its heartbeat, or a trigger."""
         return encode(INFO.topic_id, pack_esp_trigger(self.sensor_id, move))
 
 
