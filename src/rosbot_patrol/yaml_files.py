@@ -11,6 +11,10 @@ import yaml
 from rosbot_patrol.errors import ParamError
 
 
+class _StandsTwiceError(yaml.constructor.ConstructorError):
+    pass
+
+
 class _StrictLoader(yaml.SafeLoader):
     """A loader for which a key that stands twice is an error, where yaml itself keeps the last."""
 
@@ -18,20 +22,20 @@ class _StrictLoader(yaml.SafeLoader):
         seen: set[object] = set()
         for key_node, _ in node.value:
             if isinstance(key_node, yaml.ScalarNode) and key_node.tag != "tag:yaml.org,2002:merge":
-                if key_node.value in seen:
-                    raise yaml.constructor.ConstructorError(
-                        None, None, f"the key '{key_node.value}' stands twice", key_node.start_mark
-                    )
-                seen.add(key_node.value)
+                key = self.construct_object(key_node)  # 1 and 01 are one key
+                if key in seen:
+                    raise _StandsTwiceError(None, None, f"the key '{key_node.value}' stands twice", key_node.start_mark)
+                seen.add(key)
         return super().construct_mapping(node, deep)
 
 
-def read_mapping(path: str | Path, *, keys: str) -> dict[str, Any]:
+def read_mapping(path: str | Path, *, keys: str, is_secret: bool = False) -> dict[str, Any]:
     """The keys and values of a yaml file.
 
     Args:
         path: where it lies.
         keys: which keys it should have, for the message where it has none at all.
+        is_secret: say nothing of what it holds.
 
     Raises:
         ParamError: it cannot be read or is no such yaml; names the file, and the line where there is one.
@@ -48,9 +52,14 @@ def read_mapping(path: str | Path, *, keys: str) -> dict[str, Any]:
     except yaml.MarkedYAMLError as err:
         mark = err.problem_mark
         where = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        raise ParamError(str(path), f"is no valid yaml{where}: {err.problem}") from err
+        problem = err.problem
+        if is_secret:
+            problem = "a key stands twice" if isinstance(err, _StandsTwiceError) else "it cannot be parsed"
+        raise ParamError(str(path), f"is no valid yaml{where}: {problem}") from (None if is_secret else err)
     except yaml.YAMLError as err:
-        raise ParamError(str(path), f"is no valid yaml: {' '.join(str(err).split())}") from err
+        problem = "it cannot be parsed" if is_secret else " ".join(str(err).split())
+        raise ParamError(str(path), f"is no valid yaml: {problem}") from (None if is_secret else err)
     if not isinstance(tree, dict):
-        raise ParamError(str(path), f"expected the keys {keys}, got {str(tree)[:40]!r}")
+        got = "something else" if is_secret else repr(str(tree)[:40])
+        raise ParamError(str(path), f"expected the keys {keys}, got {got}")
     return tree

@@ -10,6 +10,8 @@ import logging
 import sys
 import time
 
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.rosserial.keys import key_of
 from rosbot_patrol.rosserial.tcp_client import EspClient
 
 
@@ -18,12 +20,16 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--host", default="localhost", help="where the bridge runs (default: %(default)s)")
     parser.add_argument("--port", type=int, default=11411, help="its TCP port (default: %(default)s)")
     parser.add_argument("--id", type=int, default=1, help="the sensor's id, which is its room (default: %(default)s)")
+    parser.add_argument("--key-file", default="", metavar="FILE", help="take the sensor's key from a file of keys")
+    parser.add_argument("--insist", action="store_true", help="talk only to a bridge that has the same key")
     parser.add_argument("--trigger", action="store_true", help="report motion once, as soon as connected")
     parser.add_argument("--every", type=float, default=0.0, metavar="S", help="report motion every S seconds")
     parser.add_argument("--duration", type=float, default=0.0, metavar="S", help="end after S seconds (0: Ctrl-C)")
     arguments = parser.parse_args([a for a in sys.argv[1:] if not a.startswith("__") and ":=" not in a])
     if not 0 <= arguments.id <= 255:
         parser.error(f"--id {arguments.id}: expected 0 to 255")
+    if arguments.insist and not arguments.key_file:
+        parser.error("--insist needs a --key-file")
     return arguments
 
 
@@ -42,7 +48,11 @@ def main() -> None:
     """Run the sensor until Ctrl-C or for --duration."""
     arguments = _arguments()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    client = EspClient(arguments.host, arguments.port, arguments.id).start()
+    try:
+        key = key_of(arguments.key_file, arguments.id) if arguments.key_file else None
+    except ParamError as err:
+        sys.exit(f"esp_client: {err}")
+    client = EspClient(arguments.host, arguments.port, arguments.id, key=key, insist=arguments.insist).start()
     try:
         if client.wait_connected(5.0):
             print(f"sensor {arguments.id}: connected to {arguments.host}:{arguments.port}", flush=True)

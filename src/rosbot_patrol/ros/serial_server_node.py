@@ -219,14 +219,20 @@ def body() -> None:
     policy = params.policy(rospy.get_name() + "/")
     _allow_many_files(params.max_clients)
     ros_side = RosSide(params.sensor_timeout)
-    server = SerialServer(ros_side, policy, silence_timeout=params.silence_timeout, max_clients=params.max_clients)
+    server = SerialServer(
+        ros_side,
+        policy,
+        silence_timeout=params.silence_timeout,
+        max_clients=params.max_clients,
+        max_strangers=params.max_strangers,
+    )
     ros_side.server = server
     if policy.restricted:
         ros_side.advertise(policy)
     if params.is_tcp:
         ports = server.listen(params.all_tcp_ports, params.host)
         what = "TCP port " + ", ".join(map(str, ports))
-        log.info("waiting for sensors on %s", what)
+        log.info("waiting for sensors%s on %s", f" with one of {len(policy.keys)} keys" if policy.keys else "", what)
     else:
         server.attach(params.port, params.baud)
         what = params.port

@@ -37,6 +37,7 @@ from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RatePar
 from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
 from rosbot_patrol.ros.simulator_requests import Requests
 from rosbot_patrol.ros.simulator_scenario import ScenarioRunner
+from rosbot_patrol.rosserial.keys import read_keys
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.renderer import make_renderer
@@ -73,6 +74,9 @@ class SimulatorParams(EngineParams):
     motion_sensors: str = param("", doc="file of the motion sensors, empty: none")
     prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
     bridge_host: str = param("localhost", doc="where the bridge of the motion sensors runs")
+    key_file: str = param(
+        "", doc="keys by which the motion sensors prove themselves to a bridge that asks; empty: none"
+    )
     scenario: str = param("", doc="file of a scenario to play; what it says of world, sensors, seed and start counts")
     scenario_watched: bool = param(False, doc="begin it only when somebody listens to ~scenario")
     rates: RateParams = field(default_factory=RateParams)
@@ -109,7 +113,8 @@ class Simulator:
         self._lockstep = Lockstep(p.lockstep, lambda: self._engine.now)
         if p.rate == 0.0:
             self._lockstep.subscribe()
-        self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id) for s in places}
+        keys = read_keys(p.key_file) if p.key_file else {}
+        self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id, key=keys.get(s.id)) for s in places}
         self._scenario = None
         if scenario is not None:
             self._scenario = ScenarioRunner(scenario, self._engine, self._clients, is_watched=p.scenario_watched)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.packet import Packet, Parser, encode
+from rosbot_patrol.rosserial.proof import Prover
 from rosbot_patrol.rosserial.topics import TopicId, TopicInfo, pack_time, pack_topic_info, unpack_time
 
 SYNC_PERIOD = 2.5
@@ -37,7 +38,14 @@ class Unconfigured:
     reason: str
 
 
-DeviceEvent = Message | Configured | Unconfigured
+@dataclass(frozen=True)
+class NotTrusted:
+    """The server is not the one that the device wants, or will not take the device; hang up and try again later."""
+
+    reason: str
+
+
+DeviceEvent = Message | Configured | Unconfigured | NotTrusted
 
 
 class DeviceSession:
@@ -46,17 +54,30 @@ class DeviceSession:
     Args:
         publishers: topics that it publishes; subscribers: topics that it listens to.
         max_payload: longest message taken from the server [bytes].
+        prover: answers the challenge of a server with keys, a new one each time; None for a device without a key.
+        insist: whether to talk only to a server that has shown that it has the key.
     """
 
     def __init__(
-        self, publishers: Sequence[TopicInfo], subscribers: Sequence[TopicInfo] = (), *, max_payload: int = 512
+        self,
+        publishers: Sequence[TopicInfo],
+        subscribers: Sequence[TopicInfo] = (),
+        *,
+        max_payload: int = 512,
+        prover: Prover | None = None,
+        insist: bool = False,
     ) -> None:
+        if insist and prover is None:
+            raise ValueError("a device without a key cannot insist on it")
         self._publishers = tuple(publishers)
         self._subscribers = tuple(subscribers)
         self._parser = Parser(max_payload)
         self._output: list[bytes] = []
         self._last_request = 0.0
         self._last_answer = 0.0
+        self._prover = prover
+        self._is_trusted = not insist
+        self._awaits_answer = False
         self._offset: float | None = None
         self.configured = False
 
@@ -70,6 +91,12 @@ class DeviceSession:
         for packet in self._parser.feed(data):
             events += self._packet(packet, now)
         return events
+
+    def closed(self) -> list[DeviceEvent]:
+        """The server ended the connection; what that means where it says more."""
+        if self._awaits_answer:
+            return [NotTrusted("the bridge did not take the proof, it has another key of this sensor or none")]
+        return []
 
     def tick(self, now: float) -> list[DeviceEvent]:
         """Ask for the time where it is due; notice that the server is gone."""
@@ -95,6 +122,10 @@ class DeviceSession:
         return frames
 
     def _packet(self, packet: Packet, now: float) -> list[DeviceEvent]:
+        if packet.topic_id in (TopicId.CHALLENGE, TopicId.PROOF):
+            return self._prove(packet)
+        if not self._is_trusted:
+            return [NotTrusted("the bridge did not show that it has this sensor's key")]
         if packet.topic_id == TopicId.PUBLISHER:
             return self._negotiate(now)
         if packet.topic_id == TopicId.TIME:
@@ -108,6 +139,21 @@ class DeviceSession:
             self.configured = False
             return [Unconfigured("the server stopped the traffic")]
         return [Message(packet.topic_id, packet.data)]
+
+    def _prove(self, packet: Packet) -> list[DeviceEvent]:
+        if self._prover is None:
+            return [NotTrusted("the bridge asks for a key, and this sensor has none")]
+        if packet.topic_id == TopicId.PROOF:
+            if not self._prover.confirms(packet.data):
+                return [NotTrusted("the bridge does not have this sensor's key")]
+            self._is_trusted, self._awaits_answer = True, False
+            return []
+        try:
+            self._output.append(self._prover.answer(packet.data))
+            self._awaits_answer = True
+        except ProtocolError as err:
+            return [NotTrusted(f"the bridge sent {err.problem}")]
+        return []
 
     def _negotiate(self, now: float) -> list[DeviceEvent]:
         self._request_time(now)

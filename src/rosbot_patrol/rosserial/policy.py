@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.rosserial.packet import MAX_PAYLOAD
@@ -71,6 +71,7 @@ class Policy:
         publish, subscribe, services: rules of what a device may do.
         parameters: parameters that it is told.
         peers: networks that may connect; empty: all.
+        keys: of the sensors, by id; where there are any, each device must prove that it has one of them.
         max_payload: longest message [bytes]; max_topics: most topics of one client.
         max_rate: frames a second beyond which a client is read more slowly, 0 for no limit.
         max_garbage: bytes without a frame in them after which a client is hung up on, 0 for never.
@@ -82,6 +83,7 @@ class Policy:
     services: tuple[Rule, ...] = ()
     parameters: tuple[str, ...] = ()
     peers: tuple[Network, ...] = ()
+    keys: Mapping[int, bytes] = field(default_factory=dict, repr=False)
     max_payload: int = 1024
     max_topics: int = 16
     max_rate: float = 200.0

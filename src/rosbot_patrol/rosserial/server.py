@@ -17,21 +17,23 @@ from typing import Protocol
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.client import Client, Link, listen, peer_names, tune
 from rosbot_patrol.rosserial.complaints import Complaints
-from rosbot_patrol.rosserial.policy import Policy
-from rosbot_patrol.rosserial.serial_port import SerialPort
-from rosbot_patrol.rosserial.session import (
+from rosbot_patrol.rosserial.door import Door
+from rosbot_patrol.rosserial.events import (
     Announced,
     Event,
     Garbled,
     HangUp,
     LogLine,
     ParamAsked,
+    Proven,
     Received,
     Refused,
-    Session,
     SyncLost,
     TimeAsked,
 )
+from rosbot_patrol.rosserial.policy import Policy
+from rosbot_patrol.rosserial.serial_port import SerialPort
+from rosbot_patrol.rosserial.session import Session
 from rosbot_patrol.rosserial.topics import TX_STOP, TopicId, TopicInfo, param_values
 
 log = logging.getLogger(__name__)
@@ -71,7 +73,7 @@ class SerialServer:
         handler: the other side.
         policy: what devices may do.
         silence_timeout: hang up on a TCP client not heard of for that long [s].
-        max_clients: on all ports together; beyond that the oldest without an accepted topic makes room.
+        max_clients, max_per_address, max_strangers: see `Door`.
         clock: monotonic time [s].
     """
 
@@ -82,13 +84,15 @@ class SerialServer:
         *,
         silence_timeout: float = 15.0,
         max_clients: int = 600,
+        max_per_address: int = 0,
+        max_strangers: int = 16,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.clients: dict[Link, Client] = {}
         self._handler = handler
         self._policy = policy
         self._silence_timeout = silence_timeout
-        self._max_clients = max_clients
+        self._door = Door(max_clients=max_clients, max_per_address=max_per_address, max_strangers=max_strangers)
         self._clock = clock
         self._complaints = Complaints()
         self._listeners: list[socket.socket] = []
@@ -230,16 +234,15 @@ class SerialServer:
         """Why a new connection is not taken; makes room for it where there is none."""
         if not self._policy.may_connect(host):
             return "its address is not on the list"
-        if len(self.clients) < self._max_clients:
-            return None
-        idle = next((c for c in self.clients.values() if not c.session.configured), None)
-        if idle is None:
-            return f"{self._max_clients} clients are connected"
-        self._drop(idle)
-        return None
+        reason, leaver = self._door.ask(host)
+        if leaver is not None:
+            self._complain(leaver, "to wait any longer without a proof or a topic: others come", self._clock())
+            self._drop(leaver)
+        return reason
 
     def _add(self, client: Client) -> None:
         self.clients[client.link] = client
+        self._door.enter(client)
         self._selector.register(client.link, selectors.EVENT_READ, client)
         self._flush(client)
 
@@ -294,6 +297,7 @@ class SerialServer:
         client.closed = True
         self._watch(client, 0)
         self.clients.pop(client.link, None)
+        self._door.leave(client)
         client.link.close()
         self._handler.closed(client)
 
@@ -329,6 +333,12 @@ class SerialServer:
                 self._say(client, logging.WARNING, "bytes that are no frame, skipped: %s", event.sample.hex(" "))
         elif isinstance(event, SyncLost):
             self._say(client, logging.WARNING, "silent for %.0f s, asking for its topics again", event.seconds)
+        elif isinstance(event, Proven):
+            self._door.settle(client)
+            self._say(client, logging.INFO, "proved to be sensor %d", event.sensor_id)
+        elif isinstance(event, HangUp) and event.is_refusal:
+            self._complain(client, event.reason, now)
+            self._drop(client)
         elif isinstance(event, HangUp):
             self._lose(client, f"hung up on: {event.reason}")
 
@@ -338,6 +348,8 @@ class SerialServer:
         except ProtocolError as err:
             client.session.reject(event.kind, event.info)
             self._complain(client, str(err), now)
+        else:
+            self._door.settle(client)
 
     def _complain(self, client: Client, what: str, now: float) -> None:
         if self._complaints.is_new((client.address, what), now):

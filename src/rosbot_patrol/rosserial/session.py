@@ -1,17 +1,32 @@
 """The server's side of rosserial, without sockets: bytes in, events out, frames to send.
 
-One `Session` serves one connected device. It checks what the device announces against a `Policy`; whether a message
-type exists and its MD5 fits is found by its owner, who calls `reject`.
+One `Session` serves one connected device. Where the `Policy` has keys, the device must prove that it has one before
+anything else (`proof`). What it announces is checked against the policy; whether a message type exists and its MD5 fits
+is found by the session's owner, who calls `reject`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from rosbot_patrol.errors import ProtocolError
+from rosbot_patrol.rosserial import proof
+from rosbot_patrol.rosserial.events import (
+    Announced,
+    Event,
+    Garbled,
+    HangUp,
+    LogLine,
+    ParamAsked,
+    Proven,
+    Received,
+    Refused,
+    SyncLost,
+    TimeAsked,
+)
 from rosbot_patrol.rosserial.packet import Packet, Parser, encode
 from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.topics import (
+    ESP_TRIGGER_MD5,
+    ESP_TRIGGER_TYPES,
     NEGOTIATION_IDS,
     REQUEST_TOPICS,
     ParamValues,
@@ -30,75 +45,6 @@ QUIET = 5.0  # without a frame a device counts as out of sync
 INCOMING = frozenset({TopicId.PUBLISHER, TopicId.SERVICE_SERVER_PUBLISHER, TopicId.SERVICE_CLIENT_PUBLISHER})
 
 
-@dataclass(frozen=True)
-class Announced:
-    """A topic that the policy allows; answer with `Session.reject` where it cannot be had."""
-
-    kind: TopicId
-    info: TopicInfo
-
-
-@dataclass(frozen=True)
-class Received:
-    """A message of the device on a topic that it announced."""
-
-    kind: TopicId
-    info: TopicInfo
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Refused:
-    """A topic, or what was sent on none, is not accepted."""
-
-    what: str
-    reason: str
-
-
-@dataclass(frozen=True)
-class LogLine:
-    """The device logs, level 0 (debug) to 4 (fatal)."""
-
-    level: int
-    text: str
-
-
-@dataclass(frozen=True)
-class TimeAsked:
-    """The device asks for the time; answer with `Session.answer_time`."""
-
-
-@dataclass(frozen=True)
-class ParamAsked:
-    """The device asks for a parameter that it may know; answer with `Session.answer_param`."""
-
-    name: str
-
-
-@dataclass(frozen=True)
-class Garbled:
-    """Bytes came that are no frame; told once a connection."""
-
-    sample: bytes
-
-
-@dataclass(frozen=True)
-class SyncLost:
-    """Nothing was heard for some time; the topics are asked for again."""
-
-    seconds: float
-
-
-@dataclass(frozen=True)
-class HangUp:
-    """The connection is not worth keeping."""
-
-    reason: str
-
-
-Event = Announced | Received | Refused | LogLine | TimeAsked | ParamAsked | Garbled | SyncLost | HangUp
-
-
 class Session:
     """One device.
 
@@ -106,11 +52,24 @@ class Session:
         policy: what it may do.
         now: time of the connection [s], any monotonic clock; the same clock in all calls.
         silence_timeout: hang up on a device not heard of for that long [s], None for never.
+        nonce: of the challenge; only tests give one.
+
+    Attributes:
+        proven_id: the sensor that the device has proved to be, None where it has not.
     """
 
-    def __init__(self, policy: Policy, now: float, *, silence_timeout: float | None = 15.0) -> None:
+    def __init__(
+        self, policy: Policy, now: float, *, silence_timeout: float | None = 15.0, nonce: bytes | None = None
+    ) -> None:
         self.policy = policy
-        self.parser = Parser(policy.max_payload)
+        self.proven_id: int | None = None
+        self._gate = proof.Gate(policy.keys, nonce) if policy.keys else None
+        self._is_turned_away = False
+        self._began = now
+        self._bytes_before_proof = 0
+        self._sensor_ids: frozenset[int] | None = None  # that it may speak for, None for all
+        self._triggers: set[int] = set()  # topic ids that carry EspTriggers
+        self.parser = Parser(min(policy.max_payload, proof.MAX_PAYLOAD) if self._gate else policy.max_payload)
         self.incoming: dict[int, tuple[TopicId, TopicInfo]] = {}
         self.outgoing: dict[int, tuple[TopicId, TopicInfo]] = {}
         self.last_frame = now
@@ -127,7 +86,7 @@ class Session:
         self._garbled = False
         self._credit = policy.max_rate
         self._credit_at = now
-        self._output: list[bytes] = [REQUEST_TOPICS]
+        self._output: list[bytes] = [self._gate.challenge if self._gate else REQUEST_TOPICS]
 
     @property
     def configured(self) -> bool:
@@ -144,12 +103,20 @@ class Session:
         garbage = self.parser.garbage
         self._last_bytes = now
         events = self._packets(self.parser.feed(data), now)
+        if self._gate is not None:
+            self._bytes_before_proof += len(data)
+            if self._bytes_before_proof > proof.MAX_BYTES:
+                events.append(HangUp(f"{self._bytes_before_proof} bytes and no proof", is_refusal=True))
         if self.parser.garbage > garbage:
             events += self._complain(data)
         return events
 
     def tick(self, now: float) -> list[Event]:
         """Notice what did not come; call it every half second or so."""
+        if self._gate is not None:
+            if now - self._began > proof.PROOF_TIMEOUT:
+                return [HangUp(f"no proof within {proof.PROOF_TIMEOUT:.0f} s; has it a key?", is_refusal=True)]
+            return []
         events: list[Event] = []
         while self.parser.pending and now - self._last_bytes > FRAME_TIMEOUT:
             events += self._packets(self.parser.give_up(), now)
@@ -205,9 +172,13 @@ class Session:
         return events
 
     def _packet(self, packet: Packet, now: float) -> list[Event]:
+        if self._gate is not None:
+            return self._before_proof(self._gate, packet, now)
         topic_id = packet.topic_id
         known = self.incoming.get(topic_id)
         if known is not None:
+            if topic_id in self._triggers and not self._may_speak_for(packet.data):
+                return self._refuse_id(packet.data)
             self.messages += 1
             return [Received(*known, packet.data)]
         if topic_id in NEGOTIATION_IDS:
@@ -221,6 +192,29 @@ class Session:
             return self._param(unpack_param_request(packet.data))
         return self._unknown(topic_id, now)
 
+    def _before_proof(self, gate: proof.Gate, packet: Packet, now: float) -> list[Event]:
+        if packet.topic_id != TopicId.PROOF or self._is_turned_away:
+            self.dropped += 1
+            return []
+        try:
+            self.proven_id, answer = gate.check(packet.data)
+        except ProtocolError as err:
+            self._is_turned_away = True
+            return [HangUp(str(err), is_refusal=True)]
+        self._gate = None
+        self._sensor_ids = frozenset((self.proven_id,))
+        self.parser.max_payload = self.policy.max_payload
+        self._output.append(answer)
+        self._request_topics(now)
+        return [Proven(self.proven_id)]
+
+    def _may_speak_for(self, data: bytes) -> bool:
+        return self._sensor_ids is None or data[0:1] == b"" or data[0] in self._sensor_ids
+
+    def _refuse_id(self, data: bytes) -> list[Event]:
+        self.dropped += 1
+        return [Refused(f"what it says for sensor {data[0]}", f"it has proved to be sensor {self.proven_id}")]
+
     def _announce(self, kind: TopicId, info: TopicInfo) -> list[Event]:
         known = self.incoming if kind in INCOMING else self.outgoing
         if known.get(info.topic_id) == (kind, info):
@@ -233,6 +227,11 @@ class Session:
         if reason is not None:
             return self._refuse(kind, info, reason)
         known[info.topic_id] = (kind, info)
+        is_trigger = info.md5 == ESP_TRIGGER_MD5 or info.message_type in ESP_TRIGGER_TYPES
+        if kind == TopicId.PUBLISHER and is_trigger:
+            self._triggers.add(info.topic_id)
+        elif kind in INCOMING:
+            self._triggers.discard(info.topic_id)
         self._refused_ids.discard(info.topic_id)
         return [Announced(kind, info)]
 

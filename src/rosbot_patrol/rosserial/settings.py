@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import param
+from rosbot_patrol.rosserial.keys import read_keys
 from rosbot_patrol.rosserial.policy import MOTION_TRIGGER_RULES, TRUSTED, Policy, parse_networks, parse_rules
 
 DEFAULT_TCP_PORT = 11411
@@ -29,8 +31,14 @@ class SerialNodeParams:
     allow_subscribe: tuple[str, ...] = param((), doc="'TOPIC TYPE' that devices may subscribe to")
     allow_services: tuple[str, ...] = param((), doc="'SERVICE TYPE' that devices may offer or call")
     allow_parameters: tuple[str, ...] = param((), doc="parameters that devices are told")
+    key_file: str = param("", doc="keys of the sensors, each TCP client must prove that it has one; empty: none needed")
     allow_peers: tuple[str, ...] = param((), doc="addresses and networks that may connect; empty: all")
     max_clients: int = param(600, lo=1, hi=20000, doc="TCP clients at a time, all ports together")
+    max_strangers: int = param(
+        16,
+        lo=1,
+        doc="TCP clients of one address that have not proved or announced anything; a newcomer ends the oldest",
+    )
     max_rate: float = param(200.0, lo=0.0, unit="1/s", doc="frames a second and client, beyond it reads slowly; 0: any")
     max_payload: int = param(1024, lo=64, hi=32767, unit="bytes", doc="longest message of a restricted client")
     silence_timeout: float = param(15.0, lo=1.0, unit="s", doc="hang up on a TCP client not heard of for that long")
@@ -49,7 +57,7 @@ class SerialNodeParams:
         return (self.tcp_port, *(port for port in self.tcp_ports if port != self.tcp_port))
 
     def policy(self, prefix: str) -> Policy:
-        """What devices may do; `prefix` names the parameters in messages. Raises ParamError."""
+        """What devices may do, with the keys read; `prefix` names the parameters in messages. Raises ParamError."""
         restricted = self.restrict == "always" or (self.restrict == "tcp" and self.is_tcp)
         base = Policy() if restricted else TRUSTED
         return replace(
@@ -58,7 +66,17 @@ class SerialNodeParams:
             subscribe=parse_rules(self.allow_subscribe, prefix + "allow_subscribe"),
             services=parse_rules(self.allow_services, prefix + "allow_services"),
             parameters=self.allow_parameters,
+            keys=self._keys(prefix),
             peers=parse_networks(self.allow_peers, prefix + "allow_peers"),
             max_payload=self.max_payload if restricted else base.max_payload,
             max_rate=self.max_rate if restricted else base.max_rate,
         )
+
+    def _keys(self, prefix: str) -> dict[int, bytes]:
+        """A serial device is a trusted wire, which needs no key unless it is restricted too."""
+        if not self.key_file or not (self.is_tcp or self.restrict == "always"):
+            return {}
+        try:
+            return read_keys(self.key_file)
+        except ParamError as err:
+            raise ParamError(prefix + "key_file", str(err)) from err

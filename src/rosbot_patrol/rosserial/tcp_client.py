@@ -16,8 +16,9 @@ import socket
 import threading
 import time
 
-from rosbot_patrol.rosserial.client_session import Configured, DeviceEvent, DeviceSession, Unconfigured
+from rosbot_patrol.rosserial.client_session import Configured, DeviceEvent, DeviceSession, NotTrusted, Unconfigured
 from rosbot_patrol.rosserial.poor_link import PERFECT, LinkQuality, PoorLink
+from rosbot_patrol.rosserial.proof import Prover
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, ESP_TRIGGER_TYPES, TopicInfo, pack_esp_trigger
 
 log = logging.getLogger(__name__)
@@ -46,6 +47,8 @@ class EspClient:
         sensor_id: 0 to 255, the room that it watches.
         message_type: "rosbot_patrol/EspTrigger" or another package's message of the same definition.
         heartbeat_period: wall time between two heartbeats [s].
+        key: 32 bytes that prove to a bridge with keys that this is that sensor.
+        insist: whether to talk only to a bridge that has shown that it has the key.
     """
 
     def __init__(
@@ -57,12 +60,17 @@ class EspClient:
         topic: str = "motion_trigger",
         message_type: str = ESP_TRIGGER_TYPES[0],
         heartbeat_period: float = HEARTBEAT_PERIOD,
+        key: bytes | None = None,
+        insist: bool = False,
     ) -> None:
         if not 0 <= sensor_id <= 255:
             raise ValueError(f"sensor id {sensor_id} does not fit into a byte")
         self.host, self.port, self.sensor_id = host, port, sensor_id
         self._info = TopicInfo(topic_id=PUBLISHER_ID, name=topic, message_type=message_type, md5=ESP_TRIGGER_MD5)
         self._heartbeat_period = heartbeat_period
+        self._key = key
+        self._insist = insist
+        self._told = ""
         self._lock = threading.Lock()
         self._motion = False
         self._pending = False  # a motion that has not been sent
@@ -177,7 +185,8 @@ class EspClient:
         link.settimeout(SEND_TIMEOUT)
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         link.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        session = DeviceSession([self._info])
+        prover = Prover(self.sensor_id, self._key) if self._key is not None else None
+        session = DeviceSession([self._info], prover=prover, insist=self._insist)
         self._line.begin(time.monotonic())
         heartbeat_due = time.monotonic()
         while not self._stopping and not self._reboot:
@@ -194,11 +203,16 @@ class EspClient:
             if self._wake_read in ready:
                 self._drain_wake()
             if link in ready:
-                data = link.recv(4096)
+                try:
+                    data = link.recv(4096)
+                except ConnectionResetError:
+                    data = b""
                 if not data:
+                    self._note(session.closed())
                     return
                 events += session.receive(data, time.monotonic())
-            self._note(events)
+            if not self._note(events):
+                return
 
     def _send(self, link: socket.socket, session: DeviceSession, now: float) -> None:
         """Send what has come through the line; a motion whose frame could not be sent is reported later."""
@@ -227,10 +241,18 @@ class EspClient:
             return heartbeat_due
         return now + self._heartbeat_period
 
-    def _note(self, events: list[DeviceEvent]) -> None:
+    def _note(self, events: list[DeviceEvent]) -> bool:
+        """Whether to go on with this bridge."""
         for event in events:
             if isinstance(event, Configured):
                 self._connected.set()
+                self._told = ""
+            elif isinstance(event, NotTrusted):
+                if event.reason != self._told:  # it will be so at the next attempt too
+                    self._told = event.reason
+                    log.warning("sensor %d: %s:%d: %s", self.sensor_id, self.host, self.port, event.reason)
+                return False
             elif isinstance(event, Unconfigured):
                 self._connected.clear()
                 log.info("sensor %d: %s", self.sensor_id, event.reason)
+        return True

@@ -17,7 +17,7 @@ FIRST_USER_ID = 100
 
 
 class TopicId(IntEnum):
-    """Topic ids with a meaning of their own (rosserial_msgs/TopicInfo)."""
+    """Topic ids with a meaning of their own (rosserial_msgs/TopicInfo; 8 and 9 are ours, see `proof`)."""
 
     PUBLISHER = 0
     SUBSCRIBER = 1
@@ -27,6 +27,8 @@ class TopicId(IntEnum):
     SERVICE_CLIENT_SUBSCRIBER = 5
     PARAMETER_REQUEST = 6
     LOG = 7
+    CHALLENGE = 8
+    PROOF = 9
     TIME = 10
     TX_STOP = 11
 

@@ -287,3 +287,65 @@ def test_missing_serial_device_is_said_and_tried_again(caplog):
     assert len(caplog.records) == 1
     assert "/dev/no-such-device" in caplog.text
     server.close()
+
+
+KEYS = {2: bytes(range(32)), 3: bytes(range(1, 33))}
+
+
+def test_sensor_with_a_key_is_known_and_one_without_or_with_another_is_not(caplog):
+    caplog.set_level("INFO")
+    with serving(Policy(keys=KEYS)) as (recorder, _, port):
+        good = EspClient("127.0.0.1", port, 2, key=KEYS[2], insist=True).start()
+        plain, wrong = EspClient("127.0.0.1", port, 3).start(), EspClient("127.0.0.1", port, 3, key=KEYS[2]).start()
+        assert good.wait_connected(3.0)
+        good.trigger()
+        wait_for(lambda: b"\x02\x01" in recorder.messages)
+        wait_for(lambda: "a wrong proof for sensor 3" in caplog.text)
+        wait_for(lambda: "did not take the proof" in caplog.text)
+        wait_for(lambda: "the bridge asks for a key, and this sensor has none" in caplog.text)
+        time.sleep(1.0)  # and tries again
+        assert caplog.text.count("refused a wrong proof for sensor 3") == 1
+        assert {m[0] for m in recorder.messages} == {2}
+        assert not plain.connected
+        assert not wrong.connected
+        for sensor in (good, plain, wrong):
+            sensor.stop()
+
+
+def test_sensor_that_insists_talks_to_no_bridge_without_keys(caplog):
+    with serving() as (recorder, _, port):
+        sensor = EspClient("127.0.0.1", port, 2, key=KEYS[2], insist=True).start()
+        wait_for(lambda: "did not show that it has this sensor's key" in caplog.text)
+        easy = EspClient("127.0.0.1", port, 3, key=KEYS[3]).start()
+        assert easy.wait_connected(3.0)
+        wait_for(lambda: recorder.messages)
+        assert {m[0] for m in recorder.messages} == {3}
+        sensor.stop()
+        easy.stop()
+
+
+def test_strangers_of_one_address_are_few_and_keep_no_sensor_out():
+    with serving(Policy(keys=KEYS), max_strangers=4) as (_, server, port):
+        links = [socket.create_connection(("127.0.0.1", port), timeout=3.0) for _ in range(10)]
+        wait_for(lambda: links[5].recv(100)[5:6] == b"\x08" and links[5].recv(100) == b"")
+        wait_for(lambda: len(server.clients) == 4)
+        sensor = EspClient("127.0.0.1", port, 2, key=KEYS[2]).start()
+        assert sensor.wait_connected(3.0)
+        more = [socket.create_connection(("127.0.0.1", port)) for _ in range(10)]
+        time.sleep(0.3)
+        assert sensor.connected
+        sensor.stop()
+        for link in links + more:
+            link.close()
+
+
+def test_who_does_not_prove_itself_in_time_is_let_go(monkeypatch, caplog):
+    monkeypatch.setattr("rosbot_patrol.rosserial.proof.PROOF_TIMEOUT", 0.3)
+    with serving(Policy(keys=KEYS)) as (_, server, port):
+        link = socket.create_connection(("127.0.0.1", port), timeout=3.0)
+        assert Parser().feed(link.recv(100))[0].topic_id == TopicId.CHALLENGE
+        link.sendall(ANNOUNCE + encode(10, bytes(8)))
+        assert link.recv(100) == b""
+        assert not server.clients
+        link.close()
+    assert "no proof within" in caplog.text
