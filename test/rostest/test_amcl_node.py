@@ -107,6 +107,21 @@ def test_a_respawned_node_goes_on_where_it_was(ros, room):
     assert abs(peer.do("drive", scans=2)["pose"] - 0.5) < 0.2
 
 
+def test_a_pose_saved_in_another_run_is_not_taken(ros, room):
+    node, peer = started(ros, room, "_save_pose_rate:=5.0")
+    peer.do("initialpose", x=0.5)
+    peer.do("drive", scans=10)
+    node.stop()
+    ask = ("rosparam", "get", "/amcl/saved_pose/stamp")
+    stamp = float(subprocess.run(ask, env=ros.env, check=True, capture_output=True, text=True).stdout)
+    later = ("rosparam", "set", "/amcl/saved_pose/stamp", str(stamp + 1e4))  # as if the clock had begun anew
+    subprocess.run(later, env=ros.env, check=True)
+    again = ros.node("amcl")
+    again.says("Received a 100 X 100 map", 20.0)
+    assert abs(peer.do("drive", scans=2)["pose"]) < 0.2
+    again.says("is of another run")
+
+
 def test_a_bad_parameter_is_named(ros):
     node = ros.node("amcl", "_laser_model_type:=sonar", "__name:=amcl_bad")
     node.says("/amcl_bad/laser_model_type: is 'sonar', expected one of beam, likelihood_field", 20.0)

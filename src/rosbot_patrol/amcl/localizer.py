@@ -84,11 +84,7 @@ class Localizer:
         self._forced = False
         self.estimate: Estimate | None = None
         self.map_from_odom: Pose2D | None = None
-        p = params
-        self.set_pose(
-            Pose2D(p.initial_pose_x, p.initial_pose_y, p.initial_pose_a),
-            np.diag([p.initial_cov_xx, p.initial_cov_yy, p.initial_cov_aa]),
-        )
+        self.set_pose(*start_of(params))
 
     @property
     def has_map(self) -> bool:
@@ -206,6 +202,13 @@ class Localizer:
         self._odometry = odometry
         if self.estimate is not None:
             self.map_from_odom = compose(self.estimate.pose, invert(odometry))
+
+
+def start_of(params: AmclParams) -> tuple[Pose2D, Array]:
+    """Where the parameters say that the robot starts, and the covariance of that, shape (3, 3)."""
+    p = params
+    pose = Pose2D(p.initial_pose_x, p.initial_pose_y, p.initial_pose_a)
+    return pose, np.diag([p.initial_cov_xx, p.initial_cov_yy, p.initial_cov_aa])
 
 
 def scan_problem(scan: LaserScan) -> str:

@@ -9,8 +9,9 @@ Differs: within the best cluster particles that fit the newest scan count for mo
 mean: with the tutorial's few updates that is 5 cm off instead of 25. All particles in one bin ask for the fewest
 particles, upstream's rule then asks for the most. The averages behind the recovery are of a beam's fit, so that more
 or fewer beams are no cause for random poses. Draws follow an even sequence instead of independent numbers. A new map
-keeps the pose that the filter has. An odometry that jumps or a clock that goes back is a restart, not a motion. A
-turned map is refused with a sentence. No dynamic_reconfigure.
+keeps the pose that the filter has. A pose that was saved in another run of a simulation is not taken. An odometry that
+jumps or a clock that goes back is a restart, not a motion. A turned map is refused with a sentence. No
+dynamic_reconfigure.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 from std_srvs.srv import Empty, EmptyResponse
 
-from rosbot_patrol.amcl.localizer import Localizer, Outcome, scan_problem
+from rosbot_patrol.amcl.localizer import Localizer, Outcome, scan_problem, start_of
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D, compose, invert
@@ -47,6 +48,7 @@ from rosbot_patrol.ros.grids import GetMapFast, GridMsg, SetMapFast
 from rosbot_patrol.ros.node import Loop, Worker, load_params, now, run_node
 from rosbot_patrol.ros.pose_arrays import pose_array_to_msg
 from rosbot_patrol.ros.priority import Priority
+from rosbot_patrol.ros.saved_pose import SavedPose
 from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
 from rosbot_patrol.ros.transforms import Transforms
 
@@ -76,7 +78,10 @@ class AmclNode:
         self._last_time = now()
         self._last_cloud = -math.inf
         self._odom_from_base: Pose2D | None = None
-        self._saved: tuple[float, ...] = ()
+        self._stamp = -math.inf  # of the newest scan taken in
+        self._was_placed = False  # by initialpose, set_map or global_localization
+        self._saved = SavedPose()
+        self._is_first = True
         self._health = Health()
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._pose = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=2, latch=True)
@@ -183,6 +188,7 @@ class AmclNode:
         log.info("Setting pose (%.6f): %.3f %.3f %.3f", now(), pose.x, pose.y, pose.yaw)
         covariance[2, :2] = covariance[:2, 2] = 0.0  # as upstream
         with self._lock:
+            self._was_placed = True
             self._localizer.set_pose(pose, covariance)
             if self._params.force_update_after_initialpose:
                 self._localizer.request_update()
@@ -200,7 +206,7 @@ class AmclNode:
 
     def _localize_globally(self, _request: object) -> EmptyResponse:
         with self._lock:
-            started = self._localizer.localize_globally()
+            started = self._was_placed = self._localizer.localize_globally()
         if started:
             log.info("Initializing with uniform distribution")
         else:
@@ -216,11 +222,14 @@ class AmclNode:
 
     def _step(self, placed: PlacedScan) -> None:
         scan = placed.scan
+        if self._is_first:
+            self._is_first = False
+            self._forget_other_runs(scan.stamp)
         with self._lock:
             outcome = self._localizer.update(scan, placed.odom_from_base, placed.mount)
             correction = self._localizer.map_from_odom
             poses = self._localizer.filter.poses
-            self._odom_from_base = placed.odom_from_base
+            self._odom_from_base, self._stamp = placed.odom_from_base, scan.stamp
         if correction is not None and self._params.tf_broadcast:
             stamp = scan.stamp + self._params.transform_tolerance
             self._broadcaster.sendTransform(transform_to_msg(correction, self._global, self._odom, stamp))
@@ -229,6 +238,12 @@ class AmclNode:
                 10.0, f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
             )
         self._publish(outcome, poses, scan.stamp)
+
+    def _forget_other_runs(self, stamp: float) -> None:
+        own = self._saved.own(self._params, stamp)
+        if own is not None and not self._was_placed:
+            with self._lock:
+                self._localizer.set_pose(*start_of(own))
 
     def _publish(self, outcome: Outcome, poses: np.ndarray, stamp: float) -> None:
         if outcome.estimate is not None:
@@ -249,21 +264,15 @@ class AmclNode:
     def _save_pose(self) -> None:
         with self._lock:
             correction, estimate = self._localizer.map_from_odom, self._localizer.estimate
-            odometry = self._odom_from_base
+            odometry, stamp = self._odom_from_base, self._stamp
         if correction is None or estimate is None or odometry is None:
             return
         pose = compose(correction, odometry)
         values = (*pose, *(float(v) for v in np.diag(estimate.covariance)))
-        if values == self._saved:
-            return
-        names = [f"initial_{key}" for key in ("pose_x", "pose_y", "pose_a", "cov_xx", "cov_yy", "cov_aa")]
         try:
-            for name, value in zip(names, values, strict=True):
-                rospy.set_param(f"~{name}", value)
+            self._saved.save(values, stamp)
         except (OSError, rospy.ROSException) as err:
             rospy.logwarn_throttle(30.0, f"the pose cannot be saved on the parameter server: {err}")
-            return
-        self._saved = values
 
     def _tell_health(self, current: float) -> None:
         if current < self._last_time - 1.0:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH, column
@@ -16,11 +18,28 @@ FAINT = 5.0
 NET_HEIGHT = HEIGHT + 2 * MARGIN
 
 
+class Packed:
+    """A shard in memory as jpegs of high quality: a seventh of its size, and no disk between the network and it.
+
+    Args:
+        pictures: RGB, uint8, shape (N, 240, 320, 3).
+    """
+
+    def __init__(self, pictures: np.ndarray) -> None:
+        self._files = [_packed(picture) for picture in pictures]
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    def __getitem__(self, i: int) -> np.ndarray:
+        return cv2.imdecode(self._files[i], cv2.IMREAD_COLOR)[..., ::-1]
+
+
 @dataclass
 class Pictures:
-    """A set of pictures, opened as memory maps, and the label rows of each."""
+    """A set of pictures, opened as memory maps or packed into memory, and the label rows of each."""
 
-    shards: list[np.ndarray]
+    shards: Sequence[np.ndarray | Packed]
     labels: list[list[np.ndarray]]
 
     @classmethod
@@ -39,6 +58,15 @@ class Pictures:
                 rows = np.pad(rows, ((0, 0), (0, len(COLUMNS) - rows.shape[1])), constant_values=255)
             labels.append([rows[column(rows, "picture") == i] for i in range(len(shard))])
         return cls(shards, labels)
+
+    def pack(self) -> Pictures:
+        """The same, read once and kept in memory (some 35 kB a picture); a shard that is listed twice is kept once."""
+        packed: dict[str, Packed] = {}
+        for shard in self.shards:
+            if isinstance(shard, np.memmap) and str(shard.filename) not in packed:
+                packed[str(shard.filename)] = Packed(shard)
+        shards = [packed[str(s.filename)] if isinstance(s, np.memmap) else s for s in self.shards]
+        return Pictures(shards, self.labels)
 
     def __len__(self) -> int:
         return sum(len(shard) for shard in self.shards)
@@ -87,6 +115,10 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
         size = [(x1 - x0) * WIDTH, (y1 - y0) * HEIGHT]
         boxes.append(np.stack([np.full(len(rows), b), column(rows, "kind"), *centre, *size, asked(rows)], axis=1))
     return images, np.concatenate(boxes).astype(np.float32)
+
+
+def _packed(picture: np.ndarray) -> np.ndarray:
+    return cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 96])[1]
 
 
 def _recolour(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -48,6 +48,8 @@ class Trainer:
         self.optimiser = torch.optim.AdamW(groups, lr=options.rate)
         self.steps_each = options.samples // options.batch
         self.total = self.steps_each * options.epochs
+        pictures = Pictures.open(options.data, options.name)
+        self.pictures = pictures.pack() if options.pack else pictures
         self.step = 0
         self.epoch = 0
         self.begun = time.monotonic()
@@ -63,9 +65,8 @@ class Trainer:
 
     def _epoch(self) -> None:
         rng = np.random.default_rng([self.options.seed, self.epoch])
-        pictures = Pictures.open(self.options.data, self.options.name)
-        index = self._share(pictures.index())
-        batches = _ahead(pictures, index, self.options.batch, rng)
+        index = self._share(self.pictures.index())
+        batches = _ahead(self.pictures, index, self.options.batch, rng)
         self.network.train()
         self._freeze()
         sums: dict[str, float] = {}
@@ -208,6 +209,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--bf16", action="store_true")
     parser.add_argument("--freeze", type=int, default=0, help="so many of the first layers keep their numbers")
+    parser.add_argument("--pack", action="store_true", help="read all pictures once and keep them in memory as jpegs")
     parser.add_argument("--compile", action="store_true", help="compile the network first; needs a C++ compiler")
     parser.add_argument("--anchors", action="store_true", help="find anchors and put them into the cfg file first")
     options = parser.parse_args()

@@ -1,0 +1,74 @@
+"""The pose that amcl saves to its parameters `initial_*`, and when it did so.
+
+As upstream: a node that is started again goes on from there. But a master may outlive a simulation, and in the next one
+the robot stands at its start again, with a clock that begins anew. So the time is saved too; where the first scan is
+older than it, what was saved belongs to another run and is given up for the defaults.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import fields, replace
+from typing import Any
+
+import rospy
+
+from rosbot_patrol.amcl.parameters import AmclParams
+
+log = logging.getLogger(__name__)
+
+NAMES = tuple(f"initial_{key}" for key in ("pose_x", "pose_y", "pose_a", "cov_xx", "cov_yy", "cov_aa"))
+SAVED = "~saved_pose"
+SLACK_S = 1.0
+
+
+class SavedPose:
+    """What a node before this one saved, and what this one saves."""
+
+    def __init__(self) -> None:
+        self._before = _read(rospy.get_param(SAVED, None))
+        self._last: tuple[float, ...] = ()
+
+    def own(self, params: AmclParams, stamp: float) -> AmclParams | None:
+        """The start without what was saved in another run, None where nothing is to be changed.
+
+        A value that a launch file has set since is not the saved one, and stays.
+
+        Args:
+            params: as read at the start.
+            stamp: of the first scan [s].
+        """
+        before, self._before = self._before, {}
+        if stamp >= before.get("stamp", -math.inf) - SLACK_S:
+            return None
+        saved = {name for name in NAMES if getattr(params, name) == before.get(name)}
+        if not saved:
+            return None
+        log.warning(
+            "the saved pose %.2f %.2f %.2f is of another run (saved at %.1f s, it is %.1f s now): starting without it",
+            *(getattr(params, name) for name in NAMES[:3]),
+            before["stamp"],
+            stamp,
+        )
+        defaults: dict[str, Any] = {f.name: f.default for f in fields(params) if f.name in saved}
+        return replace(params, **defaults)
+
+    def save(self, values: tuple[float, ...], stamp: float) -> None:
+        """Set the parameters `NAMES`; raises what rospy.set_param raises."""
+        if values == self._last:
+            return
+        pose = dict(zip(NAMES, values, strict=True))
+        for name, value in pose.items():
+            rospy.set_param(f"~{name}", value)
+        rospy.set_param(SAVED, {**pose, "stamp": stamp})
+        self._last = values
+
+
+def _read(tree: object) -> dict[str, float]:
+    if tree is None:
+        return {}
+    if isinstance(tree, dict) and all(isinstance(tree.get(name), int | float) for name in (*NAMES, "stamp")):
+        return {name: float(tree[name]) for name in (*NAMES, "stamp")}
+    log.warning("%s is not as amcl writes it, it is left out", rospy.resolve_name(SAVED))
+    return {}
