@@ -137,7 +137,8 @@ def latencies_ms(sent: np.ndarray, heard: np.ndarray) -> np.ndarray:
 def steady(folder: Path, fleet: Child, bridge: Bridge, kind: str, seconds: float) -> dict[str, float]:
     """Heartbeats for some time: cost and latency with one listener."""
     listener = ear(kind)
-    time.sleep(1.5)  # whatever has to settle
+    fleet.ask(steady=3.0, save="/dev/null")  # each is heard of once
+    time.sleep(0.3)
     listener.ask(clear=True)
     cpu, began = bridge.cpu_seconds(), time.monotonic()
     said = fleet.ask(steady=seconds, save=str(folder / "sent.npy"))

@@ -88,14 +88,6 @@ class Fleet:
             if sensor.link is None and now >= sensor.retry_at:
                 self.open(sensor)
 
-    def tick(self) -> None:
-        """Ask for the time where it is due."""
-        now = time.monotonic()
-        for sensor in self.sensors:
-            if sensor.link is not None:
-                sensor.session.tick(now)
-                self.flush(sensor)
-
     def flush(self, sensor: Sensor) -> None:
         """Send what the link takes."""
         sensor.waiting += b"".join(sensor.session.take_output())
@@ -151,7 +143,7 @@ def steady(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
     due = [(begin + rng.uniform(0.0, PERIOD), n) for n in range(len(fleet.sensors))]
     heapq.heapify(due)
     sent: list[tuple[int, int]] = []
-    end, tick_due, late = begin + command["steady"], begin, 0.0
+    end, late = begin + command["steady"], 0.0
     while (now := time.monotonic()) < end:
         while due[0][0] <= now:
             at, number = due[0]
@@ -159,15 +151,14 @@ def steady(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
             sensor = fleet.sensors[number]
             if sensor.link is not None and sensor.answered:
                 late = max(late, now - at)
+                sensor.session.tick(now)  # asks for the time every 2.5 s
                 sensor.waiting += sensor.frame()
                 sent.append((time.monotonic_ns(), sensor.sensor_id))
                 fleet.flush(sensor)
             now = time.monotonic()
-        if now >= tick_due:
-            tick_due = now + 0.5
-            fleet.tick()
         fleet.serve(min(due[0][0] - time.monotonic(), 0.1))
-    np.save(command["save"], np.array(sent, dtype=np.int64))
+    with open(command["save"], "wb") as file:
+        np.save(file, np.array(sent, dtype=np.int64))
     return {"sent": len(sent), "late_ms": 1e3 * late, "linked": sum(s.link is not None for s in fleet.sensors)}
 
 

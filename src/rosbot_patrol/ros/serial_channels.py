@@ -1,4 +1,4 @@
-"""Topics and services of ROS on behalf of one rosserial device."""
+"""Subscriptions and services of ROS on behalf of one rosserial device; what it publishes: serial_publishers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 100
 SERVICE_TIMEOUT = 5.0
-SETTLING = 1.0  # subscribers hear of a new publisher through the master [s]
 
 Send = Callable[[int, bytes], None]
 
@@ -76,62 +75,6 @@ def deserialize(cls: Any, data: bytes, name: str) -> Any:
         return cls().deserialize(data)
     except (genpy.DeserializationError, struct.error, UnicodeDecodeError, ValueError) as err:
         raise ProtocolError("", f"{name}: {len(data)} bytes that are no {cls._type}: {err}") from err
-
-
-class _Topic:
-    """One ROS publisher; in its first second it keeps messages back until the subscribers have found it."""
-
-    def __init__(self, name: str, cls: Any) -> None:
-        self.cls = cls
-        self._publisher = rospy.Publisher(name, cls, queue_size=QUEUE_SIZE)
-        self._lock = threading.Lock()
-        self._held: list[Any] | None = []
-        timer = threading.Timer(SETTLING, self._settle)
-        timer.daemon = True
-        timer.start()
-
-    def publish(self, message: Any) -> None:
-        with self._lock:
-            if self._held is None:
-                self._publisher.publish(message)
-            elif len(self._held) < QUEUE_SIZE:
-                self._held.append(message)
-
-    def _settle(self) -> None:
-        with self._lock:
-            held, self._held = self._held or [], None
-            for message in held:
-                self._publisher.publish(message)
-
-
-class Publishers:
-    """ROS publishers that the devices share; they stay advertised when a device goes, as upstream's do."""
-
-    def __init__(self) -> None:
-        self._by_name: dict[str, _Topic] = {}
-
-    def open(self, info: TopicInfo) -> None:
-        """Advertise a topic; raises ProtocolError."""
-        cls = message_class(info.message_type)
-        check_md5(info, cls)
-        self.advertise(info.name, cls)
-
-    def advertise(self, name: str, cls: Any) -> None:
-        """Advertise a topic where it is not yet; raises ProtocolError."""
-        name = rospy.resolve_name(name)
-        known = self._by_name.get(name)
-        if known is None:
-            try:
-                self._by_name[name] = _Topic(name, cls)
-            except (rospy.ROSException, ValueError) as err:
-                raise ProtocolError("", f"{name} cannot be published: {err}") from err
-        elif known.cls._md5sum != cls._md5sum:
-            raise ProtocolError("", f"{name} is published as {known.cls._type} already, not as {cls._type}")
-
-    def publish(self, info: TopicInfo, data: bytes) -> None:
-        """Publish the bytes of a device; raises ProtocolError."""
-        topic = self._by_name[rospy.resolve_name(info.name)]
-        topic.publish(deserialize(topic.cls, data, info.name))
 
 
 class Subscription:

@@ -17,8 +17,10 @@ Differs:
 
 from __future__ import annotations
 
+import gc
 import logging
 import resource
+import sys
 import threading
 import time
 from typing import Any
@@ -28,7 +30,8 @@ import rospy
 from rosbot_patrol.errors import ParamError, ProtocolError
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.node import Worker, load_params, run_node
-from rosbot_patrol.ros.serial_channels import DeviceService, Publishers, ServiceCaller, Subscription, message_class
+from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subscription, message_class
+from rosbot_patrol.ros.serial_publishers import Publishers
 from rosbot_patrol.rosserial.client import Client
 from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.server import SerialServer
@@ -40,6 +43,7 @@ log = logging.getLogger(__name__)
 
 GLOBAL_TCP_PORT = "/rosserial_embeddedlinux/tcp_port"
 HEALTH_PERIOD = 1.0
+SWITCH_INTERVAL = 0.0005  # a message waits no longer for a thread that writes diagnostics [s]; Python's own: 0.005
 _LOGGERS = (rospy.logdebug, rospy.loginfo, rospy.logwarn, rospy.logerr, rospy.logfatal)
 
 
@@ -86,11 +90,19 @@ class RosSide:
         if kind == TopicId.PUBLISHER:
             if info.md5 == ESP_TRIGGER_MD5:
                 self._note_sensor(client, data)
-            self._publishers.publish(info, data)
+            self._publishers.put(info, data)
         elif kind == TopicId.SERVICE_SERVER_PUBLISHER:
             self._channels[client]["offered", info.name].receive(data)
         else:
             self._channels[client]["called", info.name].receive(data)
+
+    def flush(self) -> None:
+        """Publish what came in."""
+        self._publishers.flush()
+
+    def tick(self) -> None:
+        """Publish what had to wait."""
+        self._publishers.tick()
 
     def closed(self, client: Client) -> None:
         """Withdraw the device's subscriptions and services."""
@@ -215,6 +227,7 @@ def _allow_many_files(clients: int) -> None:
 
 def body() -> None:
     """Build the server and serve until shutdown."""
+    sys.setswitchinterval(SWITCH_INTERVAL)
     params = _parameters()
     policy = params.policy(rospy.get_name() + "/")
     _allow_many_files(params.max_clients)
@@ -236,6 +249,8 @@ def body() -> None:
     else:
         server.attach(params.port, params.baud)
         what = params.port
+    gc.collect()
+    gc.freeze()  # what is there by now stays: looking through it again stopped everything for 40 ms
     rospy.on_shutdown(server.stop)
     Worker(Report(ros_side, server, what).run, name="report").start()
     server.run()

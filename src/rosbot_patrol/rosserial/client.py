@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import selectors
 import socket
 import threading
 from collections import deque
@@ -34,6 +35,7 @@ class Client:
         discarded: frames for it that were thrown away because it took none.
         read_from: no bytes are read before that time [s].
         older: connections of the same sensor, closed when they have fallen silent.
+        watched: the selector's events that the server waits for, 0 for none.
     """
 
     def __init__(self, link: Link, session: Session, peer: str, address: str) -> None:
@@ -46,6 +48,7 @@ class Client:
         self.read_from = 0.0
         self.closed = False
         self.older: list[Client] = []
+        self.watched = 0
         self._waiting: deque[bytes] = deque()
         self._lock = threading.Lock()
 
@@ -61,6 +64,11 @@ class Client:
     def wants_write(self) -> bool:
         """Whether frames wait."""
         return bool(self._waiting)
+
+    def has_to_do(self, now: float) -> bool:
+        """Whether there is something to send, or reading is to begin again."""
+        paused = not self.watched & selectors.EVENT_READ
+        return bool(self._waiting) or self.session.has_output or (paused and self.read_from <= now)
 
     def note_message(self, md5: str, data: bytes) -> bool:
         """Learn the sensor's id from an EspTrigger; return whether it is news."""
@@ -87,8 +95,11 @@ class Client:
         Raises:
             OSError: the link is gone.
         """
-        for frame in self.session.take_output():
-            self._queue(frame)
+        if self.session.has_output:
+            for frame in self.session.take_output():
+                self._queue(frame)
+        if not self._waiting:
+            return
         with self._lock:
             while self._waiting:
                 frame = self._waiting[0]

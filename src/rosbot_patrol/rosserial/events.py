@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rosbot_patrol.rosserial.topics import TopicId, TopicInfo
 
@@ -15,8 +16,7 @@ class Announced:
     info: TopicInfo
 
 
-@dataclass(frozen=True)
-class Received:
+class Received(NamedTuple):  # comes by the thousand
     """A message of the device on a topic that it announced."""
 
     kind: TopicId

@@ -73,15 +73,16 @@ class Parser:
 
     def feed(self, data: bytes) -> list[Packet]:
         """Take bytes as they came; return the frames that they complete."""
-        self._buffer += data
-        packets = []
-        start = 0
-        while True:
-            start, packet = self._next(start)
-            if packet is None:
-                break
-            packets.append(packet)
-        del self._buffer[:start]
+        stream: bytes | bytearray = data
+        if self._buffer:
+            self._buffer += data
+            stream = self._buffer
+        packets: list[Packet] = []
+        start = self._scan(stream, packets)
+        if stream is self._buffer:
+            del self._buffer[:start]
+        elif start < len(stream):
+            self._buffer += stream[start:]
         return packets
 
     def give_up(self) -> list[Packet]:
@@ -92,38 +93,41 @@ class Parser:
         del self._buffer[:1]
         return self.feed(b"")
 
-    def _next(self, start: int) -> tuple[int, Packet | None]:
-        """Where the next undecided byte is, and the frame that ended before it."""
-        buffer = self._buffer
+    def _scan(self, stream: bytes | bytearray, packets: list[Packet]) -> int:
+        """Append the frames in `stream`; return where the first undecided byte is."""
+        start, length = 0, len(stream)
         while True:
-            found = buffer.find(SYNC, start)
+            found = stream.find(SYNC, start)
             if found < 0:
-                end = len(buffer) - (1 if buffer.endswith(b"\xff") and len(buffer) > start else 0)
+                end = length - (1 if length > start and stream[-1] == 0xFF else 0)
                 self._skip(end - start)
-                return end, None
-            self._skip(found - start)
-            start = found
-            if len(buffer) - start < 5:
-                return start, None
-            size = buffer[start + 2] | buffer[start + 3] << 8
-            if (buffer[start + 2] + buffer[start + 3] + buffer[start + 4]) % 256 != 255:
+                return end
+            if found > start:
+                self._skip(found - start)
+                start = found
+            if length - start < 5:
+                return start
+            low, high = stream[start + 2], stream[start + 3]
+            if (low + high + stream[start + 4]) & 0xFF != 0xFF:
                 start = self._resync(start)
                 continue
+            size = low | high << 8
             if size > self.max_payload:
                 self.oversized += 1
                 start = self._resync(start)
                 continue
             end = start + OVERHEAD + size
-            if len(buffer) < end:
-                return start, None
-            if sum(buffer[start + 5 : end]) % 256 != 255:
+            if length < end:
+                return start
+            if sum(stream[start + 5 : end]) & 0xFF != 0xFF:
                 self.bad_checksums += 1
                 start = self._resync(start)
                 continue
             self.frames += 1
             self.garbage_run = 0
-            topic_id = buffer[start + 5] | buffer[start + 6] << 8
-            return end, Packet(topic_id, bytes(buffer[start + HEADER : end - 1]))
+            topic_id = stream[start + 5] | stream[start + 6] << 8
+            packets.append(Packet(topic_id, bytes(stream[start + HEADER : end - 1])))
+            start = end
 
     def _resync(self, start: int) -> int:
         self._skip(1)

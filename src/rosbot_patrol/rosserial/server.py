@@ -53,6 +53,12 @@ class Handler(Protocol):
     def receive(self, client: Client, kind: TopicId, info: TopicInfo, data: bytes) -> None:
         """A message came; raises ProtocolError where it makes no sense."""
 
+    def flush(self) -> None:
+        """No more messages for now: hand on those that came, before the device is answered."""
+
+    def tick(self) -> None:
+        """A quarter of a second has gone by."""
+
     def closed(self, client: Client) -> None:
         """The client has gone, and all its topics with it."""
 
@@ -173,10 +179,13 @@ class SerialServer:
             for listener in self._listeners:
                 self._selector.register(listener, selectors.EVENT_READ)
         for client in list(self.clients.values()):
-            self._handle(client, client.session.tick(now), now)
+            if events := client.session.tick(now):
+                self._handle(client, events, now)
             if client.older:
                 self._replace_older(client, now)
-            self._flush(client)
+            if client.has_to_do(now):
+                self._flush(client)
+        self._handler.tick()
 
     def _wake(self) -> None:
         try:
@@ -243,7 +252,7 @@ class SerialServer:
     def _add(self, client: Client) -> None:
         self.clients[client.link] = client
         self._door.enter(client)
-        self._selector.register(client.link, selectors.EVENT_READ, client)
+        self._watch(client, selectors.EVENT_READ)
         self._flush(client)
 
     def _read(self, client: Client) -> None:
@@ -259,6 +268,7 @@ class SerialServer:
             self._lose(client, "it closed the connection")
             return
         self._handle(client, client.session.receive(data, now), now)
+        self._handler.flush()
         client.read_from = now + client.session.pause(now)
 
     def _flush(self, client: Client) -> None:
@@ -276,15 +286,15 @@ class SerialServer:
         self._watch(client, wanted)
 
     def _watch(self, client: Client, wanted: int) -> None:
-        key = self._selector.get_map().get(client.link)
-        if key is not None and key.events == wanted:
+        if client.watched == wanted:
             return
-        if key is not None and wanted:
+        if client.watched and wanted:
             self._selector.modify(client.link, wanted, client)
-        elif key is not None:
+        elif client.watched:
             self._selector.unregister(client.link)
-        elif wanted:
+        else:
             self._selector.register(client.link, wanted, client)
+        client.watched = wanted
 
     def _lose(self, client: Client, reason: str) -> None:
         if client.closed:
@@ -357,7 +367,8 @@ class SerialServer:
 
     def _find_older(self, client: Client) -> None:
         sensor = client.sensor
-        client.older = [c for c in self.clients.values() if c is not client and c.sensor == sensor]
+        same_id = [c for c in self.clients.values() if c.sensor_id == client.sensor_id and c.address == client.address]
+        client.older = [c for c in same_id if c is not client and c.sensor == sensor]
 
     def _replace_older(self, client: Client, now: float) -> None:
         """Close what the same sensor has left behind, as it does when it loses power or its network."""

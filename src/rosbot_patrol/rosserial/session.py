@@ -93,6 +93,11 @@ class Session:
         """Whether the device has announced a topic that was accepted."""
         return bool(self.incoming or self.outgoing)
 
+    @property
+    def has_output(self) -> bool:
+        """Whether there are frames to send."""
+        return bool(self._output)
+
     def take_output(self) -> list[bytes]:
         """Frames to send, each in one piece."""
         frames, self._output = self._output, []

@@ -41,6 +41,12 @@ class Recorder:
     def receive(self, client, kind, info, data):
         self.messages.append(data)
 
+    def flush(self):
+        pass
+
+    def tick(self):
+        pass
+
     def closed(self, client):
         self.closed_peers.append(client.peer)
 
