@@ -1,0 +1,46 @@
+// What the sensor's logic needs of a board: the only thing between it and the ESP32, or the tests.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "rosserial_client.h"
+
+namespace patrol {
+
+/** Clock, pins, log line, watchdog and Wi-Fi. No call waits. */
+class Board : public RandomSource {
+ public:
+  virtual uint32_t milliseconds() = 0;  // wraps
+  virtual uint32_t random() = 0;
+  virtual bool poweredOn() = 0;            // whether this start followed power on, and not a reset
+  virtual bool motionLevel() = 0;          // the PIR's output
+  virtual bool takeEdge(uint32_t* at) = 0; // whether the output rose since the last call, and when
+  virtual void setLed(bool on) = 0;
+  virtual void log(const char* line) = 0;
+  virtual void feedWatchdog() = 0;
+
+  virtual void joinNetwork() = 0;  // begin to join Wi-Fi anew
+  virtual bool networkUp() = 0;    // whether there is an address to talk from
+
+ protected:
+  ~Board() = default;
+};
+
+enum class LinkState : uint8_t { kClosed, kConnecting, kOpen };
+
+/** One TCP connection to the bridge. No call waits. */
+class Link {
+ public:
+  virtual void open() = 0;
+  virtual LinkState poll() = 0;                               // kClosed where it failed: see error()
+  virtual int receive(uint8_t* data, size_t room) = 0;        // bytes read, 0: nothing now, -1: the link is gone
+  virtual int send(const uint8_t* data, size_t size) = 0;     // bytes taken, 0: no room now, -1: the link is gone
+  virtual void close() = 0;
+  virtual const char* error() const = 0;
+
+ protected:
+  ~Link() = default;
+};
+
+}  // namespace patrol

@@ -1,0 +1,37 @@
+// The connection to the bridge over lwIP's sockets: IPv4 and IPv6, and no call that waits.
+#pragma once
+
+#include <stdint.h>
+
+#include "hardware.h"
+#include "resolver.h"
+
+namespace patrol {
+
+/** Connects to `host` (an address or a name) and `port`; the addresses of a name are tried in turn. */
+class TcpLink final : public Link {
+ public:
+  TcpLink(const char* host, uint16_t port) : resolver_(host, port) {}
+
+  /** Start what has to run beside the loop: the look-up of a name. */
+  void begin() { resolver_.begin(); }
+
+  void open() override;
+  LinkState poll() override;
+  int receive(uint8_t* data, size_t room) override;
+  int send(const uint8_t* data, size_t size) override;
+  void close() override;
+  const char* error() const override { return error_; }
+
+ private:
+  void connectTo(const Address& address);
+  LinkState failed(const char* what, int code);
+
+  Resolver resolver_;
+  LinkState state_ = LinkState::kClosed;
+  int socket_ = -1;
+  unsigned next_address_ = 0;
+  char error_[64] = "";
+};
+
+}  // namespace patrol
