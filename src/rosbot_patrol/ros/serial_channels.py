@@ -16,6 +16,7 @@ import rospy
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.msg import EspTrigger
+from rosbot_patrol.rosserial.complaints import printable
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_TYPES, TopicInfo
 
 log = logging.getLogger(__name__)
@@ -54,12 +55,22 @@ def check_md5(info: TopicInfo, here: Any) -> None:
     """Compare the definitions of device and workspace; raises ProtocolError that shows both."""
     if info.md5 == here._md5sum:
         return
-    definition = " ".join(getattr(here, "_full_text", "").split("=" * 20)[0].split("\n"))[:200].strip()
+    theirs = printable(info.md5, 32)
     raise ProtocolError(
         "",
-        f"{info.name}: checksum of {info.message_type} does not match: here {here._md5sum} ({definition}), the device "
-        f"has {info.md5}; build its ros_lib from this workspace's messages",
+        f"{info.name}: checksum of {info.message_type} does not match: here {here._md5sum} ({_definition(here)}), the "
+        f"device has {theirs} ({_definition_of(info.md5)}); build its ros_lib from this workspace's messages",
     )
+
+
+def _definition(cls: Any) -> str:
+    return " ".join(getattr(cls, "_full_text", "").split("=" * 20)[0].split("\n"))[:200].strip()
+
+
+def _definition_of(md5: str) -> str:
+    """The definition that a device has, where a message known to this process is it; a device tells its sum only."""
+    classes = [cls for cls in genpy.Message.__subclasses__() if getattr(cls, "_md5sum", "") == md5]
+    return f"as {classes[0]._type}: {_definition(classes[0])}" if classes else "a definition not known here"
 
 
 def serialize(message: Any) -> bytes:

@@ -67,7 +67,6 @@ class RosSide:
         """Advertise or subscribe; raises ProtocolError."""
         if kind == TopicId.PUBLISHER:
             self._publishers.open(info)
-            log.info("%s publishes %s [%s]", client.peer, rospy.resolve_name(info.name), info.message_type)
             return
         channels = self._channels.setdefault(client, {})
         if kind == TopicId.SUBSCRIBER:
@@ -75,7 +74,6 @@ class RosSide:
             if key in channels:
                 channels.pop(key).close()
             channels[key] = Subscription(info, self._sender(client))
-            log.info("%s subscribes to %s [%s]", client.peer, rospy.resolve_name(info.name), info.message_type)
         elif kind in (TopicId.SERVICE_SERVER_PUBLISHER, TopicId.SERVICE_SERVER_SUBSCRIBER):
             service = self._channel(channels, ("offered", info.name), DeviceService, client, info)
             answers = kind == TopicId.SERVICE_SERVER_PUBLISHER
@@ -236,8 +234,7 @@ def body() -> None:
         ros_side,
         policy,
         silence_timeout=params.silence_timeout,
-        max_clients=params.max_clients,
-        max_strangers=params.max_strangers,
+        limits=params.limits,
     )
     ros_side.server = server
     if policy.restricted:

@@ -15,6 +15,8 @@ from rosbot_patrol.rosserial.session import Session
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5
 
 MAX_WAITING = 256  # frames
+STUCK_AFTER = 15.0  # a client that takes nothing of what waits for it [s]
+SOCKET_BUFFER = 32768  # of a restricted client, each way [bytes]
 
 
 class Link(Protocol):
@@ -31,25 +33,33 @@ class Client:
 
     Attributes:
         peer: "ADDRESS:PORT" or the path of the serial device; address: the part that stays at a reconnect.
-        sensor_id: the id that it reports in its EspTriggers, None before the first.
+        on_tcp: whether it came over the network.
+        sensor_id: the id that it last reported in its EspTriggers, None before the first.
+        refused: things that it wanted and was not given.
         discarded: frames for it that were thrown away because it took none.
         read_from: no bytes are read before that time [s].
         older: connections of the same sensor, closed when they have fallen silent.
         watched: the selector's events that the server waits for, 0 for none.
     """
 
-    def __init__(self, link: Link, session: Session, peer: str, address: str) -> None:
+    def __init__(self, link: Link, session: Session, peer: str, address: str, *, on_tcp: bool = True) -> None:
         self.link = link
         self.session = session
         self.peer = peer
         self.address = address
+        self.on_tcp = on_tcp
         self.sensor_id: int | None = None
+        self.refused = 0
         self.discarded = 0
         self.read_from = 0.0
         self.closed = False
         self.older: list[Client] = []
         self.watched = 0
+        self._sensor_ids: set[int] = set()
         self._waiting: deque[bytes] = deque()
+        self._waiting_bytes = 0
+        self._sent = 0
+        self._last_sent = (-1, 0.0)  # how much, and when that was first seen
         self._lock = threading.Lock()
 
     @property
@@ -71,11 +81,20 @@ class Client:
         return bool(self._waiting) or self.session.has_output or (paused and self.read_from <= now)
 
     def note_message(self, md5: str, data: bytes) -> bool:
-        """Learn the sensor's id from an EspTrigger; return whether it is news."""
+        """Learn the sensor's id from an EspTrigger; return whether it came on this connection for the first time."""
         if md5 != ESP_TRIGGER_MD5 or len(data) != 2 or data[0] == self.sensor_id:
             return False
         self.sensor_id = data[0]
+        if data[0] in self._sensor_ids:
+            return False
+        self._sensor_ids.add(data[0])
         return True
+
+    def is_stuck(self, now: float) -> bool:
+        """Whether it has taken nothing for long of what waits for it; ask all the time."""
+        if not self._waiting or self._last_sent[0] != self._sent:
+            self._last_sent = self._sent, now
+        return now - self._last_sent[1] > STUCK_AFTER
 
     def put(self, topic_id: int, data: bytes) -> None:
         """Queue a message for the device, from any thread (`SerialServer.send` also wakes the server).
@@ -107,6 +126,8 @@ class Client:
                     sent = self.link.send(frame)
                 except BlockingIOError:
                     return
+                self._sent += sent
+                self._waiting_bytes -= sent
                 if sent < len(frame):
                     self._waiting[0] = frame[sent:]
                     return
@@ -114,10 +135,15 @@ class Client:
 
     def _queue(self, frame: bytes) -> None:
         with self._lock:
-            if len(self._waiting) >= MAX_WAITING:
+            most = self.session.policy.max_waiting
+            while len(self._waiting) > 1 and (
+                len(self._waiting) >= MAX_WAITING or self._waiting_bytes + len(frame) > most
+            ):
+                self._waiting_bytes -= len(self._waiting[1])
                 del self._waiting[1]  # the first may be half sent
                 self.discarded += 1
             self._waiting.append(frame)
+            self._waiting_bytes += len(frame)
 
 
 def peer_names(address: tuple[object, ...]) -> tuple[str, str]:
@@ -159,9 +185,12 @@ def _why_not(port: int, problem: OSError | None) -> str:
     return f"TCP port {port} cannot be opened: {problem}"
 
 
-def tune(link: socket.socket) -> None:
-    """No delay for small frames, and a dead peer is noticed within about 11 s."""
+def tune(link: socket.socket, *, restricted: bool) -> None:
+    """No delay for small frames, a dead peer is noticed within about 11 s, and a stranger fills no large buffers."""
     link.setblocking(False)
+    if restricted:
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BUFFER)
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SOCKET_BUFFER)
     link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     link.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     link.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 5)

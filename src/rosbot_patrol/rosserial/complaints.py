@@ -6,6 +6,12 @@ from collections import OrderedDict
 from collections.abc import Hashable
 
 
+def printable(text: str, limit: int = 200) -> str:
+    """What a stranger said, in one line without control characters, as it may go into a log."""
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:limit])
+    return shown + ("..." if len(text) > limit else "")
+
+
 class Complaints:
     """Remembers what has been said; a thing is said again after `period` [s], and memory is bounded.
 
@@ -18,6 +24,7 @@ class Complaints:
         self._period = period
         self._capacity = capacity
         self._said: OrderedDict[Hashable, float] = OrderedDict()
+        self.left_out = False
         self._minutes: OrderedDict[Hashable, tuple[float, int]] = OrderedDict()
 
     def is_new(self, key: Hashable, now: float) -> bool:
@@ -32,11 +39,15 @@ class Complaints:
         return True
 
     def may_speak(self, group: Hashable, now: float, limit: int = 60) -> bool:
-        """Count a line about `group`; whether it is among the first `limit` of its minute."""
+        """Count a line about `group`; whether it is among the first `limit` of its minute.
+
+        `left_out` tells that the line just counted was the first that is not.
+        """
         began, count = self._minutes.get(group, (now, 0))
         if not 0.0 <= now - began < 60.0:
             began, count = now, 0
         self._minutes[group] = (began, count + 1)
         if len(self._minutes) > self._capacity:
             self._minutes.popitem(last=False)
+        self.left_out = count == limit
         return count < limit

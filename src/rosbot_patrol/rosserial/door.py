@@ -6,65 +6,110 @@ sensor out: the oldest of them leaves for a newcomer, first of the newcomer's ow
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+from rosbot_patrol.rosserial.budget import Budget
 from rosbot_patrol.rosserial.client import Client
+
+CONNECTION_COST = 4.0  # of an address's budget, in frames
+KEPT_ADDRESSES = 1000  # without a connection, whose budgets are remembered
+MAX_PER_SENSOR = 4  # connections that have proved to be one sensor
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """How many may come, and how much those of one address may send.
+
+    Attributes:
+        clients: TCP connections on all ports together.
+        per_address: of one address, 0 for no limit of its own.
+        strangers: of one address, at least 1.
+        rate: frames a second of one address, beyond which its clients are read more slowly; 0 for no limit.
+    """
+
+    clients: int = 600
+    per_address: int = 0
+    strangers: int = 100
+    rate: float = 0.0
 
 
 class _Crowd:
     """The connections of one address; strangers in the order in which they came."""
 
-    def __init__(self) -> None:
+    def __init__(self, rate: float, now: float) -> None:
         self.count = 0
         self.strangers: dict[Client, None] = {}
+        self.budget = Budget(rate, now)
 
 
 class Door:
-    """Keeps count.
+    """Keeps count."""
 
-    Args:
-        max_clients: on all ports together.
-        max_per_address: of one address, 0 for no limit of its own.
-        max_strangers: of one address, at least 1.
-    """
-
-    def __init__(self, *, max_clients: int = 600, max_per_address: int = 0, max_strangers: int = 16) -> None:
-        self._max_clients = max_clients
-        self._max_per_address = max_per_address
-        self._max_strangers = max_strangers
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
         self._count = 0
         self._strangers: dict[Client, None] = {}
         self._crowds: dict[str, _Crowd] = {}
+        self._proven: dict[int, set[Client]] = {}
 
-    def ask(self, address: str) -> tuple[str | None, Client | None]:
+    @property
+    def strangers(self) -> int:
+        """How many connections are strangers."""
+        return len(self._strangers)
+
+    def ask(self, address: str, now: float) -> tuple[str | None, Client | None]:
         """Why no further connection of an address is taken (None where it is), and the stranger that leaves for it."""
-        crowd = self._crowds.get(address)
-        own = next(iter(crowd.strangers), None) if crowd is not None else None
-        if crowd is not None and len(crowd.strangers) >= self._max_strangers:
+        limits, crowd = self._limits, self._crowd(address, now)
+        if crowd.budget.spend(0.0, now) > 0.0:
+            return "its address connects or sends too often", None
+        crowd.budget.spend(CONNECTION_COST, now)
+        own = next(iter(crowd.strangers), None)
+        if len(crowd.strangers) >= limits.strangers:
             return None, own
-        if crowd is not None and 0 < self._max_per_address <= crowd.count:
+        if 0 < limits.per_address <= crowd.count:
             return (None, own) if own is not None else (f"{crowd.count} clients of its address are connected", None)
-        if self._count < self._max_clients:
+        if self._count < limits.clients:
             return None, None
         stranger = own or next(iter(self._strangers), None)
         return (None, stranger) if stranger is not None else (f"{self._count} clients are connected", None)
 
-    def enter(self, client: Client) -> None:
+    def enter(self, client: Client, now: float) -> None:
         """A connection has been taken; it is a stranger."""
-        crowd = self._crowds.setdefault(client.address, _Crowd())
+        crowd = self._crowd(client.address, now)
         crowd.count += 1
         crowd.strangers[client] = None
         self._strangers[client] = None
         self._count += 1
 
+    def prove(self, client: Client, sensor_id: int) -> bool:
+        """It has proved to be a sensor; return whether there may be one more of it (a stolen key is worth few)."""
+        clients = self._proven.setdefault(sensor_id, set())
+        clients.add(client)
+        self.settle(client)
+        return len(clients) <= MAX_PER_SENSOR
+
     def settle(self, client: Client) -> None:
         """It is no stranger any more."""
-        self._strangers.pop(client, None)
-        self._crowds[client.address].strangers.pop(client, None)
+        if self._strangers.pop(client, self) is None:
+            self._crowds[client.address].strangers.pop(client, None)
+
+    def spend(self, client: Client, cost: float, now: float) -> float:
+        """It has sent `cost` frames; return how long its address has to wait [s]."""
+        return self._crowds[client.address].budget.spend(cost, now)
 
     def leave(self, client: Client) -> None:
         """Its connection has ended."""
-        crowd = self._crowds[client.address]
-        crowd.count -= 1
-        self._count -= 1
         self.settle(client)
-        if not crowd.count:
-            del self._crowds[client.address]
+        self._crowds[client.address].count -= 1
+        self._count -= 1
+        sensor_id = client.session.proven_id
+        if sensor_id in self._proven:
+            self._proven[sensor_id].discard(client)
+
+    def _crowd(self, address: str, now: float) -> _Crowd:
+        crowd = self._crowds.get(address)
+        if crowd is None:
+            if len(self._crowds) >= self._limits.clients + KEPT_ADDRESSES:
+                self._crowds = {each: crowd for each, crowd in self._crowds.items() if crowd.count}
+            crowd = self._crowds[address] = _Crowd(self._limits.rate, now)
+        return crowd

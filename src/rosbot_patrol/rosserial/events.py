@@ -54,9 +54,10 @@ class ParamAsked:
 
 @dataclass(frozen=True)
 class Garbled:
-    """Bytes came that are no frame; told once a connection."""
+    """Bytes came that are no frame; told once a connection, with what is wrong where they look like one."""
 
     sample: bytes
+    fault: str = ""
 
 
 @dataclass(frozen=True)

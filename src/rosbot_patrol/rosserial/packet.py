@@ -55,6 +55,7 @@ class Parser:
         bad_checksums: frames whose data did not add up.
         oversized: headers that announced more than `max_payload` bytes.
         garbage_run: bytes skipped since the last good frame.
+        fault: what was wrong with the first frame that did not add up or was too long, "" before there was one.
     """
 
     def __init__(self, max_payload: int = MAX_PAYLOAD) -> None:
@@ -64,6 +65,7 @@ class Parser:
         self.bad_checksums = 0
         self.oversized = 0
         self.garbage_run = 0
+        self.fault = ""
         self._buffer = bytearray()
 
     @property
@@ -114,6 +116,7 @@ class Parser:
             size = low | high << 8
             if size > self.max_payload:
                 self.oversized += 1
+                self.fault = self.fault or f"a frame of {size} bytes, at most {self.max_payload} are taken"
                 start = self._resync(start)
                 continue
             end = start + OVERHEAD + size
@@ -121,6 +124,7 @@ class Parser:
                 return start
             if sum(stream[start + 5 : end]) & 0xFF != 0xFF:
                 self.bad_checksums += 1
+                self.fault = self.fault or self._bad_sum(stream[start + 5 : end])
                 start = self._resync(start)
                 continue
             self.frames += 1
@@ -128,6 +132,12 @@ class Parser:
             topic_id = stream[start + 5] | stream[start + 6] << 8
             packets.append(Packet(topic_id, bytes(stream[start + HEADER : end - 1])))
             start = end
+
+    @staticmethod
+    def _bad_sum(body: bytes | bytearray) -> str:
+        topic_id = body[0] | body[1] << 8
+        right = checksum(body[:-1])
+        return f"{len(body) - 3} bytes for topic id {topic_id} with checksum {body[-1]:02x}, it would be {right:02x}"
 
     def _resync(self, start: int) -> int:
         self._skip(1)

@@ -16,8 +16,8 @@ from typing import Protocol
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.client import Client, Link, listen, peer_names, tune
-from rosbot_patrol.rosserial.complaints import Complaints
-from rosbot_patrol.rosserial.door import Door
+from rosbot_patrol.rosserial.complaints import Complaints, printable
+from rosbot_patrol.rosserial.door import Door, Limits
 from rosbot_patrol.rosserial.events import (
     Announced,
     Event,
@@ -39,8 +39,11 @@ from rosbot_patrol.rosserial.topics import TX_STOP, TopicId, TopicInfo, param_va
 log = logging.getLogger(__name__)
 
 READ_SIZE = 4096
+READ_SIZE_LIMITED = 1024  # of a client with a limit: so much at a time that the others do not notice
+NO_LIMITS = Limits()
 TICK = 0.25
 REOPEN_PERIOD = 3.0
+STRANGERS = "strangers"
 REPLACE_AFTER = 1.5  # silence after which an old connection gives way to a new one of the same sensor [s]
 
 
@@ -75,11 +78,14 @@ class Handler(Protocol):
 class SerialServer:
     """Serves devices until closed: call `run`, or `poll` in a loop.
 
+    Attributes:
+        clients: connected devices by their links; door: who was let in; turned_away: connections that were not taken.
+
     Args:
         handler: the other side.
         policy: what devices may do.
         silence_timeout: hang up on a TCP client not heard of for that long [s].
-        max_clients, max_per_address, max_strangers: see `Door`.
+        limits: how many TCP clients may come.
         clock: monotonic time [s].
     """
 
@@ -89,16 +95,17 @@ class SerialServer:
         policy: Policy,
         *,
         silence_timeout: float = 15.0,
-        max_clients: int = 600,
-        max_per_address: int = 0,
-        max_strangers: int = 16,
+        limits: Limits = NO_LIMITS,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.clients: dict[Link, Client] = {}
+        self.turned_away = 0
         self._handler = handler
         self._policy = policy
         self._silence_timeout = silence_timeout
-        self._door = Door(max_clients=max_clients, max_per_address=max_per_address, max_strangers=max_strangers)
+        self.door = Door(limits)
+        self._read_size = READ_SIZE if policy.max_rate <= 0.0 else READ_SIZE_LIMITED
+        self._names: set[str] = set()
         self._clock = clock
         self._complaints = Complaints()
         self._listeners: list[socket.socket] = []
@@ -183,6 +190,8 @@ class SerialServer:
                 self._handle(client, events, now)
             if client.older:
                 self._replace_older(client, now)
+            if client.on_tcp and client.is_stuck(now):
+                self._lose(client, "it reads nothing of what is sent to it")
             if client.has_to_do(now):
                 self._flush(client)
         self._handler.tick()
@@ -212,7 +221,7 @@ class SerialServer:
             return
         log.info("connected to %s at %d baud", path, baud)
         session = Session(self._policy, now, silence_timeout=None)
-        self._add(Client(port, session, path, path))
+        self._add(Client(port, session, path, path, on_tcp=False), now)
 
     def _accept(self, listener: socket.socket) -> None:
         now = self._clock()
@@ -228,37 +237,40 @@ class SerialServer:
                 self._selector.unregister(each)
             return
         peer, host = peer_names(address)
-        reason = self._turn_away(host)
+        reason = self._turn_away(host, now)
         if reason is not None:
             link.close()
-            if self._complaints.is_new(("peer", host), now):
+            self.turned_away += 1
+            if self._complaints.is_new(("peer", host), now) and self._may_speak(STRANGERS, now, limit=120):
                 log.warning("%s: refused, %s", peer, reason)
             return
-        tune(link)
-        client = Client(link, Session(self._policy, now, silence_timeout=self._silence_timeout), peer, host)
+        tune(link, restricted=self._policy.restricted)
+        session = Session(self._policy, now, address=host, silence_timeout=self._silence_timeout)
+        client = Client(link, session, peer, host)
         self._say(client, logging.INFO, "connected")
-        self._add(client)
+        self._add(client, now)
 
-    def _turn_away(self, host: str) -> str | None:
+    def _turn_away(self, host: str, now: float) -> str | None:
         """Why a new connection is not taken; makes room for it where there is none."""
         if not self._policy.may_connect(host):
-            return "its address is not on the list"
-        reason, leaver = self._door.ask(host)
+            return "its address is not on the list (~allow_peers)"
+        reason, leaver = self.door.ask(host, now)
         if leaver is not None:
-            self._complain(leaver, "to wait any longer without a proof or a topic: others come", self._clock())
+            self.turned_away += 1
+            self._complain(leaver, "to wait any longer without a proof or a topic: others come", now)
             self._drop(leaver)
         return reason
 
-    def _add(self, client: Client) -> None:
+    def _add(self, client: Client, now: float) -> None:
         self.clients[client.link] = client
-        self._door.enter(client)
+        self.door.enter(client, now)
         self._watch(client, selectors.EVENT_READ)
         self._flush(client)
 
     def _read(self, client: Client) -> None:
         now = self._clock()
         try:
-            data = client.link.recv(READ_SIZE)
+            data = client.link.recv(self._read_size)
         except BlockingIOError:
             return
         except OSError as err:
@@ -269,7 +281,9 @@ class SerialServer:
             return
         self._handle(client, client.session.receive(data, now), now)
         self._handler.flush()
-        client.read_from = now + client.session.pause(now)
+        if not client.closed:
+            of_address = self.door.spend(client, client.session.cost, now)
+            client.read_from = now + max(client.session.pause(now), of_address)
 
     def _flush(self, client: Client) -> None:
         """Send what can be sent, and tell the selector what to wait for."""
@@ -307,7 +321,7 @@ class SerialServer:
         client.closed = True
         self._watch(client, 0)
         self.clients.pop(client.link, None)
-        self._door.leave(client)
+        self.door.leave(client)
         client.link.close()
         self._handler.closed(client)
 
@@ -333,35 +347,60 @@ class SerialServer:
         elif isinstance(event, TimeAsked):
             client.session.answer_time(*self._handler.time())
         elif isinstance(event, LogLine):
-            self._handler.device_log(client, event.level, event.text)
+            self._device_log(client, event, now)
         elif isinstance(event, ParamAsked):
             client.session.answer_param(param_values(self._handler.parameter(event.name)))
         elif isinstance(event, Refused):
             self._complain(client, f"{event.what}: {event.reason}", now)
         elif isinstance(event, Garbled):
             if self._complaints.is_new((client.address, "garbled"), now):
-                self._say(client, logging.WARNING, "bytes that are no frame, skipped: %s", event.sample.hex(" "))
+                fault = f" ({event.fault})" if event.fault else ""
+                self._say(
+                    client, logging.WARNING, "bytes that are no frame, skipped: %s%s", event.sample.hex(" "), fault
+                )
         elif isinstance(event, SyncLost):
             self._say(client, logging.WARNING, "silent for %.0f s, asking for its topics again", event.seconds)
         elif isinstance(event, Proven):
-            self._door.settle(client)
-            self._say(client, logging.INFO, "proved to be sensor %d", event.sensor_id)
+            self._proven(client, event.sensor_id, now)
         elif isinstance(event, HangUp) and event.is_refusal:
             self._complain(client, event.reason, now)
             self._drop(client)
         elif isinstance(event, HangUp):
             self._lose(client, f"hung up on: {event.reason}")
 
+    def _proven(self, client: Client, sensor_id: int, now: float) -> None:
+        if self.door.prove(client, sensor_id):
+            self._say(client, logging.INFO, "proved to be sensor %d", sensor_id)
+        else:
+            self._complain(client, f"one more connection of sensor {sensor_id}; is its key known to others?", now)
+            self._drop(client)
+
     def _announce(self, client: Client, event: Announced, now: float) -> None:
+        name = event.info.name.lstrip("/")
         try:
+            if event.kind == TopicId.PUBLISHER and name not in self._names:
+                if len(self._names) >= self._policy.max_names:
+                    raise ProtocolError("", f"publisher {name!r}: {len(self._names)} topics have been made already")
+                self._names.add(name)
             self._handler.open(client, event.kind, event.info)
         except ProtocolError as err:
             client.session.reject(event.kind, event.info)
             self._complain(client, str(err), now)
-        else:
-            self._door.settle(client)
+            return
+        self.door.settle(client)
+        what = event.kind.name.lower().replace("_", " ")
+        self._say(client, logging.INFO, "%s %s [%s]", what, event.info.name, event.info.message_type)
+
+    def _device_log(self, client: Client, event: LogLine, now: float) -> None:
+        text = event.text
+        if self._policy.restricted:
+            if not self._may_speak(client.address, now):
+                return
+            text = printable(text)
+        self._handler.device_log(client, event.level, text)
 
     def _complain(self, client: Client, what: str, now: float) -> None:
+        client.refused += 1
         if self._complaints.is_new((client.address, what), now):
             self._say(client, logging.WARNING, "refused %s", what)
 
@@ -379,5 +418,14 @@ class SerialServer:
 
     def _say(self, client: Client, level: int, text: str, *details: object) -> None:
         """Log about a client, but not in a flood."""
-        if self._complaints.may_speak(client.address, self._clock()):
+        now = self._clock()
+        is_stranger = not client.session.configured and client.on_tcp
+        if self._may_speak(client.address, now) and (not is_stranger or self._may_speak(STRANGERS, now, limit=120)):
             log.log(level, "%s: " + text, client.peer, *details)
+
+    def _may_speak(self, group: str, now: float, limit: int = 60) -> bool:
+        if self._complaints.may_speak(group, now, limit):
+            return True
+        if self._complaints.left_out:
+            log.warning("%s: more than %d lines within a minute, the rest of them is left out", group, limit)
+        return False

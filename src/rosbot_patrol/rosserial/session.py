@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial import proof
+from rosbot_patrol.rosserial.budget import Budget
 from rosbot_patrol.rosserial.events import (
     Announced,
     Event,
@@ -41,6 +42,8 @@ from rosbot_patrol.rosserial.topics import (
 
 FRAME_TIMEOUT = 1.0  # a frame that stalls for longer is given up
 RETRY_PERIOD = 3.0  # between two requests for topics
+GARBAGE_PER_FRAME = 32  # bytes that are no frame cost as much as a frame
+TOPIC_COST = 10.0  # of a new topic, in frames
 QUIET = 5.0  # without a frame a device counts as out of sync
 INCOMING = frozenset({TopicId.PUBLISHER, TopicId.SERVICE_SERVER_PUBLISHER, TopicId.SERVICE_CLIENT_PUBLISHER})
 
@@ -51,23 +54,32 @@ class Session:
     Args:
         policy: what it may do.
         now: time of the connection [s], any monotonic clock; the same clock in all calls.
+        address: of the device, for the list of sensors that peers may be.
         silence_timeout: hang up on a device not heard of for that long [s], None for never.
         nonce: of the challenge; only tests give one.
 
     Attributes:
         proven_id: the sensor that the device has proved to be, None where it has not.
+        cost: what came since the last `pause`, in frames; garbage and topics count too.
     """
 
     def __init__(
-        self, policy: Policy, now: float, *, silence_timeout: float | None = 15.0, nonce: bytes | None = None
+        self,
+        policy: Policy,
+        now: float,
+        *,
+        address: str = "",
+        silence_timeout: float | None = 15.0,
+        nonce: bytes | None = None,
     ) -> None:
         self.policy = policy
         self.proven_id: int | None = None
+        self.cost = 0.0
         self._gate = proof.Gate(policy.keys, nonce) if policy.keys else None
         self._is_turned_away = False
         self._began = now
         self._bytes_before_proof = 0
-        self._sensor_ids: frozenset[int] | None = None  # that it may speak for, None for all
+        self._sensor_ids = policy.sensor_ids(address)  # that it may speak for, None for all
         self._triggers: set[int] = set()  # topic ids that carry EspTriggers
         self.parser = Parser(min(policy.max_payload, proof.MAX_PAYLOAD) if self._gate else policy.max_payload)
         self.incoming: dict[int, tuple[TopicId, TopicInfo]] = {}
@@ -79,13 +91,14 @@ class Session:
         self.sync_losses = 0
         self._silence_timeout = silence_timeout
         self._refused_ids: set[int] = set()
-        self._refusals = 0
+        self._refused_topics: set[int] = set()  # hashes, so that a device that is asked again is not told again
         self._last_bytes = now
         self._last_request = now
         self._in_sync = True
         self._garbled = False
-        self._credit = policy.max_rate
-        self._credit_at = now
+        self._budget = Budget(policy.max_rate, now)
+        self._announcements = 0
+        self._frame_began: float | None = None
         self._output: list[bytes] = [self._gate.challenge if self._gate else REQUEST_TOPICS]
 
     @property
@@ -105,14 +118,21 @@ class Session:
 
     def receive(self, data: bytes, now: float) -> list[Event]:
         """Take bytes of the device; return what they mean."""
-        garbage = self.parser.garbage
+        parser = self.parser
+        garbage = parser.garbage
         self._last_bytes = now
-        events = self._packets(self.parser.feed(data), now)
+        packets = parser.feed(data)
+        events = self._packets(packets, now)
+        if not parser.pending:
+            self._frame_began = None
+        elif packets or self._frame_began is None:
+            self._frame_began = now
         if self._gate is not None:
             self._bytes_before_proof += len(data)
             if self._bytes_before_proof > proof.MAX_BYTES:
-                events.append(HangUp(f"{self._bytes_before_proof} bytes and no proof", is_refusal=True))
-        if self.parser.garbage > garbage:
+                events.append(HangUp("more bytes than a proof has", is_refusal=True))
+        if parser.garbage > garbage:
+            self.cost += (parser.garbage - garbage) / GARBAGE_PER_FRAME
             events += self._complain(data)
         return events
 
@@ -125,6 +145,10 @@ class Session:
         events: list[Event] = []
         while self.parser.pending and now - self._last_bytes > FRAME_TIMEOUT:
             events += self._packets(self.parser.give_up(), now)
+            self._frame_began = now if self.parser.pending else None
+        slow = self.policy.max_frame_time
+        if slow and self._frame_began is not None and now - self._frame_began > slow:
+            events.append(HangUp(f"a frame that does not end within {slow:.0f} s", is_refusal=True))
         quiet = now - self.last_frame
         if self._silence_timeout is not None and quiet > self._silence_timeout:
             events.append(HangUp(f"nothing that makes sense was heard for {quiet:.0f} s"))
@@ -137,13 +161,9 @@ class Session:
         return events
 
     def pause(self, now: float) -> float:
-        """How long to read nothing more from this device [s], so that it keeps to its rate."""
-        rate = self.policy.max_rate
-        if rate <= 0.0:
-            return 0.0
-        self._credit = min(rate, self._credit + (now - self._credit_at) * rate)
-        self._credit_at = now
-        return max(0.0, -self._credit / rate)
+        """How long to read nothing more from this device [s], so that it keeps to its rate; settles the `cost`."""
+        cost, self.cost = self.cost, 0.0
+        return self._budget.spend(cost, now)
 
     def reject(self, kind: TopicId, info: TopicInfo) -> None:
         """Take back the acceptance of a topic."""
@@ -167,7 +187,7 @@ class Session:
         if packets:
             self.last_frame = now
             self._in_sync = True
-            self._credit -= len(packets)
+            self.cost += len(packets)
         for packet in packets:
             try:
                 events += self._packet(packet, now)
@@ -202,28 +222,42 @@ class Session:
             self.dropped += 1
             return []
         try:
-            self.proven_id, answer = gate.check(packet.data)
+            sensor_id, answer = gate.check(packet.data)
         except ProtocolError as err:
             self._is_turned_away = True
             return [HangUp(str(err), is_refusal=True)]
+        if self._sensor_ids is not None and sensor_id not in self._sensor_ids:
+            self._is_turned_away = True
+            reason = f"sensor {sensor_id} at this address: the list has it elsewhere (~allow_sensors)"
+            return [HangUp(reason, is_refusal=True)]
         self._gate = None
-        self._sensor_ids = frozenset((self.proven_id,))
+        self.proven_id = sensor_id
+        self._sensor_ids = frozenset((sensor_id,))
         self.parser.max_payload = self.policy.max_payload
         self._output.append(answer)
         self._request_topics(now)
-        return [Proven(self.proven_id)]
+        return [Proven(sensor_id)]
 
     def _may_speak_for(self, data: bytes) -> bool:
         return self._sensor_ids is None or data[0:1] == b"" or data[0] in self._sensor_ids
 
     def _refuse_id(self, data: bytes) -> list[Event]:
         self.dropped += 1
-        return [Refused(f"what it says for sensor {data[0]}", f"it has proved to be sensor {self.proven_id}")]
+        reason = "the list has it as another sensor, or as none (~allow_sensors)"
+        if self.proven_id is not None:
+            reason = f"it has proved to be sensor {self.proven_id}"
+        return [Refused(f"what it says for sensor {data[0]}", reason)]
 
     def _announce(self, kind: TopicId, info: TopicInfo) -> list[Event]:
         known = self.incoming if kind in INCOMING else self.outgoing
         if known.get(info.topic_id) == (kind, info):
             return []
+        if hash((kind, info)) in self._refused_topics:
+            return []
+        self.cost += TOPIC_COST
+        self._announcements += 1
+        if self._announcements > 20 * self.policy.max_topics:
+            return [HangUp(f"{self._announcements} different topics")]
         reason = self.policy.refusal(kind, info)
         if reason is None and info.topic_id < 100:
             reason = f"topic id {info.topic_id} belongs to the protocol"
@@ -243,13 +277,10 @@ class Session:
     def _refuse(self, kind: TopicId, info: TopicInfo, reason: str) -> list[Event]:
         self._note_refused(info.topic_id)
         what = f"{kind.name.lower().replace('_', ' ')} {info.name[:100]!r} of type {info.message_type[:100]!r}"
-        events: list[Event] = [Refused(what, reason)]
-        if self._refusals > 20 * self.policy.max_topics:
-            events.append(HangUp(f"{self._refusals} refused topics"))
-        return events
+        self._refused_topics.add(hash((kind, info)))
+        return [Refused(what, reason)]
 
     def _note_refused(self, topic_id: int) -> None:
-        self._refusals += 1
         if len(self._refused_ids) < 4 * self.policy.max_topics:
             self._refused_ids.add(topic_id)
 
@@ -273,7 +304,7 @@ class Session:
         events: list[Event] = []
         if not self._garbled:
             self._garbled = True
-            events.append(Garbled(data[:24]))
+            events.append(Garbled(data[:24], self.parser.fault))
         limit = self.policy.max_garbage
         if limit and self.parser.garbage_run > limit:
             events.append(HangUp(f"{self.parser.garbage_run} bytes without a frame in them"))

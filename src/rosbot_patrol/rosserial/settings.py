@@ -6,8 +6,16 @@ from dataclasses import dataclass, replace
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import param
+from rosbot_patrol.rosserial.door import Limits
 from rosbot_patrol.rosserial.keys import read_keys
-from rosbot_patrol.rosserial.policy import MOTION_TRIGGER_RULES, TRUSTED, Policy, parse_networks, parse_rules
+from rosbot_patrol.rosserial.policy import (
+    MOTION_TRIGGER_RULES,
+    TRUSTED,
+    Policy,
+    parse_networks,
+    parse_rules,
+    parse_sensors,
+)
 
 DEFAULT_TCP_PORT = 11411
 DEFAULT_PORT = "/dev/ttyUSB0"
@@ -29,17 +37,25 @@ class SerialNodeParams:
     restrict: str = param("tcp", choices=("tcp", "always", "never"), doc="where the allow_ lists hold")
     allow_publish: tuple[str, ...] = param(MOTION_TRIGGER_RULES, doc="'TOPIC TYPE' that devices may publish")
     allow_subscribe: tuple[str, ...] = param((), doc="'TOPIC TYPE' that devices may subscribe to")
-    allow_services: tuple[str, ...] = param((), doc="'SERVICE TYPE' that devices may offer or call")
+    allow_services: tuple[str, ...] = param(
+        (), doc="'SERVICE TYPE' that devices may offer or call; 'offer' or 'call' before it: only that"
+    )
     allow_parameters: tuple[str, ...] = param((), doc="parameters that devices are told")
     key_file: str = param("", doc="keys of the sensors, each TCP client must prove that it has one; empty: none needed")
     allow_peers: tuple[str, ...] = param((), doc="addresses and networks that may connect; empty: all")
+    allow_sensors: tuple[str, ...] = param(
+        (), doc="'NETWORK IDS', sensors that peers may be: '192.168.1.12 2', 'fc94::/16 1-9 12'; empty: any"
+    )
     max_clients: int = param(600, lo=1, hi=20000, doc="TCP clients at a time, all ports together")
+    max_clients_per_address: int = param(64, lo=0, doc="TCP clients of one address at a time; 0: any")
     max_strangers: int = param(
-        16,
-        lo=1,
-        doc="TCP clients of one address that have not proved or announced anything; a newcomer ends the oldest",
+        32, lo=1, doc="TCP clients of one address that proved and announced nothing; a newcomer ends the oldest"
     )
     max_rate: float = param(200.0, lo=0.0, unit="1/s", doc="frames a second and client, beyond it reads slowly; 0: any")
+    max_rate_per_address: float = param(
+        2000.0, lo=0.0, unit="1/s", doc="frames a second of all clients of one address, likewise; 0: any"
+    )
+    max_topics: int = param(16, lo=1, hi=1000, doc="topics and services of one restricted client")
     max_payload: int = param(1024, lo=64, hi=32767, unit="bytes", doc="longest message of a restricted client")
     silence_timeout: float = param(15.0, lo=1.0, unit="s", doc="hang up on a TCP client not heard of for that long")
     sensor_timeout: float = param(
@@ -64,12 +80,24 @@ class SerialNodeParams:
             base,
             publish=parse_rules(self.allow_publish, prefix + "allow_publish"),
             subscribe=parse_rules(self.allow_subscribe, prefix + "allow_subscribe"),
-            services=parse_rules(self.allow_services, prefix + "allow_services"),
+            services=parse_rules(self.allow_services, prefix + "allow_services", verbs=("offer", "call")),
             parameters=self.allow_parameters,
             keys=self._keys(prefix),
             peers=parse_networks(self.allow_peers, prefix + "allow_peers"),
+            sensors=parse_sensors(self.allow_sensors, prefix + "allow_sensors"),
+            max_topics=self.max_topics if restricted else base.max_topics,
             max_payload=self.max_payload if restricted else base.max_payload,
             max_rate=self.max_rate if restricted else base.max_rate,
+        )
+
+    @property
+    def limits(self) -> Limits:
+        """How many TCP clients may come, and how much those of one address may send."""
+        return Limits(
+            clients=self.max_clients,
+            per_address=self.max_clients_per_address,
+            strangers=self.max_strangers,
+            rate=self.max_rate_per_address if self.restrict != "never" else 0.0,
         )
 
     def _keys(self, prefix: str) -> dict[int, bytes]:

@@ -10,6 +10,7 @@ import time
 import pytest
 
 from rosbot_patrol.errors import ProtocolError
+from rosbot_patrol.rosserial.door import Limits
 from rosbot_patrol.rosserial.packet import Parser, encode
 from rosbot_patrol.rosserial.policy import TRUSTED, Policy
 from rosbot_patrol.rosserial.poor_link import LinkQuality
@@ -226,7 +227,7 @@ def test_new_connection_replaces_the_silent_one_of_the_same_sensor_only():
 
 
 def test_full_server_drops_a_stranger_for_a_newcomer_but_no_sensor(caplog):
-    with serving(max_clients=2) as (recorder, server, port):
+    with serving(limits=Limits(clients=2)) as (recorder, server, port):
         sensor, stranger = connect(port), connect(port)
         sensor.sendall(ANNOUNCE)
         wait_for(lambda: recorder.opened)
@@ -331,7 +332,7 @@ def test_sensor_that_insists_talks_to_no_bridge_without_keys(caplog):
 
 
 def test_strangers_of_one_address_are_few_and_keep_no_sensor_out():
-    with serving(Policy(keys=KEYS), max_strangers=4) as (_, server, port):
+    with serving(Policy(keys=KEYS), limits=Limits(strangers=4)) as (_, server, port):
         links = [socket.create_connection(("127.0.0.1", port), timeout=3.0) for _ in range(10)]
         wait_for(lambda: links[5].recv(100)[5:6] == b"\x08" and links[5].recv(100) == b"")
         wait_for(lambda: len(server.clients) == 4)

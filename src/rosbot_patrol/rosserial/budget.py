@@ -1,0 +1,29 @@
+"""How much a client, or all clients of one address, may ask for in a second."""
+
+from __future__ import annotations
+
+
+class Budget:
+    """Fills with `rate` a second up to one second's worth; may be overdrawn, and then one has to wait.
+
+    Args:
+        rate: units a second, 0 for no limit.
+        now: time at which it is full [s].
+    """
+
+    __slots__ = ("_at", "_credit", "_rate")
+
+    def __init__(self, rate: float, now: float) -> None:
+        self._rate = rate
+        self._credit = rate
+        self._at = now
+
+    def spend(self, cost: float, now: float) -> float:
+        """Take `cost` units (0 to only ask); return how long nothing more may be taken [s]."""
+        rate = self._rate
+        if rate <= 0.0:
+            return 0.0
+        credit = self._credit + (now - self._at) * rate
+        self._credit = credit = (rate if credit > rate else credit) - cost
+        self._at = now
+        return 0.0 if credit >= 0.0 else -credit / rate
