@@ -28,21 +28,21 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.errors import ParamError, ProtocolError
-from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.node import Worker, load_params, run_node
 from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subscription, message_class
 from rosbot_patrol.ros.serial_publishers import Publishers
+from rosbot_patrol.ros.serial_report import Report
 from rosbot_patrol.rosserial.client import Client
+from rosbot_patrol.rosserial.complaints import Complaints
 from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.server import SerialServer
 from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT, SerialNodeParams
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, unpack_esp_trigger
-from rosbot_patrol.sensors.registry import Change, MotionSensors
+from rosbot_patrol.sensors.registry import Change, MotionSensors, SensorStatus
 
 log = logging.getLogger(__name__)
 
 GLOBAL_TCP_PORT = "/rosserial_embeddedlinux/tcp_port"
-HEALTH_PERIOD = 1.0
 SWITCH_INTERVAL = 0.0005  # a message waits no longer for a thread that writes diagnostics [s]; Python's own: 0.005
 _LOGGERS = (rospy.logdebug, rospy.loginfo, rospy.logwarn, rospy.logerr, rospy.logfatal)
 
@@ -54,6 +54,7 @@ class RosSide:
         self.server: SerialServer | None = None
         self.sensors = MotionSensors(sensor_timeout)
         self.sensors_lock = threading.Lock()
+        self._told = Complaints()
         self._publishers = Publishers()
         self._channels: dict[Client, dict[tuple[str, str], Any]] = {}
 
@@ -123,13 +124,22 @@ class RosSide:
         except KeyError as err:
             raise ProtocolError("", f"parameter {name} is not set") from err
 
+    def look_at_sensors(self, now: float) -> list[SensorStatus]:
+        """All sensors as they are; the log is told which of them has just fallen silent."""
+        with self.sensors_lock:
+            events = self.sensors.tick(now)
+            statuses = self.sensors.statuses(now)
+        for event in events:
+            log.log(logging.WARNING if event.change is Change.SILENT else logging.INFO, "%s", event)
+        return statuses
+
     def _note_sensor(self, client: Client, data: bytes) -> None:
         sensor_id, move = unpack_esp_trigger(data)
         with self.sensors_lock:
             events = self.sensors.heard(sensor_id, client.address, time.monotonic(), move=move)
         for event in events:
             log.info("%s", event)
-        if move:
+        if move and self._told.may_speak(sensor_id, time.monotonic()):
             log.info("motion sensor %d: something moves", sensor_id)
 
     def _sender(self, client: Client) -> Any:
@@ -145,60 +155,6 @@ class RosSide:
         if key not in channels:
             channels[key] = cls(info, self._sender(client))
         return channels[key]
-
-
-class Report:
-    """Tells /diagnostics of the clients and sensors, and the log of sensors that fall silent; once a second."""
-
-    def __init__(self, ros_side: RosSide, server: SerialServer, what: str) -> None:
-        self._ros_side = ros_side
-        self._server = server
-        self._what = what
-        self._health = Health("rosserial")
-        self._parts: set[str] = set()
-
-    def run(self) -> None:
-        """Report until shutdown."""
-        while not rospy.is_shutdown():
-            self._step(time.monotonic())
-            time.sleep(HEALTH_PERIOD)
-
-    def _step(self, now: float) -> None:
-        with self._ros_side.sensors_lock:
-            events = self._ros_side.sensors.tick(now)
-            statuses = self._ros_side.sensors.statuses(now)
-        for event in events:
-            log.log(logging.WARNING if event.change is Change.SILENT else logging.INFO, "%s", event)
-        clients = list(self._server.clients.values())
-        parts = {self._client(client, now) for client in clients}
-        for part in self._parts - parts:
-            self._health.drop(part)
-        self._parts = parts
-        silent = [str(status.sensor_id) for status in statuses if status.silent]
-        for status in statuses:
-            level, text = (ERROR, "silent") if status.silent else (OK, "heard of")
-            values = {"peer": status.peer, "seconds ago": f"{status.seconds:.1f}", "triggers": status.triggers}
-            self._health.set(f"sensor {status.sensor_id}", level, f"{text} {status.seconds:.0f} s ago", values)
-        text = f"{self._what}: {len(clients)} connected"
-        self._health.set("", WARN if silent else OK, text + (f", silent: {', '.join(silent)}" if silent else ""))
-
-    def _client(self, client: Client, now: float) -> str:
-        session, part = client.session, f"client {client.peer}"
-        quiet = now - session.last_frame
-        level, text = (OK, "in sync") if quiet < 5.0 else (ERROR, "no sync with device")
-        if not session.configured:
-            level, text = max(level, WARN), "no topic accepted"
-        values = {
-            "messages": session.messages,
-            "dropped": session.dropped,
-            "bytes of garbage": session.parser.garbage,
-            "bad checksums": session.parser.bad_checksums,
-            "last heard": f"{quiet:.1f}",
-            "last sync lost": session.sync_losses,
-            "not delivered": client.discarded,
-        }
-        self._health.set(part, level, text, values)
-        return part
 
 
 def _parameters() -> SerialNodeParams:
@@ -249,7 +205,7 @@ def body() -> None:
     gc.collect()
     gc.freeze()  # what is there by now stays: looking through it again stopped everything for 40 ms
     rospy.on_shutdown(server.stop)
-    Worker(Report(ros_side, server, what).run, name="report").start()
+    Worker(Report(server, ros_side.look_at_sensors, what).run, name="report").start()
     server.run()
     server.close()
 

@@ -35,7 +35,7 @@ class Client:
         peer: "ADDRESS:PORT" or the path of the serial device; address: the part that stays at a reconnect.
         on_tcp: whether it came over the network.
         sensor_id: the id that it last reported in its EspTriggers, None before the first.
-        refused: things that it wanted and was not given.
+        refused: things that it wanted and was not given; last_refusal: the last of them; last_refused: when [s].
         discarded: frames for it that were thrown away because it took none.
         read_from: no bytes are read before that time [s].
         older: connections of the same sensor, closed when they have fallen silent.
@@ -50,6 +50,8 @@ class Client:
         self.on_tcp = on_tcp
         self.sensor_id: int | None = None
         self.refused = 0
+        self.last_refusal = ""
+        self.last_refused = 0.0
         self.discarded = 0
         self.read_from = 0.0
         self.closed = False
@@ -89,6 +91,12 @@ class Client:
             return False
         self._sensor_ids.add(data[0])
         return True
+
+    def note_refusal(self, what: str, now: float) -> None:
+        """It wanted something that it was not given."""
+        self.refused += 1
+        self.last_refusal = what[:200]
+        self.last_refused = now
 
     def is_stuck(self, now: float) -> bool:
         """Whether it has taken nothing for long of what waits for it; ask all the time."""

@@ -117,7 +117,8 @@ class Policy:
         peers: networks that may connect; empty: all.
         keys: of the sensors, by id; where there are any, each device must prove that it has one of them.
         sensors: which sensors peers may be, the rule of the smallest network counts; empty: any.
-        max_payload: longest message [bytes]; max_topics: most topics of one client.
+        max_payload: longest message [bytes]; max_topics: most topics of one client; max_sensors: for how many motion
+            sensors it may speak.
         max_names: most topics that all clients together may make, as they stay advertised when a client goes.
         max_rate: frames a second beyond which a client is read more slowly, 0 for no limit.
         max_garbage: bytes without a frame in them after which a client is hung up on, 0 for never.
@@ -135,6 +136,7 @@ class Policy:
     sensors: tuple[SensorRule, ...] = ()
     max_payload: int = 1024
     max_topics: int = 16
+    max_sensors: int = 16
     max_names: int = 1000
     max_rate: float = 200.0
     max_garbage: int = 65536
@@ -187,6 +189,7 @@ TRUSTED = Policy(
     restricted=False,
     max_payload=MAX_PAYLOAD,
     max_topics=200,
+    max_sensors=256,
     max_names=100_000,
     max_rate=0.0,
     max_garbage=0,

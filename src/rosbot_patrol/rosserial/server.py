@@ -16,7 +16,7 @@ from typing import Protocol
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.client import Client, Link, listen, peer_names, tune
-from rosbot_patrol.rosserial.complaints import Complaints, printable
+from rosbot_patrol.rosserial.complaints import printable
 from rosbot_patrol.rosserial.door import Door, Limits
 from rosbot_patrol.rosserial.events import (
     Announced,
@@ -31,6 +31,7 @@ from rosbot_patrol.rosserial.events import (
     SyncLost,
     TimeAsked,
 )
+from rosbot_patrol.rosserial.journal import Journal
 from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.serial_port import SerialPort
 from rosbot_patrol.rosserial.session import Session
@@ -43,7 +44,6 @@ READ_SIZE_LIMITED = 1024  # of a client with a limit: so much at a time that the
 NO_LIMITS = Limits()
 TICK = 0.25
 REOPEN_PERIOD = 3.0
-STRANGERS = "strangers"
 REPLACE_AFTER = 1.5  # silence after which an old connection gives way to a new one of the same sensor [s]
 
 
@@ -79,7 +79,7 @@ class SerialServer:
     """Serves devices until closed: call `run`, or `poll` in a loop.
 
     Attributes:
-        clients: connected devices by their links; door: who was let in; turned_away: connections that were not taken.
+        clients: connected devices by their links; door: who was let in; journal: what was said of them.
 
     Args:
         handler: the other side.
@@ -99,7 +99,7 @@ class SerialServer:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.clients: dict[Link, Client] = {}
-        self.turned_away = 0
+        self.journal = Journal()
         self._handler = handler
         self._policy = policy
         self._silence_timeout = silence_timeout
@@ -107,7 +107,6 @@ class SerialServer:
         self._read_size = READ_SIZE if policy.max_rate <= 0.0 else READ_SIZE_LIMITED
         self._names: set[str] = set()
         self._clock = clock
-        self._complaints = Complaints()
         self._listeners: list[socket.socket] = []
         self._serial: tuple[str, int] | None = None
         self._serial_due = 0.0
@@ -216,7 +215,7 @@ class SerialServer:
         try:
             port = SerialPort(path, baud)
         except OSError as err:
-            if self._complaints.is_new("serial", now):
+            if self.journal.is_new("serial", now):
                 log.error("%s; trying again every %.0f s", err, REOPEN_PERIOD)
             return
         log.info("connected to %s at %d baud", path, baud)
@@ -230,7 +229,7 @@ class SerialServer:
         except (BlockingIOError, ConnectionError):
             return
         except OSError as err:  # no file descriptors left: the listener would report itself again and again
-            if self._complaints.is_new("accept", now):
+            if self.journal.is_new("accept", now):
                 log.error("no further sensor can connect for now: %s", err)
             self._accept_from = now + 1.0
             for each in self._listeners:
@@ -240,14 +239,12 @@ class SerialServer:
         reason = self._turn_away(host, now)
         if reason is not None:
             link.close()
-            self.turned_away += 1
-            if self._complaints.is_new(("peer", host), now) and self._may_speak(STRANGERS, now, limit=120):
-                log.warning("%s: refused, %s", peer, reason)
+            self.journal.turn_away(peer, host, reason, now)
             return
         tune(link, restricted=self._policy.restricted)
         session = Session(self._policy, now, address=host, silence_timeout=self._silence_timeout)
         client = Client(link, session, peer, host)
-        self._say(client, logging.INFO, "connected")
+        self.journal.say(client, logging.INFO, now, "connected")
         self._add(client, now)
 
     def _turn_away(self, host: str, now: float) -> str | None:
@@ -256,8 +253,8 @@ class SerialServer:
             return "its address is not on the list (~allow_peers)"
         reason, leaver = self.door.ask(host, now)
         if leaver is not None:
-            self.turned_away += 1
-            self._complain(leaver, "to wait any longer without a proof or a topic: others come", now)
+            self.journal.turned_away += 1
+            self.journal.refuse(leaver, "to wait any longer without a proof or a topic: others come", now)
             self._drop(leaver)
         return reason
 
@@ -314,7 +311,7 @@ class SerialServer:
         if client.closed:
             return
         if not self._stopping:
-            self._say(client, logging.INFO, "disconnected, %s", reason)
+            self.journal.say(client, logging.INFO, self._clock(), "disconnected, %s", reason)
         self._drop(client)
 
     def _drop(self, client: Client) -> None:
@@ -333,7 +330,7 @@ class SerialServer:
                 self._event(client, event, now)
             except ProtocolError as err:
                 client.session.dropped += 1
-                self._complain(client, f"a message: {err}", now)
+                self.journal.refuse(client, f"a message: {err}", now)
 
     def _event(self, client: Client, event: Event, now: float) -> None:
         if isinstance(event, Received):
@@ -351,58 +348,58 @@ class SerialServer:
         elif isinstance(event, ParamAsked):
             client.session.answer_param(param_values(self._handler.parameter(event.name)))
         elif isinstance(event, Refused):
-            self._complain(client, f"{event.what}: {event.reason}", now)
+            self.journal.refuse(client, f"{event.what}: {event.reason}", now)
         elif isinstance(event, Garbled):
-            if self._complaints.is_new((client.address, "garbled"), now):
+            if self.journal.is_new((client.address, "garbled"), now):
                 fault = f" ({event.fault})" if event.fault else ""
-                self._say(
-                    client, logging.WARNING, "bytes that are no frame, skipped: %s%s", event.sample.hex(" "), fault
+                self.journal.say(
+                    client, logging.WARNING, now, "bytes that are no frame, skipped: %s%s", event.sample.hex(" "), fault
                 )
         elif isinstance(event, SyncLost):
-            self._say(client, logging.WARNING, "silent for %.0f s, asking for its topics again", event.seconds)
+            self.journal.say(
+                client, logging.WARNING, now, "silent for %.0f s, asking for its topics again", event.seconds
+            )
         elif isinstance(event, Proven):
             self._proven(client, event.sensor_id, now)
         elif isinstance(event, HangUp) and event.is_refusal:
-            self._complain(client, event.reason, now)
+            self.journal.refuse(client, event.reason, now)
             self._drop(client)
         elif isinstance(event, HangUp):
             self._lose(client, f"hung up on: {event.reason}")
 
     def _proven(self, client: Client, sensor_id: int, now: float) -> None:
         if self.door.prove(client, sensor_id):
-            self._say(client, logging.INFO, "proved to be sensor %d", sensor_id)
+            self.journal.say(client, logging.INFO, now, "proved to be sensor %d", sensor_id)
         else:
-            self._complain(client, f"one more connection of sensor {sensor_id}; is its key known to others?", now)
+            self.journal.refuse(client, f"one more connection of sensor {sensor_id}; is its key known to others?", now)
             self._drop(client)
 
     def _announce(self, client: Client, event: Announced, now: float) -> None:
         name = event.info.name.lstrip("/")
         try:
-            if event.kind == TopicId.PUBLISHER and name not in self._names:
-                if len(self._names) >= self._policy.max_names:
-                    raise ProtocolError("", f"publisher {name!r}: {len(self._names)} topics have been made already")
-                self._names.add(name)
+            if event.kind == TopicId.PUBLISHER and self._has_all_names(name):
+                raise ProtocolError("", f"publisher {name!r}: {len(self._names)} topics have been made already")
             self._handler.open(client, event.kind, event.info)
         except ProtocolError as err:
             client.session.reject(event.kind, event.info)
-            self._complain(client, str(err), now)
+            self.journal.refuse(client, str(err), now)
             return
+        if event.kind == TopicId.PUBLISHER:
+            self._names.add(name)
         self.door.settle(client)
         what = event.kind.name.lower().replace("_", " ")
-        self._say(client, logging.INFO, "%s %s [%s]", what, event.info.name, event.info.message_type)
+        self.journal.say(client, logging.INFO, now, "%s %s [%s]", what, event.info.name, event.info.message_type)
+
+    def _has_all_names(self, name: str) -> bool:
+        return name not in self._names and len(self._names) >= self._policy.max_names
 
     def _device_log(self, client: Client, event: LogLine, now: float) -> None:
         text = event.text
         if self._policy.restricted:
-            if not self._may_speak(client.address, now):
+            if not self.journal.may_speak(client.address, now):
                 return
             text = printable(text)
         self._handler.device_log(client, event.level, text)
-
-    def _complain(self, client: Client, what: str, now: float) -> None:
-        client.refused += 1
-        if self._complaints.is_new((client.address, what), now):
-            self._say(client, logging.WARNING, "refused %s", what)
 
     def _find_older(self, client: Client) -> None:
         sensor = client.sensor
@@ -415,17 +412,3 @@ class SerialServer:
             if not older.closed and now - older.session.last_frame > REPLACE_AFTER:
                 self._lose(older, f"its sensor {older.sensor_id} came back as {client.peer}")
         client.older = [older for older in client.older if not older.closed]
-
-    def _say(self, client: Client, level: int, text: str, *details: object) -> None:
-        """Log about a client, but not in a flood."""
-        now = self._clock()
-        is_stranger = not client.session.configured and client.on_tcp
-        if self._may_speak(client.address, now) and (not is_stranger or self._may_speak(STRANGERS, now, limit=120)):
-            log.log(level, "%s: " + text, client.peer, *details)
-
-    def _may_speak(self, group: str, now: float, limit: int = 60) -> bool:
-        if self._complaints.may_speak(group, now, limit):
-            return True
-        if self._complaints.left_out:
-            log.warning("%s: more than %d lines within a minute, the rest of them is left out", group, limit)
-        return False

@@ -43,7 +43,7 @@ from rosbot_patrol.rosserial.topics import (
 FRAME_TIMEOUT = 1.0  # a frame that stalls for longer is given up
 RETRY_PERIOD = 3.0  # between two requests for topics
 GARBAGE_PER_FRAME = 32  # bytes that are no frame cost as much as a frame
-TOPIC_COST = 10.0  # of a new topic, in frames
+TOPIC_COST = 10.0  # of a new topic or a parameter, in frames
 QUIET = 5.0  # without a frame a device counts as out of sync
 INCOMING = frozenset({TopicId.PUBLISHER, TopicId.SERVICE_SERVER_PUBLISHER, TopicId.SERVICE_CLIENT_PUBLISHER})
 
@@ -80,6 +80,7 @@ class Session:
         self._began = now
         self._bytes_before_proof = 0
         self._sensor_ids = policy.sensor_ids(address)  # that it may speak for, None for all
+        self._spoken_for: set[int] = set()
         self._triggers: set[int] = set()  # topic ids that carry EspTriggers
         self.parser = Parser(min(policy.max_payload, proof.MAX_PAYLOAD) if self._gate else policy.max_payload)
         self.incoming: dict[int, tuple[TopicId, TopicInfo]] = {}
@@ -105,6 +106,11 @@ class Session:
     def configured(self) -> bool:
         """Whether the device has announced a topic that was accepted."""
         return bool(self.incoming or self.outgoing)
+
+    @property
+    def needs_proof(self) -> bool:
+        """Whether the device has yet to prove that it has a key."""
+        return self._gate is not None
 
     @property
     def has_output(self) -> bool:
@@ -239,13 +245,24 @@ class Session:
         return [Proven(sensor_id)]
 
     def _may_speak_for(self, data: bytes) -> bool:
-        return self._sensor_ids is None or data[0:1] == b"" or data[0] in self._sensor_ids
+        sensor_id = data[0] if data else None
+        if sensor_id is None or sensor_id in self._spoken_for:
+            return True
+        if len(self._spoken_for) >= self.policy.max_sensors:
+            return False
+        if self._sensor_ids is not None and sensor_id not in self._sensor_ids:
+            return False
+        self._spoken_for.add(sensor_id)
+        return True
 
     def _refuse_id(self, data: bytes) -> list[Event]:
         self.dropped += 1
-        reason = "the list has it as another sensor, or as none (~allow_sensors)"
         if self.proven_id is not None:
             reason = f"it has proved to be sensor {self.proven_id}"
+        elif self._sensor_ids is not None and data[0] not in self._sensor_ids:
+            reason = "the list has it as another sensor, or as none (~allow_sensors)"
+        else:
+            reason = f"it speaks for {len(self._spoken_for)} others already"
         return [Refused(f"what it says for sensor {data[0]}", reason)]
 
     def _announce(self, kind: TopicId, info: TopicInfo) -> list[Event]:
@@ -285,6 +302,7 @@ class Session:
             self._refused_ids.add(topic_id)
 
     def _param(self, name: str) -> list[Event]:
+        self.cost += TOPIC_COST
         if self.policy.may_read(name):
             return [ParamAsked(name)]
         return [Refused(f"parameter {name[:100]!r}", "not on the list of what it may know")]
