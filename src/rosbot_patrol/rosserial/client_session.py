@@ -16,6 +16,7 @@ from rosbot_patrol.rosserial.topics import TopicId, TopicInfo, pack_time, pack_t
 
 SYNC_PERIOD = 2.5
 SYNC_TIMEOUT = 11.0
+FRAME_TIMEOUT = 1.0  # a frame that stalls for longer is given up
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,7 @@ class DeviceSession:
         self._subscribers = tuple(subscribers)
         self._parser = Parser(max_payload)
         self._output: list[bytes] = []
+        self._last_bytes = 0.0
         self._last_request = 0.0
         self._last_answer = 0.0
         self._prover = prover
@@ -87,10 +89,8 @@ class DeviceSession:
 
     def receive(self, data: bytes, now: float) -> list[DeviceEvent]:
         """Take bytes of the server; return what they mean."""
-        events: list[DeviceEvent] = []
-        for packet in self._parser.feed(data):
-            events += self._packet(packet, now)
-        return events
+        self._last_bytes = now
+        return self._packets(self._parser.feed(data), now)
 
     def closed(self) -> list[DeviceEvent]:
         """The server ended the connection; what that means where it says more."""
@@ -99,15 +99,18 @@ class DeviceSession:
         return []
 
     def tick(self, now: float) -> list[DeviceEvent]:
-        """Ask for the time where it is due; notice that the server is gone."""
+        """Ask for the time where it is due; notice that the server is gone, or a frame of it cut off."""
+        events: list[DeviceEvent] = []
+        while self._parser.pending and now - self._last_bytes > FRAME_TIMEOUT:
+            events += self._packets(self._parser.give_up(), now)
         if not self.configured:
-            return []
+            return events
         if now - self._last_answer > SYNC_TIMEOUT:
             self.configured = False
-            return [Unconfigured("no time from the server for 11 s")]
+            return [*events, Unconfigured("no time from the server for 11 s")]
         if now - self._last_request > SYNC_PERIOD:
             self._request_time(now)
-        return []
+        return events
 
     def publish(self, topic_id: int, data: bytes) -> bool:
         """Queue a message; False where the topics have not been negotiated."""
@@ -120,6 +123,9 @@ class DeviceSession:
         """Frames to send, each in one piece."""
         frames, self._output = self._output, []
         return frames
+
+    def _packets(self, packets: list[Packet], now: float) -> list[DeviceEvent]:
+        return [event for packet in packets for event in self._packet(packet, now)]
 
     def _packet(self, packet: Packet, now: float) -> list[DeviceEvent]:
         if packet.topic_id in (TopicId.CHALLENGE, TopicId.PROOF):
