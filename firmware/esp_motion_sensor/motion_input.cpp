@@ -2,11 +2,11 @@
 
 namespace patrol {
 
-void MotionInput::begin(bool cold, bool level, uint64_t now) {
+void MotionInput::begin(bool cold, uint64_t now) {
   warm_at_ = now + (cold ? timing_.warm_up : 0);
   began_at_ = since_ = now;
   edge_seen_ = stuck_told_ = false;
-  state_ = now < warm_at_ ? State::kWarming : level ? State::kActive : State::kIdle;
+  state_ = cold && timing_.warm_up > 0 ? State::kWarming : State::kIdle;
 }
 
 void MotionInput::edge(uint64_t when) {
@@ -59,6 +59,7 @@ Motion MotionInput::update(bool level, uint64_t now) {
         since_ = now;
       } else if (now - since_ >= timing_.release) {
         state_ = State::kIdle;
+        return Motion::kEnded;
       }
       return Motion::kNothing;
   }

@@ -14,15 +14,18 @@ struct MotionTiming {
 };
 
 /** What one `update` found. */
-enum class Motion : uint8_t { kNothing, kWarm, kBegan, kSpike, kStuck };
+enum class Motion : uint8_t { kNothing, kWarm, kBegan, kEnded, kSpike, kStuck };
 
 /** Follows the output by its interrupt and its level; one `kBegan` for each time it goes high. */
 class MotionInput {
  public:
   explicit MotionInput(const MotionTiming& timing) : timing_(timing) {}
 
-  /** Start; `cold` where the module was switched on just now and has to warm up. */
-  void begin(bool cold, bool level, uint64_t now);
+  /**
+   * Start; `cold` where the module was switched on just now and has to warm up. Otherwise an output that is high already
+   * is motion: nobody knows whether it was told before the reset.
+   */
+  void begin(bool cold, uint64_t now);
 
   /** The interrupt saw a rising edge. */
   void edge(uint64_t when);

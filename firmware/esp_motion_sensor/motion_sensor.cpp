@@ -34,7 +34,7 @@ MotionSensor::MotionSensor(const SensorConfig& config, Board& board, Link& link)
 void MotionSensor::begin() {
   clock_ = Clock(board_.milliseconds());
   const bool cold = board_.poweredOn();
-  input_.begin(cold, board_.motionLevel(), clock_.now());
+  input_.begin(cold, clock_.now());
   say("sensor %u starts after %s", config_.identity.sensor_id, cold ? "power on" : "a reset");
   if (input_.warming()) {
     say("the motion sensor warms up for %lu s: heartbeats, but no triggers", seconds(input_.warmUpLeft(clock_.now())));
@@ -63,6 +63,7 @@ void MotionSensor::readMotion(uint64_t now) {
       tellBridge(LogLevel::kInfo, "sensor %u is warm, motion counts from now on", config_.identity.sensor_id);
       break;
     case Motion::kBegan:
+      say("motion");
       pending_.raised = true;
       pending_.at = input_.beganAt();
       ++late_motions_;
@@ -71,6 +72,10 @@ void MotionSensor::readMotion(uint64_t now) {
         link_due_ = now;
         link_backoff_.reset();
       }
+      break;
+    case Motion::kEnded:  // helps to set the module's hold time
+      say("no motion any more, the output was high for %lu ms",
+          static_cast<unsigned long>(now - input_.beganAt() - config_.motion.release));
       break;
     case Motion::kSpike:
       ++spikes_;

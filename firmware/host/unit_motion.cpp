@@ -25,7 +25,7 @@ int64_t until(MotionInput* input, bool level, uint64_t from, uint64_t to, Motion
 
 MotionInput idle() {
   MotionInput input(kTiming);
-  input.begin(false, false, 0);
+  input.begin(false, 0);
   return input;
 }
 
@@ -73,7 +73,7 @@ TEST(bounces_at_the_end_are_the_same_motion) {
   CHECK(input.update(false, 3000) == Motion::kNothing);
   input.edge(3010);
   EQUAL(until(&input, true, 3010, 3020, Motion::kBegan), -1);
-  EQUAL(until(&input, false, 3021, 3100, Motion::kBegan), -1);
+  EQUAL(until(&input, false, 3021, 3100, Motion::kEnded), 3071);
   CHECK(!input.active());
   input.edge(3200);
   EQUAL(until(&input, true, 3200, 3300, Motion::kBegan), 3205);
@@ -81,7 +81,7 @@ TEST(bounces_at_the_end_are_the_same_motion) {
 
 TEST(nothing_counts_while_it_warms_up) {
   MotionInput input(kTiming);
-  input.begin(true, false, 1000);
+  input.begin(true, 1000);
   CHECK(input.warming());
   EQUAL(input.warmUpLeft(31000), 30000U);
   input.edge(2000);
@@ -94,18 +94,19 @@ TEST(nothing_counts_while_it_warms_up) {
 
 TEST(what_began_while_it_was_cold_is_no_motion) {
   MotionInput input(kTiming);
-  input.begin(true, false, 0);
+  input.begin(true, 0);
   input.edge(59000);
   EQUAL(until(&input, true, 59000, 70000, Motion::kWarm), 60000);
   EQUAL(until(&input, true, 60001, 70000, Motion::kBegan), -1);
-  EQUAL(until(&input, false, 70001, 70100, Motion::kBegan), -1);
+  EQUAL(until(&input, false, 70001, 70100, Motion::kEnded), 70051);
   EQUAL(until(&input, true, 70101, 70200, Motion::kBegan), 70106);
 }
 
-TEST(after_a_reset_the_module_is_warm) {
+TEST(after_a_reset_the_module_is_warm_and_a_motion_that_goes_on_counts) {
   MotionInput input = idle();
   CHECK(!input.warming());
   EQUAL(input.warmUpLeft(5), 0U);
+  EQUAL(until(&input, true, 1, 100, Motion::kBegan), 6);
 }
 
 TEST(an_output_that_stays_high_is_told_once_a_motion) {
