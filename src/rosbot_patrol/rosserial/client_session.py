@@ -34,9 +34,10 @@ class Configured:
 
 @dataclass(frozen=True)
 class Unconfigured:
-    """The server stopped the traffic, or has not answered for long."""
+    """The server stopped the traffic, or it is gone: it has not answered for long."""
 
     reason: str
+    is_gone: bool = False
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class DeviceSession:
         self._last_bytes = 0.0
         self._last_request = 0.0
         self._last_answer = 0.0
+        self._asked = self._answered = 0  # how often for the time
         self._prover = prover
         self._is_trusted = not insist
         self._awaits_answer = False
@@ -107,7 +109,7 @@ class DeviceSession:
             return events
         if now - self._last_answer > SYNC_TIMEOUT:
             self.configured = False
-            return [*events, Unconfigured("no time from the server for 11 s")]
+            return [*events, Unconfigured("no time from the server for 11 s", is_gone=True)]
         if now - self._last_request > SYNC_PERIOD:
             self._request_time(now)
         return events
@@ -118,6 +120,18 @@ class DeviceSession:
             return False
         self._output.append(encode(topic_id, data))
         return True
+
+    def request_receipt(self, now: float) -> int:
+        """Ask the server to show that it has what was published so far; give the number to `has_receipt`.
+
+        It asks for the time: the server answers frames in their order, and publishes before it answers.
+        """
+        self._request_time(now)
+        return self._asked
+
+    def has_receipt(self, number: int) -> bool:
+        """Whether the server has shown that."""
+        return self._answered >= number
 
     def take_output(self) -> list[bytes]:
         """Frames to send, each in one piece."""
@@ -140,6 +154,7 @@ class DeviceSession:
             except ProtocolError:
                 return []
             self._last_answer = now
+            self._answered += 1
             return []
         if packet.topic_id == TopicId.TX_STOP:
             self.configured = False
@@ -174,4 +189,5 @@ class DeviceSession:
 
     def _request_time(self, now: float) -> None:
         self._last_request = now
+        self._asked += 1
         self._output.append(encode(TopicId.TIME, pack_time(0, 0)))

@@ -74,7 +74,7 @@ class EspClient:
         self._lock = threading.Lock()
         self._motion = False
         self._pending = False  # a motion that has not been sent
-        self._in_flight = False  # a motion whose frame is being sent
+        self._receipt: int | None = None  # of a motion that was sent, until the bridge shows that it has it
         self._stopping = False
         self._reboot = False
         self._quality = PERFECT
@@ -126,6 +126,7 @@ class EspClient:
         """Drop the link without a goodbye and forget everything but the id, as a reset does."""
         with self._lock:
             self._pending = self._motion = False
+            self._receipt = None
         self._reboot = True
         self._wake()
 
@@ -164,6 +165,7 @@ class EspClient:
             finally:
                 self._connected.clear()
                 link.close()
+                self._report_again()
             retry = RETRY_FIRST if time.monotonic() - began > RETRY_LAST else min(retry * 1.6, RETRY_LAST)
             if not self._stopping:
                 self._pause(retry)
@@ -215,30 +217,34 @@ class EspClient:
                 return
 
     def _send(self, link: socket.socket, session: DeviceSession, now: float) -> None:
-        """Send what has come through the line; a motion whose frame could not be sent is reported later."""
+        """Send what has come through the line."""
         self._line.change(self._quality, now)
-        try:
-            for frame in session.take_output():
-                self._line.put(frame, now)
-            for frame in self._line.take(now):
-                link.sendall(frame)
-        except OSError:
-            self._pending = self._pending or self._in_flight
-            raise
-        self._in_flight = False
+        for frame in session.take_output():
+            self._line.put(frame, now)
+        for frame in self._line.take(now):
+            link.sendall(frame)
+
+    def _report_again(self) -> None:
+        """A motion that was sent just before the link ended: better twice than never."""
+        with self._lock:
+            self._pending = self._pending or self._receipt is not None
+            self._receipt = None
 
     def _publish_due(self, session: DeviceSession, now: float, heartbeat_due: float) -> float:
         """Send what is due; return when the next heartbeat is."""
         if not session.configured:
             return now
         with self._lock:
-            self._in_flight, self._pending = self._pending, False
-        if self._in_flight:
-            session.publish(PUBLISHER_ID, pack_esp_trigger(self.sensor_id, True))
-        elif now >= heartbeat_due:
+            is_motion, self._pending = self._pending, False
+            if is_motion:
+                session.publish(PUBLISHER_ID, pack_esp_trigger(self.sensor_id, True))
+                self._receipt = session.request_receipt(now)
+            elif self._receipt is not None and session.has_receipt(self._receipt):
+                self._receipt = None
+        if not is_motion:
+            if now < heartbeat_due:
+                return heartbeat_due
             session.publish(PUBLISHER_ID, pack_esp_trigger(self.sensor_id, False))
-        else:
-            return heartbeat_due
         return now + self._heartbeat_period
 
     def _note(self, events: list[DeviceEvent]) -> bool:
@@ -255,4 +261,6 @@ class EspClient:
             elif isinstance(event, Unconfigured):
                 self._connected.clear()
                 log.info("sensor %d: %s", self.sensor_id, event.reason)
+                if event.is_gone:  # what this link still holds goes out on the next one
+                    return False
         return True

@@ -214,3 +214,15 @@ def test_device_hears_messages_and_stop():
     device.receive(REQUEST_TOPICS, 0.0)
     assert device.receive(encode(100, b"\x01"), 0.1) == [Message(100, b"\x01")]
     assert isinstance(device.receive(TX_STOP, 0.2)[0], Unconfigured)
+
+
+def test_time_answer_is_the_receipt_for_what_was_published_before():
+    device = DeviceSession([ESP])
+    device.receive(REQUEST_TOPICS, 0.0)
+    device.receive(encode(TopicId.TIME, pack_time(1, 0)), 0.1)
+    device.publish(125, b"\x02\x01")
+    receipt = device.request_receipt(0.2)
+    assert [p.topic_id for p in Parser().feed(b"".join(device.take_output()))][-2:] == [125, TopicId.TIME]
+    assert not device.has_receipt(receipt)
+    device.receive(encode(TopicId.TIME, pack_time(2, 0)), 0.3)
+    assert device.has_receipt(receipt)
