@@ -29,8 +29,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 TICKS = os.sysconf("SC_CLK_TCK")
 AIMS = {"cpu_percent_500": 20, "mb_500": 80, "latency_p50_ms": 1, "latency_p99_ms": 10, "reconnect_500_s": 15}
-# All sensors come from one address here, which in a building they do not.
-ONE_ADDRESS = {"max_clients_per_address": 0, "max_strangers": 1000, "max_rate_per_address": 0}
+UNLIMITED = {"max_rate": 0, "max_rate_per_address": 0}
 
 
 class Child:
@@ -204,7 +203,7 @@ def measure(folder: Path, options: argparse.Namespace) -> dict[str, float]:
     try:
         if "steady" in options.parts or "reconnect" in options.parts:
             port = free_port()
-            bridge = Bridge(program(), port, folder / "bridge.log", max_clients=n + 100, **ONE_ADDRESS)
+            bridge = Bridge(program(), port, folder / "bridge.log", max_clients=n + 100)
             print(f"{n} sensors at 2 Hz, {fleet.ask(connect=n, port=port)['known']} negotiated", flush=True)
             if "steady" in options.parts:
                 with_rospy = steady(folder, fleet, bridge, "rospy", options.seconds)
@@ -224,7 +223,7 @@ def measure(folder: Path, options: argparse.Namespace) -> dict[str, float]:
                     print("flood of upstream's rosserial_python: not on the package path (ours stands in for it)")
                     continue
                 port = free_port()
-                bridge = Bridge(path, port, folder / "flood.log", **({} if name else {"max_rate": 0, **ONE_ADDRESS}))
+                bridge = Bridge(path, port, folder / "flood.log", **({} if name else UNLIMITED))
                 print("flood" + (" of upstream's rosserial_python" if name else ""), flush=True)
                 for clients in (1,) if name else (1, 100):
                     messages = 20_000 if options.quick else 200_000

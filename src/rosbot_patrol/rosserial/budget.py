@@ -4,18 +4,19 @@ from __future__ import annotations
 
 
 class Budget:
-    """Fills with `rate` a second up to one second's worth; may be overdrawn, and then one has to wait.
+    """Fills with `rate` a second; may be overdrawn, and then one has to wait.
 
     Args:
         rate: units a second, 0 for no limit.
         now: time at which it is full [s].
+        seconds: how many seconds' worth it holds.
     """
 
-    __slots__ = ("_at", "_credit", "_rate")
+    __slots__ = ("_at", "_credit", "_most", "_rate")
 
-    def __init__(self, rate: float, now: float) -> None:
+    def __init__(self, rate: float, now: float, seconds: float = 1.0) -> None:
         self._rate = rate
-        self._credit = rate
+        self._most = self._credit = rate * seconds
         self._at = now
 
     def spend(self, cost: float, now: float) -> float:
@@ -24,6 +25,6 @@ class Budget:
         if rate <= 0.0:
             return 0.0
         credit = self._credit + (now - self._at) * rate
-        self._credit = credit = (rate if credit > rate else credit) - cost
+        self._credit = credit = min(credit, self._most) - cost
         self._at = now
         return 0.0 if credit >= 0.0 else -credit / rate

@@ -10,11 +10,13 @@ from collections import deque
 from typing import Protocol
 
 from rosbot_patrol.errors import ProtocolError
+from rosbot_patrol.rosserial.budget import Budget
 from rosbot_patrol.rosserial.packet import encode
 from rosbot_patrol.rosserial.session import Session
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5
 
 MAX_WAITING = 256  # frames
+UNLIMITED = Budget(0.0, 0.0)
 STUCK_AFTER = 15.0  # a client that takes nothing of what waits for it [s]
 SOCKET_BUFFER = 32768  # of a restricted client, each way [bytes]
 
@@ -38,6 +40,7 @@ class Client:
         refused: things that it wanted and was not given; last_refusal: the last of them; last_refused: when [s].
         discarded: frames for it that were thrown away because it took none.
         read_from: no bytes are read before that time [s].
+        shared: the budget of frames that it shares with the others of its address.
         older: connections of the same sensor, closed when they have fallen silent.
         watched: the selector's events that the server waits for, 0 for none.
     """
@@ -54,6 +57,7 @@ class Client:
         self.last_refused = 0.0
         self.discarded = 0
         self.read_from = 0.0
+        self.shared = UNLIMITED
         self.closed = False
         self.older: list[Client] = []
         self.watched = 0

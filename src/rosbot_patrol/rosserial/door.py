@@ -12,6 +12,7 @@ from rosbot_patrol.rosserial.budget import Budget
 from rosbot_patrol.rosserial.client import Client
 
 CONNECTION_COST = 4.0  # of an address's budget, in frames
+BURST = 0.25  # [s] of an address's frames at once: what comes between is not delayed by more
 KEPT_ADDRESSES = 1000  # without a connection, whose budgets are remembered
 MAX_PER_SENSOR = 4  # connections that have proved to be one sensor
 
@@ -39,7 +40,7 @@ class _Crowd:
     def __init__(self, rate: float, now: float) -> None:
         self.count = 0
         self.strangers: dict[Client, None] = {}
-        self.budget = Budget(rate, now)
+        self.budget = Budget(rate, now, BURST)
 
 
 class Door:
@@ -76,6 +77,7 @@ class Door:
     def enter(self, client: Client, now: float) -> None:
         """A connection has been taken; it is a stranger."""
         crowd = self._crowd(client.address, now)
+        client.shared = crowd.budget
         crowd.count += 1
         crowd.strangers[client] = None
         self._strangers[client] = None
@@ -92,10 +94,6 @@ class Door:
         """It is no stranger any more."""
         if self._strangers.pop(client, self) is None:
             self._crowds[client.address].strangers.pop(client, None)
-
-    def spend(self, client: Client, cost: float, now: float) -> float:
-        """It has sent `cost` frames; return how long its address has to wait [s]."""
-        return self._crowds[client.address].budget.spend(cost, now)
 
     def leave(self, client: Client) -> None:
         """Its connection has ended."""

@@ -10,7 +10,7 @@ from rosbot_patrol.rosserial.complaints import Complaints
 
 log = logging.getLogger(__name__)
 
-LINES = 60  # a minute about one address
+LINES, REFUSALS = 60, 20  # a minute about one address
 STRANGERS, LINES_OF_STRANGERS = "strangers", 120  # a minute about all who have announced nothing
 
 
@@ -40,7 +40,8 @@ class Journal:
         """A client wanted something and is not given it."""
         client.note_refusal(what, now)
         self.refused += 1
-        if self.is_new((client.address, what), now):
+        address = client.address
+        if self.is_new((address, what), now) and self.may_speak(f"refusals of {address}", now, REFUSALS):
             self.say(client, logging.WARNING, now, "refused %s", what)
 
     def turn_away(self, peer: str, address: str, reason: str, now: float) -> None:

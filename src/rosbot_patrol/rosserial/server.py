@@ -266,6 +266,9 @@ class SerialServer:
 
     def _read(self, client: Client) -> None:
         now = self._clock()
+        if wait := client.shared.spend(0.0, now):  # the others of its address have sent too much
+            client.read_from = now + wait
+            return
         try:
             data = client.link.recv(self._read_size)
         except BlockingIOError:
@@ -279,7 +282,7 @@ class SerialServer:
         self._handle(client, client.session.receive(data, now), now)
         self._handler.flush()
         if not client.closed:
-            of_address = self.door.spend(client, client.session.cost, now)
+            of_address = client.shared.spend(client.session.cost, now)
             client.read_from = now + max(client.session.pause(now), of_address)
 
     def _flush(self, client: Client) -> None:

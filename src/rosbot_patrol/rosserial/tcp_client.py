@@ -49,6 +49,7 @@ class EspClient:
         heartbeat_period: wall time between two heartbeats [s].
         key: 32 bytes that prove to a bridge with keys that this is that sensor.
         insist: whether to talk only to a bridge that has shown that it has the key.
+        source: address to connect from, empty: the system's choice.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class EspClient:
         heartbeat_period: float = HEARTBEAT_PERIOD,
         key: bytes | None = None,
         insist: bool = False,
+        source: str = "",
     ) -> None:
         if not 0 <= sensor_id <= 255:
             raise ValueError(f"sensor id {sensor_id} does not fit into a byte")
@@ -70,6 +72,7 @@ class EspClient:
         self._heartbeat_period = heartbeat_period
         self._key = key
         self._insist = insist
+        self._source = (source, 0) if source else None
         self._told = ""
         self._lock = threading.Lock()
         self._motion = False
@@ -151,7 +154,7 @@ class EspClient:
         retry = RETRY_FIRST
         while not self._stopping:
             try:
-                link = socket.create_connection((self.host, self.port), timeout=CONNECT_TIMEOUT)
+                link = socket.create_connection((self.host, self.port), CONNECT_TIMEOUT, self._source)
             except OSError as err:
                 log.debug("sensor %d: %s:%d: %s", self.sensor_id, self.host, self.port, err)
                 self._pause(retry)
