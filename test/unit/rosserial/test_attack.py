@@ -45,7 +45,7 @@ def house(policy, **options):
 def test_a_stranger_without_a_key_before_a_bridge_with_lists(name, caplog):
     with house(LISTS) as (recorder, server, port):
         threads = threading.active_count()
-        assert attacks.ATTACKS[name](port, SOURCE, 0.6) > 0
+        assert attacks.ATTACKS[name](port, SOURCE, 0.3) > 0
         assert {info.name for _, info in recorder.opened} == {"motion_trigger"}
         heard = {m[0] for m in recorder.messages if isinstance(m, bytes)}
         assert heard <= ({2, 3, 201} if name.startswith(("valid", "wrong", "frames")) else {2, 3})
@@ -57,7 +57,7 @@ def test_a_stranger_without_a_key_before_a_bridge_with_lists(name, caplog):
 @pytest.mark.parametrize("name", attacks.ATTACKS)
 def test_a_stranger_before_a_bridge_with_keys(name, caplog):
     with house(Policy(keys=KEYS)) as (recorder, server, port):
-        attacks.ATTACKS[name](port, SOURCE, 0.4)
+        attacks.ATTACKS[name](port, SOURCE, 0.2)
         assert {client.address for client in recorder.clients} == {"127.0.0.2", "127.0.0.3"}
         assert {m[0] for m in recorder.messages} == {2, 3}
         assert len(server.clients) <= 2 + LIMITS.strangers
