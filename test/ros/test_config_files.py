@@ -22,6 +22,7 @@ from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.patrol.watch import WatchParams
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
+from rosbot_patrol.ros import sensor_watch_node
 from rosbot_patrol.ros.demo_intruder_node import read_walk
 from rosbot_patrol.ros.parameter_tables import document
 from rosbot_patrol.ros.patrol_node import NodeParams, load_flat
@@ -109,6 +110,27 @@ def test_patrol() -> None:
     tree = given("rosbot_patrol.launch", "patrolling_node")
     assert load(WatchParams, tree["watch"], name="/patrolling_node/watch/").frames == 5
     load_flat(NodeParams, tree)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sensors"),
+    [
+        ([], "house_sensors.yaml"),
+        (["house:=flat"], "flat_sensors.yaml"),
+        (["house:=office"], "office_sensors.yaml"),
+        (["simulation:=false"], "sensors.yaml"),
+        (["simulation:=false", f"path_to_params:={ROOT}/params/room_points_tutorial.yaml"], ""),
+    ],
+)
+def test_sensor_watch(arguments: list[str], sensors: str) -> None:
+    tree = given("rosbot_patrol.launch", "sensor_watch", *arguments)
+    for group in sensor_watch_node.GROUPS:
+        sensor_watch_node.load_group(group, tree)
+    assert Path(tree["sensors"]).name == sensors
+    assert given("rosbot_patrol.launch", "patrolling_node", *arguments)["sensors"] == tree["sensors"]
+    listed = sensor_watch_node.load_list(sensor_watch_node.load_group(sensor_watch_node.SensorWatchParams, tree))
+    assert listed.has_file == bool(sensors)
+    assert [listed.room_of(room) for room in (1, 2, 3, 4)] == [1, 2, 3, 4]
 
 
 def test_rooms_sensors_and_walks_agree() -> None:

@@ -82,6 +82,7 @@ def test_simulation_by_default_and_the_robot_where_its_version_is_set() -> None:
     simulated = names(parse(ROOT / "launch" / "rosbot_patrol.launch"))
     assert "simulator" in simulated
     assert {"patrolling_node", "move_base", "amcl", "map_server", "darknet_ros", "rgb_compress"} <= set(simulated)
+    assert "sensor_watch" in simulated
     assert {"esp_client1", "esp_client2", "esp_client3", "teleop_twist_keyboard", "laser_broadcaster"} <= set(simulated)
     robot = names(parse(ROOT / "launch" / "rosbot_patrol.launch", robot=True))
     assert "simulator" not in robot
@@ -92,6 +93,7 @@ def test_detector_on_the_pc() -> None:
     robot = names(parse(ROOT / "launch" / "rosbot_patrol.launch", "detector:=pc"))
     assert "darknet_ros" not in robot
     assert "esp_client1" not in robot
+    assert "sensor_watch" in robot
     computer = names(parse(ROOT / "launch" / "rosbot_patrol_pc.launch"))
     assert set(computer) == {"rgb_decompress", "darknet_ros", "esp_client1", "esp_client2", "esp_client3"}
 

@@ -435,3 +435,31 @@ def test_the_narrator_tells_and_ends_with_the_mission(house, person, verdict, st
     (mission,) = json.loads(summary.read_text())["missions"]
     assert mission["verdict"] == ends
     assert [Path(p).exists() for p in mission["mails"]] == [True] * person
+
+
+def test_the_file_of_sensors_says_which_room_an_id_calls_to_and_a_silent_sensor_asks_for_a_look(house):
+    from rosbot_patrol.msg import SensorEvent
+
+    (house.folder / "sensors.yaml").write_text("sensors: [{id: 9, room: 2}, {id: 4, room: 4, enabled: false}]")
+    events = rospy.Publisher("/sensors/events", SensorEvent, queue_size=10)
+    house.start_move_base()
+    house.start_patrol(sensors=str(house.folder / "sensors.yaml"))
+    for unknown in (2, 4):
+        house.send(unknown)
+    wait_until(lambda: "has no sensor with id 2" in house.log(house.patrol), 10, "the refusal")
+    wait_until(lambda: "enabled: false" in house.log(house.patrol), 10, "the other refusal")
+    house.send(9)
+    wait_until(lambda: house.states[-1].room_id == 2, 10, "the mission")
+    wait_until(lambda: events.get_num_connections() > 0, 10, "the subscription")
+    events.publish(SensorEvent(kind="silent", active=True, room=5))
+    events.publish(SensorEvent(kind="look", active=True, id=9, room=3, text="sensor 9 is silent"))
+    wait_until(lambda: list(house.states[-1].queue) == [3], 10, "the queue")
+    house.wait_for_mission(1)
+    events.unregister()
+
+
+def test_a_bad_file_of_sensors_is_one_sentence(house):
+    (house.folder / "sensors.yaml").write_text("sensors: [{id: 1, room: 1}, {id: 1, room: 2}]")
+    house.start_patrol(wait=False, sensors=str(house.folder / "sensors.yaml"))
+    assert house.patrol.wait(15) == 1
+    assert "sensors[1]/id: is 1, which sensors[0] has already" in house.log(house.patrol)

@@ -88,21 +88,42 @@ def build_mail(
         picture: JPEG, None where there is none.
         picture_note: what to say about the picture, or why there is none.
     """
-    mail = EmailMessage(policy=SMTP)
-    mail["Subject"] = SUBJECT
-    mail["From"] = envelope.sender
-    if envelope.to:
-        mail["To"] = envelope.to
-    else:
-        mail["To"] = "undisclosed-recipients:;"
-    mail["Date"] = formatdate(incident.wall, localtime=True)
-    mail["Message-ID"] = f"<{token(incident.id)}@{envelope.sender.domain or 'localhost'}>"
-    mail["Auto-Submitted"] = "auto-generated"
+    mail = _empty_mail(SUBJECT, incident.id, incident.wall, envelope)
     mail["X-Rosbot-Patrol-Incident"] = token(incident.id)
     mail.set_content(_body(incident, picture_note), charset="utf-8")
     if picture is not None:
         name = f"room{incident.room_id}-{token(incident.id)}.jpg"
         mail.add_attachment(picture, maintype="image", subtype="jpeg", filename=name)
+    return mail
+
+
+def build_notice(notice_id: str, subject: str, text: str, envelope: Envelope, *, wall: float) -> EmailMessage:
+    """A mail of plain text about something that is no incident.
+
+    Args:
+        notice_id: unlike any other's.
+        subject: is made one line of at most 200 characters.
+        text: as it is.
+        envelope: who to tell.
+        wall: when, seconds since 1970.
+    """
+    mail = _empty_mail(one_line(subject)[:200], notice_id, wall, envelope)
+    mail["X-Rosbot-Patrol-Notice"] = token(notice_id)
+    mail.set_content(text, charset="utf-8")
+    return mail
+
+
+def _empty_mail(subject: str, mail_id: str, wall: float, envelope: Envelope) -> EmailMessage:
+    mail = EmailMessage(policy=SMTP)
+    mail["Subject"] = subject
+    mail["From"] = envelope.sender
+    if envelope.to:
+        mail["To"] = envelope.to
+    else:
+        mail["To"] = "undisclosed-recipients:;"
+    mail["Date"] = formatdate(wall, localtime=True)
+    mail["Message-ID"] = f"<{token(mail_id)}@{envelope.sender.domain or 'localhost'}>"
+    mail["Auto-Submitted"] = "auto-generated"
     return mail
 
 

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import rospy
@@ -96,6 +97,11 @@ def load_params(cls: type[T], *, ignore: Iterable[str] = (), tree: dict[str, Any
     if tree is None:
         tree = rospy.get_param("~", {}) or {}
     return params.load(cls, tree, name=rospy.get_name() + "/", ignore=ignore)
+
+
+def ros_home() -> Path:
+    """Where ROS keeps a user's files."""
+    return Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
 
 
 def now() -> float:

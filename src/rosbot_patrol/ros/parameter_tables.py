@@ -37,9 +37,12 @@ from rosbot_patrol.ros.map_server_node import MapServerParams
 from rosbot_patrol.ros.narrator_node import NarratorParams
 from rosbot_patrol.ros.patrol_node import NodeParams
 from rosbot_patrol.ros.republish_node import RepublishParams
+from rosbot_patrol.ros.sensor_watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator_node import SimulatorParams
 from rosbot_patrol.ros.twist_mux_node import TwistMuxParams
 from rosbot_patrol.rosserial.settings import SerialNodeParams
+from rosbot_patrol.sensors.sensor_file import SensorSpec
+from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
 from rosbot_patrol.simulation import scenario
 from rosbot_patrol.simulation.faults import KINDS, Doorway, Fault
 
@@ -83,6 +86,10 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
         ],
     ),
     ("serial_node.py", [("", SerialNodeParams)]),
+    (
+        "sensor_watch",
+        [("", SensorWatchParams), ("", WatchTimes), ("", NoticeTimes), ("", LookTimes), ("", MailParams)],
+    ),
     ("twist_mux", [("", TwistMuxParams)]),
     ("teleop_twist_keyboard.py", [("", TeleopParams)]),
     ("simulator", [("", SimulatorParams)]),
@@ -131,6 +138,7 @@ def document() -> str:
                 if rows.count("\n") > 1:
                     place = namespace if namespace.startswith("/") else f"~{namespace}"
                     lines += ["", *([f"`{place}`", ""] if namespace else []), rows]
+    lines += ["", "## file of the sensors", "", "`sensors[]`", "", table(SensorSpec)]
     lines += ["", "## scenario file"]
     for place, cls in SCENARIO:
         lines += ["", *([f"`{place}`", ""] if place else []), table(cls)]

@@ -13,9 +13,10 @@ import rospy
 
 from rosbot_patrol.alerts.incident import Incident, load_incident, save_incident
 from rosbot_patrol.alerts.mail import Envelope, build_mail, one_line
-from rosbot_patrol.alerts.outbox import Entry, Outbox
+from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
-from rosbot_patrol.alerts.transports import DeliveryError, Transport
+from rosbot_patrol.alerts.postman import Postman
+from rosbot_patrol.alerts.transports import Transport
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.manager import Notice
@@ -48,18 +49,17 @@ class AlertDesk:
         incidents: Path,
         health: Health,
     ) -> None:
-        self._outbox, self._transport, self._envelope = outbox, transport, envelope
+        self._postman, self._transport, self._envelope = Postman(outbox, transport), transport, envelope
         self._pictures, self._incidents, self._health = pictures, incidents, health
         self._jobs: deque[tuple[Incident, Notice]] = deque()
         self._finals: deque[tuple[str, str, str, int]] = deque()
         self._memory: Callable[[], None] | None = None
-        self._outbox_lock = threading.Lock()
         self._to_record, self._to_deliver = threading.Event(), threading.Event()
         self._publisher = rospy.Publisher("/patrol/alerts", Alert, queue_size=10)
 
     def start(self) -> None:
         """Begin to work."""
-        waiting = f", {len(self._outbox)} wait from before" if len(self._outbox) else ""
+        waiting = f", {len(self._postman)} wait from before" if len(self._postman) else ""
         log.info("alert mails go to %s (transport %s)%s", self._transport.describe(), self._transport.name, waiting)
         self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
         for name, work, wake in (
@@ -131,35 +131,36 @@ class AlertDesk:
         return True
 
     def _deliver_next(self) -> float:
-        now = time.monotonic()
-        with self._outbox_lock:
-            entry = self._outbox.due(now)
-            wait = self._outbox.wait(now)
-        if entry is not None:
-            self._deliver(entry)
-            return 0.0
-        return 60.0 if wait is None else wait + 0.01
+        done = self._postman.deliver()
+        if done is None:
+            wait = self._postman.wait()
+            return 60.0 if wait is None else wait + 0.01
+        if done.delivered:
+            self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
+            incident = load_incident(self._incidents, done.id)
+            self._publish(incident, delivered=True, location=done.location, text=done.text, incident_id=done.id)
+        else:
+            self._health.set("mail", WARN, f"{len(self._postman)} mails wait: {done.text}")
+        return 0.0
 
     def _record(self, incident: Incident, notice: Notice) -> bool:
-        with self._outbox_lock:
-            if self._outbox.has(incident.id):  # the program was killed after it was written
-                self._jobs.popleft()
-                return True
+        if self._postman.has(incident.id):  # the program was killed after it was written
+            self._jobs.popleft()
+            return True
         picture, note = self._picture(notice)
         mail = build_mail(incident, self._envelope, picture, picture_note=note)
         try:
-            with self._outbox_lock:
-                self._outbox.put(incident.id, mail)
+            self._postman.put(incident.id, mail)
         except OSError as err:
             log.error(
-                "the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, self._outbox.folder, err
+                "the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, self._postman.place, err
             )
             self._health.set("mail", WARN, f"the outbox cannot be written: {err}")
             return False
         log.warning("ALERT: %s; the notice is on disk", incident.sentence)
         self._jobs.popleft()
         self._to_deliver.set()
-        self._publish(incident, delivered=False, location=str(self._outbox.folder), text=incident.sentence)
+        self._publish(incident, delivered=False, location=self._postman.place, text=incident.sentence)
         self._save(incident, picture)
         return True
 
@@ -196,39 +197,6 @@ class AlertDesk:
         if incident is not None:
             fields = {**incident.__dict__, "verdict": verdict, "reason": reason, "sightings": sightings, "final": True}
             self._save(Incident(**fields), None)
-
-    def _deliver(self, entry: Entry) -> None:
-        try:
-            mail = entry.mail()
-        except FileNotFoundError:
-            log.error("%s is gone from the outbox", entry.path)
-            with self._outbox_lock:
-                self._outbox.forget(entry)
-            return
-        except (OSError, ValueError) as err:
-            with self._outbox_lock:
-                aside = self._outbox.set_aside(entry)
-            log.error("%s cannot be sent (%s), set aside as %s", entry.path, err, aside)
-            return
-        try:
-            location = self._transport.send(entry.id, mail)
-        except DeliveryError as err:
-            self._put_off(entry, err)
-            return
-        with self._outbox_lock:
-            self._outbox.delivered(entry, time.monotonic())
-        text = f"mail about incident {entry.id} delivered by {self._transport.name}: {location}"
-        log.info("%s", text)
-        self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
-        incident = load_incident(self._incidents, entry.id)
-        self._publish(incident, delivered=True, location=location, text=text, incident_id=entry.id)
-
-    def _put_off(self, entry: Entry, err: DeliveryError) -> None:
-        with self._outbox_lock:
-            delay = self._outbox.failed(entry, time.monotonic(), permanent=err.permanent)
-            count = len(self._outbox)
-        log.error("%s; the mail stays in %s, next try in %.0f s", err, entry.path, delay)
-        self._health.set("mail", WARN, f"{count} mails wait: {err}")
 
     def _publish(
         self, incident: Incident | None, *, delivered: bool, location: str, text: str, incident_id: str = ""

@@ -32,13 +32,14 @@ from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.transports import MailParams, make_transport
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, transform_points
-from rosbot_patrol.msg import EspTrigger, PatrolState
+from rosbot_patrol.msg import EspTrigger, PatrolState, SensorEvent
 from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.drive import DriveParams
 from rosbot_patrol.patrol.inputs import Box, Frame, Inputs
 from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.manager import Commands, ManagerParams, PatrolManager, Report
 from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.repeats import Repeats
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.patrol.spin import SpinParams
 from rosbot_patrol.patrol.store import PatrolStore
@@ -46,12 +47,13 @@ from rosbot_patrol.patrol.watch import WatchParams
 from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
-from rosbot_patrol.ros.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.node import Loop, load_params, now, ros_home, run_node
 from rosbot_patrol.ros.patrol_alerts import AlertDesk
 from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.ros.patrol_images import PictureRing
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.scan import scan_points
+from rosbot_patrol.sensors.sensor_file import load_sensors
 
 log = logging.getLogger(__name__)
 
@@ -64,6 +66,7 @@ class NodeParams:
     """The node's own parameters; those of mail, drive, look, turn and watch come beside them."""
 
     path_to_params: str = param(doc="points file (the tutorial's name)")
+    sensors: str = param("", doc="file of the sensors; empty: a sensor's id is the number of its room")
     state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
     image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
     alarm_classes: list[str] = param(["person", "fire hydrant"], doc="classes of objects that alarm")
@@ -91,11 +94,6 @@ def load_flat(cls: type[P], tree: dict[str, Any]) -> P:
     return load_params(cls, tree=tree, ignore=others | (set(tree) if cls is not NodeParams else set()))
 
 
-def ros_home() -> Path:
-    """Where ROS keeps a user's files."""
-    return Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
-
-
 class PatrolNode:
     """Inputs, one thread that steps the manager, outputs."""
 
@@ -105,6 +103,8 @@ class PatrolNode:
         mail = load_flat(MailParams, tree)
         prefix = rospy.get_name() + "/"
         rooms = load_rooms(Path(self.params.path_to_params).expanduser())
+        names = {room.id: room.name for room in rooms}
+        self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
         envelope = make_envelope(mail.email_to, mail.email_from, prefix=prefix, host=socket.getfqdn())
         transport = make_transport(mail, envelope, home=ros_home(), environ=os.environ, prefix=prefix)
         folder = Path(self.params.state_dir).expanduser() if self.params.state_dir else ros_home() / "rosbot_patrol"
@@ -141,12 +141,14 @@ class PatrolNode:
         self._turning = False
         self._started = time.monotonic()
         self._first_heard: set[str] = set()
+        self._refused = Repeats()
         self._report: Report | None = None
         self.transforms = Transforms()
         self.move_base = MoveBase(self.params.map_frame)
         self._cmd_vel = rospy.Publisher("/cmd_vel", Twist, queue_size=1)
         self._state = rospy.Publisher("/patrol/state", PatrolState, queue_size=10, latch=True)
         rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100)
+        rospy.Subscriber("/sensors/events", SensorEvent, self._on_sensor_event, queue_size=100)
         rospy.Subscriber("/darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes, queue_size=10)
         rospy.Subscriber("/darknet_ros/found_object", ObjectCount, self._on_count, queue_size=10)
         rospy.Subscriber("/scan", LaserScanMsg, self._on_scan, queue_size=1, buff_size=1 << 18)
@@ -171,10 +173,27 @@ class PatrolNode:
         is_first = sender not in self._first_heard
         self._first_heard.add(sender)
         is_early = time.monotonic() - self._started < self.params.latched_window
-        if is_latched and is_first and is_early and self.store.is_handled(sender, message.id):
-            log.info("the latched trigger for room %d from %s was taken before the restart", message.id, sender)
+        room = self._room_of(message.id)
+        if room is None:
             return
-        self._triggers.append((message.id, sender if is_latched else ""))
+        if is_latched and is_first and is_early and self.store.is_handled(sender, room):
+            log.info("the latched trigger for room %d from %s was taken before the restart", room, sender)
+            return
+        self._triggers.append((room, sender if is_latched else ""))
+
+    def _room_of(self, sensor_id: int) -> int | None:
+        """The room that a sensor calls to; without a file its id, which the manager knows or refuses."""
+        if not self.sensors.has_file:
+            return sensor_id
+        room = self.sensors.room_of(sensor_id)
+        if room is None and self._refused.is_news(sensor_id, now()):
+            log.error("motion trigger refused: %s", self.sensors.refusal(sensor_id))
+        return room
+
+    def _on_sensor_event(self, message: SensorEvent) -> None:
+        if message.kind == SensorEvent.LOOK and message.active and message.room >= 0:
+            log.warning("%s: the robot looks at room %d", message.text, message.room)
+            self._triggers.append((message.room, ""))
 
     def _on_boxes(self, message: BoundingBoxes) -> None:
         time_now = now()

@@ -30,6 +30,7 @@ import rospy
 from rosbot_patrol.errors import ParamError, ProtocolError
 from rosbot_patrol.ros.node import Worker, load_params, run_node
 from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subscription, message_class
+from rosbot_patrol.ros.serial_links import LinkTeller
 from rosbot_patrol.ros.serial_publishers import Publishers
 from rosbot_patrol.ros.serial_report import Report
 from rosbot_patrol.rosserial.client import Client
@@ -55,6 +56,7 @@ class RosSide:
         self.sensors = MotionSensors(sensor_timeout)
         self.sensors_lock = threading.Lock()
         self._told = Complaints()
+        self.links = LinkTeller()
         self._publishers = Publishers()
         self._channels: dict[Client, dict[tuple[str, str], Any]] = {}
 
@@ -105,6 +107,7 @@ class RosSide:
 
     def closed(self, client: Client) -> None:
         """Withdraw the device's subscriptions and services."""
+        self.links.closed(client)
         for channel in self._channels.pop(client, {}).values():
             channel.close()
 
@@ -115,6 +118,7 @@ class RosSide:
 
     def device_log(self, client: Client, level: int, text: str) -> None:
         """To the console and /rosout, at the device's level."""
+        self.links.logged(client, text)
         _LOGGERS[min(level, len(_LOGGERS) - 1)]("%s: %s", client.peer, text)
 
     def parameter(self, name: str) -> object:
@@ -135,11 +139,13 @@ class RosSide:
 
     def _note_sensor(self, client: Client, data: bytes) -> None:
         sensor_id, move = unpack_esp_trigger(data)
+        now = time.monotonic()
+        self.links.heard(client, sensor_id, now, move=move)
         with self.sensors_lock:
-            events = self.sensors.heard(sensor_id, client.address, time.monotonic(), move=move)
+            events = self.sensors.heard(sensor_id, client.address, now, move=move)
         for event in events:
             log.info("%s", event)
-        if move and self._told.may_speak(sensor_id, time.monotonic()):
+        if move and self._told.may_speak(sensor_id, now):
             log.info("motion sensor %d: something moves", sensor_id)
 
     def _sender(self, client: Client) -> Any:
@@ -198,6 +204,7 @@ def body() -> None:
     if params.is_tcp:
         ports = server.listen(params.all_tcp_ports, params.host)
         what = "TCP port " + ", ".join(map(str, ports))
+        ros_side.links.start()
         log.info("waiting for sensors%s on %s", f" with one of {len(policy.keys)} keys" if policy.keys else "", what)
     else:
         server.attach(params.port, params.baud)

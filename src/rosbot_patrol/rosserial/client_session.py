@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.packet import Packet, Parser, encode
 from rosbot_patrol.rosserial.proof import Prover
-from rosbot_patrol.rosserial.topics import TopicId, TopicInfo, pack_time, pack_topic_info, unpack_time
+from rosbot_patrol.rosserial.topics import TopicId, TopicInfo, pack_log, pack_time, pack_topic_info, unpack_time
 
 SYNC_PERIOD = 2.5
 SYNC_TIMEOUT = 11.0
@@ -133,6 +133,13 @@ class DeviceSession:
         """Whether the server has shown that."""
         return self._answered >= number
 
+    def log(self, level: int, text: str) -> bool:
+        """Queue a line for the server's log, level 0 (debug) to 4 (fatal); False where nobody listens."""
+        if not self.configured:
+            return False
+        self._output.append(encode(TopicId.LOG, pack_log(level, text)))
+        return True
+
     def take_output(self) -> list[bytes]:
         """Frames to send, each in one piece."""
         frames, self._output = self._output, []
@@ -190,4 +197,5 @@ class DeviceSession:
     def _request_time(self, now: float) -> None:
         self._last_request = now
         self._asked += 1
-        self._output.append(encode(TopicId.TIME, pack_time(0, 0)))
+        known = self.server_time(now) or 0.0  # as far as it knows, so that the server can see a clock that is off
+        self._output.append(encode(TopicId.TIME, pack_time(int(known), int(known % 1.0 * 1e9))))

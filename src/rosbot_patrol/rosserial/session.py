@@ -37,6 +37,7 @@ from rosbot_patrol.rosserial.topics import (
     pack_time,
     unpack_log,
     unpack_param_request,
+    unpack_time,
     unpack_topic_info,
 )
 
@@ -61,6 +62,7 @@ class Session:
     Attributes:
         proven_id: the sensor that the device has proved to be, None where it has not.
         cost: what came since the last `pause`, in frames; garbage and topics count too.
+        clock_offset: how far the device takes the time to be ahead of ours [s], None where it does not say.
     """
 
     def __init__(
@@ -75,6 +77,8 @@ class Session:
         self.policy = policy
         self.proven_id: int | None = None
         self.cost = 0.0
+        self.clock_offset: float | None = None
+        self._claimed = 0.0
         self._gate = proof.Gate(policy.keys, nonce) if policy.keys else None
         self._is_turned_away = False
         self._began = now
@@ -181,7 +185,9 @@ class Session:
         return self.incoming.get(message.info.topic_id) == (message.kind, message.info)
 
     def answer_time(self, seconds: int, nanoseconds: int) -> None:
-        """Tell the time."""
+        """Tell the time; a device that said in its request what time it takes it for is compared with it."""
+        if self._claimed:
+            self.clock_offset = self._claimed - (seconds + nanoseconds * 1e-9)
         self._output.append(encode(TopicId.TIME, pack_time(seconds, nanoseconds)))
 
     def answer_param(self, values: ParamValues) -> None:
@@ -216,6 +222,7 @@ class Session:
             return self._announce(TopicId(topic_id), unpack_topic_info(packet.data))
         if topic_id == TopicId.TIME:
             self.last_time_request = now
+            self._claimed = unpack_time(packet.data) if len(packet.data) == 8 else 0.0
             return [TimeAsked()]
         if topic_id == TopicId.LOG:
             return [LogLine(*unpack_log(packet.data))]

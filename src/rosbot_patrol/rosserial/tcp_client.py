@@ -17,6 +17,7 @@ import threading
 import time
 
 from rosbot_patrol.rosserial.client_session import Configured, DeviceEvent, DeviceSession, NotTrusted, Unconfigured
+from rosbot_patrol.rosserial.device_log import STUCK_AFTER, WARN, stuck_line
 from rosbot_patrol.rosserial.poor_link import PERFECT, LinkQuality, PoorLink
 from rosbot_patrol.rosserial.proof import Prover
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, ESP_TRIGGER_TYPES, TopicInfo, pack_esp_trigger
@@ -47,6 +48,7 @@ class EspClient:
         sensor_id: 0 to 255, the room that it watches.
         message_type: "rosbot_patrol/EspTrigger" or another package's message of the same definition.
         heartbeat_period: wall time between two heartbeats [s].
+        stuck_after: an output that is high for longer is told in the log [s].
         key: 32 bytes that prove to a bridge with keys that this is that sensor.
         insist: whether to talk only to a bridge that has shown that it has the key.
         source: address to connect from, empty: the system's choice.
@@ -64,6 +66,7 @@ class EspClient:
         key: bytes | None = None,
         insist: bool = False,
         source: str = "",
+        stuck_after: float = STUCK_AFTER,
     ) -> None:
         if not 0 <= sensor_id <= 255:
             raise ValueError(f"sensor id {sensor_id} does not fit into a byte")
@@ -74,6 +77,9 @@ class EspClient:
         self._insist = insist
         self._source = (source, 0) if source else None
         self._told = ""
+        self._stuck_after = stuck_after
+        self._high_since = 0.0
+        self._stuck_told = False  # on this connection
         self._lock = threading.Lock()
         self._motion = False
         self._pending = False  # a motion that has not been sent
@@ -116,6 +122,8 @@ class EspClient:
             self._motion = active
             if rising:
                 self._pending = True
+                self._high_since = time.monotonic()
+            self._stuck_told = self._stuck_told and active
         if rising:
             self._wake()
 
@@ -193,6 +201,7 @@ class EspClient:
         prover = Prover(self.sensor_id, self._key) if self._key is not None else None
         session = DeviceSession([self._info], prover=prover, insist=self._insist)
         self._line.begin(time.monotonic())
+        self._stuck_told = False
         heartbeat_due = time.monotonic()
         while not self._stopping and not self._reboot:
             now = time.monotonic()
@@ -248,7 +257,14 @@ class EspClient:
             if now < heartbeat_due:
                 return heartbeat_due
             session.publish(PUBLISHER_ID, pack_esp_trigger(self.sensor_id, False))
+            self._tell_stuck(session, now)
         return now + self._heartbeat_period
+
+    def _tell_stuck(self, session: DeviceSession, now: float) -> None:
+        """Say once a connection that the output does not fall any more."""
+        lasted = now - self._high_since
+        if self._motion and not self._stuck_told and lasted > self._stuck_after:
+            self._stuck_told = session.log(WARN, stuck_line(self.sensor_id, lasted))
 
     def _note(self, events: list[DeviceEvent]) -> bool:
         """Whether to go on with this bridge."""

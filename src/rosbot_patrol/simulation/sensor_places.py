@@ -1,4 +1,4 @@
-"""The file that says where the motion sensors of a house hang."""
+"""The file that says where the motion sensors of a house hang; `sensors.sensor_file` reads it too, for who they are."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.yaml_files import read_mapping
+
+_OF_THE_WATCH = ("name", "enabled", "heartbeat", "peers")  # keys of rosbot_patrol.sensors.sensor_file
 
 
 def read_sensors(file: str) -> list[SensorPlace]:
@@ -26,7 +28,10 @@ def read_sensors(file: str) -> list[SensorPlace]:
     unit = tree.get("angle_unit", "rad")
     if unit not in ("rad", "deg"):
         raise ParamError(f"{file}: angle_unit", f"is {unit!r}, expected rad or deg")
-    places = [params.load(SensorPlace, item, name=f"{file}: sensors[{i}]/") for i, item in enumerate(listed)]
+    places = [
+        params.load(SensorPlace, item, name=f"{file}: sensors[{i}]/", ignore=_OF_THE_WATCH)
+        for i, item in enumerate(listed)
+    ]
     twice = [p.id for i, p in enumerate(places) if p.id in {q.id for q in places[:i]}]
     if twice:
         raise ParamError(f"{file}: sensors", f"the id {twice[0]} is used twice")

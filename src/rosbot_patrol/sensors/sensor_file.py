@@ -1,0 +1,160 @@
+"""The file that names the motion sensors: which id hangs in which room, and what is expected of it.
+
+    sensors:
+      - {id: 3, room: 5, name: hall door, peers: [192.168.1.23]}
+
+A file that says where the simulated sensors hang is such a file too: its keys port, x, y, z, yaw and angle_unit are the
+simulator's and say nothing here, as name, heartbeat, peers and enabled say nothing to the simulator. So one file can
+serve both, and cannot contradict itself; two files are held against each other by `check_places`.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import param
+from rosbot_patrol.rosserial.policy import parse_networks
+from rosbot_patrol.yaml_files import read_mapping
+
+PLACE_KEYS = frozenset({"port", "x", "y", "z", "yaw"})  # the simulator's
+
+
+def _bad_name(value: str) -> str | None:
+    return None if value.isprintable() else f"is {value!r}, expected one line without control characters"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorSpec:
+    """One motion sensor: a key each of the file's entries."""
+
+    id: int = param(lo=0, hi=255, doc="what it reports in /motion_trigger")
+    room: int = param(lo=0, hi=255, doc="number of the room that it watches, of the points file")
+    name: str = param("", check=_bad_name, doc="for people; empty: its room's name says enough")
+    enabled: bool = param(True, doc="false: out of service, neither watched nor answered")
+    heartbeat: float = param(
+        0.5, unit="s", lo=0.0, hi=3600.0, doc="it reports at least this often; 0: only motion, its silence says nothing"
+    )
+    peers: tuple[str, ...] = param((), doc="addresses and networks that it may speak from; empty: any")
+
+    def may_speak_from(self, host: str) -> bool:
+        """Whether an address is one of `peers`; what is no address, such as a serial device, is."""
+        try:
+            address = ipaddress.ip_address(host.partition("%")[0])
+        except ValueError:
+            return True
+        return not self.peers or any(address in network for network in parse_networks(self.peers, "peers"))
+
+
+class SensorList:
+    """The sensors of a file, or those that the tutorial implies: each room's sensor has the room's number as its id.
+
+    Args:
+        specs: of the file; None where there is no file.
+        room_names: name of each room by number.
+        source: the file, for messages.
+    """
+
+    def __init__(
+        self, specs: Iterable[SensorSpec] | None, room_names: Mapping[int, str], source: str = "the sensor file"
+    ) -> None:
+        self.has_file = specs is not None
+        self.source = source
+        self._specs = {spec.id: spec for spec in specs or ()}
+        self._room_names = dict(room_names)
+
+    def __iter__(self) -> Iterator[SensorSpec]:
+        return iter(self._specs.values())
+
+    def __len__(self) -> int:
+        return len(self._specs)
+
+    def find(self, sensor_id: int) -> SensorSpec | None:
+        """What is expected of an id; None where it is not known."""
+        if self.has_file or sensor_id not in self._room_names:
+            return self._specs.get(sensor_id)
+        return SensorSpec(id=sensor_id, room=sensor_id)
+
+    def room_of(self, sensor_id: int) -> int | None:
+        """Number of the room that a sensor watches; None where it is not known or out of service."""
+        spec = self.find(sensor_id)
+        return spec.room if spec is not None and spec.enabled else None
+
+    def refusal(self, sensor_id: int) -> str:
+        """Why `room_of` gives none, in one sentence."""
+        if not self.has_file:
+            return f"there is no room {sensor_id}, and no file of sensors that gives this id another"
+        if sensor_id in self._specs:
+            return f"{self.source} has it as enabled: false"
+        return f"{self.source} has no sensor with id {sensor_id}"
+
+    def room_name(self, room: int) -> str:
+        """Name of a room, "" where it is not known."""
+        return self._room_names.get(room, "")
+
+    def title(self, sensor_id: int) -> str:
+        """For people, as in `sensor 3 "hall door" in room 5 (corridor hall)`."""
+        spec = self.find(sensor_id)
+        if spec is None:
+            return f"sensor {sensor_id}"
+        name = f' "{spec.name}"' if spec.name else ""
+        return f"sensor {sensor_id}{name} in room {spec.room} ({self.room_name(spec.room)})"
+
+    def check_places(self, places: Iterable[tuple[int, int]], source: str) -> None:
+        """Hold the file against another one that gives (id, room).
+
+        Raises:
+            ParamError: an id watches another room there.
+        """
+        for sensor_id, room in places:
+            spec = self._specs.get(sensor_id)
+            if spec is not None and spec.room != room:
+                raise ParamError(
+                    f"{self.source}: sensors",
+                    f"sensor {sensor_id} watches room {spec.room}, and room {room} in {source}: one of them is wrong",
+                )
+
+
+def load_sensors(path: str | Path, room_names: Mapping[int, str], *, rooms_source: str) -> SensorList:
+    """Read the file.
+
+    Args:
+        path: of the file; "" for none: ids are numbers of rooms.
+        room_names: name of each room by number, as of the points file `rooms_source`.
+        rooms_source: for messages.
+
+    Raises:
+        ParamError: it cannot be read or is wrong; names file and key.
+    """
+    if not str(path):
+        return SensorList(None, room_names)
+    path = Path(path).expanduser()
+    tree = read_mapping(path, keys="sensors")
+    for key in tree:
+        if key not in ("sensors", "angle_unit"):
+            raise ParamError(f"{path}: {key}", params.unknown_name(str(key), ["sensors", "angle_unit"]))
+    listed = tree.get("sensors")
+    if not isinstance(listed, list) or not listed:
+        raise ParamError(f"{path}: sensors", f"expected a list of sensors, got {listed!r}")
+    specs = [_spec(item, f"{path}: sensors[{i}]/") for i, item in enumerate(listed)]
+    for i, spec in enumerate(specs):
+        before = [j for j in range(i) if specs[j].id == spec.id]
+        if before:
+            raise ParamError(f"{path}: sensors[{i}]/id", f"is {spec.id}, which sensors[{before[0]}] has already")
+        if spec.room not in room_names:
+            known = f"{rooms_source} has the rooms {', '.join(map(str, sorted(room_names)))}"
+            raise ParamError(f"{path}: sensors[{i}]/room", f"there is no room {spec.room}: {known}")
+    return SensorList(specs, room_names, str(path))
+
+
+def _spec(item: Any, name: str) -> SensorSpec:
+    if isinstance(item, Mapping):
+        item = {key: value for key, value in item.items() if key not in PLACE_KEYS}
+    spec = params.load_strict(SensorSpec, item, name=name)
+    parse_networks(spec.peers, name + "peers")
+    return spec

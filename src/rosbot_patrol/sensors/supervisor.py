@@ -1,0 +1,256 @@
+"""Which motion sensors are well, which are not, and since when: a function of time and of what is heard.
+
+Time is any monotonic clock of the wall. Where the caller itself was stopped for a while (a suspended machine, SIGSTOP),
+the supervisor's own clock stands still with it, so that nobody is taken for silent whom it could not hear; likewise
+where the clock goes back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from rosbot_patrol.sensors.problems import (
+    Event,
+    Key,
+    Kind,
+    Link,
+    Problem,
+    bridge_key,
+    duration,
+    sensor_key,
+)
+from rosbot_patrol.sensors.sensor_file import SensorList
+from rosbot_patrol.sensors.settings import WatchTimes
+from rosbot_patrol.sensors.tracked import Tracked, clock_words
+
+ASLEEP = 5.0  # a longer pause between two calls, or step back: the caller was stopped, or its clock was set [s]
+SETTLING = 15.0  # so long after a bridge began, new connections say nothing of the sensors [s]
+MAX_BRIDGES = 64
+
+# A condition counts when it has held for the first time, and is over when it has not for the second [s].
+_DELAYS: dict[Kind, tuple[float, float]] = {
+    Kind.SILENT: (0.0, 0.0),  # has its own
+    Kind.FLAPPING: (0.0, 0.0),
+    Kind.STUCK_ON: (0.0, 0.0),
+    Kind.NO_MOTION: (0.0, 0.0),
+    Kind.UNKNOWN_ID: (0.0, 0.0),
+    Kind.DUPLICATE_ID: (5.0, 30.0),
+    Kind.WRONG_PEER: (1.0, 60.0),
+    Kind.CLOCK_OFF: (10.0, 30.0),
+    Kind.BRIDGE_GONE: (0.0, 15.0),
+}
+
+
+@dataclass
+class _Bridge:
+    heard: float
+    since: float
+    clock_offset: float = 0.0
+
+
+@dataclass
+class _Condition:
+    """Something that may be wrong: since when it holds, or no longer holds, without a break."""
+
+    problem: Problem
+    true_since: float
+    false_since: float | None = None
+    is_active: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorStatus:
+    """One sensor now; `heard`, `motion`: seconds since, None for never."""
+
+    sensor_id: int
+    problems: tuple[Problem, ...]
+    waiting: bool
+    enabled: bool
+    link: Link | None
+    bridge: str
+    heard: float | None
+    motion: float | None
+    messages: int
+    triggers: int
+
+
+class Supervisor:
+    """Keeps all sensors and bridges; ids are bytes and bridges are bounded, so memory is too.
+
+    Args:
+        sensors: who is expected.
+        times: when something is a problem.
+        now: time [s].
+    """
+
+    def __init__(self, sensors: SensorList, times: WatchTimes, now: float) -> None:
+        self.sensors = sensors
+        self._times = times
+        self._now = self._last = now
+        self._slept = 0.0
+        self._bridges: dict[str, _Bridge] = {}
+        self._conditions: dict[Key, _Condition] = {}
+        self._tracked = {spec.id: Tracked(spec, times, now, is_listed=True) for spec in sensors}
+
+    # -- what is heard
+
+    def heard(self, sensor_id: int, sender: str, now: float, *, move: bool) -> None:
+        """A message of a sensor came, published by a node."""
+        tracked = self._tracked.get(sensor_id)
+        if tracked is None:
+            spec = self.sensors.find(sensor_id)
+            tracked = Tracked(spec, self._times, self._own(now), is_listed=False)
+            self._tracked[sensor_id] = tracked
+        tracked.hear(sender, self._own(now), move=move)
+
+    def linked(self, bridge: str, links: Iterable[Link], now: float, *, clock_offset: float = 0.0) -> None:
+        """A bridge told what it hears.
+
+        Args:
+            bridge: its node name.
+            links: all of its connections on which a sensor was heard.
+            now: time [s].
+            clock_offset: how far its clock is ahead of ours [s].
+        """
+        t = self._own(now)
+        known = self._bridges.get(bridge)
+        if known is None and len(self._bridges) >= MAX_BRIDGES:
+            del self._bridges[min(self._bridges, key=lambda name: self._bridges[name].heard)]
+        is_new = known is None or t - known.heard > self._times.bridge_after / 2.0
+        self._bridges[bridge] = _Bridge(t, t if known is None or is_new else known.since, clock_offset)
+        by_sensor: dict[int, list[Link]] = {}
+        for link in links:
+            by_sensor.setdefault(link.sensor_id, []).append(link)
+        settled = t - self._bridges[bridge].since > SETTLING
+        for sensor_id, tracked in self._tracked.items():
+            tracked.link(bridge, by_sensor.get(sensor_id, []), t, is_settled=settled)
+
+    def _own(self, now: float) -> float:
+        """The supervisor's own clock; a message that waited in a queue may be a little late."""
+        step = now - self._last
+        if step < -ASLEEP or step > ASLEEP:
+            self._slept += step
+            self._last = now
+        self._last = max(self._last, now)
+        self._now = max(now - self._slept, self._now)
+        return self._now
+
+    # -- what it means
+
+    def tick(self, now: float) -> list[Event]:
+        """What has changed; call it a few times a second."""
+        t = self._own(now)
+        events: list[Event] = []
+        held: set[Key] = set()
+        for problem in self._present(t):
+            held.add(problem.key)
+            events += self._hold(problem, t)
+        for key in [key for key in self._conditions if key not in held]:
+            events += self._release(key, t)
+        return events
+
+    def _present(self, t: float) -> Iterable[Problem]:
+        gone = {name for name, b in self._bridges.items() if t - b.heard > self._times.bridge_after / 3.0}
+        for name, bridge in self._bridges.items():
+            yield from self._of_bridge(name, bridge, t)
+        for sensor_id, tracked in self._tracked.items():
+            if tracked.spec is None:
+                heard = tracked.heard
+                if heard is not None and t - heard <= self._times.unknown_calm:
+                    yield self._problem(Kind.UNKNOWN_ID, sensor_id, tracked.began, self._unknown(sensor_id))
+                continue
+            for kind, (since, what) in tracked.tick(t, bridge_is_there=tracked.bridge not in gone).items():
+                yield self._problem(kind, sensor_id, since, what)
+
+    def _of_bridge(self, name: str, bridge: _Bridge, t: float) -> Iterable[Problem]:
+        if t - bridge.heard > self._times.bridge_after:
+            yield Problem(
+                key=bridge_key(Kind.BRIDGE_GONE, name), since=bridge.heard, what="has gone: nothing is heard of it"
+            )
+        elif abs(bridge.clock_offset) > self._times.clock_limit:
+            what = f"runs on a machine whose clock is {clock_words(bridge.clock_offset)}"
+            yield Problem(key=bridge_key(Kind.CLOCK_OFF, name), since=t, what=what)
+
+    def _unknown(self, sensor_id: int) -> str:
+        return f"is not known: {self.sensors.refusal(sensor_id)}"
+
+    def _problem(self, kind: Kind, sensor_id: int, since: float, what: str) -> Problem:
+        key, bridge = sensor_key(kind, sensor_id), self._tracked[sensor_id].bridge
+        return Problem(key=key, since=since, what=what, bridge=bridge)
+
+    def _hold(self, problem: Problem, t: float) -> list[Event]:
+        condition = self._conditions.get(problem.key)
+        if condition is None:
+            condition = self._conditions[problem.key] = _Condition(problem, t)
+        began = condition.problem.since
+        condition.problem = problem
+        condition.false_since = None
+        if condition.is_active:  # it goes on: since its first begin
+            condition.problem = Problem(key=problem.key, since=began, what=problem.what, bridge=problem.bridge)
+            return []
+        if t - condition.true_since < _DELAYS[problem.key.kind][0]:
+            return []
+        condition.is_active = True
+        return [self._event(problem, t, active=True)]
+
+    def _release(self, key: Key, t: float) -> list[Event]:
+        condition = self._conditions[key]
+        if condition.is_active:
+            if condition.false_since is None:
+                condition.false_since = t
+            if t - condition.false_since < _DELAYS[key.kind][1]:
+                return []
+        del self._conditions[key]
+        return [self._event(condition.problem, t, active=False)] if condition.is_active else []
+
+    def _event(self, problem: Problem, t: float, *, active: bool) -> Event:
+        lasted = t - problem.since
+        who = self.title(problem.key)
+        text = f"{who} {problem.what}"
+        if not active:
+            text = f"{who} is well again: {problem.key.kind_name.replace('_', ' ')} for {duration(lasted)}"
+        return Event(problem=problem, active=active, lasted=lasted, text=text)
+
+    # -- what people are told
+
+    def title(self, key: Key) -> str:
+        """Whom a problem is about, for people."""
+        return f"bridge {key.bridge}" if key.sensor_id < 0 else self.sensors.title(key.sensor_id)
+
+    def problems(self) -> dict[Key, Problem]:
+        """Everything that is wrong now."""
+        return {key: c.problem for key, c in self._conditions.items() if c.is_active}
+
+    def age(self, since: float) -> float:
+        """How long ago a time of a problem was, on this clock [s]."""
+        return max(self._now - since, 0.0)
+
+    def bridges(self) -> Mapping[str, bool]:
+        """Every bridge that was heard of, and whether it is there."""
+        gone = {key.bridge for key in self.problems() if key.kind is Kind.BRIDGE_GONE}
+        return {name: name not in gone for name in self._bridges}
+
+    def statuses(self) -> list[SensorStatus]:
+        """All sensors that a file names or that were heard, by id."""
+        wrong: dict[int, list[Problem]] = {}
+        order = list(Kind)
+        for key, problem in self.problems().items():
+            wrong.setdefault(key.sensor_id, []).append(problem)
+        for listed in wrong.values():
+            listed.sort(key=lambda p: order.index(p.key.kind))
+        return [self._status(n, t, tuple(wrong.get(n, ()))) for n, t in sorted(self._tracked.items())]
+
+    def _status(self, sensor_id: int, tracked: Tracked, problems: tuple[Problem, ...]) -> SensorStatus:
+        return SensorStatus(
+            sensor_id=sensor_id,
+            problems=problems,
+            waiting=tracked.is_waiting(self._now),
+            enabled=tracked.spec is None or tracked.spec.enabled,
+            link=tracked.last_link,
+            bridge=tracked.bridge,
+            heard=None if tracked.heard is None else self.age(tracked.heard),
+            motion=None if tracked.motion is None else self.age(tracked.motion),
+            messages=tracked.messages,
+            triggers=tracked.triggers,
+        )

@@ -1,0 +1,135 @@
+"""What the owner is told of motion sensors, in words: what is wrong, since when, and what to do."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rosbot_patrol.sensors.problems import Kind, duration
+
+MAX_LISTED = 20  # of one kind in one notice
+
+_ONE_IS: dict[Kind, str] = {
+    Kind.SILENT: "is silent",
+    Kind.BRIDGE_GONE: "has gone",
+    Kind.DUPLICATE_ID: "is reported by two at a time",
+    Kind.WRONG_PEER: "speaks from an address that is not its own",
+    Kind.FLAPPING: "comes and goes",
+    Kind.STUCK_ON: "reports motion without an end",
+    Kind.NO_MOTION: "has seen no motion for very long",
+    Kind.UNKNOWN_ID: "is not known",
+    Kind.CLOCK_OFF: "has a clock that is far off",
+}
+_TO_DO: dict[Kind, str] = {
+    Kind.SILENT: "see that it has power and Wi-Fi, and switch it off and on. Until it is heard again, nobody notices"
+    " motion in its room.",
+    Kind.BRIDGE_GONE: "it is started again by itself within seconds. Where it is not, look at the machine that it runs"
+    " on, at its network and at its log. Sensors that report through it are not heard.",
+    Kind.DUPLICATE_ID: "two devices have one id, or somebody imitates a sensor. Find both by their addresses, and give"
+    " one another id. A key for each sensor shuts imitators out (docs/sensors.md, Security).",
+    Kind.WRONG_PEER: "where it has a new address, correct 'peers' in the file of sensors. Otherwise somebody imitates"
+    " it.",
+    Kind.FLAPPING: "its Wi-Fi is weak, or its power supply is. Bring it nearer to the access point, and try another"
+    " supply.",
+    Kind.STUCK_ON: "where nobody was there, something warm moves before it (heating, curtain, sun), its supply is"
+    " noisy, or it is broken. Turn both of its potentiometers to the left; replace it.",
+    Kind.NO_MOTION: "walk past it and see whether it reports. It may be covered, turned away, or its output stuck.",
+    Kind.UNKNOWN_ID: "add it to the file of sensors, or correct the id in its firmware. If it is none of yours,"
+    " somebody reports motion on your network. The robot does not answer it.",
+    Kind.CLOCK_OFF: "let both machines set their clocks by NTP. A sensor takes its time from the bridge: restart it.",
+}
+_MANY_SILENT = (
+    "So many at a time: look at the Wi-Fi (access point, router) and at the power before the sensors. Somebody may also"
+    " have cut or jammed them."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Item:
+    """One thing to tell.
+
+    Attributes:
+        kind: what; None: all is well again.
+        title: whom it is about; what: in words that follow it.
+        since: begin, seconds since 1970; lasted: how long [s].
+    """
+
+    kind: Kind | None
+    title: str
+    what: str
+    since: float
+    lasted: float
+
+
+def subject(items: Sequence[Item]) -> str:
+    """One line for all of it."""
+    wrong = [item for item in items if item.kind is not None]
+    well = [item for item in items if item.kind is None]
+    parts = []
+    kinds = {item.kind for item in wrong}
+    if len(wrong) == 1 and wrong[0].kind is not None:
+        parts.append(f"{wrong[0].title} {_ONE_IS[wrong[0].kind]}")
+    elif kinds == {Kind.SILENT}:
+        parts.append(f"{len(wrong)} motion sensors are silent")
+    elif wrong:
+        parts.append(f"{len(wrong)} things are wrong with the motion sensors")
+    if len(well) == 1:
+        parts.append(f"{well[0].title} is well again")
+    elif well:
+        parts.append(f"{len(well)} motion sensors are well again")
+    return "rosbot patrol: " + ", ".join(parts)
+
+
+def text(items: Sequence[Item], *, watched: int, well: int) -> str:
+    """The whole notice.
+
+    Args:
+        items: what to tell.
+        watched: how many sensors are watched.
+        well: how many of them are well.
+    """
+    blocks = []
+    for kind in Kind:
+        of_kind = [item for item in items if item.kind is kind]
+        if of_kind:
+            lines = [_line(item) for item in of_kind[:MAX_LISTED]] + _rest(len(of_kind))
+            lines.append(f"What to do: {_TO_DO[kind]}")
+            if kind is Kind.SILENT and len(of_kind) >= 3 and 2 * len(of_kind) >= watched:
+                lines.append(_MANY_SILENT)
+            blocks.append(lines)
+    back = [item for item in items if item.kind is None]
+    if back:
+        blocks.append([_line(item) for item in back[:MAX_LISTED]] + _rest(len(back)))
+    blocks.append([f"{well} of {watched} motion sensors are well."])
+    return "\n\n".join("\n".join(lines) for lines in blocks) + "\n"
+
+
+def _rest(count: int) -> list[str]:
+    return [f"- and {count - MAX_LISTED} more"] if count > MAX_LISTED else []
+
+
+def _line(item: Item) -> str:
+    since = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(item.since))
+    title = item.title[:1].upper() + item.title[1:]
+    if item.kind is None:
+        return f"- {title} is well again: {item.what}, from {since}, for {duration(item.lasted)}."
+    if item.kind is Kind.SILENT and "start" not in item.what:
+        return f"- {title} {item.what}. Last heard {since}, {duration(item.lasted)} ago."
+    return f"- {title} {item.what}. Since {since} ({duration(item.lasted)})."
+
+
+def short(kinds: Sequence[Kind]) -> str:
+    """Problems in a few words: "it was silent, it came and went"."""
+    was = {
+        Kind.SILENT: "it was silent",
+        Kind.BRIDGE_GONE: "it was gone",
+        Kind.DUPLICATE_ID: "two reported its id",
+        Kind.WRONG_PEER: "it spoke from a wrong address",
+        Kind.FLAPPING: "it came and went",
+        Kind.STUCK_ON: "it reported motion without an end",
+        Kind.NO_MOTION: "it saw no motion",
+        Kind.UNKNOWN_ID: "it is heard no more",
+        Kind.CLOCK_OFF: "its clock was off",
+    }
+    return ", ".join(was[kind] for kind in kinds)

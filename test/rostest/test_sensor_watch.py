@@ -1,0 +1,207 @@
+"""sensor_watch before a real master: real TCP, a real bridge, virtual ESP32s, mails in a Maildir."""
+
+import json
+import mailbox
+import os
+import signal
+import socket
+import time
+from email.header import decode_header, make_header
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+from ros_processes import free_port, wait_for
+
+from rosbot_patrol.rosserial.poor_link import LinkQuality
+from rosbot_patrol.rosserial.tcp_client import EspClient
+
+ROOT = Path(__file__).resolve().parents[2]
+TRIGGER = ["/motion_trigger", "rosbot_patrol/EspTrigger"]
+EVENTS, STATES = ["/sensors/events", "rosbot_patrol/SensorEvent"], ["/sensors/states", "rosbot_patrol/SensorStates"]
+DIAGNOSTICS = ["/diagnostics", "diagnostic_msgs/DiagnosticArray"]
+FAST = {
+    "silent_after": 2.0,
+    "start_grace": 4.0,
+    "steady_after": 0.5,
+    "notice_after": 1.0,
+    "well_after": 1.0,
+    "notice_interval": 0.0,
+    "mail_interval": 0.0,
+}
+
+
+def lasting_port():
+    """A free port that no outgoing connection can be given while the bridge on it is away."""
+    return next(port for port in range(20000 + os.getpid() % 5000, 32000) if is_free(port))
+
+
+def is_free(port):
+    with socket.socket() as s:
+        return s.connect_ex(("127.0.0.1", port)) != 0
+
+
+def plain(header):
+    return str(make_header(decode_header(header)))
+
+
+class Watch:
+    """The node, its file of sensors, and its mails."""
+
+    def __init__(self, ros, folder, sensors, **params):
+        self.ros, self.folder = ros, folder
+        (folder / "sensors.yaml").write_text(json.dumps({"sensors": sensors}), encoding="utf-8")
+        self.params = {
+            "path_to_params": str(ROOT / "params" / "room_points.yaml"),
+            "sensors": str(folder / "sensors.yaml") if sensors else "",
+            "state_dir": str(folder / "state"),
+            "maildir": str(folder / "mail"),
+            "transport": "maildir",
+            **FAST,
+            **params,
+        }
+        self.start()
+
+    def start(self):
+        arguments = [f"_{key}:={json.dumps(value)}" for key, value in self.params.items()]
+        self.node = self.ros.node("sensor_watch", *arguments)
+
+    def mails(self):
+        place = self.folder / "mail"
+        box = mailbox.Maildir(place, create=False) if (place / "new").exists() else []
+        return sorted(box, key=lambda mail: mail["Message-ID"])
+
+    def mail(self, subject):
+        """The mail of that subject, once it is there."""
+        return wait_for(
+            lambda: [m for m in self.mails() if plain(m["Subject"]) == f"rosbot patrol: {subject}"], 12.0, subject
+        )[0]
+
+
+def bridge(ros, port, name="esp_client1"):
+    node = ros.node("serial_node.py", "_port:=tcp", f"_tcp_port:={port}", f"__name:={name}")
+    node.says("waiting for sensors")
+    return node
+
+
+def event(kind, sensor_id, active):
+    return lambda said: (said.get("kind"), said.get("id"), said.get("active")) == (kind, sensor_id, active)
+
+
+def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_path):
+    port, probe = free_port(), ros.probe()
+    for topic in (EVENTS, STATES, DIAGNOSTICS):
+        probe.tell(subscribe=topic)
+    watch = Watch(ros, tmp_path, [{"id": 3, "room": 5, "name": "Haustür"}, {"id": 4, "room": 4}])
+    watch.node.says("watching 2 sensors of")
+    bridge(ros, port)
+    sensors = [EspClient("127.0.0.1", port, i).start() for i in (3, 4)]
+    probe.expect(lambda said: said.get("text") == "2 of 2 sensors are well")
+    sensors[0].set_link(LinkQuality(loss=1.0))  # says nothing more on a link that stays open
+    silent = probe.expect(event("silent", 3, True))
+    assert (silent["room"], silent["name"], silent["bridge"]) == (5, "Haustür", "/esp_client1")
+    assert silent["text"].startswith('sensor 3 "Haustür" in room 5 (corridor hall) is silent')
+    probe.expect(lambda said: "sensor_watch: sensor 3 Haust" in str(said.get("status")) and "not: 3" in str(said))
+    mail = watch.mail('sensor 3 "Haustür" in room 5 (corridor hall) is silent')
+    text = mail.get_payload(decode=True).decode()
+    assert "Last heard 20" in text
+    assert "What to do: see that it has power" in text
+    assert "1 of 2 motion sensors are well." in text
+    sensors[0].set_link(LinkQuality())
+    probe.expect(event("silent", 3, False))
+    watch.mail('sensor 3 "Haustür" in room 5 (corridor hall) is well again')
+    time.sleep(1.5)
+    assert len(watch.mails()) == 2
+    for sensor in sensors:
+        sensor.stop()
+
+
+def test_a_bridge_is_killed_and_its_sensors_are_told_as_one(ros, tmp_path):
+    port, probe = lasting_port(), ros.probe()
+    probe.tell(subscribe=EVENTS)
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}, {"id": 2, "room": 2}], bridge_after=2.0)
+    first = bridge(ros, port)
+    sensors = [EspClient("127.0.0.1", port, i).start() for i in (1, 2)]
+    wait_for(lambda: all(s.connected for s in sensors))
+    time.sleep(1.5)
+    first.stop(signal.SIGKILL)
+    gone = probe.expect(lambda said: said.get("kind") == "bridge_gone" and said.get("active"))
+    assert gone["text"] == "bridge /esp_client1 has gone: nothing is heard of it"
+    mail = watch.mail("bridge /esp_client1 has gone").get_payload(decode=True).decode()
+    assert "and with it of sensor 1 in room 1 (guest room), sensor 2 in room 2" in mail
+    bridge(ros, port)
+    for i in (1, 2):
+        probe.expect(event("silent", i, False), 15.0)
+    assert len(watch.mails()) == 1  # its well-being takes longer to be believed
+    for sensor in sensors:
+        sensor.stop()
+
+
+def test_who_else_speaks(ros, tmp_path):
+    """An id that is not in the file, a second peer with a sensor's id on another bridge, a stuck output, garbage."""
+    ports, probe = (free_port(), free_port()), ros.probe()
+    for topic in (EVENTS, STATES):
+        probe.tell(subscribe=topic)
+    probe.tell(advertise=["/sensors/links", "rosbot_patrol/SensorLinks"])
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], notice_after=60.0)
+    for i, port in enumerate(ports):
+        bridge(ros, port, f"esp_client{i + 1}")
+    honest = EspClient("127.0.0.1", ports[0], 1, stuck_after=1.0).start()
+    others = [EspClient("127.0.0.1", ports[1], i).start() for i in (1, 9)]
+    unknown = probe.expect(event("unknown_id", 9, True))
+    assert unknown["text"].endswith("sensors.yaml has no sensor with id 9")
+    honest.set_motion(True)
+    assert "its output stays high" in probe.expect(event("stuck_on", 1, True))["text"]
+    double = probe.expect(event("duplicate_id", 1, True), 15.0)
+    assert "is reported by two at a time: 127.0.0.1:" in double["text"]
+    for link in ({"id": 1, "peer": "x" * 3000, "heard": -1.0}, {"id": 255, "heard": 1e30, "clock_known": True}):
+        probe.tell(publish=["/sensors/links", {"bridge": "", "links": [link] * 300}])
+    states = probe.expect(lambda said: "/esp_client2" in str(said.get("bridges")))
+    assert 'state: "' in str(states) or "state:" in str(states)
+    assert watch.node.popen.poll() is None
+    assert "Traceback" not in watch.node.output
+    for sensor in (honest, *others):
+        sensor.stop()
+
+
+def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(ros, tmp_path):
+    probe = ros.probe()
+    probe.tell(subscribe=EVENTS)
+    watch = Watch(ros, tmp_path, [{"id": 7, "room": 7}], start_grace=1.0)
+    watch.mail("sensor 7 in room 7 (north-east hall) is silent")
+    wait_for((tmp_path / "state" / "sensors.json").exists)
+    watch.node.stop(signal.SIGKILL)
+    before = len(probe.heard(kind="silent"))
+    watch.start()
+    wait_for(lambda: len(probe.heard(kind="silent")) > before)
+    time.sleep(2.5)
+    assert len(watch.mails()) == 1
+    assert watch.node.stop() == 0
+
+
+def test_a_plain_publisher_is_watched_too_and_a_silent_one_asks_for_a_look(ros, tmp_path):
+    probe = ros.probe()
+    for topic in (EVENTS, STATES):
+        probe.tell(subscribe=topic)
+    probe.tell(advertise=TRIGGER)
+    watch = Watch(ros, tmp_path, [], patrol_silent_sensors=True, look_after=2.0, notice_after=60.0)
+    watch.node.says("watching whatever sensor is heard")
+    probe.tell(publish=[TRIGGER[0], {"id": 2, "move": True}])  # a test by hand: nobody waits for its heartbeat
+    for _ in range(60):
+        probe.tell(publish=[TRIGGER[0], {"id": 6, "move": False}])
+        time.sleep(0.05)
+    look = probe.expect(event("look", 6, True))
+    assert (look["room"], look["room_name"]) == (6, "tilted hall")
+    assert not probe.heard(kind="silent", id=2)
+
+
+def test_a_bad_file_is_one_sentence(ros, tmp_path):
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 12}])
+    watch.node.says("sensors[0]/room: there is no room 12: ")
+    assert watch.node.popen.wait(5.0) == 1
+    assert "Traceback" not in watch.node.output
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 2}], motion_sensors=str(ROOT / "config" / "house_sensors.yaml"))
+    watch.node.says("sensor 1 watches room 2, and room 1 in")
+    assert watch.node.popen.wait(5.0) == 1
