@@ -2,6 +2,7 @@
 """Motion sensors by the hundred in one process, for rosserial.py: JSON commands by line on stdin, answers on stdout.
 
     {"connect": N, "port": P}           N sensors, each from a loopback address of its own; until all are negotiated
+                                        ("keys": FILE where the bridge asks for them)
     {"steady": SECONDS, "save": FILE}   each sends a heartbeat every 0.5 s, at phases by chance (seeded)
     {"flood": COUNT}                    each sends so many heartbeats as fast as the bridge takes them
     {"reconnect": SECONDS}              all drop their links at once, come back and report
@@ -25,7 +26,9 @@ from typing import Any
 import numpy as np
 
 from rosbot_patrol.rosserial.client_session import DeviceSession
+from rosbot_patrol.rosserial.keys import read_keys
 from rosbot_patrol.rosserial.packet import encode
+from rosbot_patrol.rosserial.proof import Prover
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicInfo, pack_esp_trigger
 
 INFO = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=ESP_TRIGGER_MD5)
@@ -45,6 +48,8 @@ class Sensor:
         self.waiting = b""
         self.retry_at = 0.0
         self.answered = False  # the bridge has told the time after the topics: it knows them
+        self.secret: bytes | None = None
+        self.breaks = 0
 
     def frame(self, *, move: bool = False) -> bytes:
         """Its heartbeat, or a trigger."""
@@ -66,7 +71,9 @@ class Fleet:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         link.bind((sensor.source, 0))
         link.connect_ex(("127.0.0.1", self.port))
-        sensor.link, sensor.session, sensor.waiting, sensor.answered = link, DeviceSession([INFO]), b"", False
+        prover = Prover(sensor.sensor_id, sensor.secret) if sensor.secret is not None else None
+        session = DeviceSession([INFO], prover=prover)
+        sensor.link, sensor.session, sensor.waiting, sensor.answered = link, session, b"", False
         self._selector.register(link, selectors.EVENT_READ, sensor)
 
     def drop(self, sensor: Sensor, *, abruptly: bool = False) -> None:
@@ -117,6 +124,7 @@ class Fleet:
         self.flush(sensor)
 
     def _broken(self, sensor: Sensor) -> None:
+        sensor.breaks += 1
         self.drop(sensor)
         sensor.retry_at = time.monotonic() + 0.2
 
@@ -131,7 +139,9 @@ class Fleet:
 def connect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
     fleet.port = command["port"]
     fleet.sensors = [Sensor(number) for number in range(command["connect"])]
+    keys = read_keys(command["keys"]) if "keys" in command else {}
     for sensor in fleet.sensors:
+        sensor.secret = keys.get(sensor.sensor_id)
         fleet.open(sensor)
     return {"known": fleet.wait_all(30.0)}
 
@@ -159,7 +169,8 @@ def steady(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
         fleet.serve(min(due[0][0] - time.monotonic(), 0.1))
     with open(command["save"], "wb") as file:
         np.save(file, np.array(sent, dtype=np.int64))
-    return {"sent": len(sent), "late_ms": 1e3 * late, "linked": sum(s.link is not None for s in fleet.sensors)}
+    linked = sum(s.link is not None for s in fleet.sensors)
+    return {"sent": len(sent), "late_ms": 1e3 * late, "linked": linked, "breaks": sum(s.breaks for s in fleet.sensors)}
 
 
 def flood(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:

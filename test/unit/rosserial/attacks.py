@@ -144,16 +144,20 @@ def large_frames(port: int, source: str, seconds: float) -> int:
 
 
 def many_topics(port: int, source: str, seconds: float, count: int = 1_000_000) -> int:
-    """Up to a million topics under names of their own."""
-    sent = 0
-
-    def frames(_: int) -> bytes:
-        nonlocal sent
-        sent += 10
-        names = range(sent, sent + 10)
-        return b"".join(announce(f"t{n}_" + "x" * 180, "std_msgs/Bool", 200 + n % 60000) for n in names if n < count)
-
-    again_and_again(port, source, seconds, frames)
+    """Up to a million topics under names of their own, on a new connection whenever the bridge reads no more."""
+    until, sent = time.monotonic() + seconds, 0
+    stranger = Stranger(port, source)
+    while sent < count and time.monotonic() < until:
+        names = range(sent, min(sent + 100, count))
+        frames = b"".join(announce(f"t{n}_" + "x" * 180, "std_msgs/Bool", 200 + n % 60000) for n in names)
+        stranger.link.settimeout(0.005)
+        began = time.monotonic()
+        is_taken = stranger.say(frames)
+        sent += len(names)
+        if not is_taken or time.monotonic() - began > 0.004:
+            stranger.close(abruptly=True)
+            stranger = Stranger(port, source)
+    stranger.close()
     return sent
 
 
@@ -273,15 +277,18 @@ def main() -> None:
     parser.add_argument("port", type=int)
     parser.add_argument("--source", default="127.0.0.66", help="loopback address to come from (default: %(default)s)")
     parser.add_argument("--seconds", type=float, default=5.0, help="of each attack")
+    parser.add_argument("--sources", type=int, default=1, help="from so many addresses, the next ones too")
     parser.add_argument("--only", choices=sorted(ATTACKS), help="one of them instead of all at once")
     options = parser.parse_args()
     names = [options.only] if options.only else list(ATTACKS)
-    counts = {}
+    first, last = options.source.rsplit(".", 1)
+    sources = [f"{first}.{int(last) + i}" for i in range(options.sources)]
+    counts = dict.fromkeys(names, 0)
 
-    def run(name: str) -> None:
-        counts[name] = ATTACKS[name](options.port, options.source, options.seconds)
+    def run(name: str, source: str) -> None:
+        counts[name] += ATTACKS[name](options.port, source, options.seconds)
 
-    threads = [threading.Thread(target=run, args=(name,), daemon=True) for name in names]
+    threads = [threading.Thread(target=run, args=(n, source), daemon=True) for n in names for source in sources]
     for thread in threads:
         thread.start()
     for thread in threads:
