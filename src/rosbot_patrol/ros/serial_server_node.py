@@ -31,7 +31,7 @@ from rosbot_patrol.errors import ParamError, ProtocolError
 from rosbot_patrol.ros.node import Worker, load_params, run_node
 from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subscription, message_class
 from rosbot_patrol.ros.serial_links import LinkTeller
-from rosbot_patrol.ros.serial_publishers import Publishers
+from rosbot_patrol.ros.serial_publishers import SETTLING, Publishers
 from rosbot_patrol.ros.serial_report import Report
 from rosbot_patrol.rosserial.client import Client
 from rosbot_patrol.rosserial.complaints import Complaints
@@ -213,6 +213,8 @@ def body() -> None:
     gc.freeze()  # what is there by now stays: looking through it again stopped everything for 40 ms
     rospy.on_shutdown(server.stop)
     Worker(Report(server, ros_side.look_at_sensors, what).run, name="report").start()
+    if policy.restricted:
+        time.sleep(SETTLING)  # sensors wait meanwhile: what they are told to have arrived shall find its listeners
     server.run()
     server.close()
 
