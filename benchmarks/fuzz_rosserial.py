@@ -27,7 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "test/unit/rosserial"
 CORPUS = TESTS / "corpus"
-MAX_LENGTH = 192  # of an input [bytes]
+MAX_LENGTH = 96  # of an input [bytes]
 MAX_SECONDS, MAX_MB = 5, 300
 sys.path[:0] = [str(TESTS), str(ROOT / "src")]
 
