@@ -3,6 +3,7 @@
 import json
 import mailbox
 import os
+import re
 import signal
 import socket
 import time
@@ -112,7 +113,9 @@ def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_p
     sensors[0].set_link(LinkQuality())
     probe.expect(event("silent", 3, False))
     watch.mail('sensor 3 "Haustür" in room 5 (corridor hall) is well again')
-    time.sleep(1.5)
+    shown = ros.node("sensors")
+    assert shown.popen.wait(10.0) == 0
+    assert re.search(r"^3 +5 corridor hall \"Haustür\" +ok +\d s ago +never +0 +127\.0\.0\.1:\d+$", shown.output, re.M)
     assert len(watch.mails()) == 2
     for sensor in sensors:
         sensor.stop()
@@ -166,21 +169,6 @@ def test_who_else_speaks(ros, tmp_path):
         sensor.stop()
 
 
-def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(ros, tmp_path):
-    probe = ros.probe()
-    probe.tell(subscribe=EVENTS)
-    watch = Watch(ros, tmp_path, [{"id": 7, "room": 7}], start_grace=1.0)
-    watch.mail("sensor 7 in room 7 (north-east hall) is silent")
-    wait_for((tmp_path / "state" / "sensors.json").exists)
-    watch.node.stop(signal.SIGKILL)
-    before = len(probe.heard(kind="silent"))
-    watch.start()
-    wait_for(lambda: len(probe.heard(kind="silent")) > before)
-    time.sleep(2.5)
-    assert len(watch.mails()) == 1
-    assert watch.node.stop() == 0
-
-
 def test_a_plain_publisher_is_watched_too_and_a_silent_one_asks_for_a_look(ros, tmp_path):
     probe = ros.probe()
     for topic in (EVENTS, STATES):
@@ -205,3 +193,20 @@ def test_a_bad_file_is_one_sentence(ros, tmp_path):
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 2}], motion_sensors=str(ROOT / "config" / "house_sensors.yaml"))
     watch.node.says("sensor 1 watches room 2, and room 1 in")
     assert watch.node.popen.wait(5.0) == 1
+
+
+def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp_path):
+    """And simulated time that stands still, with no /clock at all, changes nothing."""
+    ros = sim_ros
+    probe = ros.probe()
+    probe.tell(subscribe=EVENTS)
+    watch = Watch(ros, tmp_path, [{"id": 7, "room": 7}], start_grace=1.0)
+    watch.mail("sensor 7 in room 7 (north-east hall) is silent")
+    wait_for((tmp_path / "state" / "sensors.json").exists)
+    watch.node.stop(signal.SIGKILL)
+    before = len(probe.heard(kind="silent"))
+    watch.start()
+    wait_for(lambda: len(probe.heard(kind="silent")) > before)
+    time.sleep(2.5)
+    assert len(watch.mails()) == 1
+    assert watch.node.stop() == 0

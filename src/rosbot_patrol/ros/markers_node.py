@@ -1,4 +1,7 @@
-"""Rooms and motion sensors as markers for rviz, on `~markers` (latched); the room that the patrol is about is lit."""
+"""Rooms and motion sensors as markers for rviz, on `~markers` (latched); the room that the patrol is about is lit.
+
+A sensor is red while it reports motion, black where it is silent, yellow where something else is wrong with it.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from rosbot_patrol.msg import EspTrigger, PatrolState
+from rosbot_patrol.msg import EspTrigger, PatrolState, SensorEvent, SensorStates
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.rooms import Room, Rooms, load_rooms
 from rosbot_patrol.ros.node import load_params, run_node
@@ -19,6 +22,7 @@ from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.sensor_places import read_sensors
 
 QUIET, BUSY, MOTION = ColorRGBA(0.2, 0.5, 0.9, 0.8), ColorRGBA(1.0, 0.6, 0.0, 1.0), ColorRGBA(1.0, 0.1, 0.1, 1.0)
+SILENT, BAD = ColorRGBA(0.05, 0.05, 0.05, 1.0), ColorRGBA(1.0, 0.9, 0.0, 1.0)
 MOTION_SHOWN_S = 5.0
 
 
@@ -64,10 +68,12 @@ class _Markers:
         self._rooms, self._sensors = rooms, sensors
         self._busy: int | None = None
         self._moved: dict[int, float] = {}
+        self._wrong: dict[int, ColorRGBA] = {}
         self._lock = threading.Lock()
         self._publisher = rospy.Publisher("~markers", MarkerArray, queue_size=1, latch=True)
         rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=1)
         rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=20)
+        rospy.Subscriber("/sensors/states", SensorStates, self._on_sensors, queue_size=1)
 
     def _on_state(self, state: PatrolState) -> None:
         with self._lock:
@@ -78,16 +84,21 @@ class _Markers:
             with self._lock:
                 self._moved[trigger.id] = rospy.get_time()
 
+    def _on_sensors(self, message: SensorStates) -> None:
+        wrong = {s.id: SILENT if s.state == SensorEvent.SILENT else BAD for s in message.sensors if s.problems}
+        with self._lock:
+            self._wrong = wrong
+
     def publish(self) -> None:
         now = rospy.get_time()
         with self._lock:
-            busy, moved = self._busy, dict(self._moved)
+            busy, moved, wrong = self._busy, dict(self._moved), self._wrong
         out = MarkerArray()
         for room in self._rooms:
             out.markers += room_markers(room, BUSY if room.id == busy else QUIET)
         for sensor in self._sensors:
             lit = 0.0 <= now - moved.get(sensor.id, -math.inf) < MOTION_SHOWN_S
-            out.markers += sensor_markers(sensor, MOTION if lit else QUIET)
+            out.markers += sensor_markers(sensor, MOTION if lit else wrong.get(sensor.id, QUIET))
         self._publisher.publish(out)
 
 

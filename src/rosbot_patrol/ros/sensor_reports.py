@@ -17,6 +17,8 @@ def state_name(status: SensorStatus) -> str:
         return status.problems[0].key.kind_name
     if not status.enabled:
         return "disabled"
+    if not status.watched:
+        return "unwatched"
     return "waiting" if status.waiting else "ok"
 
 
@@ -26,6 +28,8 @@ def state_text(status: SensorStatus) -> str:
         return "; ".join(problem.what for problem in status.problems)
     if not status.enabled:
         return "is out of service"
+    if not status.watched and status.heard is not None:
+        return "sends no heartbeats: its silence says nothing"
     if status.heard is None:
         return "has not been heard yet"
     moved = "no motion yet" if status.motion is None else f"last motion {duration(status.motion)} ago"
@@ -34,12 +38,13 @@ def state_text(status: SensorStatus) -> str:
 
 def summary(statuses: list[SensorStatus], watch: Supervisor) -> tuple[int, str]:
     """Level and sentence for all of them."""
-    expected = [s for s in statuses if s.enabled and watch.sensors.find(s.sensor_id) is not None]
-    bad = [str(s.sensor_id) for s in expected if s.problems]
+    expected = [s for s in statuses if s.watched]
+    bad = [str(s.sensor_id) for s in statuses if s.problems and watch.sensors.find(s.sensor_id) is not None]
     unknown = [str(s.sensor_id) for s in statuses if s.problems and watch.sensors.find(s.sensor_id) is None]
     gone = [name for name, is_there in watch.bridges().items() if not is_there]
     waiting = sum(s.waiting for s in expected)
-    text = f"{len(expected) - len(bad) - waiting} of {len(expected)} sensors are well"
+    well = sum(not s.problems and not s.waiting for s in expected)
+    text = f"{well} of {len(expected)} sensors are well"
     text += f", not: {', '.join(bad[:20])}{', ...' if len(bad) > 20 else ''}" if bad else ""
     text += f", {waiting} not heard yet" if waiting else ""
     text += f", {len(unknown)} unknown ids: {', '.join(unknown[:10])}" if unknown else ""

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import logging
-import math
 import time
 from collections import deque
 from collections.abc import Mapping
@@ -157,8 +156,7 @@ class SensorWatch:
             self._watch.heard(sensor_id, sender, at, move=move)
         while self._links:
             message, offset, at = self._links.popleft()
-            sound = [link for link in links_from_msg(message) if math.isfinite(link.heard)]
-            self._watch.linked(message.bridge, sound, at, clock_offset=offset)
+            self._watch.linked(message.bridge, links_from_msg(message), at, clock_offset=offset)
 
     def _tell_owner(self) -> None:
         now = time.monotonic()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -25,13 +26,16 @@ class LinkTeller:
         self._clients: dict[str, Client] = {}
         self._lock = threading.Lock()
         self._changed = threading.Event()
+        self._is_started = False
         # in simulated time a device's clock goes at another pace, which is no fault of it
         self._compares_clocks = not rospy.get_param("/use_sim_time", False)
         self._publisher = rospy.Publisher("/sensors/links", SensorLinks, queue_size=5)
 
     def start(self) -> None:
-        """Begin to publish."""
-        Worker(self._run, name="links").start()
+        """Begin to publish; a bridge on which no sensor is expected does so with the first that it hears."""
+        if not self._is_started:
+            self._is_started = True
+            Worker(self._run, name="links").start()
 
     def heard(self, client: Client, sensor_id: int, now: float, *, move: bool) -> None:
         """A sensor's message came."""
@@ -40,6 +44,7 @@ class LinkTeller:
             if is_new:
                 self._clients[client.peer] = client
         if is_new:
+            self.start()
             self._changed.set()
 
     def logged(self, client: Client, text: str) -> None:
@@ -96,7 +101,7 @@ def _message(link: Link) -> SensorLink:
 
 
 def links_from_msg(message: SensorLinks) -> list[Link]:
-    """The links of a message."""
+    """The links of a message; those that make no sense are left out."""
     return [
         Link(
             sensor_id=each.id,
@@ -106,7 +111,8 @@ def links_from_msg(message: SensorLinks) -> list[Link]:
             triggers=each.triggers,
             proven=each.proven,
             is_stuck=each.stuck,
-            clock_offset=each.clock_offset if each.clock_known else None,
+            clock_offset=each.clock_offset if each.clock_known and math.isfinite(each.clock_offset) else None,
         )
         for each in message.links
+        if math.isfinite(each.heard)
     ]

@@ -175,7 +175,7 @@ class Notices:
     def _notice(
         self, items: tuple[Item, ...], statuses: Mapping[int, SensorStatus], watch: Supervisor, wall: float
     ) -> Notice:
-        expected = [s for s in statuses.values() if s.enabled and watch.sensors.find(s.sensor_id) is not None]
+        expected = [status for status in statuses.values() if status.watched]
         well = sum(not s.problems and not s.waiting for s in expected)
         stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(wall))
         return Notice(

@@ -61,12 +61,22 @@ class _Condition:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorStatus:
-    """One sensor now; `heard`, `motion`: seconds since, None for never."""
+    """One sensor now.
+
+    Attributes:
+        problems: the worst first.
+        waiting: it was not heard yet, and need not have been.
+        enabled: it is not out of service.
+        watched: its silence would be noticed.
+        link: on which it was heard last, None where no bridge says; bridge: of it.
+        heard, motion: seconds since, None for never.
+    """
 
     sensor_id: int
     problems: tuple[Problem, ...]
     waiting: bool
     enabled: bool
+    watched: bool
     link: Link | None
     bridge: str
     heard: float | None
@@ -154,11 +164,12 @@ class Supervisor:
         gone = {name for name, b in self._bridges.items() if t - b.heard > self._times.bridge_after / 3.0}
         for name, bridge in self._bridges.items():
             yield from self._of_bridge(name, bridge, t)
-        for sensor_id, tracked in self._tracked.items():
+        for sensor_id, tracked in list(self._tracked.items()):
             if tracked.spec is None:
-                heard = tracked.heard
-                if heard is not None and t - heard <= self._times.unknown_calm:
+                if tracked.heard is not None and t - tracked.heard <= self._times.unknown_calm:
                     yield self._problem(Kind.UNKNOWN_ID, sensor_id, tracked.began, self._unknown(sensor_id))
+                else:
+                    del self._tracked[sensor_id]
                 continue
             for kind, (since, what) in tracked.tick(t, bridge_is_there=tracked.bridge not in gone).items():
                 yield self._problem(kind, sensor_id, since, what)
@@ -247,6 +258,7 @@ class Supervisor:
             problems=problems,
             waiting=tracked.is_waiting(self._now),
             enabled=tracked.spec is None or tracked.spec.enabled,
+            watched=tracked.is_watched,
             link=tracked.last_link,
             bridge=tracked.bridge,
             heard=None if tracked.heard is None else self.age(tracked.heard),

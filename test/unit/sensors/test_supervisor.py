@@ -81,6 +81,7 @@ def test_without_a_file_only_who_sent_heartbeats_can_fall_silent():
     assert house.run(300.0) == []
     house.speaker(3).beat = None
     assert house.run(60.0) == [("silent", 3, True)]
+    assert {s.sensor_id: s.watched for s in house.watch.statuses()} == {3: True, 5: False}
 
 
 def test_flapping_is_told_instead_of_looking_well():
@@ -149,6 +150,7 @@ def test_unknown_id_is_told_once_and_forgotten_after_a_while():
     house.speakers.pop()
     assert house.run(590.0) == []
     assert house.run(20.0) == [("unknown_id", 9, False)]
+    assert [s.sensor_id for s in house.watch.statuses()] == [1]
 
 
 def test_two_peers_with_one_id():
