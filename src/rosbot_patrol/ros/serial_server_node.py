@@ -49,7 +49,7 @@ _LOGGERS = (rospy.logdebug, rospy.loginfo, rospy.logwarn, rospy.logerr, rospy.lo
 
 
 class RosSide:
-    """Gives the devices' messages to ROS and the other way round (`rosserial.server.Handler`)."""
+    """Gives the devices' messages to ROS and the other way round (`rosserial.dispatch.Handler`)."""
 
     def __init__(self, sensor_timeout: float) -> None:
         self.server: SerialServer | None = None

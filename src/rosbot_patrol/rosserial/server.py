@@ -12,30 +12,15 @@ import selectors
 import socket
 import time
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
-from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.client import Client, Link, listen, peer_names, tune
-from rosbot_patrol.rosserial.complaints import printable
+from rosbot_patrol.rosserial.dispatch import Dispatcher, Handler
 from rosbot_patrol.rosserial.door import Door, Limits
-from rosbot_patrol.rosserial.events import (
-    Announced,
-    Event,
-    Garbled,
-    HangUp,
-    LogLine,
-    ParamAsked,
-    Proven,
-    Received,
-    Refused,
-    SyncLost,
-    TimeAsked,
-)
 from rosbot_patrol.rosserial.journal import Journal
 from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.serial_port import SerialPort
 from rosbot_patrol.rosserial.session import Session
-from rosbot_patrol.rosserial.topics import TX_STOP, TopicId, TopicInfo, param_values
+from rosbot_patrol.rosserial.topics import TX_STOP
 
 log = logging.getLogger(__name__)
 
@@ -45,34 +30,6 @@ NO_LIMITS = Limits()
 TICK = 0.25
 REOPEN_PERIOD = 3.0
 REPLACE_AFTER = 1.5  # silence after which an old connection gives way to a new one of the same sensor [s]
-
-
-class Handler(Protocol):
-    """Where messages go to and come from; called on the server's thread, must not wait."""
-
-    def open(self, client: Client, kind: TopicId, info: TopicInfo) -> None:
-        """A topic or service is announced; raises ProtocolError where it cannot be had."""
-
-    def receive(self, client: Client, kind: TopicId, info: TopicInfo, data: bytes) -> None:
-        """A message came; raises ProtocolError where it makes no sense."""
-
-    def flush(self) -> None:
-        """No more messages for now: hand on those that came, before the device is answered."""
-
-    def tick(self) -> None:
-        """A quarter of a second has gone by."""
-
-    def closed(self, client: Client) -> None:
-        """The client has gone, and all its topics with it."""
-
-    def time(self) -> tuple[int, int]:
-        """The time told to devices: seconds, nanoseconds."""
-
-    def device_log(self, client: Client, level: int, text: str) -> None:
-        """The device logs something, level 0 (debug) to 4 (fatal)."""
-
-    def parameter(self, name: str) -> object:
-        """The value of a parameter; raises ProtocolError where it is not set."""
 
 
 class SerialServer:
@@ -105,7 +62,9 @@ class SerialServer:
         self._silence_timeout = silence_timeout
         self.door = Door(limits)
         self._read_size = READ_SIZE if policy.max_rate <= 0.0 else READ_SIZE_LIMITED
-        self._names: set[str] = set()
+        self._dispatcher = Dispatcher(
+            handler, policy, self.door, self.journal, hang_up=self._lose, on_new_sensor=self._find_older
+        )
         self._clock = clock
         self._listeners: list[socket.socket] = []
         self._serial: tuple[str, int] | None = None
@@ -186,7 +145,7 @@ class SerialServer:
                 self._selector.register(listener, selectors.EVENT_READ)
         for client in list(self.clients.values()):
             if events := client.session.tick(now):
-                self._handle(client, events, now)
+                self._dispatcher.take(client, events, now)
             if client.older:
                 self._replace_older(client, now)
             if client.on_tcp and client.is_stuck(now):
@@ -279,7 +238,7 @@ class SerialServer:
         if not data:
             self._lose(client, "it closed the connection")
             return
-        self._handle(client, client.session.receive(data, now), now)
+        self._dispatcher.take(client, client.session.receive(data, now), now)
         self._handler.flush()
         if not client.closed:
             of_address = client.shared.spend(client.session.cost, now)
@@ -310,10 +269,10 @@ class SerialServer:
             self._selector.register(client.link, wanted, client)
         client.watched = wanted
 
-    def _lose(self, client: Client, reason: str) -> None:
+    def _lose(self, client: Client, reason: str | None) -> None:
         if client.closed:
             return
-        if not self._stopping:
+        if reason is not None and not self._stopping:
             self.journal.say(client, logging.INFO, self._clock(), "disconnected, %s", reason)
         self._drop(client)
 
@@ -324,85 +283,6 @@ class SerialServer:
         self.door.leave(client)
         client.link.close()
         self._handler.closed(client)
-
-    def _handle(self, client: Client, events: list[Event], now: float) -> None:
-        for event in events:
-            if client.closed:
-                return
-            try:
-                self._event(client, event, now)
-            except ProtocolError as err:
-                client.session.dropped += 1
-                self.journal.refuse(client, f"a message: {err}", now)
-
-    def _event(self, client: Client, event: Event, now: float) -> None:
-        if isinstance(event, Received):
-            if not client.session.accepts(event):  # refused since, in the same piece of data
-                return
-            if client.note_message(event.info.md5, event.data):
-                self._find_older(client)
-            self._handler.receive(client, event.kind, event.info, event.data)
-        elif isinstance(event, Announced):
-            self._announce(client, event, now)
-        elif isinstance(event, TimeAsked):
-            client.session.answer_time(*self._handler.time())
-        elif isinstance(event, LogLine):
-            self._device_log(client, event, now)
-        elif isinstance(event, ParamAsked):
-            client.session.answer_param(param_values(self._handler.parameter(event.name)))
-        elif isinstance(event, Refused):
-            self.journal.refuse(client, f"{event.what}: {event.reason}", now)
-        elif isinstance(event, Garbled):
-            if self.journal.is_new((client.address, "garbled"), now):
-                fault = f" ({event.fault})" if event.fault else ""
-                self.journal.say(
-                    client, logging.WARNING, now, "bytes that are no frame, skipped: %s%s", event.sample.hex(" "), fault
-                )
-        elif isinstance(event, SyncLost):
-            self.journal.say(
-                client, logging.WARNING, now, "silent for %.0f s, asking for its topics again", event.seconds
-            )
-        elif isinstance(event, Proven):
-            self._proven(client, event.sensor_id, now)
-        elif isinstance(event, HangUp) and event.is_refusal:
-            self.journal.refuse(client, event.reason, now)
-            self._drop(client)
-        elif isinstance(event, HangUp):
-            self._lose(client, f"hung up on: {event.reason}")
-
-    def _proven(self, client: Client, sensor_id: int, now: float) -> None:
-        if self.door.prove(client, sensor_id):
-            self.journal.say(client, logging.INFO, now, "proved to be sensor %d", sensor_id)
-        else:
-            self.journal.refuse(client, f"one more connection of sensor {sensor_id}; is its key known to others?", now)
-            self._drop(client)
-
-    def _announce(self, client: Client, event: Announced, now: float) -> None:
-        name = event.info.name.lstrip("/")
-        try:
-            if event.kind == TopicId.PUBLISHER and self._has_all_names(name):
-                raise ProtocolError("", f"publisher {name!r}: {len(self._names)} topics have been made already")
-            self._handler.open(client, event.kind, event.info)
-        except ProtocolError as err:
-            client.session.reject(event.kind, event.info)
-            self.journal.refuse(client, str(err), now)
-            return
-        if event.kind == TopicId.PUBLISHER:
-            self._names.add(name)
-        self.door.settle(client)
-        what = event.kind.name.lower().replace("_", " ")
-        self.journal.say(client, logging.INFO, now, "%s %s [%s]", what, event.info.name, event.info.message_type)
-
-    def _has_all_names(self, name: str) -> bool:
-        return name not in self._names and len(self._names) >= self._policy.max_names
-
-    def _device_log(self, client: Client, event: LogLine, now: float) -> None:
-        text = event.text
-        if self._policy.restricted:
-            if not self.journal.may_speak(client.address, now):
-                return
-            text = printable(text)
-        self._handler.device_log(client, event.level, text)
 
     def _find_older(self, client: Client) -> None:
         sensor = client.sensor

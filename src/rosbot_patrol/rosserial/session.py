@@ -40,6 +40,7 @@ from rosbot_patrol.rosserial.topics import (
     unpack_time,
     unpack_topic_info,
 )
+from rosbot_patrol.rosserial.voice import Voice
 
 FRAME_TIMEOUT = 1.0  # a frame that stalls for longer is given up
 RETRY_PERIOD = 3.0  # between two requests for topics
@@ -60,7 +61,6 @@ class Session:
         nonce: of the challenge; only tests give one.
 
     Attributes:
-        proven_id: the sensor that the device has proved to be, None where it has not.
         cost: what came since the last `pause`, in frames; garbage and topics count too.
         clock_offset: how far the device takes the time to be ahead of ours [s], None where it does not say.
     """
@@ -75,7 +75,6 @@ class Session:
         nonce: bytes | None = None,
     ) -> None:
         self.policy = policy
-        self.proven_id: int | None = None
         self.cost = 0.0
         self.clock_offset: float | None = None
         self._claimed = 0.0
@@ -83,8 +82,7 @@ class Session:
         self._is_turned_away = False
         self._began = now
         self._bytes_before_proof = 0
-        self._sensor_ids = policy.sensor_ids(address)  # that it may speak for, None for all
-        self._spoken_for: set[int] = set()
+        self._voice = Voice(policy.sensor_ids(address), policy.max_sensors)
         self._triggers: set[int] = set()  # topic ids that carry EspTriggers
         self.parser = Parser(min(policy.max_payload, proof.MAX_PAYLOAD) if self._gate else policy.max_payload)
         self.incoming: dict[int, tuple[TopicId, TopicInfo]] = {}
@@ -110,6 +108,11 @@ class Session:
     def configured(self) -> bool:
         """Whether the device has announced a topic that was accepted."""
         return bool(self.incoming or self.outgoing)
+
+    @property
+    def proven_id(self) -> int | None:
+        """The sensor that the device has proved to be, None where it has not."""
+        return self._voice.proven_id
 
     @property
     def needs_proof(self) -> bool:
@@ -214,8 +217,9 @@ class Session:
         topic_id = packet.topic_id
         known = self.incoming.get(topic_id)
         if known is not None:
-            if topic_id in self._triggers and not self._may_speak_for(packet.data):
-                return self._refuse_id(packet.data)
+            if topic_id in self._triggers and not self._voice.may_say(packet.data):
+                self.dropped += 1
+                return [Refused(f"what it says for sensor {packet.data[0]}", self._voice.why_not(packet.data))]
             self.messages += 1
             return [Received(*known, packet.data)]
         if topic_id in NEGOTIATION_IDS:
@@ -239,38 +243,15 @@ class Session:
         except ProtocolError as err:
             self._is_turned_away = True
             return [HangUp(str(err), is_refusal=True)]
-        if self._sensor_ids is not None and sensor_id not in self._sensor_ids:
+        if not self._voice.prove(sensor_id):
             self._is_turned_away = True
             reason = f"sensor {sensor_id} at this address: the list has it elsewhere (~allow_sensors)"
             return [HangUp(reason, is_refusal=True)]
         self._gate = None
-        self.proven_id = sensor_id
-        self._sensor_ids = frozenset((sensor_id,))
         self.parser.max_payload = self.policy.max_payload
         self._output.append(answer)
         self._request_topics(now)
         return [Proven(sensor_id)]
-
-    def _may_speak_for(self, data: bytes) -> bool:
-        sensor_id = data[0] if data else None
-        if sensor_id is None or sensor_id in self._spoken_for:
-            return True
-        if len(self._spoken_for) >= self.policy.max_sensors:
-            return False
-        if self._sensor_ids is not None and sensor_id not in self._sensor_ids:
-            return False
-        self._spoken_for.add(sensor_id)
-        return True
-
-    def _refuse_id(self, data: bytes) -> list[Event]:
-        self.dropped += 1
-        if self.proven_id is not None:
-            reason = f"it has proved to be sensor {self.proven_id}"
-        elif self._sensor_ids is not None and data[0] not in self._sensor_ids:
-            reason = "the list has it as another sensor, or as none (~allow_sensors)"
-        else:
-            reason = f"it speaks for {len(self._spoken_for)} others already"
-        return [Refused(f"what it says for sensor {data[0]}", reason)]
 
     def _announce(self, kind: TopicId, info: TopicInfo) -> list[Event]:
         known = self.incoming if kind in INCOMING else self.outgoing
