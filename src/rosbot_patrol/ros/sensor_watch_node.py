@@ -35,7 +35,7 @@ from rosbot_patrol.sensors.notices import Notice, Notices
 from rosbot_patrol.sensors.problems import SERIOUS
 from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
-from rosbot_patrol.sensors.supervisor import Supervisor
+from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
 from rosbot_patrol.simulation.sensor_places import read_sensors
 
 log = logging.getLogger(__name__)
@@ -145,8 +145,8 @@ class SensorWatch:
         self._reports.update(statuses, self._watch)
         if events or not count % STATES_EVERY:
             self._states.publish(states_to_msg(statuses, self._watch))
-        self._tell_owner()
-        for look in self._looks.update(self._watch, time.monotonic()):
+        self._tell_owner(statuses)
+        for look in self._looks.update(self._watch, statuses, time.monotonic()):
             log.warning("%s: the robot is asked to look at room %d", look.text, look.room)
             self._events.publish(look_to_msg(look, self._watch))
 
@@ -158,10 +158,10 @@ class SensorWatch:
             message, offset, at = self._links.popleft()
             self._watch.linked(message.bridge, links_from_msg(message), at, clock_offset=offset)
 
-    def _tell_owner(self) -> None:
+    def _tell_owner(self, statuses: list[SensorStatus]) -> None:
         now = time.monotonic()
         if self._unwritten is None:
-            self._unwritten = self._notices.update(self._watch, now, time.time())
+            self._unwritten = self._notices.update(self._watch, statuses, now, time.time())
             if self._unwritten is None:
                 return
             log.warning("notice to the owner: %s", self._unwritten.subject)

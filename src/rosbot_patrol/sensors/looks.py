@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.sensors.problems import Kind
 from rosbot_patrol.sensors.settings import LookTimes
-from rosbot_patrol.sensors.supervisor import Supervisor
+from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,8 +31,8 @@ class Looks:
         self._answered: dict[int, float] = {}
         self._looked: dict[int, float] = {}
 
-    def update(self, watch: Supervisor, now: float) -> list[Look]:
-        """What to ask for now; call it about once a second."""
+    def update(self, watch: Supervisor, listed: Sequence[SensorStatus], now: float) -> list[Look]:
+        """What to ask for now; call it about once a second. `listed`: all sensors, as of `watch.statuses`."""
         if not self._params.patrol_silent_sensors:
             return []
         problems = watch.problems()
@@ -40,7 +41,7 @@ class Looks:
         for sensor_id in [n for n in self._answered if n not in silent]:
             del self._answered[sensor_id]
         wishes = []
-        heard = {s.sensor_id: s.heard for s in watch.statuses()}
+        heard = {s.sensor_id: s.heard for s in listed}
         for sensor_id, problem in silent.items():
             room = watch.sensors.room_of(sensor_id)
             if sensor_id in self._answered or room is None or problem.bridge in gone or heard[sensor_id] is None:

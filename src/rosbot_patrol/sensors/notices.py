@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -81,16 +81,17 @@ class Notices:
         except (KeyError, TypeError, ValueError) as err:
             log.warning("what was kept of the notices about sensors makes no sense (%r), starting afresh", err)
 
-    def update(self, watch: Supervisor, now: float, wall: float) -> Notice | None:
+    def update(self, watch: Supervisor, listed: Sequence[SensorStatus], now: float, wall: float) -> Notice | None:
         """What to send now, None for nothing; call it about once a second.
 
         Args:
             watch: what is wrong.
+            listed: all sensors, as of `watch.statuses`.
             now: time [s].
             wall: seconds since 1970.
         """
         problems = watch.problems()
-        statuses = {status.sensor_id: status for status in watch.statuses()}
+        statuses = {status.sensor_id: status for status in listed}
         for key in [key for key in self._seen if key not in problems]:
             del self._seen[key]
         for key in problems:

@@ -7,6 +7,7 @@ where the clock goes back.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -31,7 +32,7 @@ MAX_BRIDGES = 64
 # A condition counts when it has held for the first time, and is over when it has not for the second [s].
 _DELAYS: dict[Kind, tuple[float, float]] = {
     Kind.SILENT: (0.0, 0.0),  # has its own
-    Kind.FLAPPING: (0.0, 0.0),
+    Kind.FLAPPING: (0.0, 0.0),  # has its own, too
     Kind.STUCK_ON: (0.0, 0.0),
     Kind.NO_MOTION: (0.0, 0.0),
     Kind.UNKNOWN_ID: (0.0, 0.0),
@@ -44,8 +45,11 @@ _DELAYS: dict[Kind, tuple[float, float]] = {
 
 @dataclass
 class _Bridge:
+    """A bridge: heard last, there without a break since [s]; when it came back, lately."""
+
     heard: float
     since: float
+    returns: deque[float]
     clock_offset: float = 0.0
 
 
@@ -127,12 +131,16 @@ class Supervisor:
         known = self._bridges.get(bridge)
         if known is None and len(self._bridges) >= MAX_BRIDGES:
             del self._bridges[min(self._bridges, key=lambda name: self._bridges[name].heard)]
-        is_new = known is None or t - known.heard > self._times.bridge_after / 2.0
-        self._bridges[bridge] = _Bridge(t, t if known is None or is_new else known.since, clock_offset)
+        if known is None:
+            known = self._bridges[bridge] = _Bridge(t, t, deque(maxlen=self._times.flap_count))
+        elif t - known.heard > self._times.bridge_after / 2.0:
+            known.since = t
+            known.returns.append(t)
+        known.heard, known.clock_offset = t, clock_offset
         by_sensor: dict[int, list[Link]] = {}
         for link in links:
             by_sensor.setdefault(link.sensor_id, []).append(link)
-        settled = t - self._bridges[bridge].since > SETTLING
+        settled = t - known.since > SETTLING
         for sensor_id, tracked in self._tracked.items():
             tracked.link(bridge, by_sensor.get(sensor_id, []), t, is_settled=settled)
 
@@ -182,6 +190,12 @@ class Supervisor:
         elif abs(bridge.clock_offset) > self._times.clock_limit:
             what = f"runs on a machine whose clock is {clock_words(bridge.clock_offset)}"
             yield Problem(key=bridge_key(Kind.CLOCK_OFF, name), since=t, what=what)
+        returns = bridge.returns
+        while returns and t - returns[0] > self._times.flap_window:
+            returns.popleft()
+        if len(returns) == self._times.flap_count:
+            what = f"comes and goes: it came back {len(returns)} times within {duration(returns[-1] - returns[0])}"
+            yield Problem(key=bridge_key(Kind.FLAPPING, name), since=returns[0], what=what)
 
     def _unknown(self, sensor_id: int) -> str:
         return f"is not known: {self.sensors.refusal(sensor_id)}"

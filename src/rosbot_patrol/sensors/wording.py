@@ -30,8 +30,8 @@ _TO_DO: dict[Kind, str] = {
     " one another id. A key for each sensor shuts imitators out (docs/sensors.md, Security).",
     Kind.WRONG_PEER: "where it has a new address, correct 'peers' in the file of sensors. Otherwise somebody imitates"
     " it.",
-    Kind.FLAPPING: "its Wi-Fi is weak, or its power supply is. Bring it nearer to the access point, and try another"
-    " supply.",
+    Kind.FLAPPING: "a sensor's Wi-Fi is weak, or its power supply is: bring it nearer to the access point, and try"
+    " another supply. A bridge that comes and goes is restarted again and again: its log says why.",
     Kind.STUCK_ON: "where nobody was there, something warm moves before it (heating, curtain, sun), its supply is"
     " noisy, or it is broken. Turn both of its potentiometers to the left; replace it.",
     Kind.NO_MOTION: "walk past it and see whether it reports. It may be covered, turned away, or its output stuck.",

@@ -228,7 +228,10 @@ def test_a_bridge_that_dies_and_comes_back():
         house.run(4.0)
         house.bridges.add("/esp_client1")
         house.run(20.0)
-    assert not any(e.problem.key.kind_name == "flapping" for e in house.events)
+    flapping = [brief(e) for e in house.events if e.problem.key.kind_name == "flapping"]
+    assert flapping == [("flapping", "/esp_client1", True)]
+    house.run(700.0)
+    assert house.wrong() == []
 
 
 def test_whoever_was_asleep_himself_takes_nobody_for_silent():
@@ -264,3 +267,33 @@ def test_garbage_in_links_harms_nobody():
         house.watch.linked("", [Link(sensor_id=1, peer="", heard=heard, clock_offset=float("nan"))], house.now)
         house.run(2.0)
     assert [s.sensor_id for s in house.watch.statuses()] == [1]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_whatever_happens_each_problem_begins_and_ends_in_turn(seed):
+    rng = random.Random(seed)
+    house = House(1, 2, 3, listed=bool(seed % 2), no_motion_after=40.0, stuck_after=20.0, unknown_calm=30.0)
+    house.speakers.append(Speaker(rng.choice([1, 9]), "10.0.0.66:1", "/esp_client2"))
+    for _ in range(40):
+        s = rng.choice(house.speakers)
+        s.beat = rng.choice([None, 0.5, 0.5, 4.0])
+        s.move, s.clock = rng.random() < 0.3, rng.choice([None, 0.0, 1e6])
+        s.peer = rng.choice([s.peer, f"10.0.0.{rng.randrange(9)}:{rng.randrange(9)}"])
+        house.bridges = {b for b in ("/esp_client1", "/esp_client2") if rng.random() < 0.8}
+        if rng.random() < 0.05:
+            house.now += rng.choice([100.0, -100.0])
+        house.run(rng.choice([0.25, 3.0, 12.0, 40.0]))
+    active = set()
+    for event in house.events:
+        assert (event.problem.key in active) is not event.active
+        (active.add if event.active else active.discard)(event.problem.key)
+        assert event.lasted >= 0.0
+        assert event.text
+    assert active == set(house.watch.problems())
+    for s in house.speakers[:3]:
+        s.beat, s.move, s.clock, s.heard = 0.5, False, 0.0, house.now
+    house.bridges = {"/esp_client1"}
+    house.speakers.pop()
+    house.run(1000.0)
+    gone = {"bridge_gone//esp_client2", "silent/9"}  # who left for good
+    assert set(house.wrong()) - gone <= {f"no_motion/{i}" for i in (1, 2, 3)}
