@@ -23,6 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TRIGGER = ["/motion_trigger", "rosbot_patrol/EspTrigger"]
 EVENTS, STATES = ["/sensors/events", "rosbot_patrol/SensorEvent"], ["/sensors/states", "rosbot_patrol/SensorStates"]
 DIAGNOSTICS = ["/diagnostics", "diagnostic_msgs/DiagnosticArray"]
+SHOWN = {"path_to_params": "params/room_points.yaml", "motion_sensors": "config/house_sensors.yaml"}
 FAST = {
     "silent_after": 2.0,
     "start_grace": 4.0,
@@ -145,18 +146,20 @@ def test_a_bridge_is_killed_and_its_sensors_are_told_as_one(ros, tmp_path):
 def test_who_else_speaks(ros, tmp_path):
     """An id that is not in the file, a second peer with a sensor's id on another bridge, a stuck output, garbage."""
     ports, probe = (free_port(), free_port()), ros.probe()
-    for topic in (EVENTS, STATES):
+    for topic in (EVENTS, STATES, ["/house_markers/markers", "visualization_msgs/MarkerArray"]):
         probe.tell(subscribe=topic)
     probe.tell(advertise=["/sensors/links", "rosbot_patrol/SensorLinks"])
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], notice_after=60.0)
     for i, port in enumerate(ports):
         bridge(ros, port, f"esp_client{i + 1}")
+    ros.node("house_markers", *(f"_{key}:={ROOT}/{file}" for key, file in SHOWN.items()))
     honest = EspClient("127.0.0.1", ports[0], 1, stuck_after=1.0).start()
     others = [EspClient("127.0.0.1", ports[1], i).start() for i in (1, 9)]
     unknown = probe.expect(event("unknown_id", 9, True))
     assert unknown["text"].endswith("sensors.yaml has no sensor with id 9")
     honest.set_motion(True)
     assert "its output stays high" in probe.expect(event("stuck_on", 1, True))["text"]
+    probe.expect(lambda said: "g: 0.875" in str(said.get("markers")))  # yellow in rviz
     double = probe.expect(event("duplicate_id", 1, True), 15.0)
     assert "is reported by two at a time: 127.0.0.1:" in double["text"]
     for link in ({"id": 1, "peer": "x" * 3000, "heard": -1.0}, {"id": 255, "heard": 1e30, "clock_known": True}):

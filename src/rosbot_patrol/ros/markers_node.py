@@ -22,7 +22,7 @@ from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.sensor_places import read_sensors
 
 QUIET, BUSY, MOTION = ColorRGBA(0.2, 0.5, 0.9, 0.8), ColorRGBA(1.0, 0.6, 0.0, 1.0), ColorRGBA(1.0, 0.1, 0.1, 1.0)
-SILENT, BAD = ColorRGBA(0.05, 0.05, 0.05, 1.0), ColorRGBA(1.0, 0.9, 0.0, 1.0)
+SILENT, BAD = ColorRGBA(0.05, 0.05, 0.05, 1.0), ColorRGBA(1.0, 0.875, 0.0, 1.0)
 MOTION_SHOWN_S = 5.0
 
 
