@@ -90,12 +90,18 @@ def test_taken_port_is_one_sentence_and_exit_1(ros):
     assert "Traceback" not in second.output
 
 
-def test_wrong_argument_is_one_sentence(ros):
+def test_wrong_argument_is_one_sentence(ros, tmp_path):
     node = ros.node("serial_node.py", "tcp", "many")
     node.says("argument 2: expected a TCP port, got 'many'")
     assert node.popen.wait(5.0) == 1
     node = ros.node("serial_node.py", "_port:=tcp", "_allow_publish:=['everything']", "__name:=misled")
     node.says("allow_publish: expected 'TOPIC PACKAGE/TYPE', got 'everything'")
+    path = tmp_path / "keys.yaml"
+    path.write_text(f'keys: {{1: "{"0f1e2d3c4b5a6978" * 4}"}}')
+    path.chmod(0o644)
+    node = ros.node("serial_node.py", "_port:=tcp", f"_key_file:={path}", "__name:=open")
+    node.says(f"/open/key_file: {path}: others can read it (mode 644); 'chmod 600 {path}'")
+    assert node.popen.wait(5.0) == 1
 
 
 def test_strangers_get_nothing_through_and_the_sensor_does_not_notice(ros):

@@ -47,6 +47,7 @@ class Complaints:
         if not 0.0 <= now - began < 60.0:
             began, count = now, 0
         self._minutes[group] = (began, count + 1)
+        self._minutes.move_to_end(group)
         if len(self._minutes) > self._capacity:
             self._minutes.popitem(last=False)
         self.left_out = count == limit

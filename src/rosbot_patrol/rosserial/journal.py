@@ -54,7 +54,7 @@ class Journal:
         """Whether there may be one more line about an address in this minute."""
         if self._complaints.may_speak(group, now, limit):
             return True
-        if self._complaints.left_out:
+        if self._complaints.left_out and (group == STRANGERS or self._may_speak_of_strangers(now)):
             log.warning("%s: more than %d lines within a minute, the rest of them is left out", group, limit)
         return False
 

@@ -1,9 +1,12 @@
 """Who is let in, and who leaves for a newcomer."""
 
+import logging
+
 from rosbot_patrol.rosserial.budget import Budget
 from rosbot_patrol.rosserial.client import Client
 from rosbot_patrol.rosserial.complaints import Complaints, printable
 from rosbot_patrol.rosserial.door import KEPT_ADDRESSES, Door, Limits
+from rosbot_patrol.rosserial.journal import Journal
 from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.session import Session
 
@@ -150,6 +153,20 @@ def test_lines_about_a_peer_are_limited_and_that_is_said_once():
     heard = [(said.may_speak("a", 0.1 * i, limit=3), said.left_out) for i in range(6)]
     assert heard == [(True, False)] * 3 + [(False, True)] + [(False, False)] * 2
     assert said.may_speak("a", 61.0, limit=3)
+
+
+def test_log_is_not_flooded_however_many_come(caplog):
+    journal = Journal()
+    for number in range(2000):
+        journal.turn_away(f"10.0.{number}:1", f"10.0.{number}", "its address is not on the list", 0.01 * number)
+        journal.refuse(client(f"10.1.{number}"), f"topic {number}", 0.01 * number)
+        journal.refuse(client("10.2.0.1"), f"topic {number}", 0.01 * number)
+        journal.say(client("10.3.0.1"), logging.WARNING, 0.01 * number, "connected")
+    assert (journal.turned_away, journal.refused) == (2000, 4000)
+    assert len(caplog.records) <= 124
+    for name in ("strangers", "refusals of 10.2.0.1", "10.3.0.1"):
+        assert caplog.text.count(f"{name}: more than ") <= 1
+    assert "strangers: more than 120 lines within a minute, the rest of them is left out" in caplog.text
 
 
 def test_what_a_stranger_says_stays_one_line():

@@ -124,3 +124,13 @@ def test_headers_without_end_cost_no_quadratic_time():
     for _ in range(40):
         parser.feed(header * 800 + rng.randbytes(96))
     assert parser.pending <= 1024 + 8
+
+
+def test_what_was_wrong_with_a_frame_is_told_with_what_would_be_right():
+    parser = Parser(100)
+    good = encode(125, b"\x02\x01")
+    assert parser.feed(good[:-1] + bytes((good[-1] ^ 1,))) == []
+    assert parser.fault == "2 bytes for topic id 125 with checksum 7e, it would be 7f"
+    parser = Parser(100)
+    parser.feed(encode(125, bytes(200)))
+    assert parser.fault == "a frame of 200 bytes, at most 100 are taken"
