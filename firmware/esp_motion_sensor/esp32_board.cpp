@@ -50,6 +50,7 @@ void startWatchdog(uint32_t timeout_s) {
 }  // namespace
 
 void Esp32Board::begin(uint32_t watchdog_s) {
+  Serial.setTxBufferSize(1024);  // so that a few lines at once do not wait for the port
   Serial.begin(115200);
   loop_task = xTaskGetCurrentTaskHandle();
   pinMode(static_cast<uint8_t>(pir_pin_), INPUT_PULLDOWN);  // a broken wire is no motion

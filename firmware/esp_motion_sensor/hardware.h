@@ -29,14 +29,14 @@ class Board : public RandomSource {
 
 enum class LinkState : uint8_t { kClosed, kConnecting, kOpen };
 
-/** One TCP connection to the bridge. No call waits. */
+/** One TCP connection to the bridge. No call waits. (lwIP may have macros named open, send, poll and so on.) */
 class Link {
  public:
-  virtual void open() = 0;
-  virtual LinkState poll() = 0;                               // kClosed where it failed: see error()
-  virtual int receive(uint8_t* data, size_t room) = 0;        // bytes read, 0: nothing now, -1: the link is gone
-  virtual int send(const uint8_t* data, size_t size) = 0;     // bytes taken, 0: no room now, -1: the link is gone
-  virtual void close() = 0;
+  virtual void dial() = 0;
+  virtual LinkState progress() = 0;                            // kClosed where it failed: see error()
+  virtual int readSome(uint8_t* data, size_t room) = 0;        // bytes read, 0: nothing now, -1: the link is gone
+  virtual int writeSome(const uint8_t* data, size_t size) = 0; // bytes taken, 0: no room now, -1: the link is gone
+  virtual void hangUp() = 0;
   virtual const char* error() const = 0;
 
  protected:

@@ -119,7 +119,7 @@ void MotionSensor::keepLink(uint64_t now) {
   switch (link_state_) {
     case LinkState::kClosed:
       if (!network_up_ || now < link_due_) return;
-      link_.open();
+      link_.dial();
       link_state_ = LinkState::kConnecting;
       link_since_ = now;
       break;
@@ -133,7 +133,7 @@ void MotionSensor::keepLink(uint64_t now) {
 }
 
 void MotionSensor::connecting(uint64_t now) {
-  switch (link_.poll()) {
+  switch (link_.progress()) {
     case LinkState::kOpen:
       link_state_ = LinkState::kOpen;
       link_since_ = send_moved_at_ = now;
@@ -153,7 +153,7 @@ void MotionSensor::connecting(uint64_t now) {
 void MotionSensor::talk(uint64_t now) {
   uint8_t data[256];
   for (int i = 0; i < kReadsPerStep; ++i) {  // bounded, so that a flood does not hold the loop
-    const int count = link_.receive(data, sizeof(data));
+    const int count = link_.readSome(data, sizeof(data));
     if (count < 0) {
       loseLink(link_.error(), now);
       return;
@@ -227,7 +227,7 @@ void MotionSensor::report(uint64_t now) {
 void MotionSensor::flush(uint64_t now) {
   if (link_state_ != LinkState::kOpen) return;
   while (client_.outputSize() > 0) {
-    const int count = link_.send(client_.output(), client_.outputSize());
+    const int count = link_.writeSome(client_.output(), client_.outputSize());
     if (count < 0) {
       loseLink(link_.error(), now);
       return;
@@ -251,14 +251,13 @@ void MotionSensor::dropOld(uint64_t now) {
 }
 
 void MotionSensor::loseLink(const char* why, uint64_t now) {
-  link_.close();
+  link_.hangUp();
   const bool held = link_state_ == LinkState::kOpen && was_configured_;
   if (held) link_lost_at_ = now;
   if (held && now - link_since_ > kStable) link_backoff_.reset();
   link_state_ = LinkState::kClosed;
   was_configured_ = false;
-  if (in_flight_.raised) {  // nobody knows whether it arrived: better twice than never
-    if (!pending_.raised) pending_.at = in_flight_.at;
+  if (in_flight_.raised) {  // nobody knows whether it arrived: better twice than never (pending_.at is its time still)
     pending_.raised = true;
     ++late_motions_;
     in_flight_.raised = false;

@@ -17,14 +17,14 @@ bool wouldWait(int code) { return code == EAGAIN || code == EWOULDBLOCK || code 
 
 }  // namespace
 
-void TcpLink::open() {
-  close();
+void TcpLink::dial() {
+  hangUp();
   error_[0] = '\0';
   state_ = LinkState::kConnecting;
   resolver_.ask();
 }
 
-LinkState TcpLink::poll() {
+LinkState TcpLink::progress() {
   if (state_ != LinkState::kConnecting) return state_;
   if (socket_ < 0) {
     switch (resolver_.state()) {
@@ -52,7 +52,7 @@ LinkState TcpLink::poll() {
   return state_;
 }
 
-int TcpLink::receive(uint8_t* data, size_t room) {
+int TcpLink::readSome(uint8_t* data, size_t room) {
   const ssize_t count = lwip_recv(socket_, data, room, MSG_DONTWAIT);
   if (count > 0) return static_cast<int>(count);
   if (count < 0 && wouldWait(errno)) return 0;
@@ -60,7 +60,7 @@ int TcpLink::receive(uint8_t* data, size_t room) {
   return -1;
 }
 
-int TcpLink::send(const uint8_t* data, size_t size) {
+int TcpLink::writeSome(const uint8_t* data, size_t size) {
   const ssize_t count = lwip_send(socket_, data, size, MSG_DONTWAIT | MSG_NOSIGNAL);
   if (count > 0) return static_cast<int>(count);
   if (count == 0 || wouldWait(errno)) return 0;
@@ -68,7 +68,7 @@ int TcpLink::send(const uint8_t* data, size_t size) {
   return -1;
 }
 
-void TcpLink::close() {
+void TcpLink::hangUp() {
   if (socket_ >= 0) lwip_close(socket_);
   socket_ = -1;
   state_ = LinkState::kClosed;
@@ -96,7 +96,7 @@ LinkState TcpLink::failed(const char* what, int code) {
   } else {
     snprintf(error_, sizeof(error_), "%s", what);
   }
-  close();
+  hangUp();
   resolver_.doubt();  // the bridge may have got another address
   return state_;
 }

@@ -16,11 +16,11 @@ class TcpLink final : public Link {
   /** Start what has to run beside the loop: the look-up of a name. */
   void begin() { resolver_.begin(); }
 
-  void open() override;
-  LinkState poll() override;
-  int receive(uint8_t* data, size_t room) override;
-  int send(const uint8_t* data, size_t size) override;
-  void close() override;
+  void dial() override;
+  LinkState progress() override;
+  int readSome(uint8_t* data, size_t room) override;
+  int writeSome(const uint8_t* data, size_t size) override;
+  void hangUp() override;
   const char* error() const override { return error_; }
 
  private:

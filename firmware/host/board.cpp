@@ -79,6 +79,7 @@ void digitalWrite(uint8_t, uint8_t) {}
 void attachInterrupt(uint8_t, void (*handler)(), int) { interrupt_handler = handler; }
 
 HardwareSerial Serial;
+size_t HardwareSerial::setTxBufferSize(size_t size) { return size; }
 void HardwareSerial::begin(unsigned long) {}
 int HardwareSerial::availableForWrite() { return 4096; }
 size_t HardwareSerial::println(const char* line) {

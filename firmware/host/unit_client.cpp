@@ -121,6 +121,17 @@ TEST(time_is_asked_every_2500_ms_and_a_silent_bridge_is_left_after_11_s) {
   CHECK(!peer.client.configured());
 }
 
+TEST(asking_for_topics_again_is_no_sign_of_life) {
+  Peer peer;
+  uint64_t now = 0;
+  for (; peer.fault().empty() && now < 20000; now += 100) {
+    peer.tell(kTopics, now);
+    peer.client.tick(now);
+    peer.said();
+  }
+  EQUAL(now, 11200U);
+}
+
 TEST(an_answer_is_a_receipt_for_what_was_sent_before_it) {
   Peer peer;
   peer.tell(kTopics, 10);
@@ -155,6 +166,16 @@ TEST(tx_stop_ends_the_traffic_until_topics_are_asked_for_again) {
   CHECK(peer.client.configured());
 }
 
+TEST(after_tx_stop_the_bridge_has_15_s_to_ask_again) {
+  Peer peer;
+  peer.tell(kTopics, 10);
+  peer.tell("ff fe 00 00 ff 0b 00 f4", 20000);
+  peer.client.tick(35000);
+  EQUAL(peer.fault(), "");
+  peer.client.tick(35001);
+  EQUAL(peer.fault(), "the bridge asked for no topics for 15 s");
+}
+
 TEST(unknown_ids_and_wrong_sizes_are_ignored) {
   Peer peer;
   peer.tell(kTopics, 10);
@@ -181,7 +202,7 @@ TEST(a_frame_that_stalls_is_given_up_after_a_second) {
 TEST(a_new_connection_begins_from_nothing) {
   Peer peer;
   peer.tell(kTopics, 10);
-  peer.tell("ff fe 40 00", 20);
+  peer.tell("ff fe 40 00 bf", 20);
   peer.client.begin(30);
   CHECK(!peer.client.configured());
   EQUAL(peer.said(), "");
@@ -202,6 +223,16 @@ TEST(the_key_is_proved_before_the_topics) {
   EQUAL(peer.said(), "");
   peer.tell(kTopics, 30);
   CHECK(peer.client.configured());
+}
+
+TEST(a_new_challenge_needs_a_new_proof) {
+  Peer peer(true, true);
+  peer.tell(challenge(), 10);
+  peer.tell(frame(9, bytes(kBridgeProof)), 20);
+  peer.tell(challenge(), 30);
+  CHECK(!peer.client.bridgeProven());
+  peer.tell(kTopics, 40);
+  CHECK(!peer.client.configured());
 }
 
 TEST(a_wrong_proof_of_the_bridge_ends_the_connection) {

@@ -71,6 +71,7 @@ TEST(garbage_costs_itself_only) {
   EQUAL(parsed(bytes("ff fe 08 00 f7 0a 00 01") + good), expected);  // cut off
   EQUAL(parsed(bytes("ff fe ff 7f 81") + good), expected);            // announces 32767 bytes
   EQUAL(parsed(bytes("ff") + good), expected);
+  EQUAL(parsed(encoded(10, Bytes(129, 0)) + good), expected);         // longer than a sensor takes
   Bytes wrong = good;
   wrong[9] = static_cast<uint8_t>(wrong[9] ^ 1);
   EQUAL(parsed(wrong + good), expected);

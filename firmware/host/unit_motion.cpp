@@ -128,6 +128,8 @@ TEST(the_clock_counts_on_where_the_board_wraps) {
     raw += 86400000U;
     expected += 86400000U;
     EQUAL(clock.update(raw), expected);
+    EQUAL(clock.timeOf(raw + 1), expected);
+    EQUAL(clock.timeOf(raw - 5), expected - 5);
   }
 }
 

@@ -65,13 +65,13 @@ struct FakeBridge final : patrol::Link {
   std::vector<std::string> messages;  // of id 125
   std::string logged;
 
-  void open() override {
+  void dial() override {
     ++opened;
     state = LinkState::kConnecting;
     parser.clear();
     to_sensor.clear();
   }
-  LinkState poll() override {
+  LinkState progress() override {
     if (state == LinkState::kConnecting && refuses) state = LinkState::kClosed;
     if (state == LinkState::kConnecting && reachable) {
       state = LinkState::kOpen;
@@ -79,7 +79,7 @@ struct FakeBridge final : patrol::Link {
     }
     return state;
   }
-  int receive(uint8_t* data, size_t room) override {
+  int readSome(uint8_t* data, size_t room) override {
     if (closes) return -1;
     if (!hears) return 0;
     size_t count = 0;
@@ -89,7 +89,7 @@ struct FakeBridge final : patrol::Link {
     }
     return static_cast<int>(count);
   }
-  int send(const uint8_t* data, size_t size) override {
+  int writeSome(const uint8_t* data, size_t size) override {
     if (closes) return -1;
     if (!takes) return 0;
     if (hears) {
@@ -101,7 +101,7 @@ struct FakeBridge final : patrol::Link {
     }
     return static_cast<int>(size);
   }
-  void close() override { state = LinkState::kClosed; }
+  void hangUp() override { state = LinkState::kClosed; }
   const char* error() const override { return "refused"; }
 
   void heard(const patrol::Frame& frame) {
@@ -197,6 +197,29 @@ TEST(motion_without_a_link_is_told_after_the_reconnect) {
   EQUAL(world.bridge.triggers(), 1);
   CHECK(world.bridge.logged.find("there was no link until now (2 in all)") != std::string::npos);
   CHECK(world.bridge.logged.find("is back after") != std::string::npos);
+
+  world.bridge.refuses = world.bridge.closes = true;
+  world.run(100);
+  world.motion();
+  world.run(20000);
+  world.bridge.refuses = world.bridge.closes = false;
+  world.run(13000);
+  EQUAL(world.bridge.triggers(), 2);
+  CHECK(world.bridge.logged.find("there was no link until now (1 in all)") != std::string::npos);
+}
+
+TEST(after_a_link_that_held_the_first_try_is_soon) {
+  World world;
+  world.bridge.refuses = true;
+  world.run(60000);
+  world.bridge.refuses = false;
+  world.run(35000);
+  world.bridge.closes = true;
+  world.run(3);
+  world.bridge.closes = false;
+  const int opened = world.bridge.opened;
+  world.run(380);
+  EQUAL(world.bridge.opened, opened + 1);
 }
 
 TEST(motion_that_could_not_be_told_for_a_minute_is_dropped) {
@@ -223,9 +246,22 @@ TEST(motion_hurries_the_next_try) {
   EQUAL(world.bridge.triggers(), 1);
 }
 
+TEST(the_next_heartbeat_comes_half_a_second_after_a_trigger) {
+  World world;
+  world.run(1400);
+  world.board.move(true);
+  world.run(10);
+  EQUAL(world.bridge.triggers(), 1);
+  const int before = world.bridge.heartbeats();
+  world.run(490);
+  EQUAL(world.bridge.heartbeats(), before);
+  world.run(20);
+  EQUAL(world.bridge.heartbeats(), before + 1);
+}
+
 TEST(a_trigger_that_vanished_with_the_link_is_sent_again) {
   World world;
-  world.run(1000);
+  world.run(100000);
   world.bridge.hears = false;  // the cable is cut: sends succeed and go nowhere
   world.motion();
   CHECK(world.sensor.triggerUnconfirmed());

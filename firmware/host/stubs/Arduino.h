@@ -24,6 +24,7 @@ void attachInterrupt(uint8_t pin, void (*handler)(), int mode);
 
 class HardwareSerial {
  public:
+  size_t setTxBufferSize(size_t size);
   void begin(unsigned long baud);
   int availableForWrite();
   size_t println(const char* line);
