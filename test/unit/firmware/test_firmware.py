@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rosbot_patrol.rosserial.device_log import STUCK_AFTER, stuck_line
 from rosbot_patrol.rosserial.packet import Parser, encode
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, ESP_TRIGGER_TYPES
 
@@ -96,6 +97,13 @@ def test_topic_and_type_are_those_of_the_bridge():
     assert f'kEspTriggerMd5[] = "{ESP_TRIGGER_MD5}"' in settings
     for each in ESP_TRIGGER_TYPES:
         assert f'"{each}"' in settings
+
+
+def test_stuck_output_is_told_in_the_words_that_the_bridge_knows():
+    told = stuck_line(5, STUCK_AFTER)
+    words = told.replace("sensor 5", "sensor %u").replace("for 600 s", "for %lu s")
+    assert f'"{words}"' in (SKETCH / "motion_sensor.cpp").read_text()
+    assert f"STUCK_MS {STUCK_AFTER * 1000:.0f}" in (SKETCH / "settings.h").read_text()
 
 
 def test_secrets_are_not_committed_and_their_absence_is_one_sentence(tmp_path):
