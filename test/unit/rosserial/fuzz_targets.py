@@ -312,8 +312,8 @@ def noisy(stream: bytes, tape: Tape | None) -> bytes:
         damaged = bytearray(stream)
         damaged[tape.byte() % len(stream)] ^= tape.byte()
         return bytes(damaged)
-    if kind == 3:
-        return stream + piece(tape)
+    if kind == 3:  # cut off and run into the next one
+        return stream[: tape.byte()] + stream[tape.byte() :]
     return stream
 
 
