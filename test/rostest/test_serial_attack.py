@@ -48,7 +48,7 @@ def test_nothing_gets_through_and_the_sensors_do_not_notice(ros, tmp_path, prote
             wait_for(lambda: "bytes that are no frame" in bridge.output or "proof" in bridge.output)
             count = len(probe.heard(topic="/motion_trigger", id=sensor.sensor_id, move=True))
             sensor.trigger()
-            wait_for(lambda s=sensor, n=count: len(probe.heard(id=s.sensor_id, move=True)) > n, 2.0, "the trigger")
+            wait_for(lambda s=sensor, n=count: len(probe.heard(id=s.sensor_id, move=True)) > n, 4.0, "the trigger")
         assert attacker.wait(SECONDS + 40.0) == 0
     finally:
         attacker.kill()

@@ -37,7 +37,7 @@ def house(policy, **options):
         for sensor in sensors:
             before = len(recorder.messages)
             sensor.trigger()
-            wait_for(lambda i=sensor.sensor_id, n=before: bytes((i, 1)) in recorder.messages[n:], 1.0)
+            wait_for(lambda i=sensor.sensor_id, n=before: bytes((i, 1)) in recorder.messages[n:], 3.0)
             sensor.stop()
 
 
