@@ -19,6 +19,11 @@ class Budget:
         self._most = self._credit = rate * seconds
         self._at = now
 
+    @property
+    def debt(self) -> float:
+        """How much of it was used up when it was last asked, 0 without a limit."""
+        return self._most - self._credit
+
     def spend(self, cost: float, now: float) -> float:
         """Take `cost` units (0 to only ask); return how long nothing more may be taken [s]."""
         rate = self._rate

@@ -28,8 +28,14 @@ READ_SIZE = 4096
 READ_SIZE_LIMITED = 1024  # of a client with a limit: so much at a time that the others do not notice
 NO_LIMITS = Limits()
 TICK = 0.25
+ROUND = 0.002  # of work between two looks at who is ready [s]
 REOPEN_PERIOD = 3.0
 REPLACE_AFTER = 1.5  # silence after which an old connection gives way to a new one of the same sensor [s]
+
+
+def _has_sent(ready: tuple[selectors.SelectorKey, int]) -> float:
+    client = ready[0].data
+    return client.shared.debt if isinstance(client, Client) else -1.0
 
 
 class SerialServer:
@@ -72,6 +78,7 @@ class SerialServer:
         self._tick_due = 0.0
         self._accept_from = 0.0
         self._stopping = False
+        self._left: list[tuple[selectors.SelectorKey, int]] = []  # ready at the last poll, without a turn
         self._selector = selectors.DefaultSelector()
         self._wake_read, self._wake_write = socket.socketpair()
         self._wake_read.setblocking(False)
@@ -121,20 +128,38 @@ class SerialServer:
         self._wake_write.close()
 
     def poll(self, timeout: float) -> None:
-        """Wait for at most `timeout` [s], and do what is to do."""
-        for key, mask in self._selector.select(timeout):
-            if key.fileobj is self._wake_read:
-                self._woken()
-            elif isinstance(key.data, Client):
-                if not key.data.closed and mask & selectors.EVENT_READ:
-                    self._read(key.data)
-                self._flush(key.data)
-            else:
-                self._accept(key.fileobj)  # type: ignore[arg-type]
+        """Wait for at most `timeout` [s], and do what is to do.
+
+        Whose address has sent least comes first. After some milliseconds it looks anew who is there, so that a flood
+        of some delays the others by no more; who had no turn comes before those that have asked for as much.
+        """
+        ready = self._selector.select(0.0 if self._left else timeout)
+        if self._left:
+            files = {key.fd for key, _ in self._left}
+            ready = self._left + [each for each in ready if each[0].fd not in files]
+            self._left = []
+        if len(ready) > 1:
+            ready.sort(key=_has_sent)
+        until = self._clock() + ROUND
+        for number, (key, mask) in enumerate(ready, start=1):
+            self._serve(key, mask)
+            if self._clock() > until:
+                self._left = ready[number:]
+                break
         now = self._clock()
         if now >= self._tick_due:
             self._tick_due = now + TICK
             self._tick(now)
+
+    def _serve(self, key: selectors.SelectorKey, mask: int) -> None:
+        if key.fileobj is self._wake_read:
+            self._woken()
+        elif isinstance(key.data, Client):
+            if not key.data.closed and mask & selectors.EVENT_READ:
+                self._read(key.data)
+            self._flush(key.data)
+        else:
+            self._accept(key.fileobj)  # type: ignore[arg-type]
 
     def _tick(self, now: float) -> None:
         if self._serial is not None and not self.clients and now >= self._serial_due:

@@ -396,3 +396,37 @@ def test_trigger_that_the_server_never_read_is_reported_again():
         assert b"\x04\x01" not in [p.data for p in packets]
         link.close()
         sensor.stop()
+
+
+def test_who_has_sent_least_comes_first_and_nobody_is_left_out(monkeypatch):
+    monkeypatch.setattr("rosbot_patrol.rosserial.server.ROUND", -1.0)  # one turn between two looks
+    recorder = Recorder()
+    server = SerialServer(recorder, Policy(), limits=Limits(rate=1000.0))
+    (port,) = server.listen([0])
+    links = []
+    for number in (66, 66, 2):  # two of a flooder, and a sensor
+        link = socket.create_connection(("127.0.0.1", port), 3.0, (f"127.0.0.{number}", 0))
+        while len(server.clients) <= len(links):
+            server.poll(0.1)
+        link.sendall(ANNOUNCE)
+        links.append(link)
+    while len(recorder.opened) < 3:
+        server.poll(0.1)
+    for link in links[:2]:
+        link.sendall(encode(125, b"\x42\x01") * 50)
+    while len(recorder.messages) < 100:
+        server.poll(0.1)
+    recorder.messages.clear()
+    for number, link in zip((66, 67, 2), links, strict=True):
+        link.sendall(encode(125, bytes((number, 1))))
+    server.poll(0.1)
+    assert recorder.messages == [b"\x02\x01"]
+    links[2].sendall(encode(125, b"\x02\x00"))
+    server.poll(0.1)
+    assert recorder.messages[1:] == [b"\x02\x00"]
+    for _ in range(2):
+        server.poll(0.1)
+    assert sorted(recorder.messages[2:]) == [b"\x42\x01", b"\x43\x01"]
+    for link in links:
+        link.close()
+    server.close()
