@@ -190,3 +190,22 @@ def test_services_and_parameters_of_a_serial_device(ros):
     device.expect(126, b"\x01" + text("lit"))
     assert b"1." in device.expect(TopicId.PARAMETER_REQUEST)[0]
     bridge.says("parameter /no_such is not set")
+
+
+def test_device_that_comes_back_with_another_id_hears_its_topic_again(ros):
+    probe, device = ros.probe(), Device()
+    probe.tell(advertise=["/led", "std_msgs/Bool"])
+    ros.node("serial_node.py", device.path)
+    device.expect(TopicId.PUBLISHER)
+    device.send(announce(TopicId.SUBSCRIBER, 100, "led", "std_msgs/Bool", BOOL))
+
+    def lit(topic_id):
+        probe.tell(publish=["/led", {"data": True}])
+        return b"\x01" in device.received(topic_id)
+
+    wait_for(lambda: lit(100))
+    device.send(b"boot\r\n", announce(TopicId.SUBSCRIBER, 101, "led", "std_msgs/Bool", BOOL))
+    wait_for(lambda: lit(101))
+    before = len(device.received(100))
+    wait_for(lambda: lit(101) and len(device.received(101)) > 3)
+    assert len(device.received(100)) == before
