@@ -79,6 +79,7 @@ def again_and_again(port: int, source: str, seconds: float, frames: Callable[[in
     """Send what `frames` gives, connecting anew whenever the bridge hangs up; return how often something was sent."""
     until, count, stranger = time.monotonic() + seconds, 0, Stranger(port, source)
     while time.monotonic() < until:
+        stranger.link.settimeout(0.1)  # the bridge reads slowly who says much
         if stranger.say(frames(count)):
             count += 1
         else:
