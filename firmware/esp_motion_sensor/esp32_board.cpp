@@ -34,6 +34,9 @@ void IRAM_ATTR onRisingEdge() {
   if (woken == pdTRUE) portYIELD_FROM_ISR();
 }
 
+// An address in the house's own network wants IPv6 on Wi-Fi; Husarnet has an interface of its own.
+bool wantsIpv6() { return !USE_HUSARNET && strchr(BRIDGE_HOST, ':') != nullptr; }
+
 void startWatchdog(uint32_t timeout_s) {
 #if ESP_IDF_VERSION_MAJOR >= 5
   esp_task_wdt_config_t config = {};
@@ -103,12 +106,20 @@ void Esp32Board::joinNetwork() {
     WiFi.mode(WIFI_STA);
     WiFi.setSleep(false);  // asleep it would hear the bridge up to 0.3 s late
     WiFi.setAutoReconnect(true);
+#if ESP_IDF_VERSION_MAJOR >= 5  // Arduino core 3; core 2 wants it once Wi-Fi is up
+    if (wantsIpv6()) WiFi.enableIPv6();
+#endif
   }
   WiFi.begin(WIFI_SSID, WIFI_PASSWORD);
 }
 
 bool Esp32Board::networkUp() {
-  if (WiFi.status() != WL_CONNECTED) return false;
+  const bool up = WiFi.status() == WL_CONNECTED;
+#if ESP_IDF_VERSION_MAJOR < 5
+  if (up && !wifi_was_up_ && wantsIpv6()) WiFi.enableIpV6();
+#endif
+  wifi_was_up_ = up;
+  if (!up) return false;
   startHusarnet();
   return husarnetJoined();
 }

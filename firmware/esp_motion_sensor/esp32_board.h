@@ -33,6 +33,7 @@ class Esp32Board final : public Board {
   const int led_pin_;
   bool led_on_ = false;
   bool wifi_begun_ = false;
+  bool wifi_was_up_ = false;
 };
 
 }  // namespace patrol

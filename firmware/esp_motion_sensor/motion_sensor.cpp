@@ -5,7 +5,7 @@
 namespace patrol {
 namespace {
 
-constexpr uint32_t kNetworkFirst = 5000;   // joining Wi-Fi takes some seconds: to ask sooner would only begin anew
+constexpr uint32_t kNetworkFirst = 12000;  // joining Wi-Fi takes some seconds: to ask sooner would only begin anew
 constexpr uint32_t kNetworkLongest = 30000;
 constexpr uint32_t kLinkFirst = 250;
 constexpr uint32_t kLinkLongest = 8000;

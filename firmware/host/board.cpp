@@ -97,6 +97,11 @@ wl_status_t WiFiClass::begin(const char*, const char*) {
   wifi_begun = true;
   return status();
 }
+#if HOST_IDF_MAJOR >= 5
+bool WiFiClass::enableIPv6(bool) { return true; }
+#else
+bool WiFiClass::enableIpV6() { return true; }
+#endif
 bool WiFiClass::disconnect() { return true; }
 wl_status_t WiFiClass::status() { return wifi_begun && wifi_up ? WL_CONNECTED : WL_DISCONNECTED; }
 

@@ -13,5 +13,10 @@ class WiFiClass {
   wl_status_t begin(const char* ssid, const char* password);
   bool disconnect();
   wl_status_t status();
+#if HOST_IDF_MAJOR >= 5
+  bool enableIPv6(bool enable = true);
+#else
+  bool enableIpV6();
+#endif
 };
 extern WiFiClass WiFi;
