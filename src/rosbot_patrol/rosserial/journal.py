@@ -36,6 +36,18 @@ class Journal:
         if self.may_speak(client.address, now) and (not is_stranger or self._may_speak_of_strangers(now)):
             log.log(level, "%s: " + text, client.peer, *details)
 
+    def come(self, client: Client, now: float) -> None:
+        """A connection has been taken; an address that tries again and again is told of once."""
+        if self.is_new((client.address, "connected"), now):
+            self.say(client, logging.INFO, now, "connected")
+
+    def go(self, client: Client, reason: str, now: float) -> None:
+        """A connection has ended, other than by a refusal; likewise where nothing came of it."""
+        if client.session.needs_proof:
+            reason += ", without a proof (has it a key?)"
+        if client.session.configured or self.is_new((client.address, reason), now):
+            self.say(client, logging.INFO, now, "disconnected, %s", reason)
+
     def refuse(self, client: Client, what: str, now: float) -> None:
         """A client wanted something and is not given it."""
         client.note_refusal(what, now)

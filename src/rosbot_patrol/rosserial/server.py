@@ -228,7 +228,7 @@ class SerialServer:
         tune(link, restricted=self._policy.restricted)
         session = Session(self._policy, now, address=host, silence_timeout=self._silence_timeout)
         client = Client(link, session, peer, host)
-        self.journal.say(client, logging.INFO, now, "connected")
+        self.journal.come(client, now)
         self._add(client, now)
 
     def _turn_away(self, host: str, now: float) -> str | None:
@@ -298,7 +298,7 @@ class SerialServer:
         if client.closed:
             return
         if reason is not None and not self._stopping:
-            self.journal.say(client, logging.INFO, self._clock(), "disconnected, %s", reason)
+            self.journal.go(client, reason, self._clock())
         self._drop(client)
 
     def _drop(self, client: Client) -> None:

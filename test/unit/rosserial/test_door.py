@@ -169,6 +169,19 @@ def test_log_is_not_flooded_however_many_come(caplog):
     assert "strangers: more than 120 lines within a minute, the rest of them is left out" in caplog.text
 
 
+def test_who_tries_again_and_again_is_told_of_once(caplog):
+    caplog.set_level("INFO")
+    journal = Journal()
+    for number in range(20):
+        device = client("10.0.0.9", keys={2: bytes(range(32))})
+        journal.come(device, 3.0 * number)
+        journal.go(device, "it closed the connection", 3.0 * number)
+    assert [record.message for record in caplog.records] == [
+        "10.0.0.9:1: connected",
+        "10.0.0.9:1: disconnected, it closed the connection, without a proof (has it a key?)",
+    ]
+
+
 def test_what_a_stranger_says_stays_one_line():
     assert printable("a\n[ERROR] b\x1b[2J\u202e").replace("\N{REPLACEMENT CHARACTER}", "?") == "a?[ERROR] b?[2J?"
     assert printable("x" * 300) == "x" * 200 + "..."
