@@ -20,7 +20,7 @@ class Clock {
   /** The time of the last `update` [ms]. */
   uint64_t now() const { return now_; }
 
-  /** When a reading was taken [ms]: one of the last 24 days, or one newer than the last `update`, which counts as now. */
+  /** When a reading of the last 24 days was taken [ms]; one newer than the last `update` counts as now. */
   uint64_t timeOf(uint32_t raw) const {
     const uint32_t age = last_ - raw;
     if (age > 0x7FFFFFFFU || age > now_) return now_;

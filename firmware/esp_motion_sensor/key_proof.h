@@ -1,7 +1,7 @@
 // The pre-shared key: how a sensor proves who it is before anything is negotiated, and how the bridge does.
 //
-// The bridge sends frame 8 (01 | 32 random bytes), the sensor answers frame 9 (01 | its id | 16 random bytes | HMAC), the
-// bridge answers frame 9 (01 | HMAC). Both HMACs are SHA-256 over a text of their own, both nonces and the id.
+// The bridge sends frame 8 (01 | 32 random bytes), the sensor answers frame 9 (01 | its id | 16 random bytes | HMAC),
+// and the bridge answers frame 9 (01 | HMAC). Both HMACs are SHA-256 over a text of their own, both nonces and the id.
 #pragma once
 
 #include <stddef.h>

@@ -22,8 +22,8 @@ class MotionInput {
   explicit MotionInput(const MotionTiming& timing) : timing_(timing) {}
 
   /**
-   * Start; `cold` where the module was switched on just now and has to warm up. Otherwise an output that is high already
-   * is motion: nobody knows whether it was told before the reset.
+   * Start; `cold` where the module was switched on just now and has to warm up. Otherwise an output that is high
+   * already is motion: nobody knows whether it was told before the reset.
    */
   void begin(bool cold, uint64_t now);
 

@@ -67,9 +67,12 @@ void Resolver::lookUp() {
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
-  const int failure = lwip_getaddrinfo(host_, nullptr, &hints, &found);
+  if (lwip_getaddrinfo(host_, nullptr, &hints, &found) != 0) {  // then what was known before is still worth a try
+    state_.store(count_ > 0 ? ResolverState::kKnown : ResolverState::kFailed, std::memory_order_release);
+    return;
+  }
   count_ = 0;
-  for (const addrinfo* each = failure == 0 ? found : nullptr; each != nullptr && count_ < kMost; each = each->ai_next) {
+  for (const addrinfo* each = found; each != nullptr && count_ < kMost; each = each->ai_next) {
     if (each->ai_addrlen > sizeof(sockaddr_storage)) continue;
     Address& next = addresses_[count_++];
     memset(&next, 0, sizeof(next));
@@ -77,7 +80,7 @@ void Resolver::lookUp() {
     next.size = each->ai_addrlen;
     setPort(&next.storage, port_);
   }
-  if (found != nullptr) lwip_freeaddrinfo(found);
+  lwip_freeaddrinfo(found);
   state_.store(count_ > 0 ? ResolverState::kKnown : ResolverState::kFailed, std::memory_order_release);
 }
 

@@ -15,6 +15,9 @@ uint8_t sumOf(const uint8_t* data, size_t size) {
   return static_cast<uint8_t>(sum);
 }
 
+/** Whether a frame may begin here; the second sync byte may not have come yet. */
+bool mayBegin(const uint8_t* data, size_t size) { return data[0] == kSync && (size < 2 || data[1] == kProtocol); }
+
 uint8_t checksum(const uint8_t* data, size_t size) { return static_cast<uint8_t>(255 - sumOf(data, size)); }
 
 }  // namespace
@@ -46,7 +49,7 @@ bool FrameParser::next(Frame* frame) {
   drop(taken_);
   for (;;) {
     size_t start = 0;
-    while (start < size_ && (buffer_[start] != kSync || (start + 1 < size_ && buffer_[start + 1] != kProtocol))) ++start;
+    while (start < size_ && !mayBegin(buffer_ + start, size_ - start)) ++start;
     skip(start);
     if (size_ < kLengthEnd) return false;
     const size_t length = static_cast<size_t>(buffer_[2] | buffer_[3] << 8);

@@ -12,8 +12,8 @@
 // The number of the room that this sensor watches, 0 to 255.
 #define SENSOR_ID 1
 
-// The key that `rosrun rosbot_patrol sensor_key ID` printed: 64 hexadecimal digits, another one for each sensor. Without
-// it the sensor proves nothing, and a bridge with keys turns it away.
+// The key that `rosrun rosbot_patrol sensor_key ID` printed: 64 hexadecimal digits, another one for each sensor.
+// Without it the sensor proves nothing, and a bridge with keys turns it away.
 // #define SENSOR_KEY "..."
 
 // true: talk to no bridge that does not prove that it knows this key.

@@ -1,5 +1,5 @@
-// Feeds a client with damaged conversations: it must never crash, never send what is no frame, and never give its topics
-// to a bridge without proof when it insists on one.
+// Feeds a client with damaged conversations: it must never crash, never send what is no frame, and never give its
+// topics to a bridge without proof when it insists on one.
 //
 // usage: fuzz_client [INPUTS [SEED]]     mutated frames, by default 100000
 // With clang and libFuzzer: clang++ -DPATROL_LIBFUZZER -fsanitize=fuzzer,address,undefined ... (see firmware/README.md)
@@ -103,9 +103,10 @@ Bytes conversation() {
   for (uint32_t changes = below(5); changes > 0; --changes) {
     const size_t at = below(bytes.size());
     const auto place = bytes.begin() + static_cast<Bytes::difference_type>(at);
+    const size_t left = std::min<size_t>(9, bytes.size() - at);
     switch (below(4)) {
       case 0: bytes[at] = static_cast<uint8_t>(random32()); break;
-      case 1: bytes.erase(place, place + static_cast<Bytes::difference_type>(below(std::min<size_t>(9, bytes.size() - at) + 1))); break;
+      case 1: bytes.erase(place, place + static_cast<Bytes::difference_type>(below(left + 1))); break;
       case 2: bytes.insert(place, 1 + below(5), static_cast<uint8_t>(0xfe + below(2))); break;
       default: bytes[at] = static_cast<uint8_t>(bytes[at] ^ 1U << below(8)); break;
     }

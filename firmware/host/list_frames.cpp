@@ -1,4 +1,4 @@
-// Prints the frames that the firmware's parser finds in the bytes on stdin, "ID HEX" each, to hold it against ours in Python.
+// Prints the frames that the firmware's parser finds in the bytes on stdin, "ID HEX" each, to compare it with Python's.
 // usage: list_frames [PIECE]     PIECE: bytes given to the parser at a time
 #include <stdio.h>
 #include <stdlib.h>

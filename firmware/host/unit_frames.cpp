@@ -58,7 +58,8 @@ TEST(frames_that_do_not_fit_are_not_written) {
 }
 
 TEST(frames_are_found_in_pieces_of_any_size) {
-  const Bytes stream = encoded(0, {}) + encoded(10, Bytes(8, 7)) + encoded(8, Bytes(33, 0xff)) + encoded(300, Bytes(128, 0xfe));
+  const Bytes stream =
+      encoded(0, {}) + encoded(10, Bytes(8, 7)) + encoded(8, Bytes(33, 0xff)) + encoded(300, Bytes(128, 0xfe));
   const std::string expected = parsed(stream);
   CHECK(expected.find("300:fefe") != std::string::npos);
   for (size_t piece = 1; piece < stream.size(); ++piece) EQUAL(parsed(stream, piece), expected);

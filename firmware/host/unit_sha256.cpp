@@ -76,7 +76,8 @@ TEST(proof_has_the_agreed_form) {
   challenge[0] = 1;
   patrol::KeyProof exchange;
   CHECK(exchange.answer(key.data(), 5, challenge.data(), challenge.size(), nonce.data(), proof.data()));
-  EQUAL(unit::hex(proof), "0105" + unit::hex(nonce) + "81ca4be99dc5c04aa35b1706fcf09c16d9b9150a6f0e60ce4580008279bc6cbf");
+  EQUAL(unit::hex(proof),
+        "0105" + unit::hex(nonce) + "81ca4be99dc5c04aa35b1706fcf09c16d9b9150a6f0e60ce4580008279bc6cbf");
   Bytes answer = bytes("01 d838b779447b377af074bdc8eee33acbba5d28ac001ae2d905844ce75ff56764");
   CHECK(exchange.bridgeProves(answer.data(), answer.size()));
   for (size_t i = 0; i < answer.size(); ++i) {
