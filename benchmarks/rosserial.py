@@ -188,6 +188,25 @@ def reconnect(folder: Path, fleet: Child, sensors: int) -> float:
     return seconds
 
 
+def killed(folder: Path, fleet: Child, bridge: Bridge, sensors: int, port: int) -> tuple[float, Bridge]:
+    """Seconds from `kill -9` of the bridge, which is started anew at once, until each sensor was heard again."""
+    listener = ear("rospy")
+    fleet.tell(comeback=30.0)
+    time.sleep(0.5)
+    began = time.monotonic_ns()
+    bridge.popen.kill()
+    bridge.popen.wait()
+    bridge = Bridge(program(), port, folder / "again.log", max_clients=sensors + 100)
+    said = fleet.hear()
+    listener.ask(count=sensors, within=5.0, save=str(folder / "heard.npy"))
+    listener.stop()
+    heard = np.load(folder / "heard.npy")
+    back = len(np.unique(heard[:, 1]))
+    seconds = (heard[-1, 0] - began) / 1e9 if back == sensors else float("nan")
+    print(f"  kill -9: {said['known']} negotiated, {back} heard again, {seconds:.2f} s", flush=True)
+    return seconds, bridge
+
+
 def free_port() -> int:
     import socket
 
@@ -215,6 +234,8 @@ def measure(folder: Path, options: argparse.Namespace) -> dict[str, float]:
                 figures["reconnect_500_s"] = max(reconnect(folder, fleet, n) for _ in range(3))
             figures |= {"mb_500": bridge.megabytes("Rss"), "mb_pss_500": bridge.megabytes("Pss")}
             print(f"  RSS {figures['mb_500']:.1f} MB, PSS {figures['mb_pss_500']:.1f} MB")
+            if "reconnect" in options.parts:
+                figures["killed_500_s"], bridge = killed(folder, fleet, bridge, n, port)
             fleet.ask(bye=True)
             bridge.stop()
         if "flood" in options.parts:

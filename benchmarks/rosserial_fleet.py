@@ -6,6 +6,7 @@
     {"steady": SECONDS, "save": FILE}   each sends a heartbeat every 0.5 s, at phases by chance (seeded)
     {"flood": COUNT}                    each sends so many heartbeats as fast as the bridge takes them
     {"reconnect": SECONDS}              all drop their links at once, come back and report
+    {"comeback": SECONDS}               wait until the bridge has gone and all are back, and report
     {"bye": true}                       all hang up
 
 Times are CLOCK_MONOTONIC in ns, the same clock in all processes of a machine.
@@ -192,8 +193,20 @@ def reconnect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
     began = time.monotonic_ns()
     for sensor in fleet.sensors:
         fleet.open(sensor)
+    return {"began": began, "known": report(fleet, command["reconnect"])}
+
+
+def comeback(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
+    """The bridge is about to be killed, and comes back: as `reconnect`."""
+    for sensor in fleet.sensors:
+        sensor.answered = False
+    return {"known": report(fleet, command["comeback"])}
+
+
+def report(fleet: Fleet, seconds: float) -> int:
+    """Each sends one message as soon as the bridge knows it; how many have."""
     waiting = list(fleet.sensors)
-    until = time.monotonic() + command["reconnect"]
+    until = time.monotonic() + seconds
     while waiting and time.monotonic() < until:
         fleet.serve(0.05)
         for sensor in waiting:
@@ -201,7 +214,7 @@ def reconnect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
                 sensor.waiting += sensor.frame(move=bool(sensor.key >> 8))
                 fleet.flush(sensor)
         waiting = [sensor for sensor in waiting if not sensor.answered]
-    return {"began": began, "known": len(fleet.sensors) - len(waiting)}
+    return len(fleet.sensors) - len(waiting)
 
 
 def bye(fleet: Fleet, _command: dict[str, Any]) -> dict[str, Any]:
@@ -213,7 +226,14 @@ def bye(fleet: Fleet, _command: dict[str, Any]) -> dict[str, Any]:
 
 def main() -> int:
     fleet = Fleet()
-    does = {"connect": connect, "steady": steady, "flood": flood, "reconnect": reconnect, "bye": bye}
+    does = {
+        "connect": connect,
+        "steady": steady,
+        "flood": flood,
+        "reconnect": reconnect,
+        "comeback": comeback,
+        "bye": bye,
+    }
     for line in sys.stdin:
         command = json.loads(line)
         act = next(function for name, function in does.items() if name in command)
