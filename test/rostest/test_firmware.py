@@ -1,20 +1,23 @@
 """The firmware's host build (the sketch itself, over real TCP) before serial_node.py and a real master."""
 
+import itertools
 import json
 import signal
 import socket
 import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, Teller, free_port, wait_for
+from ros_processes import Process, free_port, wait_for
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BUILD = REPOSITORY / ".ws" / "firmware"
+IDS = itertools.count(10)
 KEY, OTHER_KEY = "0123456789abcdef" * 4, "fedcba9876543210" * 4
 
 # Says when a trigger comes, by the clock that the firmware's "edge" lines tell too.
@@ -77,14 +80,49 @@ def built():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.fixture(scope="module")
+def shared(master):
+    """A listener and a bridge without keys for all tests here: each test has sensors of its own ids."""
+    listener, port = master.script(LISTENER), free_port()
+    bridge = bridge_on(master, port)
+    nodes = [listener.process, bridge]
+    master.processes[:] = [each for each in master.processes if each not in nodes]  # or they would end with a test
+    yield SimpleNamespace(listener=listener, bridge=bridge, port=port)
+    for node in nodes:
+        node.stop()
+
+
+@pytest.fixture
+def listener(shared):
+    return shared.listener
+
+
+@pytest.fixture
+def sensor_id():
+    return next(IDS)
+
+
 @pytest.fixture
 def start(ros):
     """Starts firmware, and ends it with the test."""
 
-    def begin(port, *arguments):
-        firmware = Firmware(port, *arguments)
+    def begin(port, sensor_id, *arguments):
+        firmware = Firmware(port, "--id", str(sensor_id), *arguments)
         ros.processes.append(firmware)
         firmware.says("Wi-Fi is there")
+        return firmware
+
+    return begin
+
+
+@pytest.fixture
+def connect(start, listener):
+    """Starts firmware, and waits until it is heard."""
+
+    def begin(port, sensor_id, *arguments):
+        firmware = start(port, sensor_id, *arguments)
+        firmware.says("the bridge listens")
+        listener.expect(lambda said: said.get("id") == sensor_id)
         return firmware
 
     return begin
@@ -97,203 +135,192 @@ def bridge_on(ros, port, *arguments):
     return bridge
 
 
-def listener_of(ros):
-    listener = ros.script(LISTENER)
-    assert isinstance(listener, Teller)
-    return listener
-
-
-def triggers(listener, sensor_id=5):
+def triggers(listener, sensor_id):
     return listener.heard(id=sensor_id, move=True)
 
 
-def connected(ros, start, *arguments, bridge_arguments=()):
-    port, listener = free_port(), listener_of(ros)
-    bridge = bridge_on(ros, port, *bridge_arguments)
-    firmware = start(port, "--id", "5", *arguments)
-    firmware.says("the bridge listens")
-    listener.expect(lambda said: said.get("id") == 5)
-    return port, listener, bridge, firmware
-
-
-def test_each_motion_is_published_within_50_ms(ros, start):
-    _, listener, _, firmware = connected(ros, start)
+def test_each_motion_is_published_within_50_ms(shared, listener, connect, sensor_id):
+    firmware = connect(shared.port, sensor_id)
     motions = 30
     for _ in range(motions):
         firmware.move()
-    wait_for(lambda: len(triggers(listener)) == motions)
-    delays = sorted((said["at"] - edge) / 1e6 for said, edge in zip(triggers(listener), firmware.edges, strict=True))
+    wait_for(lambda: len(triggers(listener, sensor_id)) == motions)
+    heard = [said["at"] for said in triggers(listener, sensor_id)]
+    delays = sorted((at - edge) / 1e6 for at, edge in zip(heard, firmware.edges, strict=True))
     median, p95 = delays[len(delays) // 2], delays[int(len(delays) * 0.95)]
     print(f"interrupt to topic, {motions} motions: median {median:.1f} ms, p95 {p95:.1f} ms, worst {delays[-1]:.1f} ms")
     assert median < 50.0
     assert delays[-1] < 1000.0  # a busy machine
     firmware.tell("spike 1")
-    time.sleep(0.5)
-    assert len(triggers(listener)) == motions
-    assert listener.heard(id=5, move=False)
+    firmware.says("a spike on the motion sensor's output")
+    assert len(triggers(listener, sensor_id)) == motions
+    assert listener.heard(id=sensor_id, move=False)
 
 
-def test_connects_over_ipv4_and_ipv6_and_by_name(ros, start):
-    port, listener, _, _ = connected(ros, start)  # localhost
-    for sensor_id, host in ((6, "127.0.0.1"), (7, "::1")):
-        firmware = start(port, "--id", str(sensor_id), "--host", host)
-        firmware.says("the bridge listens")
-        firmware.move()
-        wait_for(lambda n=sensor_id: triggers(listener, n))
-    nowhere = start(port, "--host", "no.such.name.invalid")
-    nowhere.says("no link to the bridge: its name is unknown", 20.0)
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_connects_over_ipv4_and_ipv6(shared, listener, connect, sensor_id, host):
+    firmware = connect(shared.port, sensor_id, "--host", host)
+    firmware.move()
+    wait_for(lambda: triggers(listener, sensor_id))
 
 
-def test_cut_cable_loses_no_motion(ros, start):
-    _, listener, bridge, firmware = connected(ros, start)
+def test_unknown_name_is_said(start, sensor_id):
+    start(11411, sensor_id, "--host", "no.such.name.invalid").says("no link to the bridge: its name is unknown", 20.0)
+
+
+def test_cut_cable_loses_no_motion(shared, listener, connect, sensor_id):
+    firmware = connect(shared.port, sensor_id)
     firmware.tell("cable 0")
     firmware.move()
     firmware.says("no answer to a trigger for 4 s")
-    assert not triggers(listener)
+    assert not triggers(listener, sensor_id)
     firmware.tell("cable 1")
-    wait_for(lambda: triggers(listener), 20.0)
-    listener.expect(lambda said: "there was no link until now" in said.get("log", ""))
+    wait_for(lambda: triggers(listener, sensor_id), 20.0)
+    late = f"sensor {sensor_id}: motion began"
+    listener.expect(lambda said: late in said.get("log", "") and "there was no link until now" in said["log"])
     time.sleep(0.5)
-    assert len(triggers(listener)) == 1
-    assert bridge.popen.poll() is None
+    assert len(triggers(listener, sensor_id)) == 1
+    assert shared.bridge.popen.poll() is None
 
 
-def test_wifi_lost_and_back(ros, start):
-    _, listener, _, firmware = connected(ros, start)
+def test_wifi_lost_and_back(shared, listener, connect, sensor_id):
+    firmware = connect(shared.port, sensor_id)
     firmware.tell("wifi 0")
     firmware.says("Wi-Fi is lost")
     firmware.move()
     time.sleep(0.3)
-    assert not triggers(listener)
+    assert not triggers(listener, sensor_id)
     firmware.tell("wifi 1")
-    wait_for(lambda: triggers(listener))
+    wait_for(lambda: triggers(listener, sensor_id))
 
 
-def test_killed_bridge_is_found_again_and_no_motion_is_lost(ros, start):
-    port, listener, bridge, firmware = connected(ros, start)
+def test_killed_bridge_is_found_again_and_no_motion_is_lost(ros, listener, connect, sensor_id):
+    port = free_port()
+    bridge = bridge_on(ros, port)
+    firmware = connect(port, sensor_id)
     firmware.move()
-    wait_for(lambda: len(triggers(listener)) == 1)
+    wait_for(lambda: len(triggers(listener, sensor_id)) == 1)
     bridge.stop(signal.SIGKILL)
     firmware.says("no link to the bridge")
     firmware.move()
     firmware.move()
-    bridge = bridge_on(ros, port)
-    wait_for(lambda: len(triggers(listener)) == 2, 15.0)
+    bridge_on(ros, port)
+    wait_for(lambda: len(triggers(listener, sensor_id)) == 2, 15.0)
     listener.expect(lambda said: "(2 in all)" in said.get("log", ""))
 
 
-def test_hung_bridge_gets_the_motion_when_it_wakes(ros, start):
-    _, listener, bridge, firmware = connected(ros, start)
+def test_hung_bridge_gets_the_motion_when_it_wakes(ros, listener, connect, sensor_id):
+    port = free_port()
+    bridge = bridge_on(ros, port)
+    firmware = connect(port, sensor_id)
     bridge.popen.send_signal(signal.SIGSTOP)
     try:
         firmware.move()
         firmware.says("no answer to a trigger for 4 s")
     finally:
         bridge.popen.send_signal(signal.SIGCONT)
-    wait_for(lambda: triggers(listener))
+    wait_for(lambda: triggers(listener, sensor_id))
     wait_for(lambda: firmware.count("the bridge listens") == 2, 15.0)
 
 
 @pytest.mark.parametrize("how", ["reset", "break"])
-def test_reset_also_in_mid_frame(ros, start, how):
-    port, listener, bridge, firmware = connected(ros, start)
-    other = start(port, "--id", "6")
-    other.says("the bridge listens")
+def test_reset_also_in_mid_frame(ros, listener, connect, sensor_id, how):
+    port = free_port()
+    bridge = bridge_on(ros, port)  # its own, as it logs 60 lines a minute of one address at most
+    firmware = connect(port, sensor_id)
+    other = connect(port, next(IDS))
     for reset in range(1, 4):
         firmware.tell(how)
         wait_for(lambda n=reset: firmware.count("starts after a reset") == n)
         wait_for(lambda n=reset: firmware.count("the bridge listens") == n + 1)
         firmware.move()
-        wait_for(lambda n=reset: len(triggers(listener)) == n)
+        wait_for(lambda n=reset: len(triggers(listener, sensor_id)) == n)
     # What the resets left hanging about is closed: the sensor came back.
-    bridge.says("its sensor 5 came back as")
+    bridge.says(f"its sensor {sensor_id} came back as")
     assert other.count("the bridge listens") == 1
     assert bridge.popen.poll() is None
     assert "Traceback" not in bridge.output
 
 
-def test_warm_up_sends_heartbeats_and_no_triggers(ros, start):
-    _, listener, _, firmware = connected(ros, start, "--warm-up", "2500")
-    firmware.says("warms up for 2 s")
+def test_warm_up_sends_heartbeats_and_no_triggers(shared, listener, connect, sensor_id):
+    firmware = connect(shared.port, sensor_id, "--warm-up", "2000")
     firmware.tell("motion 1")
     time.sleep(0.2)
     firmware.tell("motion 0")
+    assert firmware.count("motion counts from now on") == 0
     firmware.says("motion counts from now on")
-    assert listener.heard(id=5, move=False)
-    assert not triggers(listener)
+    assert listener.heard(id=sensor_id, move=False)
+    assert not triggers(listener, sensor_id)
     firmware.move()
-    wait_for(lambda: triggers(listener))
+    wait_for(lambda: triggers(listener, sensor_id))
 
 
-def test_motion_goes_on_where_the_milliseconds_wrap(ros, start):
-    _, listener, _, firmware = connected(ros, start, "--clock", str(2**32 - 1500))
+def test_motion_goes_on_where_the_milliseconds_wrap(shared, listener, connect, sensor_id):
+    firmware = connect(shared.port, sensor_id, "--clock", str(2**32 - 1500))
     for _ in range(10):
         firmware.move()
-    wait_for(lambda: len(triggers(listener)) == 10)
+    wait_for(lambda: len(triggers(listener, sensor_id)) == 10)
     assert firmware.count("the bridge listens") == 1
 
 
-def test_motion_that_is_too_old_is_dropped(ros, start):
+def test_motion_that_is_too_old_is_dropped(ros, listener, start, sensor_id):
     port = free_port()
-    firmware = start(port, "--id", "5", "--max-age", "1500")
+    firmware = start(port, sensor_id, "--max-age", "1000")
     firmware.move()
     firmware.says("could not be told and is dropped")
-    listener = listener_of(ros)
     bridge_on(ros, port)
     firmware.says("the bridge listens", 20.0)
-    listener.expect(lambda said: said.get("id") == 5)
-    time.sleep(0.5)
-    assert not triggers(listener)
+    listener.expect(lambda said: said.get("id") == sensor_id)
+    assert not triggers(listener, sensor_id)
 
 
-def key_file(folder, **keys):
-    path = folder / "keys.yaml"
+def bridge_with_keys(ros, folder, **keys):
+    path, port = folder / "keys.yaml", free_port()
     path.write_text("keys:\n" + "".join(f'  {name.strip("_")}: "{key}"\n' for name, key in keys.items()))
     path.chmod(0o600)
-    return f"_key_file:={path}"
+    return bridge_on(ros, port, f"_key_file:={path}"), port
 
 
-def test_key_is_proved_on_both_sides(ros, start, tmp_path):
-    keys = key_file(tmp_path, _5=KEY)
-    _, listener, bridge, firmware = connected(ros, start, "--key", KEY, "--insist", bridge_arguments=[keys])
+def test_key_is_proved_on_both_sides(ros, listener, connect, sensor_id, tmp_path):
+    bridge, port = bridge_with_keys(ros, tmp_path, **{f"_{sensor_id}": KEY})
+    firmware = connect(port, sensor_id, "--key", KEY, "--insist")
     firmware.says("has proved that it is ours")
     firmware.move()
-    wait_for(lambda: triggers(listener))
+    wait_for(lambda: triggers(listener, sensor_id))
     firmware.tell("break")
     wait_for(lambda: firmware.count("has proved that it is ours") == 2)
     firmware.move()
-    wait_for(lambda: len(triggers(listener)) == 2)
+    wait_for(lambda: len(triggers(listener, sensor_id)) == 2)
     assert KEY not in bridge.output + firmware.output
 
 
-@pytest.mark.parametrize("arguments", [(), ("--key", OTHER_KEY)])
-def test_sensor_without_the_key_gets_nothing_through(ros, start, tmp_path, arguments):
-    port, listener = free_port(), listener_of(ros)
-    bridge_on(ros, port, key_file(tmp_path, _5=KEY))
-    honest = start(port, "--id", "5", "--key", KEY)
-    stranger = start(port, "--id", "5", *arguments)
-    honest.says("the bridge listens")
-    stranger.says("no link to the bridge")
-    stranger.move()
-    time.sleep(1.0)
-    assert not triggers(listener)
-    assert stranger.count("the bridge listens") == 0
-    if not arguments:
-        stranger.says("the bridge wants a key, and this sensor has none (SENSOR_KEY in secrets.h)")
+def test_sensor_without_the_key_gets_nothing_through(ros, listener, connect, start, sensor_id, tmp_path):
+    _, port = bridge_with_keys(ros, tmp_path, **{f"_{sensor_id}": KEY})
+    honest = connect(port, sensor_id, "--key", KEY)
+    for arguments in ((), ("--key", OTHER_KEY)):
+        stranger = start(port, sensor_id, *arguments)
+        stranger.says("no link to the bridge")
+        stranger.move()
+        time.sleep(0.5)
+        assert not triggers(listener, sensor_id)
+        assert stranger.count("the bridge listens") == 0
+        if not arguments:
+            stranger.says("the bridge wants a key, and this sensor has none (SENSOR_KEY in secrets.h)")
     honest.move()
-    wait_for(lambda: len(triggers(listener)) == 1)
+    wait_for(lambda: len(triggers(listener, sensor_id)) == 1)
 
 
-def test_sensor_with_a_key_before_a_bridge_without(ros, start):
-    port, listener, _, firmware = connected(ros, start, "--key", KEY)
+def test_sensor_with_a_key_before_a_bridge_without(shared, listener, connect, start, sensor_id):
+    firmware = connect(shared.port, sensor_id, "--key", KEY)
     firmware.says("this sensor has a key, but the bridge did not ask for it")
     firmware.move()
-    wait_for(lambda: triggers(listener))
-    insisting = start(port, "--id", "6", "--key", KEY, "--insist")
+    wait_for(lambda: triggers(listener, sensor_id))
+    other_id = next(IDS)
+    insisting = start(shared.port, other_id, "--key", KEY, "--insist")
     insisting.says("has not proved that it knows the key, and this sensor insists on it")
     insisting.move()
     time.sleep(0.5)
-    assert not triggers(listener, 6)
+    assert not triggers(listener, other_id)
 
 
 def test_what_sensor_key_prints_goes_into_secrets_h(ros, tmp_path):
@@ -310,7 +337,7 @@ def test_what_sensor_key_prints_goes_into_secrets_h(ros, tmp_path):
 def test_bytes_of_the_negotiation_are_those_of_upstreams_client(start):
     """Against a server of a few lines, as rosserial_python behaves: it asks after a while, and tells the time."""
     with socket.create_server(("127.0.0.1", 0)) as server:
-        firmware = start(server.getsockname()[1], "--host", "127.0.0.1", "--id", "2")
+        firmware = start(server.getsockname()[1], 2, "--host", "127.0.0.1")
         link, _ = server.accept()
         with link:
             link.settimeout(5.0)
