@@ -62,7 +62,8 @@ struct FakeBridge final : patrol::Link {
   LinkState state = LinkState::kClosed;
   patrol::FrameParser parser;
   std::deque<uint8_t> to_sensor;
-  std::vector<std::string> messages;  // of id 125
+  int trigger_count = 0;
+  int heartbeat_count = 0;
   std::string logged;
 
   void dial() override {
@@ -106,7 +107,7 @@ struct FakeBridge final : patrol::Link {
 
   void heard(const patrol::Frame& frame) {
     const Bytes data(frame.data, frame.data + frame.size);
-    if (frame.topic_id == 125) messages.push_back(unit::hex(data));
+    if (frame.topic_id == 125) ++(data == Bytes{5, 1} ? trigger_count : heartbeat_count);
     if (frame.topic_id == 7) logged += std::string(data.begin() + 5, data.end()) + "\n";
     if (frame.topic_id == 10 && answers) say(10, Bytes(8, 1));
   }
@@ -115,12 +116,8 @@ struct FakeBridge final : patrol::Link {
     patrol::encodeFrame(id, data.data(), data.size(), out.data(), out.size());
     to_sensor.insert(to_sensor.end(), out.begin(), out.end());
   }
-  int triggers() const {
-    int count = 0;
-    for (const std::string& message : messages) count += message == "0501" ? 1 : 0;
-    return count;
-  }
-  int heartbeats() const { return static_cast<int>(messages.size()) - triggers(); }
+  int triggers() const { return trigger_count; }
+  int heartbeats() const { return heartbeat_count; }
 };
 
 patrol::SensorConfig config() {
@@ -406,4 +403,79 @@ TEST(spikes_are_told_once_a_minute) {
   size_t lines = 0;
   for (size_t at = 0; (at = world.board.lines.find("a spike", at)) != std::string::npos; ++at) ++lines;
   EQUAL(lines, 1U);
+}
+
+/** A bridge and a link to which something happens every few seconds, until `calm_from`. */
+struct Trouble {
+  explicit Trouble(uint32_t seed) : state(seed * 2654435761U) {}
+
+  uint32_t random(uint32_t limit) {
+    state = state * 1664525U + 1013904223U;
+    return (state >> 8) % limit;
+  }
+  void step(World* world, uint32_t now, bool calm) {
+    FakeBridge& bridge = world->bridge;
+    if (now < change_at && !(calm && bad)) {
+      if (bridge.state == LinkState::kClosed) bridge.closes = bridge.refuses;
+      return;
+    }
+    change_at = now + 200 + random(8000);
+    const bool was_cut = cut;
+    cut = !calm && random(3) == 0;
+    bridge.refuses = !calm && random(4) == 0;
+    bridge.closes = was_cut || bridge.refuses;  // TCP does not come back from a cut as if nothing had been
+    bridge.hears = bridge.reachable = !cut;
+    bridge.takes = calm || random(6) != 0;
+    world->board.up = calm || random(8) != 0;
+    bad = cut || bridge.refuses || !bridge.takes || !world->board.up;
+    if (bad || bridge.closes) good_since = now;
+  }
+
+  uint32_t state;
+  uint32_t change_at = 0;
+  uint32_t good_since = 0;
+  bool cut = false;
+  bool bad = false;
+};
+
+TEST(whatever_happens_to_the_link_no_motion_is_lost) {
+  int reconnects = 0;
+  for (uint32_t seed = 1; seed <= 12; ++seed) {
+    World world(0xFFFFFFFFU - 300000U);  // it wraps on the way
+    world.board.seed = seed;
+    Trouble trouble(seed);
+    uint32_t move_at = 2000;
+    uint32_t moved_at = 0;
+    uint32_t motions = 0;
+    bool waiting = false;  // for a motion to be told
+    for (uint32_t now = 0; now < 630000; ++now) {
+      trouble.step(&world, now, now >= 600000);
+      if (now == move_at && now < 600000) {
+        world.board.move(true);
+        waiting = true;
+        moved_at = now;
+        ++motions;
+      }
+      if (now == move_at + 100) {
+        world.board.move(false);
+        move_at += 25000 + trouble.random(25000);
+      }
+      const int before = world.bridge.triggers();
+      world.run(1);
+      if (world.bridge.triggers() > before) waiting = false;
+      if (world.said("is dropped")) waiting = false;  // it says so, which is all that it can do after a minute
+      world.board.lines.clear();
+      if (waiting && now - trouble.good_since > 20000 && now - moved_at > 20000) {
+        CHECK(!"a motion is told 20 s after the link is well");
+        waiting = false;
+      }
+    }
+    CHECK(motions >= 12);
+    CHECK(!waiting && !world.sensor.triggerPending() && !world.sensor.triggerUnconfirmed());
+    CHECK(world.bridge.triggers() >= static_cast<int>(motions) / 2);
+    CHECK(world.bridge.triggers() <= static_cast<int>(motions) + world.bridge.opened);
+    CHECK(world.bridge.heartbeats() > 200);
+    reconnects += world.bridge.opened;
+  }
+  CHECK(reconnects > 300);
 }
