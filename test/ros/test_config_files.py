@@ -119,6 +119,7 @@ def test_patrol() -> None:
         (["house:=flat"], "flat_sensors.yaml"),
         (["house:=office"], "office_sensors.yaml"),
         (["simulation:=false"], "sensors.yaml"),
+        (["simulation:=false", "house:=flat"], "flat_sensors.yaml"),
         (["simulation:=false", f"path_to_params:={ROOT}/params/room_points_tutorial.yaml"], ""),
     ],
 )

@@ -16,6 +16,7 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import free_port, wait_for
 
+from rosbot_patrol.rosserial.keys import add_key, new_key
 from rosbot_patrol.rosserial.poor_link import LinkQuality
 from rosbot_patrol.rosserial.tcp_client import EspClient
 
@@ -82,8 +83,8 @@ class Watch:
         )[0]
 
 
-def bridge(ros, port, name="esp_client1"):
-    node = ros.node("serial_node.py", "_port:=tcp", f"_tcp_port:={port}", f"__name:={name}")
+def bridge(ros, port, *arguments, name="esp_client1"):
+    node = ros.node("serial_node.py", "_port:=tcp", f"_tcp_port:={port}", f"__name:={name}", *arguments)
     node.says("waiting for sensors")
     return node
 
@@ -98,12 +99,15 @@ def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_p
         probe.tell(subscribe=topic)
     watch = Watch(ros, tmp_path, [{"id": 3, "room": 5, "name": "Haustür"}, {"id": 4, "room": 4}])
     watch.node.says("watching 2 sensors of")
-    bridge(ros, port)
-    sensors = [EspClient("127.0.0.1", port, i).start() for i in (3, 4)]
+    keys = {i: new_key() for i in (3, 4)}
+    for i, key in keys.items():
+        add_key(tmp_path / "keys.yaml", i, key)
+    bridge(ros, port, f"_key_file:={tmp_path}/keys.yaml", name="with_keys")  # parameters outlive their node
+    sensors = [EspClient("127.0.0.1", port, i, key=key).start() for i, key in keys.items()]
     probe.expect(lambda said: said.get("text") == "2 of 2 sensors are well")
     sensors[0].set_link(LinkQuality(loss=1.0))  # says nothing more on a link that stays open
     silent = probe.expect(event("silent", 3, True))
-    assert (silent["room"], silent["name"], silent["bridge"]) == (5, "Haustür", "/esp_client1")
+    assert (silent["room"], silent["name"], silent["bridge"]) == (5, "Haustür", "/with_keys")
     assert silent["text"].startswith('sensor 3 "Haustür" in room 5 (corridor hall) is silent')
     probe.expect(lambda said: "sensor_watch: sensor 3 Haust" in str(said.get("status")) and "not: 3" in str(said))
     mail = watch.mail('sensor 3 "Haustür" in room 5 (corridor hall) is silent')
@@ -116,7 +120,8 @@ def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_p
     watch.mail('sensor 3 "Haustür" in room 5 (corridor hall) is well again')
     shown = ros.node("sensors")
     assert shown.popen.wait(10.0) == 0
-    assert re.search(r"^3 +5 corridor hall \"Haustür\" +ok +\d s ago +never +0 +127\.0\.0\.1:\d+$", shown.output, re.M)
+    line = r'^3 +5 corridor hall "Haustür" +ok +\d s ago +never +0 +127\.0\.0\.1:\d+ \(key\)$'
+    assert re.search(line, shown.output, re.M), shown.output
     assert len(watch.mails()) == 2
     for sensor in sensors:
         sensor.stop()
@@ -151,7 +156,7 @@ def test_who_else_speaks(ros, tmp_path):
     probe.tell(advertise=["/sensors/links", "rosbot_patrol/SensorLinks"])
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], notice_after=60.0)
     for i, port in enumerate(ports):
-        bridge(ros, port, f"esp_client{i + 1}")
+        bridge(ros, port, name=f"esp_client{i + 1}")
     ros.node("house_markers", *(f"_{key}:={ROOT}/{file}" for key, file in SHOWN.items()))
     honest = EspClient("127.0.0.1", ports[0], 1, stuck_after=1.0).start()
     others = [EspClient("127.0.0.1", ports[1], i).start() for i in (1, 9)]
