@@ -204,11 +204,18 @@ def test_a_bad_file_is_one_sentence(ros, tmp_path):
 
 
 def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp_path):
-    """And simulated time that stands still, with no /clock at all, changes nothing."""
+    """Nor is it lost where the disk takes nothing. Simulated time that stands still (no /clock) changes nothing."""
     ros = sim_ros
     probe = ros.probe()
     probe.tell(subscribe=EVENTS)
-    watch = Watch(ros, tmp_path, [{"id": 7, "room": 7}], start_grace=1.0)
+    watch = Watch(ros, tmp_path, [{"id": 7, "room": 7}], start_grace=2.0)
+    watch.node.says("watching 1 sensors")
+    outbox = tmp_path / "state" / "sensor_outbox"
+    outbox.rename(tmp_path / "aside")
+    outbox.write_text("the disk takes nothing")
+    watch.node.says("is silent' cannot be written to")
+    outbox.unlink()
+    (tmp_path / "aside").rename(outbox)
     watch.mail("sensor 7 in room 7 (north-east hall) is silent")
     wait_for((tmp_path / "state" / "sensors.json").exists)
     watch.node.stop(signal.SIGKILL)
