@@ -70,6 +70,7 @@ class Fleet:
         link = socket.socket()
         link.setblocking(False)
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # its port does not keep a bridge from listening
         link.bind((sensor.source, 0))
         link.connect_ex(("127.0.0.1", self.port))
         prover = Prover(sensor.sensor_id, sensor.secret) if sensor.secret is not None else None
