@@ -1,7 +1,9 @@
 """A master, nodes and a probe as processes, so that tests in one pytest run may each have a master of their own."""
 
+import contextlib
 import json
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -18,9 +20,12 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 
 def free_port():
-    with socket.socket() as s:
-        s.bind(("localhost", 0))
-        return s.getsockname()[1]
+    """A port that nobody has, below those (32768 and up) that connections get, so that none takes it meanwhile."""
+    while True:
+        port = random.SystemRandom().randrange(20000, 32768)
+        with socket.socket() as s, contextlib.suppress(OSError):
+            s.bind(("", port))
+            return port
 
 
 def wait_for(condition, seconds=10.0, what="the condition"):
