@@ -120,6 +120,7 @@ def test_patrol() -> None:
         (["house:=office"], "office_sensors.yaml"),
         (["simulation:=false"], "sensors.yaml"),
         (["simulation:=false", "house:=flat"], "flat_sensors.yaml"),
+        (["sensors:=none"], "none"),
         (["simulation:=false", f"path_to_params:={ROOT}/params/room_points_tutorial.yaml"], ""),
     ],
 )
@@ -130,7 +131,7 @@ def test_sensor_watch(arguments: list[str], sensors: str) -> None:
     assert Path(tree["sensors"]).name == sensors
     assert given("rosbot_patrol.launch", "patrolling_node", *arguments)["sensors"] == tree["sensors"]
     listed = sensor_watch_node.load_list(sensor_watch_node.load_group(sensor_watch_node.SensorWatchParams, tree))
-    assert listed.has_file == bool(sensors)
+    assert listed.has_file == (sensors not in ("", "none"))
     assert [listed.room_of(room) for room in (1, 2, 3, 4)] == [1, 2, 3, 4]
 
 

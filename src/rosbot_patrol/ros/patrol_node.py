@@ -66,7 +66,7 @@ class NodeParams:
     """The node's own parameters; those of mail, drive, look, turn and watch come beside them."""
 
     path_to_params: str = param(doc="points file (the tutorial's name)")
-    sensors: str = param("", doc="file of the sensors; empty: a sensor's id is the number of its room")
+    sensors: str = param("", doc="file of the sensors; empty or none: a sensor's id is the number of its room")
     state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
     image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
     alarm_classes: list[str] = param(["person", "fire hydrant"], doc="classes of objects that alarm")

@@ -51,7 +51,9 @@ class SensorWatchParams:
     """The node's own parameters; those of mail, times and looks come beside them."""
 
     path_to_params: str = param(doc="points file, which names the rooms")
-    sensors: str = param("", doc="file of the sensors; empty: each room's sensor has the room's number as its id")
+    sensors: str = param(
+        "", doc="file of the sensors; empty or none: each room's sensor has the room's number as its id"
+    )
     motion_sensors: str = param("", doc="the simulator's file, to hold `sensors` against; empty: none")
     state_dir: str = param("", doc="folder of notices that wait, as the patrol's; empty: rosbot_patrol in ROS's home")
 
@@ -69,7 +71,7 @@ def load_list(params: SensorWatchParams) -> SensorList:
     """The sensors, checked against rooms and simulator; raises ParamError."""
     rooms = load_rooms(Path(params.path_to_params).expanduser())
     sensors = load_sensors(params.sensors, {room.id: room.name for room in rooms}, rooms_source=rooms.source)
-    if params.sensors and params.motion_sensors:
+    if sensors.has_file and params.motion_sensors:
         sensors.check_places([(p.id, p.room) for p in read_sensors(params.motion_sensors)], params.motion_sensors)
     return sensors
 

@@ -124,14 +124,14 @@ def load_sensors(path: str | Path, room_names: Mapping[int, str], *, rooms_sourc
     """Read the file.
 
     Args:
-        path: of the file; "" for none: ids are numbers of rooms.
+        path: of the file; "" or "none" (roslaunch takes no empty argument) for none: ids are numbers of rooms.
         room_names: name of each room by number, as of the points file `rooms_source`.
         rooms_source: for messages.
 
     Raises:
         ParamError: it cannot be read or is wrong; names file and key.
     """
-    if not str(path):
+    if str(path) in ("", "none"):
         return SensorList(None, room_names)
     path = Path(path).expanduser()
     tree = read_mapping(path, keys="sensors")

@@ -28,6 +28,7 @@ def test_a_sensors_id_need_not_be_its_room(tmp_path):
 
 
 def test_without_a_file_the_id_is_the_room():
+    assert not load_sensors("none", ROOMS, rooms_source="points.yaml").has_file
     sensors = load_sensors("", ROOMS, rooms_source="points.yaml")
     assert not sensors.has_file
     assert [sensors.room_of(i) for i in (0, 1, 2, 5)] == [0, 1, None, 5]
