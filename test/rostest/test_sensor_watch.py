@@ -2,10 +2,8 @@
 
 import json
 import mailbox
-import os
 import re
 import signal
-import socket
 import time
 from email.header import decode_header, make_header
 from pathlib import Path
@@ -34,16 +32,6 @@ FAST = {
     "notice_interval": 0.0,
     "mail_interval": 0.0,
 }
-
-
-def lasting_port():
-    """A free port that no outgoing connection can be given while the bridge on it is away."""
-    return next(port for port in range(20000 + os.getpid() % 5000, 32000) if is_free(port))
-
-
-def is_free(port):
-    with socket.socket() as s:
-        return s.connect_ex(("127.0.0.1", port)) != 0
 
 
 def plain(header):
@@ -128,7 +116,7 @@ def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_p
 
 
 def test_a_bridge_is_killed_and_its_sensors_are_told_as_one(ros, tmp_path):
-    port, probe = lasting_port(), ros.probe()
+    port, probe = free_port(), ros.probe()
     probe.tell(subscribe=EVENTS)
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}, {"id": 2, "room": 2}], bridge_after=2.0)
     first = bridge(ros, port)
