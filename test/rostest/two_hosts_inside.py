@@ -94,11 +94,11 @@ def test_one_host_is_cut_off_and_plugged_in_again(hosts, master):
     cut, before, began = len(probe.heard(id=1)), len(probe.heard(id=2)), time.monotonic()
     one.trigger()
     two.trigger()
-    wait_for(lambda: len(probe.heard(id=2, move=True)) == 2, 0.5, "the trigger of the host that was left alone")
+    wait_for(lambda: len(probe.heard(id=2, move=True)) == 2, 2.0, "the trigger of the host that was left alone")
     wait_for(lambda: "[fd77:1::2]" in bridge.output and "nothing that makes sense" in bridge.output, 8.0, "the notice")
-    assert len(probe.heard(id=1)) <= cut + 1
+    assert len(probe.heard(id=1)) <= cut + 2  # what was on its way
     seconds = time.monotonic() - began
-    assert len(probe.heard(id=2)) - before >= 2 * seconds - 2  # its heartbeats
+    assert len(probe.heard(id=2)) - before >= 2 * seconds - 4  # its heartbeats
     assert "10.77.2.2" not in "\n".join(line for line in bridge.lines if "disconnected" in line)
 
     one.plug("up")
