@@ -151,8 +151,9 @@ class Dispatcher:
         if event.kind == TopicId.PUBLISHER:
             self._names.add(name)
         self._door.settle(client)
-        what = event.kind.name.lower().replace("_", " ")
-        self._journal.say(client, logging.INFO, now, "%s %s [%s]", what, event.info.name, event.info.message_type)
+        what = f"{event.kind.name.lower().replace('_', ' ')} {event.info.name} [{event.info.message_type}]"
+        if self._journal.is_new((client.address, what), now):
+            self._journal.say(client, logging.INFO, now, "%s", what)
 
     def _has_all_names(self, name: str) -> bool:
         return name not in self._names and len(self._names) >= self._policy.max_names
