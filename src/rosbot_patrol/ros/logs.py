@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import logging.handlers
+import queue
+from collections.abc import Iterator
+
+WAITING = 2000  # records
 
 
 class _ToRosout(logging.Handler):
@@ -21,3 +27,29 @@ def install() -> None:
         package.addHandler(_ToRosout())
         package.setLevel(logging.INFO)
         package.propagate = False
+
+
+class _ToQueue(logging.handlers.QueueHandler):
+    def enqueue(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(queue.Full):  # what nobody could read so fast
+            self.queue.put_nowait(record)
+
+
+@contextlib.contextmanager
+def in_background() -> Iterator[None]:
+    """Meanwhile, write the records on a thread of its own.
+
+    rospy asks the master for a parameter at each line, and waits for the answer: 2 ms, and 100 ms on a busy machine.
+    """
+    package = logging.getLogger("rosbot_patrol")
+    handlers = package.handlers[:]
+    records: queue.Queue[logging.LogRecord] = queue.Queue(WAITING)
+    listener = logging.handlers.QueueListener(records, *handlers)
+    package.handlers[:] = [_ToQueue(records)]
+    listener.start()
+    try:
+        yield
+    finally:
+        package.handlers[:] = handlers
+        with contextlib.suppress(queue.Full):
+            listener.stop()

@@ -28,6 +28,7 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.errors import ParamError, ProtocolError
+from rosbot_patrol.ros import logs
 from rosbot_patrol.ros.node import Worker, load_params, run_node
 from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subscription, message_class
 from rosbot_patrol.ros.serial_links import LinkTeller
@@ -45,7 +46,7 @@ log = logging.getLogger(__name__)
 
 GLOBAL_TCP_PORT = "/rosserial_embeddedlinux/tcp_port"
 SWITCH_INTERVAL = 0.0005  # a message waits no longer for a thread that writes diagnostics [s]; Python's own: 0.005
-_LOGGERS = (rospy.logdebug, rospy.loginfo, rospy.logwarn, rospy.logerr, rospy.logfatal)
+_LEVELS = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR, logging.CRITICAL)
 
 
 class RosSide:
@@ -119,7 +120,7 @@ class RosSide:
     def device_log(self, client: Client, level: int, text: str) -> None:
         """To the console and /rosout, at the device's level."""
         self.links.logged(client, text)
-        _LOGGERS[min(level, len(_LOGGERS) - 1)]("%s: %s", client.peer, text)
+        log.log(_LEVELS[min(level, len(_LEVELS) - 1)], "%s: %s", client.peer, text)
 
     def parameter(self, name: str) -> object:
         """A ROS parameter; raises ProtocolError where it is not set."""
@@ -215,8 +216,9 @@ def body() -> None:
     Worker(Report(server, ros_side.look_at_sensors, what).run, name="report").start()
     if policy.restricted:
         time.sleep(SETTLING)  # sensors wait meanwhile: what they are told to have arrived shall find its listeners
-    server.run()
-    server.close()
+    with logs.in_background():
+        server.run()
+        server.close()
 
 
 def main() -> None:
