@@ -1,5 +1,5 @@
 import pytest
-from house import House
+from sensor_house import House
 
 from rosbot_patrol.sensors.looks import Looks
 from rosbot_patrol.sensors.notices import Notices

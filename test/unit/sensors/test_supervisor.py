@@ -1,7 +1,7 @@
 import random
 
 import pytest
-from house import STEP, House, Speaker, brief
+from sensor_house import STEP, House, Speaker, brief
 
 from rosbot_patrol.sensors.sensor_file import SensorSpec
 
