@@ -1,0 +1,41 @@
+"""Shards on disk as pictures and labels, read from there or kept in memory."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rosbot_patrol.detection.training.dataset import Pictures, batch_of
+from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two shards of two pictures each; in each picture a person."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    for shard in range(2):
+        picture = np.stack([x * 0.5 + 40 * shard, y * 0.8, (x + y) * 0.3], axis=-1).astype(np.uint8)
+        rows = np.zeros((2, len(COLUMNS)))
+        rows[:, COLUMNS.index("picture")] = 0, 1
+        rows[:, COLUMNS.index("x0")], rows[:, COLUMNS.index("x1")] = 0.25, 0.5
+        rows[:, COLUMNS.index("y0")], rows[:, COLUMNS.index("y1")] = 0.5, 1.0
+        np.save(tmp_path / f"room-{shard:04d}.npy", np.stack([picture, picture[::-1]]))
+        np.savez(tmp_path / f"room-{shard:04d}.npz", boxes=rows)
+    return tmp_path
+
+
+def test_pictures_in_memory_are_those_on_disk(folder: Path) -> None:
+    disk = Pictures.open(folder, "room,room")  # listed twice, it counts twice
+    memory = disk.pack()
+    assert len(memory) == len(disk) == 8
+    assert memory.shards[0] is memory.shards[2]  # but is kept once
+    for shard, i in disk.index():
+        off = np.abs(memory.picture(shard, i).astype(int) - disk.picture(shard, i))
+        assert off.mean() < 2.0
+    _, rows = batch_of(memory, memory.index()[:2], None)
+    assert rows[0, 2:6].tolist() == [120.0, 188.0, 80.0, 120.0]
+
+
+def test_no_pictures_of_a_name(folder: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="holds no pictures named hall"):
+        Pictures.open(folder, "hall")
