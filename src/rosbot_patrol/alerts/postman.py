@@ -14,6 +14,8 @@ from rosbot_patrol.alerts.transports import DeliveryError, Transport
 
 log = logging.getLogger(__name__)
 
+LOOK_AGAIN = 60.0  # [s]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Delivery:
@@ -62,6 +64,11 @@ class Postman:
         """How long until something is due [s], None where nothing waits."""
         with self._lock:
             return self._outbox.wait(self._clock())
+
+    def pause(self) -> float:
+        """How long until `deliver` may have something to do [s], a minute where nothing waits."""
+        wait = self.wait()
+        return LOOK_AGAIN if wait is None else wait + 0.01
 
     def deliver(self) -> Delivery | None:
         """Deliver what is due now, None where nothing is; waits for the transport. Raises OSError."""

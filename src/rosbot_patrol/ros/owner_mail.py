@@ -77,8 +77,7 @@ class OwnerMail:
         """Deliver one mail; returns how long to wait for the next [s]."""
         done = self._postman.deliver()
         if done is None:
-            wait = self._postman.wait()
-            return 60.0 if wait is None else wait + 0.01
+            return self._postman.pause()
         if done.delivered:
             self._health.set("mail", OK, f"notices go to {self._postman.transport.describe()}")
         else:

@@ -133,8 +133,7 @@ class AlertDesk:
     def _deliver_next(self) -> float:
         done = self._postman.deliver()
         if done is None:
-            wait = self._postman.wait()
-            return 60.0 if wait is None else wait + 0.01
+            return self._postman.pause()
         if done.delivered:
             self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
             incident = load_incident(self._incidents, done.id)
