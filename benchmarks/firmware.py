@@ -14,7 +14,6 @@ import argparse
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+
+from rosbot_patrol.ros.ports import free_port
 
 ROOT = Path(__file__).resolve().parents[1]
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -35,12 +36,6 @@ heard = lambda m: print(time.monotonic_ns(), m.id, int(m.move), flush=True)
 rospy.Subscriber("/motion_trigger", kind, heard, tcp_nodelay=True)
 rospy.spin()
 """
-
-
-def free_port() -> int:
-    with socket.socket() as s:
-        s.bind(("localhost", 0))
-        return int(s.getsockname()[1])
 
 
 def serial_node() -> str:

@@ -26,6 +26,8 @@ from typing import Any
 
 import numpy as np
 
+from rosbot_patrol.ros.ports import free_port
+
 HERE = Path(__file__).resolve().parent
 TICKS = os.sysconf("SC_CLK_TCK")
 AIMS = {"cpu_percent_500": 20, "mb_500": 80, "latency_p50_ms": 1, "latency_p99_ms": 10, "reconnect_500_s": 15}
@@ -205,14 +207,6 @@ def killed(folder: Path, fleet: Child, bridge: Bridge, sensors: int, port: int) 
     seconds = (heard[-1, 0] - began) / 1e9 if back == sensors else float("nan")
     print(f"  kill -9: {said['known']} negotiated, {back} heard again, {seconds:.2f} s", flush=True)
     return seconds, bridge
-
-
-def free_port() -> int:
-    import socket
-
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def measure(folder: Path, options: argparse.Namespace) -> dict[str, float]:

@@ -16,7 +16,6 @@ import argparse
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -25,6 +24,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+
+from rosbot_patrol.ros.ports import free_port
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = ("darknet_ros", "rgb_compress", "rgb_decompress")
@@ -51,9 +52,7 @@ class House:
     """A master, the nodes, and their memory."""
 
     def __init__(self, log: Path) -> None:
-        with socket.socket() as free:
-            free.bind(("localhost", 0))
-            port = free.getsockname()[1]
+        port = free_port()
         os.environ.update(ROS_MASTER_URI=f"http://localhost:{port}", ROS_HOSTNAME="localhost")
         self._log = log.open("w")
         self._core = self._start("roscore", "-p", str(port))

@@ -1,31 +1,21 @@
 """A master, nodes and a probe as processes, so that tests in one pytest run may each have a master of their own."""
 
-import contextlib
 import json
 import os
-import random
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
 from pathlib import Path
 
+from rosbot_patrol.ros.ports import free_port
+
 HERE = Path(__file__).resolve().parent
 
 # A shell's background job starts with SIGINT ignored, and so would every node: each would have to be killed.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def free_port():
-    """A port that nobody has, below those (32768 and up) that connections get, so that none takes it meanwhile."""
-    while True:
-        port = random.SystemRandom().randrange(20000, 32768)
-        with socket.socket() as s, contextlib.suppress(OSError):
-            s.bind(("", port))
-            return port
 
 
 def wait_for(condition, seconds=10.0, what="the condition"):

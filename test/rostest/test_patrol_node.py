@@ -8,7 +8,6 @@ import json
 import mailbox
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -16,16 +15,11 @@ import time
 from pathlib import Path
 
 import pytest
+from ros_processes import free_port
 
 rospy = pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("localhost", 0))
-        return s.getsockname()[1]
 
 
 def stop(process, sig=signal.SIGINT):

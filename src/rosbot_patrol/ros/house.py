@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import threading
 import time
@@ -28,18 +27,12 @@ from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.msg import Alert, Contacts, EspTrigger, PatrolState
 from rosbot_patrol.ros.convert import pose2d_from_pose
+from rosbot_patrol.ros.ports import free_port
 from rosbot_patrol.srv import MoveActor, RemoveActor, SpawnActor
 
 
 class HouseError(PatrolError):
     """The house did not come up or did not do what was waited for."""
-
-
-def free_port() -> int:
-    """A TCP port that nobody listens on now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Master:
