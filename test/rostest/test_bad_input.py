@@ -34,6 +34,7 @@ from ros_processes import Process, free_port, wait_for
 from rosbot_patrol.alerts.incident import Incident
 from rosbot_patrol.alerts.mail import build_mail, make_envelope
 from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.detection.darknet_cfg import read_cfg
 from rosbot_patrol.detection.darknet_weights import format_weights
 from rosbot_patrol.detection.random_weights import random_weights
@@ -296,7 +297,7 @@ def put_a_mail_into_the_outbox(folder):
         verdict="confirmed",
         reason="person seen",
     )
-    mail = build_mail(incident, make_envelope("owner@example.org", "rosbot@localhost"), None)
+    mail = build_mail(incident_notice(incident, None), make_envelope("owner@example.org", "rosbot@localhost"))
     outbox = folder / "state" / "outbox"
     Outbox(outbox).put(incident.id, mail)
     return lambda: list(outbox.glob("*.eml"))

@@ -1,13 +1,12 @@
-"""The mail about an incident: proper MIME, and nothing that a parameter or a room's name can inject.
+"""The mail of a notice: proper MIME, and nothing that a parameter or a room's name can inject.
 
-Matches the tutorial's subject and first sentence. Differs: Date, Message-ID, character set, room, time, verdict and
-the picture (the original writes three header lines and one sentence).
+Differs from the tutorial: Date, Message-ID, character set, room, time, verdict and the picture (the original writes
+three header lines and one sentence).
 """
 
 from __future__ import annotations
 
 import re
-import time
 from dataclasses import dataclass
 from email.errors import HeaderParseError
 from email.headerregistry import Address
@@ -15,11 +14,8 @@ from email.message import EmailMessage
 from email.policy import SMTP
 from email.utils import formatdate, getaddresses
 
-from rosbot_patrol.alerts.incident import Incident
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.errors import ParamError
-
-SUBJECT = "rosbot patrol node"
-FIRST_SENTENCE = "I have found something strange it could be invader"
 
 _USER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]*")  # a user of this machine
 _HOST = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*")
@@ -77,40 +73,30 @@ def make_envelope(email_to: str, email_from: str, *, prefix: str = "~", host: st
     return Envelope(sender=sender[0] if sender and _is_real(sender[0]) else fallback, to=to)
 
 
-def build_mail(
-    incident: Incident, envelope: Envelope, picture: bytes | None, *, picture_note: str = ""
-) -> EmailMessage:
-    """The mail about an incident.
+def build_mail(notice: Notice, envelope: Envelope) -> EmailMessage:
+    """The mail that tells a notice.
 
     Args:
-        incident: what happened.
+        notice: what happened; nothing in it can add a header or a line to the table of facts.
         envelope: who to tell.
-        picture: JPEG, None where there is none.
-        picture_note: what to say about the picture, or why there is none.
     """
-    mail = _empty_mail(SUBJECT, incident.id, incident.wall, envelope)
-    mail["X-Rosbot-Patrol-Incident"] = token(incident.id)
-    mail.set_content(_body(incident, picture_note), charset="utf-8")
-    if picture is not None:
-        name = f"room{incident.room_id}-{token(incident.id)}.jpg"
-        mail.add_attachment(picture, maintype="image", subtype="jpeg", filename=name)
+    mail = _empty_mail(one_line(notice.subject)[:200], notice.id, notice.wall, envelope)
+    if notice.incident:
+        mail["X-Rosbot-Patrol-Incident"] = token(notice.incident)
+    else:
+        mail["X-Rosbot-Patrol-Notice"] = token(notice.id)
+    mail.set_content(plain_text(notice), charset="utf-8")
+    if notice.picture is not None:
+        name = token(notice.picture_name)
+        mail.add_attachment(notice.picture, maintype="image", subtype="jpeg", filename=name)
     return mail
 
 
-def build_notice(notice_id: str, subject: str, text: str, envelope: Envelope, *, wall: float) -> EmailMessage:
-    """A mail of plain text about something that is no incident.
-
-    Args:
-        notice_id: unlike any other's.
-        subject: is made one line of at most 200 characters.
-        text: as it is.
-        envelope: who to tell.
-        wall: when, seconds since 1970.
-    """
-    mail = _empty_mail(one_line(subject)[:200], notice_id, wall, envelope)
-    mail["X-Rosbot-Patrol-Notice"] = token(notice_id)
-    mail.set_content(text, charset="utf-8")
-    return mail
+def plain_text(notice: Notice) -> str:
+    """What a notice says, for a reader of plain text."""
+    text = notice.text.rstrip("\n")
+    table = "\n".join(f"{one_line(key) + ':':10}{one_line(value)}" for key, value in notice.facts)
+    return f"{text}\n\n{table}\n" if table else f"{text}\n"
 
 
 def _empty_mail(subject: str, mail_id: str, wall: float, envelope: Envelope) -> EmailMessage:
@@ -139,24 +125,3 @@ def one_line(text: str) -> str:
 
 def _is_real(address: Address) -> bool:
     return "*" not in address.addr_spec and (not address.domain or bool(_HOST.fullmatch(address.domain)))
-
-
-def _body(incident: Incident, picture_note: str) -> str:
-    when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(incident.wall))
-    rows = [
-        ("Room", f"{incident.room_id} ({incident.room_name})"),
-        ("Time", f"{when} (robot's clock {incident.ros_time:.1f} s)"),
-        ("Verdict", incident.verdict),
-        (
-            "Seen",
-            f"{incident.object_class}, probability {incident.probability:.2f}, in {incident.pictures} pictures",
-        ),
-        ("Why", incident.reason),
-    ]
-    if incident.pose is not None:
-        x, y, yaw = incident.pose
-        rows.append(("Robot", f"x {x:.2f} m, y {y:.2f} m, heading {yaw:.2f} rad in the map"))
-    rows.append(("Picture", picture_note or "attached"))
-    rows.append(("Incident", incident.id))
-    table = "\n".join(f"{key + ':':10}{one_line(value)}" for key, value in rows)
-    return f"{FIRST_SENTENCE}.\n\n{table}\n"

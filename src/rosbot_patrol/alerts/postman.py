@@ -7,8 +7,9 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from email.message import EmailMessage
 
+from rosbot_patrol.alerts.mail import Envelope, build_mail
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Entry, Outbox
 from rosbot_patrol.alerts.transports import DeliveryError, Transport
 
@@ -33,11 +34,14 @@ class Postman:
     Args:
         outbox: mails on disk.
         transport: how they leave.
+        envelope: whom they go to.
         clock: monotonic time [s].
     """
 
-    def __init__(self, outbox: Outbox, transport: Transport, clock: Callable[[], float] = time.monotonic) -> None:
-        self._outbox, self.transport = outbox, transport
+    def __init__(
+        self, outbox: Outbox, transport: Transport, envelope: Envelope, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._outbox, self.transport, self._envelope = outbox, transport, envelope
         self._clock = clock
         self._lock = threading.Lock()
 
@@ -55,10 +59,10 @@ class Postman:
         with self._lock:
             return self._outbox.has(mail_id)
 
-    def put(self, mail_id: str, mail: EmailMessage) -> None:
-        """Keep a mail until it is delivered. Raises OSError."""
+    def put(self, notice: Notice) -> None:
+        """Keep a notice until it is delivered. Raises OSError."""
         with self._lock:
-            self._outbox.put(mail_id, mail)
+            self._outbox.put(notice.id, build_mail(notice, self._envelope))
 
     def wait(self) -> float | None:
         """How long until something is due [s], None where nothing waits."""

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import rospy
 
-from rosbot_patrol.alerts.mail import build_notice, make_envelope
+from rosbot_patrol.alerts.mail import make_envelope
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.postman import Postman
 from rosbot_patrol.alerts.transports import MailParams, make_transport
@@ -37,7 +38,7 @@ class OwnerMail:
         self._envelope = make_envelope(mail.email_to, mail.email_from, prefix=prefix, host=socket.getfqdn())
         transport = make_transport(mail, self._envelope, home=ros_home(), environ=os.environ, prefix=prefix)
         outbox = Outbox(folder, interval=mail.mail_interval, first_delay=mail.mail_retry)
-        self._postman = Postman(outbox, transport)
+        self._postman = Postman(outbox, transport, self._envelope)
         self._health = health
         self._wake = threading.Event()
 
@@ -52,8 +53,7 @@ class OwnerMail:
     def put(self, notice_id: str, subject: str, text: str) -> bool:
         """Keep a notice; returns whether the disk took it."""
         try:
-            mail = build_notice(notice_id, subject, text, self._envelope, wall=time.time())
-            self._postman.put(notice_id, mail)
+            self._postman.put(Notice(id=notice_id, wall=time.time(), kind="sensor", subject=subject, text=text))
         except OSError as err:
             log.error("the notice '%s' cannot be written to %s: %s; trying on", subject, self._postman.place, err)
             self._health.set("mail", WARN, f"the outbox cannot be written: {err}")

@@ -12,11 +12,12 @@ from pathlib import Path
 import rospy
 
 from rosbot_patrol.alerts.incident import Incident, load_incident, save_incident
-from rosbot_patrol.alerts.mail import Envelope, build_mail, one_line
+from rosbot_patrol.alerts.mail import Envelope, one_line
 from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
 from rosbot_patrol.alerts.postman import Postman
 from rosbot_patrol.alerts.transports import Transport
+from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.manager import Notice
@@ -49,7 +50,7 @@ class AlertDesk:
         incidents: Path,
         health: Health,
     ) -> None:
-        self._postman, self._transport, self._envelope = Postman(outbox, transport), transport, envelope
+        self._postman, self._transport = Postman(outbox, transport, envelope), transport
         self._pictures, self._incidents, self._health = pictures, incidents, health
         self._jobs: deque[tuple[Incident, Notice]] = deque()
         self._finals: deque[tuple[str, str, str, int]] = deque()
@@ -147,9 +148,8 @@ class AlertDesk:
             self._jobs.popleft()
             return True
         picture, note = self._picture(notice)
-        mail = build_mail(incident, self._envelope, picture, picture_note=note)
         try:
-            self._postman.put(incident.id, mail)
+            self._postman.put(incident_notice(incident, picture, picture_note=note))
         except OSError as err:
             log.error(
                 "the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, self._postman.place, err

@@ -4,6 +4,7 @@ from email.policy import SMTP, default
 import pytest
 
 from rosbot_patrol.alerts.mail import build_mail, make_envelope
+from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.errors import ParamError
 
 JPEG = b"\xff\xd8\xff\xe0 picture \x00\x01\n.\nFrom \r\n\xff\xd9"
@@ -14,7 +15,7 @@ def read_back(mail):
 
 
 def test_the_mail_is_the_tutorials_and_a_proper_one(make_incident, envelope):
-    mail = read_back(build_mail(make_incident(), envelope, JPEG))
+    mail = read_back(build_mail(incident_notice(make_incident(), JPEG), envelope))
     assert mail["Subject"] == "rosbot patrol node"
     assert mail["To"] == "owner@example.org"
     assert mail["From"] == "robot@example.org"
@@ -35,7 +36,9 @@ def test_the_mail_is_the_tutorials_and_a_proper_one(make_incident, envelope):
 
 
 def test_without_a_picture_the_mail_says_why(make_incident, envelope):
-    mail = read_back(build_mail(make_incident(), envelope, None, picture_note="none came from the camera"))
+    mail = read_back(
+        build_mail(incident_notice(make_incident(), None, picture_note="none came from the camera"), envelope)
+    )
     assert list(mail.iter_attachments()) == []
     assert "none came from the camera" in mail.get_body().get_content()
 
@@ -43,10 +46,10 @@ def test_without_a_picture_the_mail_says_why(make_incident, envelope):
 @pytest.mark.parametrize("evil", ["a\nBcc: evil@x.org", "a\r\n\r\nnew body", "a\x00b", "a\u2028b", "\n.\n"])
 @pytest.mark.parametrize("field", ["room_name", "object_class", "reason", "id", "verdict", "phase"])
 def test_no_field_can_inject_a_header_or_a_line(make_incident, envelope, field, evil):
-    mail = read_back(build_mail(make_incident(**{field: evil}), envelope, JPEG))
+    mail = read_back(build_mail(incident_notice(make_incident(**{field: evil}), JPEG), envelope))
     assert mail["Bcc"] is None
     assert mail["Subject"] == "rosbot patrol node"
-    assert sorted(mail.keys()) == sorted(read_back(build_mail(make_incident(), envelope, JPEG)).keys())
+    assert sorted(mail.keys()) == sorted(read_back(build_mail(incident_notice(make_incident(), JPEG), envelope)).keys())
     lines = mail.get_body().get_content().splitlines()
     assert not any(line.startswith(("Bcc", "new body", ".")) for line in lines)
     assert len(list(mail.iter_attachments())) == 1
@@ -96,4 +99,7 @@ def test_what_is_a_real_address(to, real):
 def test_the_tutorials_placeholder_as_sender_becomes_an_address_that_servers_take(make_incident):
     envelope = make_envelope("", "*****@****.***", host="not a host")
     assert envelope.sender.addr_spec == "rosbot_patrol@localhost"
-    assert read_back(build_mail(make_incident(), envelope, None))["From"] == "rosbot patrol <rosbot_patrol@localhost>"
+    assert (
+        read_back(build_mail(incident_notice(make_incident(), None), envelope))["From"]
+        == "rosbot patrol <rosbot_patrol@localhost>"
+    )

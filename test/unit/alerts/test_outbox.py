@@ -6,13 +6,14 @@ import pytest
 
 from rosbot_patrol.alerts.mail import build_mail
 from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.wording import incident_notice
 
 
 @pytest.fixture
 def put(make_incident, envelope):
     def put(outbox, *names):
         for name in names:
-            outbox.put(name, build_mail(make_incident(id=name), envelope, b"picture"))
+            outbox.put(name, build_mail(incident_notice(make_incident(id=name), b"picture"), envelope))
 
     return put
 

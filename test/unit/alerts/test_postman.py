@@ -1,6 +1,7 @@
 import pytest
 
-from rosbot_patrol.alerts.mail import build_notice
+from rosbot_patrol.alerts.mail import build_mail
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.postman import Postman
 from rosbot_patrol.alerts.transports import DeliveryError, MaildirTransport
@@ -32,13 +33,13 @@ def outbox(tmp_path):
     return Outbox(tmp_path / "outbox", interval=0.0, first_delay=5.0)
 
 
-def notice(envelope, subject="sensor 3 is silent"):
-    return build_notice("20261121T010203Z-sensors1", subject, "text\n", envelope, wall=1_790_000_000.0)
+def notice(name="20261121T010203Z-sensors1", subject="sensor 3 is silent"):
+    return Notice(id=name, wall=1_790_000_000.0, kind="sensor", subject=subject, text="text\n")
 
 
 def test_a_mail_is_delivered_once_and_put_off_from_the_end_of_a_failure(tmp_path, outbox, envelope):
-    postman = Postman(outbox, Down(), clock)
-    postman.put("n1", notice(envelope))
+    postman = Postman(outbox, Down(), envelope, clock)
+    postman.put(notice("n1"))
     done = postman.deliver()
     assert not done.delivered
     assert "next try in 5 s" in done.text
@@ -51,9 +52,9 @@ def test_a_mail_is_delivered_once_and_put_off_from_the_end_of_a_failure(tmp_path
 
 
 def test_a_file_that_is_gone_or_no_mail_does_not_stop_the_others(tmp_path, outbox, envelope):
-    postman = Postman(outbox, MaildirTransport(tmp_path / "mail"), clock)
+    postman = Postman(outbox, MaildirTransport(tmp_path / "mail"), envelope, clock)
     for name in ("n1", "n2", "n3"):
-        postman.put(name, notice(envelope))
+        postman.put(notice(name))
     files = sorted(outbox.folder.glob("*.eml"))
     files[0].unlink()
     files[1].write_bytes(b"\0\0")
@@ -65,7 +66,7 @@ def test_a_file_that_is_gone_or_no_mail_does_not_stop_the_others(tmp_path, outbo
 
 @pytest.mark.parametrize("evil", ["a\nBcc: evil@x.org", "a\r\n\r\nbody", "a\0", "x" * 5000])
 def test_nothing_in_a_notices_subject_can_inject(envelope, evil):
-    mail = notice(envelope, evil)
+    mail = build_mail(notice(subject=evil), envelope)
     text = mail.as_bytes().decode()
     assert mail["Bcc"] is None
     assert "\nBcc:" not in text

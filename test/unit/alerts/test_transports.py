@@ -17,12 +17,13 @@ from rosbot_patrol.alerts.transports import (
     make_transport,
     read_password,
 )
+from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.errors import ParamError
 
 
 @pytest.fixture
 def mail(make_incident, envelope):
-    return build_mail(make_incident(), envelope, b"\xff\xd8 a picture")
+    return build_mail(incident_notice(make_incident(), b"\xff\xd8 a picture"), envelope)
 
 
 def smtp(server, envelope, **given):

@@ -1,0 +1,116 @@
+"""What the owner is told: one record, whatever it travels by, and its form on disk.
+
+A notice says what happened in plain values; each channel makes of it what it sends (a mail, a JSON document). On disk
+it is one JSON document, so that one written today can leave tomorrow by a channel that did not exist yet.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import re
+from dataclasses import dataclass
+from typing import Any
+
+FORMAT = 1
+_ID = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]{0,149}")
+
+URGENT = ("incident", "test")  # never merged into a digest, never held up by what is not urgent
+
+
+@dataclass(frozen=True, kw_only=True)
+class Notice:
+    """One thing that the owner is told.
+
+    Attributes:
+        id: unlike any other's; letters, digits, dots, dashes: it becomes a file's name and a Message-ID.
+        wall: when it happened, seconds since 1970.
+        kind: "incident", "verdict", "sensor", "fault", "digest", "test", ...; channels may ask for some of them only.
+        subject: one line.
+        text: paragraphs, for people.
+        facts: (name, value) pairs shown as a table below the text.
+        room_id, room_name: where; -1 and "" for nowhere.
+        verdict: of the mission; "" for none.
+        incident: id of its record; "" for none.
+        picture: JPEG, None where there is none.
+        picture_name: file name of it.
+        channels: names of those that are asked; empty for all that take its kind.
+
+    Raises:
+        ValueError: an id that is none.
+    """
+
+    id: str
+    wall: float
+    kind: str
+    subject: str
+    text: str
+    facts: tuple[tuple[str, str], ...] = ()
+    room_id: int = -1
+    room_name: str = ""
+    verdict: str = ""
+    incident: str = ""
+    picture: bytes | None = None
+    picture_name: str = "picture.jpg"
+    channels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not _ID.fullmatch(self.id):
+            raise ValueError(f"'{self.id}' is no id of a notice: expected letters, digits, dots and dashes")
+
+    @property
+    def is_urgent(self) -> bool:
+        """Whether it leaves as a message of its own, as soon as it can."""
+        return self.kind in URGENT
+
+    def to_bytes(self) -> bytes:
+        """The notice as it lies on disk."""
+        tree = {"format": FORMAT, **{name: getattr(self, name) for name in _TEXTS}}
+        tree |= {"wall": self.wall, "room_id": self.room_id, "facts": self.facts, "channels": self.channels}
+        if self.picture is not None:
+            tree["picture"] = base64.b64encode(self.picture).decode("ascii")
+        return json.dumps(tree, indent=1).encode("ascii")
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Notice:
+        """The notice that `to_bytes` gave.
+
+        Raises:
+            ValueError: it is none, or one of a newer version of this program; says which.
+        """
+        try:
+            tree = json.loads(data)
+        except (ValueError, RecursionError) as err:
+            raise ValueError(f"is no notice: {err}") from err
+        if not isinstance(tree, dict) or not isinstance(tree.get("format"), int):
+            raise ValueError("is no notice: it has no format number")
+        if tree["format"] > FORMAT:
+            raise ValueError(f"is of format {tree['format']}, this version knows up to {FORMAT}")
+        try:
+            return cls._from_tree(tree)
+        except (KeyError, TypeError, ValueError) as err:
+            raise ValueError(f"is no notice: {err!r}") from err
+
+    @classmethod
+    def _from_tree(cls, tree: dict[str, Any]) -> Notice:
+        texts = {name: tree[name] for name in _TEXTS}
+        for name, value in texts.items():
+            if not isinstance(value, str):
+                raise TypeError(f"{name} is no text")
+        picture = tree.get("picture")
+        try:
+            data = None if picture is None else base64.b64decode(picture, validate=True)
+        except binascii.Error as err:
+            raise ValueError(f"picture: {err}") from err
+        return cls(
+            wall=float(tree["wall"]),
+            room_id=int(tree["room_id"]),
+            facts=tuple((str(name), str(value)) for name, value in tree["facts"]),
+            channels=tuple(map(str, tree["channels"])),
+            picture=data,
+            **texts,
+        )
+
+
+_TEXTS = ("id", "kind", "subject", "text", "room_name", "verdict", "incident", "picture_name")

@@ -1,0 +1,52 @@
+"""What a notice about an incident says. Matches the tutorial's subject and first sentence."""
+
+from __future__ import annotations
+
+import time
+
+from rosbot_patrol.alerts.incident import Incident
+from rosbot_patrol.alerts.mail import token
+from rosbot_patrol.alerts.notice import Notice
+
+SUBJECT = "rosbot patrol node"
+FIRST_SENTENCE = "I have found something strange it could be invader"
+
+
+def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: str = "") -> Notice:
+    """The notice of a confirmed intruder.
+
+    Args:
+        incident: what happened.
+        picture: JPEG, None where there is none.
+        picture_note: what to say about the picture, or why there is none.
+    """
+    return Notice(
+        id=token(incident.id),
+        wall=incident.wall,
+        kind="incident",
+        subject=SUBJECT,
+        text=f"{FIRST_SENTENCE}.",
+        facts=_facts(incident, picture_note),
+        room_id=incident.room_id,
+        room_name=incident.room_name,
+        verdict=incident.verdict,
+        incident=incident.id,
+        picture=picture,
+        picture_name=f"room{incident.room_id}-{token(incident.id)}.jpg",
+    )
+
+
+def _facts(incident: Incident, picture_note: str) -> tuple[tuple[str, str], ...]:
+    when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(incident.wall))
+    seen = f"{incident.object_class}, probability {incident.probability:.2f}, in {incident.pictures} pictures"
+    rows = [
+        ("Room", f"{incident.room_id} ({incident.room_name})"),
+        ("Time", f"{when} (robot's clock {incident.ros_time:.1f} s)"),
+        ("Verdict", incident.verdict),
+        ("Seen", seen),
+        ("Why", incident.reason),
+    ]
+    if incident.pose is not None:
+        x, y, yaw = incident.pose
+        rows.append(("Robot", f"x {x:.2f} m, y {y:.2f} m, heading {yaw:.2f} rad in the map"))
+    return (*rows, ("Picture", picture_note or "attached"), ("Incident", incident.id))
