@@ -1,0 +1,163 @@
+"""The floor that a map shows, on a grid coarse enough to reckon with in plain numpy, with the clearance to what stands.
+
+The patrol asks it where somebody could be, where the robot can stand and how far one can look. Cells that the map does
+not know are no floor: the inside of a cupboard, what lies beyond a window.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.errors import MapError
+from rosbot_patrol.grid import Grid, GridInfo
+
+Mask = NDArray[np.bool_]
+Array = NDArray[np.float64]
+
+EDGE = 0.1  # of a cell of the floor [m]
+CLEARANCE_MOST = 1.0  # clearances are exact up to here [m]
+_MARGIN = 0.3  # around the known part of the map [m]
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Where there is floor.
+
+    Attributes:
+        info: place and size of the grid, in the map's frame.
+        free: floor, shape (height, width).
+        clearance: from a floor cell to the nearest thing or unknown place [m], at most CLEARANCE_MOST; 0 elsewhere.
+    """
+
+    info: GridInfo
+    free: Mask
+    clearance: Array
+
+    @property
+    def cell_area(self) -> float:
+        """[m^2]."""
+        return self.info.resolution**2
+
+    def is_free(self, x: float, y: float) -> bool:
+        """Whether a point lies on the floor."""
+        ix, iy = self.info.cell_of(x, y)
+        return self.info.contains_cell(ix, iy) and bool(self.free[iy, ix])
+
+    def nearest(self, mask: Mask, x: float, y: float, within: float = math.inf) -> tuple[int, int] | None:
+        """(ix, iy) of the cell of a mask that is nearest to a point, None where none lies within a distance [m]."""
+        iy, ix = np.nonzero(mask)
+        if not len(ix):
+            return None
+        xs, ys = self.centres(ix, iy)
+        gaps = np.hypot(xs - x, ys - y)
+        k = int(gaps.argmin())
+        return (int(ix[k]), int(iy[k])) if gaps[k] <= within else None
+
+    def centres(self, ix: NDArray[np.int64], iy: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Place in x and y of cells' centres [m]."""
+        i = self.info
+        return i.origin_x + (ix + 0.5) * i.resolution, i.origin_y + (iy + 0.5) * i.resolution
+
+    def indices(self, xs: Array, ys: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Mask]:
+        """ix, iy of points, clipped to the grid, and which lie inside."""
+        i = self.info
+        ix = np.floor((xs - i.origin_x) / i.resolution).astype(np.int64)
+        iy = np.floor((ys - i.origin_y) / i.resolution).astype(np.int64)
+        inside = (ix >= 0) & (iy >= 0) & (ix < i.width) & (iy < i.height)
+        return ix.clip(0, i.width - 1), iy.clip(0, i.height - 1), inside
+
+    def mark_near(self, points: Array, radius: float) -> Mask:
+        """Cells whose centre lies within a radius [m] of any point, shape (N, 2)."""
+        hit = np.zeros(self.info.shape, bool)
+        ix, iy, inside = self.indices(points[:, 0], points[:, 1])
+        hit[iy[inside], ix[inside]] = True
+        return _grown(hit, math.ceil(radius / self.info.resolution - 0.5))
+
+
+def floor_of(grid: Grid, *, free_below: int = 25) -> Floor:
+    """The floor of a map.
+
+    Args:
+        grid: occupancy, -1 unknown, 0 free to 100 occupied.
+        free_below: up to this a cell is floor.
+
+    Raises:
+        MapError: the map is turned, or shows no floor.
+    """
+    grid.info.require_aligned("the patrol's floor")
+    is_floor = (grid.cells >= 0) & (grid.cells <= free_below)
+    if not is_floor.any():
+        raise MapError("the map", "shows no free cell, so that nobody can say what of a room was seen")
+    fold = max(1, round(EDGE / grid.info.resolution))
+    info, fine = _cropped(grid.info, is_floor, fold)
+    clearance = _clearance(fine, CLEARANCE_MOST / grid.info.resolution) * grid.info.resolution
+    blocks = (info.height, fold, info.width, fold)
+    free = fine.reshape(blocks).mean(axis=(1, 3)) >= 0.5
+    coarse = clearance.reshape(blocks).max(axis=(1, 3))
+    return Floor(info, free, np.where(free, coarse, 0.0))
+
+
+def _cropped(info: GridInfo, is_floor: Mask, fold: int) -> tuple[GridInfo, Mask]:
+    """The coarse grid about the floor, and the fine cells under it."""
+    margin = math.ceil(_MARGIN / info.resolution)
+    rows, columns = np.flatnonzero(is_floor.any(axis=1)), np.flatnonzero(is_floor.any(axis=0))
+    y0, x0 = int(rows[0]) - margin, int(columns[0]) - margin
+    height = math.ceil((int(rows[-1]) + 1 + margin - y0) / fold)
+    width = math.ceil((int(columns[-1]) + 1 + margin - x0) / fold)
+    fine = np.zeros((height * fold, width * fold), bool)
+    into_y, into_x = max(-y0, 0), max(-x0, 0)
+    part = is_floor[max(y0, 0) : y0 + height * fold, max(x0, 0) : x0 + width * fold]
+    fine[into_y : into_y + part.shape[0], into_x : into_x + part.shape[1]] = part
+    coarse = GridInfo(
+        resolution=info.resolution * fold,
+        width=width,
+        height=height,
+        origin_x=info.origin_x + x0 * info.resolution,
+        origin_y=info.origin_y + y0 * info.resolution,
+    )
+    return coarse, fine
+
+
+def _clearance(free: Mask, most: float) -> Array:
+    """Distance from each free cell to the nearest that is not [cells], exact up to `most`.
+
+    Columns first, then rows: the two passes of Felzenszwalb and Huttenlocher's distance transform, the second one over
+    the shifts that the bound allows.
+    """
+    reach = math.ceil(most)
+    down = _run_lengths(free)
+    up = _run_lengths(free[::-1])[::-1]
+    column = np.minimum(np.minimum(down, up), reach + 1).astype(np.float64) ** 2
+    best = column.copy()
+    for shift in range(1, reach + 1):
+        best[:, shift:] = np.minimum(best[:, shift:], column[:, :-shift] + shift * shift)
+        best[:, :-shift] = np.minimum(best[:, :-shift], column[:, shift:] + shift * shift)
+    out: Array = np.minimum(np.sqrt(best), most)
+    return out
+
+
+def _run_lengths(free: Mask) -> NDArray[np.int64]:
+    """How many free cells in a row end at each cell, from row 0 on."""
+    out = np.zeros(free.shape, np.int64)
+    count = np.zeros(free.shape[1], np.int64)
+    for row, is_free in enumerate(free):
+        count = (count + 1) * is_free
+        out[row] = count
+    return out
+
+
+def _grown(mask: Mask, cells: int) -> Mask:
+    """A mask with all within so many cells of it."""
+    out = mask.copy()
+    for dy in range(-cells, cells + 1):
+        for dx in range(-cells, cells + 1):
+            if dx * dx + dy * dy > cells * cells:
+                continue
+            to = (slice(max(dy, 0), mask.shape[0] + min(dy, 0)), slice(max(dx, 0), mask.shape[1] + min(dx, 0)))
+            of = (slice(max(-dy, 0), mask.shape[0] + min(-dy, 0)), slice(max(-dx, 0), mask.shape[1] + min(-dx, 0)))
+            out[to] |= mask[of]
+    return out

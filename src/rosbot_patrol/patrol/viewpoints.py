@@ -1,0 +1,196 @@
+"""Where to look from next, so that the floor of a room that is not yet seen comes into view.
+
+Next best view (Connolly 1985; for coverage by a ground robot Gonzalez-Banos and Latombe 2002): of the places that the
+robot can reach in the room and at its doors, the one that shows most unseen floor for each metre of way.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.coverage import CoverageParams, sight_on_map, visible
+from rosbot_patrol.patrol.floor import Array, Floor, Mask
+
+_FAR = 1e9
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewpointParams:
+    """Where one may look from, and what it must be worth."""
+
+    coverage_goal: float = param(0.95, lo=0.0, hi=1.0, doc="share of the room's floor that is enough")
+    viewpoints_most: int = param(4, lo=0, hi=50, doc="further viewpoints in one mission, at most")
+    viewpoints_time: float = param(150.0, unit="s", lo=0.0, doc="no further viewpoint is begun later than this")
+    viewpoint_gain: float = param(0.01, lo=0.0, hi=1.0, doc="share of the floor that a viewpoint must show anew")
+    viewpoint_clearance: float = param(
+        0.35, unit="m", lo=0.1, doc="from a viewpoint to the nearest thing, so that the robot can turn there"
+    )
+    passage_clearance: float = param(
+        0.22, unit="m", lo=0.05, doc="half the narrowest gap that a viewpoint is reached through"
+    )
+    viewpoint_spacing: float = param(0.4, unit="m", lo=0.1, doc="between the places that are compared")
+    doorway_depth: float = param(1.0, unit="m", lo=0.0, doc="so far outside of the room a viewpoint may lie")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Viewpoint:
+    """A place to look from.
+
+    Attributes:
+        pose: in map, heading where the turn begins.
+        turn: to the left from there [rad], 0 where one look ahead is enough.
+        gain: unseen floor that it shows [m^2].
+        way: to it [m].
+    """
+
+    pose: Pose2D
+    turn: float
+    gain: float
+    way: float
+
+
+class ViewpointPlanner:
+    """Plans viewpoints on one floor.
+
+    Args:
+        floor: of the map.
+        params: of viewpoints.
+        coverage: what counts as seen.
+    """
+
+    def __init__(
+        self, floor: Floor, params: ViewpointParams | None = None, coverage: CoverageParams | None = None
+    ) -> None:
+        self.floor, self.params = floor, params or ViewpointParams()
+        self._coverage = coverage or CoverageParams()
+
+    def next(
+        self,
+        start: Pose2D,
+        room: Mask,
+        unseen: Mask,
+        *,
+        width: float,
+        stands: Mask | None = None,
+        tried: tuple[tuple[float, float], ...] = (),
+    ) -> Viewpoint | None:
+        """The best further viewpoint, None where none is worth its way.
+
+        Args:
+            start: where the robot is, in map.
+            room: the room's floor.
+            unseen: its part that is not yet seen.
+            width: of the camera's view [rad].
+            stands: cells on which something stands that the map does not show, grown by the robot's radius.
+            tried: places [m] that could not be reached; their surroundings are left out.
+        """
+        ways = self.ways(start, stands)
+        places = self._places(room, ways, stands, tried)
+        least = max(self.params.viewpoint_gain * int(room.sum()), 1.0)
+        best: tuple[float, float, float, float, int] | None = None
+        for x, y, way in places:
+            sight = sight_on_map(self.floor, x, y, self._coverage.view_range)
+            shown = int(visible(self.floor, unseen, sight, self._coverage)[2].sum())
+            worth = shown / (way + 1.5)  # a turn costs as much as a metre and a half
+            if shown >= least and (best is None or worth > best[0]):
+                best = worth, x, y, way, shown
+        if best is None:
+            return None
+        _, x, y, way, most = best
+        first, turn = self.arc(x, y, unseen, width)
+        return Viewpoint(pose=Pose2D(x, y, first), turn=turn, gain=most * self.floor.cell_area, way=way)
+
+    def instead(
+        self, start: Pose2D, room: Mask, *, tried: tuple[tuple[float, float], ...], width: float
+    ) -> Viewpoint | None:
+        """Another place to look into a room from whose own point cannot be reached."""
+        return self.next(start, room, room, width=width, tried=tried)
+
+    def arc(self, x: float, y: float, unseen: Mask, width: float) -> tuple[float, float]:
+        """Heading at which to begin [rad] and how far to turn left [rad], to have all unseen floor in view from there.
+
+        The turn is a whole one where unseen floor lies all round.
+        """
+        sight = sight_on_map(self.floor, x, y, self._coverage.view_range)
+        bearings, _, in_view = visible(self.floor, unseen, sight, self._coverage)
+        bearings = np.sort(bearings[in_view])
+        if not len(bearings):
+            return 0.0, math.tau
+        gaps = np.diff(bearings, append=bearings[0] + math.tau)
+        k = int(gaps.argmax())
+        first, span = float(bearings[(k + 1) % len(bearings)]), math.tau - float(gaps[k])
+        inner = 0.6 * width  # the outer fifths of the picture are for what the heading is off by
+        if span <= inner:
+            return math.remainder(first + span / 2.0, math.tau), 0.0
+        turn = span - inner
+        if turn > math.tau - width:
+            return math.remainder(first, math.tau), math.tau
+        return math.remainder(first + inner / 2.0, math.tau), turn
+
+    def ways(self, start: Pose2D, stands: Mask | None = None) -> Array:
+        """Length of the way from a pose to each cell [m], _FAR where the robot does not get."""
+        wide = self.floor.clearance >= self.params.passage_clearance
+        if stands is not None:
+            wide &= ~stands
+        cell = self.floor.nearest(wide, start.x, start.y, 1.0)
+        if cell is None:
+            return np.full(self.floor.info.shape, _FAR)
+        return _ways(wide, cell) * self.floor.info.resolution
+
+    def _places(
+        self, room: Mask, ways: Array, stands: Mask | None, tried: tuple[tuple[float, float], ...]
+    ) -> list[tuple[float, float, float]]:
+        p, floor = self.params, self.floor
+        iy, ix = np.nonzero(room)
+        if not len(ix):
+            return []
+        xs, ys = floor.centres(ix, iy)
+        inside = floor.mark_near(np.column_stack((xs, ys)), p.doorway_depth)
+        good = inside & (floor.clearance >= p.viewpoint_clearance) & (ways < _FAR)
+        if stands is not None:
+            good &= ~stands
+        for x, y in tried:
+            good &= ~floor.mark_near(np.array([[x, y]]), p.viewpoint_spacing)
+        return [self._place(iy, ix, ways) for iy, ix in self._thinned(good)]
+
+    def _thinned(self, good: Mask) -> list[tuple[int, int]]:
+        """Of each square of the spacing, the cell with the greatest clearance."""
+        edge = max(round(self.params.viewpoint_spacing / self.floor.info.resolution), 1)
+        iy, ix = np.nonzero(good)
+        square = (iy // edge) * (good.shape[1] // edge + 1) + ix // edge
+        order = np.lexsort((-self.floor.clearance[iy, ix], square))
+        _, first = np.unique(square[order], return_index=True)
+        return [(int(iy[order[k]]), int(ix[order[k]])) for k in first]
+
+    def _place(self, iy: int, ix: int, ways: Array) -> tuple[float, float, float]:
+        x, y = self.floor.info.centre_of(ix, iy)
+        return x, y, float(ways[iy, ix])
+
+
+def _ways(wide: Mask, start: tuple[int, int]) -> Array:
+    """Steps from a cell to each other over a mask, by waves over the whole grid: a diagonal counts 1.4."""
+    out = np.full(wide.shape, _FAR)
+    ix, iy = start
+    out[iy, ix] = 0.0
+    front: tuple[NDArray[np.int64], NDArray[np.int64]] = (np.array([iy]), np.array([ix]))
+    steps = [(dy, dx, math.hypot(dy, dx)) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
+    while len(front[0]):
+        reached = []
+        for dy, dx, length in steps:
+            y, x = front[0] + dy, front[1] + dx
+            gone = out[front] + length
+            inside = (y >= 0) & (x >= 0) & (y < wide.shape[0]) & (x < wide.shape[1])
+            y, x, gone = y[inside], x[inside], gone[inside]
+            better = wide[y, x] & (gone < out[y, x] - 1e-9)
+            y, x, gone = y[better], x[better], gone[better]
+            np.minimum.at(out, (y, x), gone)
+            reached.append(y * wide.shape[1] + x)
+        cells = np.unique(np.concatenate(reached))
+        front = cells // wide.shape[1], cells % wide.shape[1]
+    return out
