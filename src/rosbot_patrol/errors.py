@@ -14,7 +14,8 @@
     |- ProtocolError      bytes of a peer that make no sense
     |- DetectorError      a network, its weights or a picture
     |- ImageError         the bytes of a picture that make no sense
-    `- AlertError         a notice that could not be delivered
+    |- AlertError         a notice that could not be delivered
+    `- StoreError         incidents that could not be kept or read
 
 A constructor takes facts and writes the sentence, so that a reader is told what and where.
 """
@@ -147,3 +148,21 @@ class ImageError(PatrolError):
 
 class AlertError(PatrolError):
     """A notice that its transport did not take."""
+
+
+class StoreError(PatrolError):
+    """The incidents' database or folder does not do what it should.
+
+    Args:
+        path: of the database or the file.
+        problem: what is wrong with it.
+        is_full: the disk has no room, or no more than it may use.
+        is_corrupt: what is in the database makes no sense; it has to be set aside.
+    """
+
+    def __init__(self, path: object, problem: str, *, is_full: bool = False, is_corrupt: bool = False) -> None:
+        super().__init__(f"{path}: {problem}")
+        self.path = str(path)
+        self.problem = problem
+        self.is_full = is_full
+        self.is_corrupt = is_corrupt

@@ -1,73 +1,153 @@
-"""What happened: the record of one confirmed intruder, as plain values."""
+"""What happened: the record of one mission, as plain values."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
-from dataclasses import dataclass
-from pathlib import Path
+import re
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
-from rosbot_patrol.files import write_atomic
+OPEN = ""  # the verdict of a mission that still runs
+VERDICTS = ("confirmed", "clear", "unreachable", "unverified")
+
+_NAME = re.compile(r"(?!\.)[A-Za-z0-9._+-]{1,120}")
+_DOING = {"driving": "driving to", "looking": "looking around in", "returning": "coming home from"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event:
+    """Something that was said or done during a mission.
+
+    Attributes:
+        wall: when, seconds since 1970.
+        kind: sensor (what one said), state (what the robot does), seen, notice, verdict, fault, note.
+        text: one sentence.
+        data: further plain values, such as the sensor's id.
+    """
+
+    wall: float
+    kind: str
+    text: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredFile:
+    """A file of an incident's folder.
+
+    Attributes:
+        name: in that folder.
+        role: detection (the notice's picture), best, before, after, look, map, other.
+        sha256: of its bytes, in hex; size: of it [bytes].
+        stamp: when a picture was taken, by the robot's clock [s]; None where it is no picture.
+        caption: for people.
+    """
+
+    name: str
+    role: str
+    sha256: str
+    size: int
+    stamp: float | None = None
+    caption: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Incident:
-    """One intruder of one mission.
+    """One mission, whatever came of it.
 
     Attributes:
-        id: that of its mission.
-        wall: when it was confirmed, seconds since 1970; ros_time: by the robot's clock [s].
-        room_id, room_name: of the mission.
-        phase: what the robot was doing: driving, looking, returning.
-        object_class, probability: of the detector, mean over `pictures`.
-        verdict: of the mission so far; reason: in one sentence.
-        pose: x [m], y [m], yaw [rad] of the robot in map, None where it was not known.
-        sightings: how many pictures confirmed it in the whole mission, known when that is over.
-        final: the mission is over.
+        id: that of its mission, with "-2" and so on for further persons elsewhere in the same mission.
+        wall: when it began, seconds since 1970; ros_time: the same by the robot's clock [s].
+        room_id, room_name: where the robot was sent.
+        origin: what sent it: trigger, schedule, action, silent sensor, all.
+        verdict: one of VERDICTS, OPEN while there is none; reason: in one sentence.
+        phase: what the robot was doing when it saw somebody first, or else last: driving, looking, returning.
+        times: (phase, wall) in the order in which the phases began.
+        share_seen: of the room's floor, 0 to 1; None where nobody measured.
+        object_class, probability: of the detector, mean over `pictures`; "", 0 and 0 where nobody was confirmed.
+        confirmed: when somebody was, seconds since 1970; sightings: confirmations in all.
+        pose: x [m], y [m], yaw [rad] of the robot in map at that moment, None where it was not known.
+        person: x, y [m] of the person in map, None where nobody knows; person_room: the room that lies in, "" for none.
+        path: x, y [m] of the robot in map on its way.
+        triggers: how often the room's sensor called.
+        closed: when the record was completed, seconds since 1970; None while it is open.
+        events: in the order in which they came.
+        files: of its folder.
     """
 
     id: str
     wall: float
-    ros_time: float
     room_id: int
     room_name: str
-    phase: str
-    object_class: str
-    probability: float
-    pictures: int
-    verdict: str
-    reason: str
-    pose: tuple[float, float, float] | None = None
+    ros_time: float = 0.0
+    origin: str = "trigger"
+    verdict: str = OPEN
+    reason: str = ""
+    phase: str = ""
+    times: tuple[tuple[str, float], ...] = ()
+    share_seen: float | None = None
+    object_class: str = ""
+    probability: float = 0.0
+    pictures: int = 0
+    confirmed: float | None = None
     sightings: int = 0
-    final: bool = False
+    pose: tuple[float, float, float] | None = None
+    person: tuple[float, float] | None = None
+    person_room: str = ""
+    path: tuple[tuple[float, float], ...] = ()
+    triggers: int = 1
+    closed: float | None = None
+    events: tuple[Event, ...] = ()
+    files: tuple[StoredFile, ...] = ()
+
+    @property
+    def room(self) -> str:
+        """Number and name."""
+        return f"room {self.room_id} ({self.room_name})" if self.room_name else f"room {self.room_id}"
 
     @property
     def sentence(self) -> str:
         """For people."""
-        return (
-            f"{self.object_class} seen while {_DOING.get(self.phase, self.phase)} room {self.room_id}"
-            f" ({self.room_name}), probability {self.probability:.2f}"
-        )
+        if self.object_class:
+            doing = _DOING.get(self.phase, self.phase)
+            return f"{self.object_class} seen while {doing} {self.room}, probability {self.probability:.2f}"
+        return f"{self.room}: {self.verdict or 'the mission runs'}{f', {self.reason}' if self.reason else ''}"
+
+    def durations(self) -> tuple[tuple[str, float], ...]:
+        """How long each phase took [s]; the last one until the record was closed."""
+        ends = [wall for _, wall in self.times[1:]] + ([self.closed] if self.closed is not None else [])
+        return tuple((phase, end - wall) for (phase, wall), end in zip(self.times, ends, strict=False))
 
 
-_DOING = {"driving": "driving to", "looking": "looking around in", "returning": "coming home from"}
+def is_name(text: str) -> bool:
+    """Whether a text can be the name of an incident's folder or of a file in it."""
+    return bool(_NAME.fullmatch(text))
 
 
-def save_incident(folder: Path, incident: Incident, picture: bytes | None = None) -> Path:
-    """Write the record (and its picture) into `folder`/ID; returns that folder. Raises OSError."""
-    home = folder / incident.id
-    if picture is not None:
-        write_atomic(home / "picture.jpg", picture)
-    text = json.dumps(dataclasses.asdict(incident), indent=1, ensure_ascii=False)
-    write_atomic(home / "incident.json", text.encode("utf-8"))
-    return home
+def incident_to_plain(incident: Incident) -> dict[str, Any]:
+    """The record for JSON."""
+    return dataclasses.asdict(incident)
 
 
-def load_incident(folder: Path, incident_id: str) -> Incident | None:
-    """The record of an id, None where there is none that makes sense."""
-    try:
-        tree = json.loads((folder / incident_id / "incident.json").read_text(encoding="utf-8"))
-        pose = tree.pop("pose")
-        return Incident(**tree, pose=tuple(pose) if pose else None)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
-        return None
+def incident_from_plain(plain: Mapping[str, Any]) -> Incident:
+    """The record of `incident_to_plain`; fields that a later version added are left out.
+
+    Raises:
+        KeyError, TypeError, ValueError: this is no record.
+    """
+    known = {f.name for f in dataclasses.fields(Incident)}
+    values: dict[str, Any] = {key: value for key, value in plain.items() if key in known}
+    for key in ("pose", "person"):
+        values[key] = tuple(map(float, values[key])) if values.get(key) else None
+    values["times"] = tuple((str(phase), float(wall)) for phase, wall in values.get("times", ()))
+    values["path"] = tuple((float(x), float(y)) for x, y in values.get("path", ()))
+    values["events"] = tuple(Event(**event) for event in values.get("events", ()))
+    values["files"] = tuple(StoredFile(**file) for file in values.get("files", ()))
+    return Incident(**values)
+
+
+def clock_text(wall: float) -> str:
+    """A time for people, in the robot's time zone."""
+    return time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(wall))

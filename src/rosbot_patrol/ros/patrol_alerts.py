@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import threading
 import time
@@ -11,7 +12,8 @@ from pathlib import Path
 
 import rospy
 
-from rosbot_patrol.alerts.incident import Incident, load_incident, save_incident
+from rosbot_patrol.alerts.incident import Incident
+from rosbot_patrol.alerts.incident_json import load_incident, save_incident
 from rosbot_patrol.alerts.mail import Envelope, one_line
 from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
@@ -194,8 +196,10 @@ class AlertDesk:
     def _complete(self, mission_id: str, verdict: str, reason: str, sightings: int) -> None:
         incident = load_incident(self._incidents, mission_id)
         if incident is not None:
-            fields = {**incident.__dict__, "verdict": verdict, "reason": reason, "sightings": sightings, "final": True}
-            self._save(Incident(**fields), None)
+            closed = dataclasses.replace(
+                incident, verdict=verdict, reason=reason, sightings=sightings, closed=time.time()
+            )
+            self._save(closed, None)
 
     def _publish(
         self, incident: Incident | None, *, delivered: bool, location: str, text: str, incident_id: str = ""

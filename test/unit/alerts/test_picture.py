@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rosbot_patrol.alerts.incident import load_incident, save_incident
+from rosbot_patrol.alerts.incident_json import load_incident, save_incident
 from rosbot_patrol.alerts.picture import LabelledBox, RawPicture, to_jpeg
 from rosbot_patrol.errors import AlertError
 
@@ -64,7 +64,7 @@ def test_what_cannot_be_attached_is_said(bad, said):
 
 
 def test_an_incident_reads_back(tmp_path, make_incident):
-    incident = make_incident()
+    incident = make_incident(confirmed=1_790_000_000.0)
     home = save_incident(tmp_path, incident, b"jpeg")
     assert load_incident(tmp_path, incident.id) == incident
     assert (home / "picture.jpg").read_bytes() == b"jpeg"

@@ -1,0 +1,185 @@
+"""The incidents' SQLite file: its tables, how it is opened, and what becomes of one that cannot be used.
+
+WAL, so that people read while the robot writes; synchronous=FULL, so that what a call wrote is on the disk when it
+returns. Tables:
+
+- links: the chain (rosbot_patrol.alerts.chain). A closed record is the body of its link, byte for byte.
+- incidents: what lists and searches need of each record, and the whole of those that are open.
+- events, files: of open records only; they move into the link's body on closing.
+- incidents_text: an FTS5 index over two columns of incidents.
+
+A file of a later version is never written: a new one is begun beside it, with this version in its name. One that makes
+no sense is renamed, never deleted.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rosbot_patrol.errors import StoreError
+
+VERSION = 1
+APPLICATION_ID = 0x52504149  # "RPAI"
+NAME = "incidents.sqlite"
+FOLDER = "incidents"
+BUSY_TIMEOUT = 5.0  # [s] to wait for another writer
+
+_SCHEMA = """
+CREATE TABLE links (
+  n INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT NOT NULL, incident TEXT NOT NULL, wall REAL NOT NULL,
+  body TEXT, digest TEXT NOT NULL, previous TEXT NOT NULL, hash TEXT NOT NULL);
+CREATE INDEX links_incident ON links(incident);
+CREATE TABLE incidents (
+  seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, wall REAL NOT NULL, room_id INTEGER NOT NULL,
+  room_name TEXT NOT NULL, origin TEXT NOT NULL, verdict TEXT NOT NULL, reason TEXT NOT NULL, share REAL,
+  object_class TEXT NOT NULL, closed REAL, link INTEGER, bytes INTEGER NOT NULL DEFAULT 0,
+  tags TEXT NOT NULL, words TEXT NOT NULL, record TEXT);
+CREATE INDEX incidents_wall ON incidents(wall);
+CREATE INDEX incidents_room ON incidents(room_id, wall);
+CREATE INDEX incidents_verdict ON incidents(verdict, wall);
+CREATE INDEX incidents_both ON incidents(room_id, verdict, wall);
+CREATE INDEX incidents_open ON incidents(seq) WHERE closed IS NULL;
+CREATE TABLE events (
+  n INTEGER PRIMARY KEY, incident TEXT NOT NULL, wall REAL NOT NULL, kind TEXT NOT NULL, text TEXT NOT NULL,
+  data TEXT NOT NULL);
+CREATE INDEX events_incident ON events(incident);
+CREATE TABLE files (
+  incident TEXT NOT NULL, name TEXT NOT NULL, role TEXT NOT NULL, sha256 TEXT NOT NULL, size INTEGER NOT NULL,
+  stamp REAL, caption TEXT NOT NULL, PRIMARY KEY (incident, name));
+CREATE VIRTUAL TABLE incidents_text USING fts5(
+  tags, words, content='incidents', content_rowid='seq', tokenize='unicode61 remove_diacritics 2', prefix='2 3');
+CREATE TRIGGER incidents_added AFTER INSERT ON incidents BEGIN
+  INSERT INTO incidents_text(rowid, tags, words) VALUES (new.seq, new.tags, new.words); END;
+CREATE TRIGGER incidents_gone AFTER DELETE ON incidents BEGIN
+  INSERT INTO incidents_text(incidents_text, rowid, tags, words)
+  VALUES ('delete', old.seq, old.tags, old.words); END;
+CREATE TRIGGER incidents_changed AFTER UPDATE OF tags, words ON incidents BEGIN
+  INSERT INTO incidents_text(incidents_text, rowid, tags, words)
+  VALUES ('delete', old.seq, old.tags, old.words);
+  INSERT INTO incidents_text(rowid, tags, words) VALUES (new.seq, new.tags, new.words); END;
+"""
+
+
+def beside(path: Path) -> Path:
+    """Where this version keeps its incidents when the file at `path` is a later version's."""
+    return path.with_name(f"{path.stem}.v{VERSION}{path.suffix}")
+
+
+def database_path(state_dir: Path) -> tuple[Path, int]:
+    """The file that this version uses in a folder, and the version of a later one that it leaves alone (0: none).
+
+    Raises:
+        StoreError: the file is there and cannot be read.
+    """
+    path = state_dir / NAME
+    version = _version(path)
+    return (beside(path), version) if version > VERSION else (path, 0)
+
+
+def open_for_reading(path: Path) -> sqlite3.Connection:
+    """A connection that writes nothing; works beside a program that writes, and on a disk that takes nothing.
+
+    Raises:
+        StoreError: there is no such file, or it is no database of incidents.
+    """
+    if not path.exists():
+        raise StoreError(path, "there is none; the patrol makes it when it starts")
+    wal = path.with_name(path.name + "-wal")
+    with errors_of(path):
+        try:
+            connection = _connect(path, "mode=ro")
+            connection.execute("SELECT n FROM links LIMIT 1").fetchone()
+        except sqlite3.OperationalError:
+            if wal.exists() and wal.stat().st_size:
+                raise
+            connection = _connect(path, "immutable=1")
+            connection.execute("SELECT n FROM links LIMIT 1").fetchone()
+    return connection
+
+
+def open_for_writing(path: Path) -> sqlite3.Connection:
+    """A connection that writes; makes the database where there is none.
+
+    Raises:
+        StoreError: `is_corrupt` where the file is no such database or a damaged one.
+    """
+    with errors_of(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        connection = _connect(path, "mode=rwc")
+        try:
+            _prepare(connection, path)
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    uri = f"{path.absolute().as_uri()}?{mode}"
+    connection = sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT, isolation_level=None, check_same_thread=False)
+    connection.row_factory = sqlite3.Row
+    return connection
+
+
+def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+    if not connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+        connection.execute("PRAGMA auto_vacuum=INCREMENTAL")
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA journal_size_limit=4194304")
+    version = connection.execute("PRAGMA user_version").fetchone()[0]
+    if version == 0 and not connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+        connection.executescript(
+            f"BEGIN IMMEDIATE;{_SCHEMA}PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};COMMIT;"
+        )
+        return
+    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID or version != VERSION:
+        raise StoreError(path, "is a database, but not one of incidents", is_corrupt=True)
+    problem = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+    if problem != "ok":
+        raise StoreError(path, f"is damaged: {problem.splitlines()[0]}", is_corrupt=True)
+
+
+def _version(path: Path) -> int:
+    """The version that a file says it has; 0 where there is none or it says nothing."""
+    if not path.exists():
+        return 0
+    try:
+        with path.open("rb") as file:
+            head = file.read(72)
+    except OSError as err:
+        raise StoreError(path, f"cannot be read: {err.strerror or err}") from err
+    is_ours = head.startswith(b"SQLite format 3\0") and int.from_bytes(head[68:72], "big") == APPLICATION_ID
+    return int.from_bytes(head[60:64], "big") if is_ours else 0
+
+
+@contextmanager
+def errors_of(path: Path) -> Iterator[None]:
+    """Whatever SQLite and the disk say about a file, as a StoreError."""
+    try:
+        yield
+    except sqlite3.Error as err:
+        name = getattr(err, "sqlite_errorname", "") or ""
+        is_corrupt = name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB")) or (
+            type(err) is sqlite3.DatabaseError and not name
+        )
+        raise StoreError(path, str(err), is_full=name.startswith("SQLITE_FULL"), is_corrupt=is_corrupt) from err
+    except OSError as err:
+        raise StoreError(path, f"{err.strerror or err}", is_full=err.errno in (27, 28, 122)) from err
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.Connection]:
+    """All or nothing, on the disk when it ends. Raises StoreError."""
+    with errors_of(path):
+        connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield connection
+            connection.execute("COMMIT")
+        except BaseException:
+            with suppress(sqlite3.Error):  # what went wrong is said by the error that is under way
+                connection.execute("ROLLBACK")
+            raise
