@@ -1,4 +1,6 @@
+import os
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -34,3 +36,13 @@ def make_incident():
 @pytest.fixture
 def envelope():
     return make_envelope("owner@example.org", "robot@example.org")
+
+
+@pytest.fixture
+def quick_disk(tmp_path):
+    """A folder in memory where there is one: databases that wait for a disk at each write take seconds."""
+    if not os.access("/dev/shm", os.W_OK):
+        yield tmp_path
+        return
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as folder:
+        yield Path(folder)

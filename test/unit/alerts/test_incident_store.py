@@ -13,8 +13,8 @@ ID = "20261121T010203Z-1"
 
 
 @pytest.fixture
-def store(tmp_path):
-    with IncidentStore(tmp_path, wall=1.0) as store:
+def store(quick_disk):
+    with IncidentStore(quick_disk, wall=1.0) as store:
         yield store
 
 
@@ -22,27 +22,27 @@ def picture(name="a.jpg", data=b"jpeg", **given):
     return NewFile(name=name, role="best", data=data, **given)
 
 
-def test_a_record_reads_back_while_open_and_when_closed(store, make_incident, tmp_path):
+def test_a_record_reads_back_while_open_and_when_closed(store, make_incident, quick_disk):
     store.begin(make_incident(verdict="", closed=None))
     store.update(ID, times=(("driving", 10.0), ("looking", 20.0)), share_seen=0.96)
     store.add_event(ID, Event(wall=11.0, kind="sensor", text="sensor 3 sees motion", data={"sensor": 3}))
     store.add_files(ID, [picture(stamp=61.5, caption="Küche")])
-    for reader in (store, IncidentStore(tmp_path, read_only=True)):
+    for reader in (store, IncidentStore(quick_disk, read_only=True)):
         kept = reader.get(ID)
         assert (kept.verdict, kept.closed, kept.share_seen) == ("", None, 0.96)
         assert kept.events[0].data == {"sensor": 3}
         assert (kept.files[0].name, kept.files[0].size, kept.files[0].caption) == ("a.jpg", 4, "Küche")
     closed = store.close(ID, wall=30.0, verdict="confirmed", reason="a person")
-    assert closed == IncidentStore(tmp_path, read_only=True).get(ID)
+    assert closed == IncidentStore(quick_disk, read_only=True).get(ID)
     assert closed.durations() == (("driving", 10.0), ("looking", 10.0))
     assert store.folder.read(ID, "a.jpg") == b"jpeg"
     assert store.link(ID).hash == store.head()[1]
 
 
-def test_what_was_written_is_there_for_another_program_at_once(store, make_incident, tmp_path):
+def test_what_was_written_is_there_for_another_program_at_once(store, make_incident, quick_disk):
     store.begin(make_incident())
     store.add_event(ID, Event(wall=1.0, kind="note", text="x"))
-    with IncidentStore(tmp_path, read_only=True) as other:
+    with IncidentStore(quick_disk, read_only=True) as other:
         assert len(other.get(ID).events) == 1
         assert other.open_ids() == (ID,)
 
@@ -129,12 +129,12 @@ def test_a_record_of_a_later_form_is_read(make_incident):
     assert incident_from_plain({**plain, "mood": "good"}) == make_incident()
 
 
-def test_the_chain_goes_on_from_program_to_program(tmp_path, make_incident):
+def test_the_chain_goes_on_from_program_to_program(quick_disk, make_incident):
     for i in range(3):
-        with IncidentStore(tmp_path, wall=float(i)) as store:
+        with IncidentStore(quick_disk, wall=float(i)) as store:
             store.begin(make_incident(id=f"m{i}"))
             store.close(f"m{i}", wall=float(i))
-    with IncidentStore(tmp_path) as store:
+    with IncidentStore(quick_disk) as store:
         rows = [chain.Link(**dict(row)) for row in store.connection.execute("SELECT * FROM links ORDER BY n")]
     before = (0, chain.START)
     for link in rows:
@@ -143,8 +143,8 @@ def test_the_chain_goes_on_from_program_to_program(tmp_path, make_incident):
     assert [link.kind for link in rows] == ["begun", "record", "record", "record"]
 
 
-def test_two_writers_keep_one_chain(store, make_incident, tmp_path):
-    with IncidentStore(tmp_path) as other:
+def test_two_writers_keep_one_chain(store, make_incident, quick_disk):
+    with IncidentStore(quick_disk) as other:
         for i in range(6):
             one = (store, other)[i % 2]
             one.begin(make_incident(id=f"m{i}"))
@@ -152,10 +152,10 @@ def test_two_writers_keep_one_chain(store, make_incident, tmp_path):
     assert store.head()[0] == 7
 
 
-def test_reading_makes_nothing(tmp_path):
+def test_reading_makes_nothing(quick_disk):
     with pytest.raises(StoreError, match="there is none; the patrol makes it"):
-        IncidentStore(tmp_path, read_only=True)
-    assert list(tmp_path.iterdir()) == []
+        IncidentStore(quick_disk, read_only=True)
+    assert list(quick_disk.iterdir()) == []
 
 
 def test_a_full_disk_is_said_as_such_and_the_record_stays_as_it_was(store, make_incident):
@@ -169,7 +169,7 @@ def test_a_full_disk_is_said_as_such_and_the_record_stays_as_it_was(store, make_
     store.add_event(ID, Event(wall=1.0, kind="note", text="small"))
 
 
-def test_a_locked_database_waits_and_then_says_so(store, make_incident, tmp_path, monkeypatch):
+def test_a_locked_database_waits_and_then_says_so(store, make_incident, quick_disk, monkeypatch):
     other = sqlite3.connect(store.path, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     store.connection.execute("PRAGMA busy_timeout=50")

@@ -1,0 +1,106 @@
+"""Finding incidents: by room, verdict, time and words, the newest first, in milliseconds among 100,000."""
+
+from __future__ import annotations
+
+import sqlite3
+from dataclasses import dataclass
+from pathlib import Path
+
+from rosbot_patrol.alerts.incident_database import errors_of
+from rosbot_patrol.alerts.incident_rows import clean, room_tag, verdict_tag
+
+_COLUMNS = "seq, id, wall, room_id, room_name, origin, verdict, reason, share, object_class, closed, bytes"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Query:
+    """What to look for; what is not said does not matter.
+
+    Attributes:
+        room: its id.
+        verdict: "" for those that are open.
+        since, until: when the mission began, seconds since 1970.
+        text: words that have to be there, or how they begin; case and accents do not matter.
+        limit: at most so many.
+    """
+
+    room: int | None = None
+    verdict: str | None = None
+    since: float | None = None
+    until: float | None = None
+    text: str = ""
+    limit: int = 50
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """One line of a list; see Incident. `bytes`: of its files."""
+
+    seq: int
+    id: str
+    wall: float
+    room_id: int
+    room_name: str
+    origin: str
+    verdict: str
+    reason: str
+    share: float | None
+    object_class: str
+    closed: float | None
+    bytes: int
+
+
+def find_incidents(connection: sqlite3.Connection, path: Path, query: Query) -> list[Found]:
+    """The incidents that fit, the newest first. Raises StoreError."""
+    words = _words(query.text)
+    if query.text.strip() and not words:
+        return []
+    with errors_of(path):
+        rows = _by_words(connection, query, words) if words else _by_columns(connection, query)
+    return [Found(**dict(row)) for row in rows]
+
+
+def _by_columns(connection: sqlite3.Connection, query: Query) -> list[sqlite3.Row]:
+    where, values = _time_limits(query)
+    for column, value in (("room_id", query.room), ("verdict", query.verdict)):
+        if value is not None:
+            where.append(f"{column} = ?")
+            values.append(value)
+    sql = f"SELECT {_COLUMNS} FROM incidents {_and(where)} ORDER BY wall DESC, seq DESC LIMIT ?"
+    return connection.execute(sql, (*values, query.limit)).fetchall()
+
+
+def _by_words(connection: sqlite3.Connection, query: Query, words: list[str]) -> list[sqlite3.Row]:
+    # The index answers for room and verdict too, and walks its rows from the newest: no row is fetched for nothing.
+    terms = [f"words : {word}" for word in words]
+    terms += [] if query.room is None else [f'tags : "{room_tag(query.room)}"']
+    terms += [] if query.verdict is None else [f'tags : "{verdict_tag(query.verdict)}"']
+    where, values = _time_limits(query)
+    first = 0
+    if query.since is not None:
+        first = connection.execute("SELECT min(seq) FROM incidents WHERE wall >= ?", (query.since,)).fetchone()[0] or 0
+    columns = ", ".join(f"i.{name.strip()}" for name in _COLUMNS.split(","))
+    more = "".join(f" AND i.{condition}" for condition in where)
+    sql = f"""SELECT {columns} FROM incidents_text t CROSS JOIN incidents i ON i.seq = t.rowid
+        WHERE incidents_text MATCH ? AND t.rowid >= ?{more} ORDER BY t.rowid DESC LIMIT ?"""
+    return connection.execute(sql, (" AND ".join(terms), first, *values, query.limit)).fetchall()
+
+
+def _time_limits(query: Query) -> tuple[list[str], list[float | int | str]]:
+    where: list[str] = []
+    values: list[float | int | str] = []
+    for condition, value in (("wall >= ?", query.since), ("wall < ?", query.until)):
+        if value is not None:
+            where.append(condition)
+            values.append(value)
+    return where, values
+
+
+def _and(where: list[str]) -> str:
+    return f"WHERE {' AND '.join(where)}" if where else ""
+
+
+def _words(text: str) -> list[str]:
+    """What people typed as terms of FTS5: each word a prefix, nothing in it means anything else."""
+    parts = clean(text).split()
+    return ['"' + part.replace('"', '""') + '"*' for part in parts if any(map(str.isalnum, part))]
