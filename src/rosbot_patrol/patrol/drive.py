@@ -17,6 +17,9 @@ class DriveParams:
         0.0, unit="s", lo=0.0, doc="longest drive; 0: 60 s and 40 s for each metre as the crow flies"
     )
     goal_attempts: int = param(2, lo=1, hi=20, doc="how often a goal is tried")
+    other_viewpoints: int = param(
+        3, lo=0, hi=20, doc="other free points of the room to try where its own cannot be reached, each once"
+    )
     retry_delay: float = param(2.0, unit="s", lo=0.0, doc="pause before a goal is tried again")
     server_wait: float = param(60.0, unit="s", lo=0.0, doc="how long to wait for move_base in one drive, in all")
 
@@ -30,7 +33,7 @@ class DriveStep:
         cancel: the goal that runs is to be given up.
         waiting: for the action server.
         reached: the pose is reached.
-        problem: why it will not be, "" while it may.
+        problem: why it will not be, "" while it may; is_down: as there is no action server.
     """
 
     goal: Goal | None = None
@@ -38,6 +41,7 @@ class DriveStep:
     waiting: bool = False
     reached: bool = False
     problem: str = ""
+    is_down: bool = False
 
 
 class Drive:
@@ -88,7 +92,7 @@ class Drive:
         self._retry_at = None
         self._waited += passed
         if self._waited > self.params.server_wait:
-            return DriveStep(problem=f"move_base did not answer for {self.params.server_wait:.0f} s")
+            return DriveStep(is_down=True, problem=f"move_base did not answer for {self.params.server_wait:.0f} s")
         return DriveStep(waiting=True)
 
     def _send(self, pose: Pose2D | None) -> DriveStep:

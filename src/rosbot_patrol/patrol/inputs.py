@@ -6,7 +6,12 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.patrol.request import Request
 
 
 class GoalState(Enum):
@@ -45,7 +50,12 @@ class Goal:
 
 @dataclass(frozen=True, kw_only=True)
 class Box:
-    """One object in one picture: class, probability, corners [px]."""
+    """One object in one picture: class, probability, corners [px], and what the depth picture says of it.
+
+    Attributes:
+        depth: typical distance along the optical axis [m], None where it is not known.
+        relief: spread of the depth inside the box [m]: a poster has none.
+    """
 
     label: str
     probability: float
@@ -53,6 +63,8 @@ class Box:
     ymin: int
     xmax: int
     ymax: int
+    depth: float | None = None
+    relief: float | None = None
 
     @property
     def width(self) -> int:
@@ -79,12 +91,69 @@ class Frame:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ScanView:
+    """One scan as it lies around the robot.
+
+    Attributes:
+        stamp: when it was taken [s].
+        points: where the beams ended, in base_link [m], shape (N, 2); beams that met nothing are left out.
+        pose: of base_link in map at that moment, None where it is not known.
+        range_max: how far the lidar sees [m].
+    """
+
+    stamp: float
+    points: NDArray[np.float64]
+    pose: Pose2D | None = None
+    range_max: float = 12.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Battery:
+    """What the battery last said.
+
+    Attributes:
+        share: of its charge, 0 to 1, None where it is not told; voltage: [V], None likewise.
+        is_charging: it hangs at the charger.
+        at: when it was heard [s].
+    """
+
+    share: float | None = None
+    voltage: float | None = None
+    is_charging: bool = False
+    at: float = -math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guarded:
+    """What is guarded now (see `arming`).
+
+    Attributes:
+        mode: armed_away, armed_home, night or disarmed.
+        rooms: whose sensors count, None for all of them.
+        why: one sentence about what is not guarded, "" where everything is.
+        is_quiet: quiet hours: nothing but triggers and people's orders moves the robot.
+        holds_until: an entry delay runs to this moment, in seconds since 1970: notices wait; None where none does.
+    """
+
+    mode: str = "armed_away"
+    rooms: frozenset[int] | None = None
+    why: str = ""
+    is_quiet: bool = False
+    holds_until: float | None = None
+
+    def counts(self, room_id: int) -> bool:
+        """Whether a call of the room's sensor starts a mission."""
+        return self.rooms is None or room_id in self.rooms
+
+
+@dataclass(frozen=True, kw_only=True)
 class Inputs:
     """One step's inputs.
 
     Attributes:
         wall: seconds since 1970, for ids and records only.
         triggers: rooms whose sensor saw motion since the last step, in order of arrival.
+        requests: rooms that something else asks for; ids and priorities are given to them here.
         frames: what the detector saw since the last step.
         yaw: heading of base_link in odom [rad], None where it is not known now.
         pose: of base_link in map, None where it is not known now.
@@ -93,10 +162,16 @@ class Inputs:
         detector_at: when the detector was last heard [s].
         camera_at: when a picture came last that was not black [s].
         camera_changed_at: when one came last that differs from the one before [s], inf where nobody compares.
+        scan: the newest scan, while a mission runs; None where it is silent.
+        map: of the house, None until it was heard.
+        battery: None where nobody tells of one.
+        guarded: what is armed.
+        stop: why the emergency stop holds the robot, "" where it does not.
     """
 
     wall: float = 0.0
     triggers: tuple[int, ...] = ()
+    requests: tuple[Request, ...] = ()
     frames: tuple[Frame, ...] = ()
     yaw: float | None = None
     pose: Pose2D | None = None
@@ -105,3 +180,8 @@ class Inputs:
     detector_at: float = -math.inf
     camera_at: float = -math.inf
     camera_changed_at: float = math.inf
+    scan: ScanView | None = None
+    map: Grid | None = None
+    battery: Battery | None = None
+    guarded: Guarded = Guarded()
+    stop: str = ""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.inputs import Inputs
+from rosbot_patrol.patrol.inputs import Goal, Inputs
 from rosbot_patrol.patrol.spin import Spin, SpinParams
 
 
@@ -37,13 +37,18 @@ class LookStep:
     """What to do now.
 
     Attributes:
-        speed: turning speed [rad/s].
+        speed: turning speed [rad/s], None where the wheels are another's.
+        goal: to be driven to; cancel: give it up.
+        progress: a viewpoint is done, which has to outlive the program.
         done: the look is over.
         problem: why it does not count as a look at the whole room, "" where it does.
         why: what it does, for people.
     """
 
-    speed: float = 0.0
+    speed: float | None = 0.0
+    goal: Goal | None = None
+    cancel: bool = False
+    progress: bool = False
     done: bool = False
     problem: str = ""
     why: str = ""

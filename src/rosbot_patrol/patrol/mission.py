@@ -1,4 +1,4 @@
-"""Missions, the rooms that wait for one, and what of them outlives the program."""
+"""Missions: one room to be looked at, from what called for it to the verdict."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from rosbot_patrol.patrol.request import Origin
 from rosbot_patrol.patrol.rooms import Room, Rooms
 from rosbot_patrol.patrol.watch import Confirmation
+
+View = tuple[float, float, float]  # x [m], y [m], yaw [rad] in map
 
 
 class Phase(Enum):
@@ -20,6 +23,7 @@ class Phase(Enum):
     DRIVING = "driving"
     LOOKING = "looking"
     RETURNING = "returning"
+    STOPPED = "stopped"
 
 
 class Verdict(Enum):
@@ -33,11 +37,13 @@ class Verdict(Enum):
 
 @dataclass(kw_only=True)
 class Mission:
-    """One trigger on its way to a verdict.
+    """One call on its way to a verdict.
 
     Attributes:
         id: unlike any other's, sorts by time.
         room: to be looked at.
+        origin: what called for it; priority: greater goes first; called: when, in seconds since 1970; note: by whom,
+            for people.
         phase: DRIVING, LOOKING or RETURNING.
         started: [s]; arrived, looked: end of the drive and of the look [s], None before.
         wall: start in seconds since 1970.
@@ -45,10 +51,20 @@ class Mission:
         notified: its one notice is on disk.
         sightings: confirmations in all; best: the surest.
         triggers: how often the room's sensor called, the first time with it.
+        times: seconds spent waiting, driving, looking and returning, by name.
+        began: when each of these began first, in seconds since 1970.
+        views_done: poses from which the room was looked at in a full turn.
+        share_seen: of the room's floor, 0 to 1, None where nobody measures.
+        place: x, y of the person in map [m], None where it is not known.
+        own_motion: rooms whose sensor called while the robot passed them, with seconds since 1970: not followed.
     """
 
     id: str
     room: Room
+    origin: Origin = Origin.TRIGGER
+    priority: int = 0
+    called: float = 0.0
+    note: str = ""
     phase: Phase = Phase.DRIVING
     started: float = 0.0
     wall: float = 0.0
@@ -60,32 +76,12 @@ class Mission:
     sightings: int = 0
     best: Confirmation | None = field(default=None, repr=False)
     triggers: int = 1
-
-
-class MissionQueue:
-    """Rooms that wait for a mission: one entry a room, in order of arrival."""
-
-    def __init__(self) -> None:
-        self._waiting: dict[int, int] = {}
-
-    def add(self, room_id: int) -> bool:
-        """Queue a room; False where it waits already (its count of triggers grows)."""
-        is_new = room_id not in self._waiting
-        self._waiting[room_id] = self._waiting.get(room_id, 0) + 1
-        return is_new
-
-    def pop(self) -> tuple[int, int]:
-        """The room that waits longest, and how often it was triggered."""
-        room_id = next(iter(self._waiting))
-        return room_id, self._waiting.pop(room_id)
-
-    @property
-    def rooms(self) -> tuple[int, ...]:
-        """Ids in order of arrival."""
-        return tuple(self._waiting)
-
-    def __bool__(self) -> bool:
-        return bool(self._waiting)
+    times: dict[str, float] = field(default_factory=dict)
+    began: dict[str, float] = field(default_factory=dict)
+    views_done: list[View] = field(default_factory=list)
+    share_seen: float | None = None
+    place: tuple[float, float] | None = None
+    own_motion: list[tuple[float, int]] = field(default_factory=list)
 
 
 def mission_id(wall: float, count: int) -> str:
@@ -98,6 +94,10 @@ def mission_to_plain(mission: Mission) -> dict[str, Any]:
     return {
         "id": mission.id,
         "room": mission.room.id,
+        "origin": mission.origin.value,
+        "priority": mission.priority,
+        "called": mission.called,
+        "note": mission.note,
         "phase": mission.phase.value,
         "wall": mission.wall,
         "verdict": mission.verdict.value if mission.verdict else "",
@@ -105,13 +105,17 @@ def mission_to_plain(mission: Mission) -> dict[str, Any]:
         "notified": mission.notified,
         "sightings": mission.sightings,
         "triggers": mission.triggers,
+        "times": dict(mission.times),
+        "began": dict(mission.began),
+        "views_done": [list(view) for view in mission.views_done],
+        "share_seen": mission.share_seen,
+        "place": list(mission.place) if mission.place else None,
+        "own_motion": [list(item) for item in mission.own_motion],
     }
 
 
 def mission_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Mission | None:
     """The mission of `mission_to_plain`; None where its room is gone from the points file.
-
-    A look that was interrupted starts over: the mission drives again.
 
     Raises:
         KeyError, TypeError, ValueError: this is no mission.
@@ -119,15 +123,26 @@ def mission_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Mission | None
     room = rooms.find(int(plain["room"]))
     if room is None:
         return None
-    phase = Phase(plain["phase"])
+    place = plain["place"]
+    share = plain["share_seen"]
     return Mission(
         id=str(plain["id"]),
         room=room,
-        phase=Phase.RETURNING if phase is Phase.RETURNING else Phase.DRIVING,
+        origin=Origin(plain["origin"]),
+        priority=int(plain["priority"]),
+        called=float(plain["called"]),
+        note=str(plain["note"]),
+        phase=Phase(plain["phase"]),
         wall=float(plain["wall"]),
         verdict=Verdict(plain["verdict"]) if plain["verdict"] else None,
         reason=str(plain["reason"]),
         notified=bool(plain["notified"]),
         sightings=int(plain["sightings"]),
         triggers=int(plain["triggers"]),
+        times={str(name): float(seconds) for name, seconds in plain["times"].items()},
+        began={str(name): float(wall) for name, wall in plain["began"].items()},
+        views_done=[(float(x), float(y), float(yaw)) for x, y, yaw in plain["views_done"]],
+        share_seen=None if share is None else float(share),
+        place=None if place is None else (float(place[0]), float(place[1])),
+        own_motion=[(float(wall), int(room_id)) for wall, room_id in plain["own_motion"]],
     )

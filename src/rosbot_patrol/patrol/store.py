@@ -16,7 +16,7 @@ from rosbot_patrol.files import write_atomic
 
 log = logging.getLogger(__name__)
 
-VERSION = 1
+VERSION = 2
 
 
 class PatrolStore:

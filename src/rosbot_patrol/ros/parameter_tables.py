@@ -24,8 +24,10 @@ from rosbot_patrol.images.compressed import CompressedParams
 from rosbot_patrol.images.compressed_depth import CompressedDepthParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import declared, table
+from rosbot_patrol.patrol.battery import BatteryParams
 from rosbot_patrol.patrol.drive import DriveParams
 from rosbot_patrol.patrol.look import LookParams
+from rosbot_patrol.patrol.queueing import PriorityParams
 from rosbot_patrol.patrol.spin import SpinParams
 from rosbot_patrol.planning.dwa_params import DWAPlannerParams
 from rosbot_patrol.planning.global_planner import GlobalPlannerParams
@@ -50,7 +52,15 @@ from rosbot_patrol.simulation.faults import KINDS, Doorway, Fault
 SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     (
         "patrol_robot",
-        [("", NodeParams), ("", MailParams), ("", DriveParams), ("", LookParams), ("", SpinParams)],
+        [
+            ("", NodeParams),
+            ("", MailParams),
+            ("", DriveParams),
+            ("", LookParams),
+            ("", SpinParams),
+            ("", PriorityParams),
+            ("", BatteryParams),
+        ],
     ),
     (
         "move_base",

@@ -22,7 +22,7 @@ from rosbot_patrol.alerts.transports import Transport
 from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
-from rosbot_patrol.patrol.manager import Notice
+from rosbot_patrol.patrol.commands import Notice
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.patrol_images import PictureRing
 

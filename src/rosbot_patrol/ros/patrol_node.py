@@ -34,11 +34,14 @@ from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, transform_points
 from rosbot_patrol.msg import EspTrigger, PatrolState, SensorEvent
 from rosbot_patrol.params import declared, param
+from rosbot_patrol.patrol.battery import BatteryParams, check_battery
+from rosbot_patrol.patrol.commands import Commands, Report
 from rosbot_patrol.patrol.drive import DriveParams
 from rosbot_patrol.patrol.inputs import Box, Frame, Inputs
 from rosbot_patrol.patrol.look import LookParams
-from rosbot_patrol.patrol.manager import Commands, ManagerParams, PatrolManager, Report
+from rosbot_patrol.patrol.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.queueing import PriorityParams
 from rosbot_patrol.patrol.repeats import Repeats
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.patrol.spin import SpinParams
@@ -71,7 +74,13 @@ class NodeParams:
     image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
     alarm_classes: list[str] = param(["person", "fire hydrant"], doc="classes of objects that alarm")
     own_motion_radius: float = param(
-        2.0, unit="m", lo=0.0, doc="on the way back, so near to its room's point, the robot is what its sensor sees"
+        2.0, unit="m", lo=0.0, doc="so near to a room's point the moving robot is what its sensor sees"
+    )
+    own_motion_memory: float = param(
+        2.0, unit="s", lo=0.0, hi=60.0, doc="so long after it was near the robot is still what the sensor saw"
+    )
+    resume_max_age: float = param(
+        43200.0, unit="s", lo=0.0, doc="a call that is older than this after a restart is reported, not followed"
     )
     base_frame: str = param("base_link", doc="the robot")
     odom_frame: str = param("odom", doc="frame in which a turn is measured")
@@ -85,7 +94,7 @@ class NodeParams:
     watch: WatchParams = WatchParams()
 
 
-FLAT = (NodeParams, MailParams, DriveParams, LookParams, SpinParams)
+FLAT = (NodeParams, MailParams, DriveParams, LookParams, SpinParams, PriorityParams, BatteryParams)
 
 
 def load_flat(cls: type[P], tree: dict[str, Any]) -> P:
@@ -102,6 +111,8 @@ class PatrolNode:
         self.params = load_flat(NodeParams, tree)
         mail = load_flat(MailParams, tree)
         prefix = rospy.get_name() + "/"
+        battery = load_flat(BatteryParams, tree)
+        check_battery(battery, prefix)
         rooms = load_rooms(Path(self.params.path_to_params).expanduser())
         names = {room.id: room.name for room in rooms}
         self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
@@ -118,6 +129,10 @@ class PatrolNode:
             ManagerParams(
                 alarm_classes=tuple(self.params.alarm_classes),
                 own_motion_radius=self.params.own_motion_radius,
+                own_motion_memory=self.params.own_motion_memory,
+                resume_max_age=self.params.resume_max_age,
+                priorities=load_flat(PriorityParams, tree),
+                battery=battery,
                 drive=load_flat(DriveParams, tree),
                 look=load_flat(LookParams, tree),
                 spin=load_flat(SpinParams, tree),
@@ -282,8 +297,7 @@ class PatrolNode:
             self._publish_state(time_now, commands.report)
         if commands.notice is not None:
             self.desk.take(commands.notice, time_now)
-        if commands.ended is not None:
-            ended = commands.ended
+        for ended in commands.ended:
             verdict = ended.verdict.value if ended.verdict else ""
             self.desk.close_incident(ended.id, verdict, ended.reason, ended.sightings)
         if self.manager.mission is not None:
@@ -310,10 +324,18 @@ class PatrolNode:
             mission=report.mission,
             room_id=report.room_id,
             room_name=report.room_name,
+            origin=report.origin,
             why=report.why,
             queue=bytes(report.queue),
+            verdict=report.verdict,
             last_verdict=report.last_verdict,
+            share_seen=-1.0,
+            mode=report.mode,
         )
+        mission = self.manager.mission
+        if mission is not None:
+            message.share_seen = -1.0 if mission.share_seen is None else mission.share_seen
+            message.phases, message.seconds = list(mission.times), list(mission.times.values())
         message.header.stamp = convert.time_to_msg(time_now)
         self._state.publish(message)
         self.health.set("", OK if report.phase is not Phase.STARTING else WARN, f"{report.phase.value}: {report.why}")
@@ -343,7 +365,8 @@ class PatrolNode:
         with self._stepping:
             self._is_over = True
             if self._is_signalled:
-                self.manager.abandon("the node is ended")
+                for ended in self.manager.abandon("the patrol was ended").ended:
+                    self.desk.close_incident(ended.id, "unverified", ended.reason, ended.sightings)
             self.move_base.cancel()
             if self._turning:
                 self._cmd_vel.publish(convert.twist_to_msg(STOP))

@@ -1,0 +1,84 @@
+"""The rooms that wait for a mission: one entry a room, the most urgent first, in order of arrival among equals."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.request import Origin, Request
+
+
+@dataclass(frozen=True, kw_only=True)
+class PriorityParams:
+    """Who goes first: a greater number does."""
+
+    priority_trigger: int = param(40, lo=0, hi=100, doc="of a room whose motion sensor called; greater goes first")
+    priority_action: int = param(30, lo=0, hi=100, doc="of a room that a program or a person asked for")
+    priority_silent_sensor: int = param(20, lo=0, hi=100, doc="of a room whose sensor has gone silent")
+    priority_schedule: int = param(10, lo=0, hi=100, doc="of a room of a scheduled round")
+    preempt: bool = param(
+        True, doc="a motion sensor's call puts the look of a round or at a silent sensor back into the queue"
+    )
+
+    def of(self, origin: Origin) -> int:
+        """The priority of what an origin asks for."""
+        return {
+            Origin.TRIGGER: self.priority_trigger,
+            Origin.ACTION: self.priority_action,
+            Origin.ALL: self.priority_action,
+            Origin.SILENT_SENSOR: self.priority_silent_sensor,
+            Origin.SCHEDULE: self.priority_schedule,
+        }[origin]
+
+
+class MissionQueue:
+    """Requests that wait."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[int, Request] = {}
+
+    def add(self, request: Request) -> bool:
+        """Queue a request; False where its room waits already: then the more urgent of the two counts."""
+        kept = self._waiting.get(request.room_id)
+        if kept is None:
+            self._waiting[request.room_id] = request
+            return True
+        calls = kept.triggers + request.triggers
+        if request.priority > kept.priority:
+            kept = dataclasses.replace(kept, origin=request.origin, note=request.note, priority=request.priority)
+        self._waiting[request.room_id] = dataclasses.replace(kept, triggers=calls)
+        return False
+
+    def put_back(self, request: Request) -> None:
+        """Queue a request before all others of its priority."""
+        others = {room: kept for room, kept in self._waiting.items() if room != request.room_id}
+        self._waiting = {request.room_id: request, **others}
+
+    def find(self, room_id: int) -> Request | None:
+        """What waits for a room."""
+        return self._waiting.get(room_id)
+
+    def pop(self) -> Request:
+        """The most urgent, among equals the one that waits longest."""
+        first = next(iter(self))
+        return self._waiting.pop(first.room_id)
+
+    def drop(self, *origins: Origin) -> list[Request]:
+        """Take out what these origins asked for; all where none is named."""
+        dropped = [request for request in self if not origins or request.origin in origins]
+        for request in dropped:
+            del self._waiting[request.room_id]
+        return dropped
+
+    @property
+    def rooms(self) -> tuple[int, ...]:
+        """Ids of the rooms, the next first."""
+        return tuple(request.room_id for request in self)
+
+    def __iter__(self) -> Iterator[Request]:
+        return iter(sorted(self._waiting.values(), key=lambda request: -request.priority))
+
+    def __len__(self) -> int:
+        return len(self._waiting)

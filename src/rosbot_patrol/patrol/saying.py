@@ -1,0 +1,47 @@
+"""What the patrol says of itself, in sentences."""
+
+from __future__ import annotations
+
+from rosbot_patrol.patrol.commands import Report
+from rosbot_patrol.patrol.mission import Mission, Phase
+from rosbot_patrol.patrol.queueing import MissionQueue
+from rosbot_patrol.patrol.watch import Confirmation
+
+_WHERE = {Phase.DRIVING: "on the way to", Phase.LOOKING: "in"}
+
+
+def verdict(mission: Mission) -> str:
+    """The verdict so far and its reason."""
+    return f"{mission.verdict.value}: {mission.reason}" if mission.verdict else "without a verdict"
+
+
+def sighting(mission: Mission, seen: Confirmation) -> str:
+    """That somebody was seen."""
+    where = _WHERE.get(mission.phase, "on the way back from")
+    sure = f"probability {seen.probability:.2f} over {seen.pictures} pictures"
+    return f"{seen.label} seen {where} {mission.room.title}, {sure}"
+
+
+def rooms_open(mission: Mission | None, queue: MissionQueue) -> str:
+    """Rooms that have no verdict yet, "" where there are none."""
+    ids = ([mission.room.id] if mission else []) + list(queue.rooms)
+    return f"room{'s' * (len(ids) > 1)} {', '.join(map(str, ids))}" if ids else ""
+
+
+def report(
+    phase: Phase, why: str, mission: Mission | None, queue: MissionQueue, last_verdict: str, mode: str
+) -> Report:
+    """The state for people."""
+    about = Report(phase=phase, why=why, queue=queue.rooms, last_verdict=last_verdict, mode=mode)
+    if mission is None:
+        return about
+    return Report(
+        **{
+            **vars(about),
+            "mission": mission.id,
+            "room_id": mission.room.id,
+            "room_name": mission.room.name,
+            "origin": mission.origin.value,
+            "verdict": mission.verdict.value if mission.verdict else "",
+        }
+    )
