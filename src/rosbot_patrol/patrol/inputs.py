@@ -49,13 +49,34 @@ class Goal:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Box:
-    """One object in one picture: class, probability, corners [px], and what the depth picture says of it.
+class Measured:
+    """What is known of a box's object in space.
 
     Attributes:
-        depth: typical distance along the optical axis [m], None where it is not known.
-        relief: spread of the depth inside the box [m]: a poster has none.
+        x: place in map [m]; y: likewise.
+        error: of the place, about [m].
+        away: distance from the camera over the floor [m].
+        top: of the object over the floor [m]; height, width: of what shows of it [m].
+        is_cut: the box ends at the picture's upper or lower edge: there may be more of it.
+        is_flat: all of it lies in one plane, None where no depth tells.
+        source: what told the distance: "depth", "lidar", "floor" (the box's lower edge).
     """
+
+    x: float
+    y: float
+    error: float
+    away: float
+    top: float
+    height: float
+    width: float
+    is_cut: bool = False
+    is_flat: bool | None = None
+    source: str = "depth"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """One object in one picture: class, probability, corners [px], and its place where that is known."""
 
     label: str
     probability: float
@@ -63,8 +84,7 @@ class Box:
     ymin: int
     xmax: int
     ymax: int
-    depth: float | None = None
-    relief: float | None = None
+    measured: Measured | None = None
 
     @property
     def width(self) -> int:

@@ -516,10 +516,7 @@ class PatrolManager:
     def _watch_frames(self, inputs: Inputs, out: Commands) -> None:
         mission = self.mission
         assert mission is not None
-        for frame in inputs.frames:
-            seen = self._watch.add(self._now, frame)
-            if seen is None:
-                continue
+        for seen in [seen for frame in inputs.frames for seen in self._watch.add(self._now, frame)]:
             mission.sightings += 1
             if mission.best is None or seen.probability > mission.best.probability:
                 mission.best = seen

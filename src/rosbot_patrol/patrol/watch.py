@@ -1,17 +1,22 @@
-"""When detections make an intruder: one class of alarm, in several pictures, over some time, sure enough on average.
+"""When detections make an intruder: one class of alarm, in several pictures, over some time, sure enough.
 
 A detector that is shown the same picture again and again (a dead camera behind darknet_ros) adds nothing: pictures
-count by their stamp. Pictures in which nothing was seen count against.
+count by their stamp. Pictures in which nothing was seen count against. Sure is what the median of the pictures'
+probabilities is, so that one lucky picture does not make up for doubtful ones. What the judge refuses (a pet, a poster,
+one outside) counts as nothing seen. Where places are known, only boxes near each other make one person: two who are in
+view at once are confirmed each.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
+import statistics
+from collections import Counter, deque
 from dataclasses import dataclass
 
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.inputs import Box, Frame
+from rosbot_patrol.patrol.inputs import Box, Frame, Measured
+from rosbot_patrol.patrol.judge import Judge
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,10 +27,13 @@ class WatchParams:
     window: int = param(5, lo=1, hi=100, doc="out of this many last pictures")
     span: float = param(0.2, unit="s", lo=0.0, hi=10.0, doc="least time from the first of them to the last")
     max_age: float = param(10.0, unit="s", lo=0.1, doc="older pictures are forgotten")
-    min_score: float = param(0.65, lo=0.0, hi=1.0, doc="least mean probability")
+    min_score: float = param(0.65, lo=0.0, hi=1.0, doc="least median of the probabilities")
     min_height: int = param(16, unit="px", lo=1, doc="smaller boxes are not believed")
     min_aspect: float = param(0.15, lo=0.0, doc="least height / width of a box")
     max_aspect: float = param(8.0, lo=0.1, doc="greatest height / width of a box")
+    same_place: float = param(
+        1.0, unit="m", lo=0.1, doc="boxes of one person are so near to each other from picture to picture"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +42,11 @@ class Confirmation:
 
     Attributes:
         label: its class.
-        probability: mean over the pictures that show it.
+        probability: median over the pictures that show it.
         stamp: of the picture that shows it best [s].
         boxes: alarm boxes in that picture, the best first.
         pictures: how many showed it.
+        measured: its place and size as they were last measured, None where nothing tells.
     """
 
     label: str
@@ -45,6 +54,7 @@ class Confirmation:
     stamp: float
     boxes: tuple[Box, ...]
     pictures: int
+    measured: Measured | None = None
 
 
 class Watch:
@@ -53,10 +63,18 @@ class Watch:
     Args:
         alarm_classes: classes that alarm.
         params: how sure to be.
+        judge: who refuses what cannot be an intruder.
+
+    Attributes:
+        refusals: why boxes were refused since `start`, and how often.
     """
 
-    def __init__(self, alarm_classes: tuple[str, ...], params: WatchParams | None = None) -> None:
+    def __init__(
+        self, alarm_classes: tuple[str, ...], params: WatchParams | None = None, judge: Judge | None = None
+    ) -> None:
         self.params = params or WatchParams()
+        self.judge = judge or Judge()
+        self.refusals: Counter[str] = Counter()
         self._classes = frozenset(alarm_classes)
         self._views: deque[_View] = deque(maxlen=self.params.window)
         self._newest = -math.inf
@@ -64,20 +82,25 @@ class Watch:
     def start(self, now: float) -> None:
         """Forget everything; pictures taken before `now` do not count from here on."""
         self._views.clear()
+        self.refusals.clear()
         self._newest = now
 
-    def add(self, now: float, frame: Frame) -> Confirmation | None:
-        """Take one picture's boxes; a confirmation where they make an intruder."""
+    def add(self, now: float, frame: Frame) -> tuple[Confirmation, ...]:
+        """Take one picture's boxes; a confirmation for each intruder that they make."""
         stamp = now if frame.stamp is None else frame.stamp
         if frame.stamp is not None:
             if stamp <= self._newest or now - stamp > self.params.max_age:
-                return None
+                return ()
             self._newest = stamp
         view = _View(arrived=now, stamp=stamp, boxes=tuple(box for box in frame.boxes if self._is_plausible(box)))
         self._views.append(view)
         while now - self._views[0].arrived > self.params.max_age:
             self._views.popleft()
-        return self._confirm({box.label for box in view.boxes})
+        found: list[Confirmation] = []
+        for box in sorted(view.boxes, key=_score, reverse=True):
+            if not any(self._is_same(box, other.label, other.measured) for other in found):
+                found += self._confirm(box)
+        return tuple(found)
 
     def candidate(self, now: float, recent: float = 0.6) -> bool:
         """Whether a picture that came lately shows something that may become an intruder."""
@@ -88,21 +111,44 @@ class Watch:
             return False
         if box.width <= 0 or box.height < self.params.min_height:
             return False
-        return self.params.min_aspect <= box.height / box.width <= self.params.max_aspect
+        if not self.params.min_aspect <= box.height / box.width <= self.params.max_aspect:
+            return False
+        refusal = self.judge.refusal(box)
+        if refusal:
+            self.refusals[refusal] += 1
+        return not refusal
 
-    def _confirm(self, labels: set[str]) -> Confirmation | None:
-        for label in sorted(labels, key=self._best_score, reverse=True):
-            shown = [(max(view.of(label), key=_score), view) for view in self._views if view.of(label)]
-            mean = sum(box.probability for box, _ in shown) / len(shown)
-            span = shown[-1][1].stamp - shown[0][1].stamp
-            if len(shown) >= self.params.frames and span >= self.params.span - 1e-6 and mean >= self.params.min_score:
-                view = max(shown, key=lambda pair: (pair[0].probability, pair[0].height))[1]
-                boxes = tuple(sorted(view.boxes, key=lambda b: (b.label != label, -b.probability)))
-                return Confirmation(label=label, probability=mean, stamp=view.stamp, boxes=boxes, pictures=len(shown))
-        return None
+    def _is_same(self, box: Box, label: str, measured: Measured | None) -> bool:
+        if box.label != label:
+            return False
+        if box.measured is None or measured is None:
+            return True
+        apart = math.hypot(box.measured.x - measured.x, box.measured.y - measured.y)
+        return apart <= self.params.same_place + min(box.measured.error, 1.0) + min(measured.error, 1.0)
 
-    def _best_score(self, label: str) -> float:
-        return max(box.probability for view in self._views for box in view.of(label))
+    def _confirm(self, newest: Box) -> list[Confirmation]:
+        shown = []
+        for view in self._views:
+            same = [box for box in view.boxes if self._is_same(box, newest.label, newest.measured)]
+            if same:
+                shown.append((max(same, key=_score), view))
+        sure = statistics.median_low(box.probability for box, _ in shown)
+        span = shown[-1][1].stamp - shown[0][1].stamp
+        if len(shown) < self.params.frames or span < self.params.span - 1e-6 or sure < self.params.min_score:
+            return []
+        best, view = max(shown, key=lambda pair: (pair[0].probability, pair[0].height))
+        others = sorted((b for b in view.boxes if b is not best), key=lambda b: (b.label != best.label, -b.probability))
+        measured = min((b.measured for b, _ in shown[-3:] if b.measured), key=lambda m: m.error, default=None)
+        return [
+            Confirmation(
+                label=best.label,
+                probability=sure,
+                stamp=view.stamp,
+                boxes=(best, *others),
+                pictures=len(shown),
+                measured=measured,
+            )
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,9 +156,6 @@ class _View:
     arrived: float
     stamp: float
     boxes: tuple[Box, ...]
-
-    def of(self, label: str) -> list[Box]:
-        return [box for box in self.boxes if box.label == label]
 
 
 def _score(box: Box) -> float:

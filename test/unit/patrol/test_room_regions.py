@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +49,7 @@ def test_a_point_beside_the_floor_takes_the_nearest_and_one_far_off_is_told() ->
     assert regions.lost == (2,)
 
 
+@functools.cache
 def house(name: str, file: str) -> RoomRegions:
     rooms = load_rooms(ROOT / "params" / f"{file}.yaml")
     return part_rooms(floor_of(read_map(ROOT / "maps" / f"{name}_map.yaml")), rooms)

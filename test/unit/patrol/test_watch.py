@@ -1,6 +1,7 @@
 import pytest
 
-from rosbot_patrol.patrol.inputs import Box, Frame
+from rosbot_patrol.patrol.inputs import Box, Frame, Measured
+from rosbot_patrol.patrol.judge import Judge, Known
 from rosbot_patrol.patrol.watch import Watch, WatchParams
 
 
@@ -11,9 +12,7 @@ def box(label="person", probability=0.9, xmin=100, ymin=100, xmax=200, ymax=400)
 def feed(watch, frames, now=None):
     found = []
     for frame in frames:
-        seen = watch.add(frame.stamp if now is None else now, frame)
-        if seen:
-            found.append(seen)
+        found += watch.add(frame.stamp if now is None else now, frame)
     return found
 
 
@@ -29,7 +28,7 @@ def watch():
 
 
 def test_three_pictures_over_two_tenths_make_an_intruder(watch):
-    found = feed(watch, frames([box(probability=0.6)], [box(probability=0.9)], [box(probability=0.6)]))
+    found = feed(watch, frames([box(probability=0.7)], [box(probability=0.9)], [box(probability=0.6)]))
     assert len(found) == 1
     assert found[0].label == "person"
     assert found[0].probability == pytest.approx(0.7)
@@ -59,7 +58,7 @@ def test_an_empty_picture_never_hides_a_later_stamp(watch):
     # darknet_ros says "nothing" with the time of now, and boxes with the earlier time of their picture
     watch.add(1.30, Frame())
     found = [watch.add(1.3 + i / 10, Frame(stamp=1.15 + i / 10, boxes=(box(),))) for i in range(3)]
-    assert found[-1] is not None
+    assert found[-1]
 
 
 def test_the_same_picture_again_and_again_proves_nothing(watch):
@@ -119,3 +118,49 @@ def test_one_picture_is_enough_where_asked_for():
 
 def test_a_burst_of_pictures_within_a_tenth_of_a_second_is_too_short(watch):
     assert feed(watch, frames(*[[box()]] * 4, period=0.02)) == []
+
+
+def test_one_sure_picture_does_not_make_up_for_doubtful_ones(watch):
+    assert feed(watch, frames(*[[box(probability=p)] for p in (0.5, 0.99, 0.5, 0.99, 0.5)])) == []
+
+
+def at(x, y, **fields):
+    defaults = {"error": 0.1, "away": 2.0, "top": 1.7, "height": 1.6, "width": 0.5}
+    return Measured(x=x, y=y, **{**defaults, **fields})
+
+
+def placed(x, y, probability=0.9, **fields):
+    return Box(
+        label="person", probability=probability, xmin=100, ymin=100, xmax=200, ymax=400, measured=at(x, y, **fields)
+    )
+
+
+def test_two_who_are_in_view_at_once_are_confirmed_each(watch):
+    found = feed(watch, frames(*[[placed(1.0, 1.0), placed(4.0, 1.0, 0.8)]] * 3))
+    assert [round(seen.measured.x) for seen in found] == [1, 4]
+    assert [seen.boxes[0].measured.x for seen in found] == [1.0, 4.0]
+
+
+def test_boxes_at_different_places_do_not_add_up(watch):
+    assert feed(watch, frames([placed(1.0, 1.0)], [placed(5.0, 1.0)], [placed(1.0, 5.0)])) == []
+
+
+def test_one_who_walks_is_one(watch):
+    assert len(feed(watch, frames(*[[placed(1.0 + 0.15 * i, 1.0)] for i in range(3)]))) == 1
+
+
+def test_a_box_whose_place_is_not_known_adds_to_any(watch):
+    assert len(feed(watch, frames([box()], [placed(1.0, 1.0)], [box()]))) == 1
+
+
+def test_the_surest_place_of_the_last_pictures_is_told(watch):
+    found = feed(watch, frames([placed(1.3, 1.0, error=0.9)], [placed(1.0, 1.0, error=0.1)], [box()]))
+    assert found[0].measured.x == 1.0
+
+
+def test_what_the_judge_refuses_counts_as_nothing_seen_and_is_told():
+    watch = Watch(("person",), judge=Judge(known=(Known(x=1.0, y=1.0, name="the coat stand"),)))
+    watch.start(0.0)
+    assert feed(watch, frames(*[[placed(1.1, 1.0)]] * 4)) == []
+    assert not watch.candidate(1.3)
+    assert watch.refusals == {"it is the coat stand at (1.0, 1.0)": 4}

@@ -1,0 +1,213 @@
+"""Where the object of a box stands, and how large it is: by depth, by the lidar, or by where its box meets the floor.
+
+Distances are taken in this order. Depth tells the nearest thing in the middle of the box, and whether all of it lies
+in one plane, as a picture on a wall does. The lidar tells what stands in the box's bearings that the map does not show:
+legs. Where neither tells, the lower edge of the box is taken for the feet, which is good to some tens of per cent at a
+camera this low; a box that ends at the picture's lower edge has no feet.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import angle_difference, wrap_angles
+from rosbot_patrol.patrol.inputs import Box, Measured
+
+Array = NDArray[np.float64]
+
+_EDGE = 3  # a box that ends so near to the picture's edge may go on beyond it [px]
+_THICK = 0.12  # from the front of a person to the middle [m]
+_DEEP = 0.35  # what is so much farther than the nearest part is not of the person [m]
+_FEW = 40  # depths, at least, to say anything
+_LEGS = 2  # beams, at least
+_GRID = 48  # samples along each side of a box, at most
+_FLAT_SHARE = 0.92  # of the samples lie in a picture's plane
+_NOISE = 0.003  # of a depth camera, at 1 m; it grows with the square [m]
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A pinhole camera: focal lengths and middle [px], size of the picture [px]."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    @property
+    def view_width(self) -> float:
+        """Angle that a picture spans from left to right [rad]."""
+        return math.atan2(self.cx, self.fx) + math.atan2(self.width - self.cx, self.fx)
+
+
+@dataclass(frozen=True)
+class View:
+    """From where a picture was taken.
+
+    Attributes:
+        lens: of the colour picture.
+        map_from_optical: pose of the camera (z ahead, x right, y down), z from the floor, shape (4, 4).
+    """
+
+    lens: Lens
+    map_from_optical: Array
+
+    def ray(self, u: float, v: float) -> Array:
+        """Direction of a pixel in map, of length 1 along the optical axis, shape (3,)."""
+        lens = self.lens
+        along = np.array([(u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, 1.0])
+        return np.asarray(self.map_from_optical[:3, :3] @ along)
+
+    @property
+    def eye(self) -> Array:
+        """Place of the camera [m], shape (3,)."""
+        return np.asarray(self.map_from_optical[:3, 3])
+
+    @property
+    def yaw(self) -> float:
+        """Heading of the camera in map [rad]."""
+        ahead = self.map_from_optical[:3, 2]
+        return math.atan2(ahead[1], ahead[0])
+
+
+@dataclass(frozen=True)
+class Depth:
+    """A depth picture: metres along the optical axis, NaN where unknown, shape (H, W), and its lens."""
+
+    metres: NDArray[np.float32]
+    lens: Lens
+
+
+def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | None = None) -> Box:
+    """A box with its place and size.
+
+    Args:
+        box: in the colour picture.
+        view: of the colour picture.
+        depth: taken at the same time by a camera beside it.
+        unmapped: what the lidar hits where the map shows nothing, in map [m], shape (N, 2).
+    """
+    if box.width <= 0 or box.height <= 0:
+        return box
+    flat: bool | None = None
+    if depth is not None:
+        samples = _samples(box, view.lens, depth)
+        along = _nearest(samples)
+        flat = _is_flat(samples)
+        if along is not None:
+            return replace(box, measured=_at(box, view, along, source="depth", error=0.1 + 0.02 * along, flat=flat))
+    found = _by_lidar(box, view, unmapped) if unmapped is not None else None
+    if found is not None:
+        return replace(box, measured=_at(box, view, found, source="lidar", error=0.15 + 0.02 * found, flat=flat))
+    found = _by_floor(box, view)
+    if found is None:
+        return box
+    return replace(box, measured=_at(box, view, found, source="floor", error=0.3 + 0.25 * found, flat=flat))
+
+
+def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: bool | None) -> Measured:
+    """The record of an object whose front is so far along the optical axis [m]."""
+    lens, middle = view.lens, (box.xmin + box.xmax) / 2.0
+    place = view.eye + view.ray(middle, lens.cy) * (along + _THICK)
+    top = view.eye + view.ray(middle, box.ymin) * along
+    away = math.hypot(*(place - view.eye)[:2])
+    is_cut = box.ymin <= _EDGE or box.ymax >= lens.height - _EDGE
+    return Measured(
+        x=float(place[0]),
+        y=float(place[1]),
+        error=error,
+        away=away,
+        top=float(top[2]),
+        height=box.height / lens.fy * along,
+        width=box.width / lens.fx * along,
+        is_cut=is_cut,
+        is_flat=flat,
+        source=source,
+    )
+
+
+def _samples(box: Box, lens: Lens, depth: Depth) -> NDArray[np.float64]:
+    """Depths over a box, on a grid of at most _GRID by _GRID, shape (rows, columns); both cameras look the same way."""
+    other = depth.lens
+
+    def along(first: float, last: float, middle: float, focal: float, centre: float, scale: float, most: int) -> Array:
+        places = np.linspace(first, last, _GRID + 1)[:-1] + (last - first) / _GRID / 2.0
+        return np.clip(np.rint((places - middle) / focal * scale + centre), 0, most - 1)
+
+    columns = along(box.xmin, box.xmax, lens.cx, lens.fx, other.cx, other.fx, depth.metres.shape[1])
+    rows = along(box.ymin, box.ymax, lens.cy, lens.fy, other.cy, other.fy, depth.metres.shape[0])
+    return np.asarray(depth.metres[np.ix_(rows.astype(int), columns.astype(int))], np.float64)
+
+
+def _nearest(samples: NDArray[np.float64]) -> float | None:
+    """How far the nearest thing of some size in the middle of a box is [m]."""
+    rows, columns = samples.shape
+    middle = samples[rows // 8 : rows * 3 // 4, columns // 4 : columns * 3 // 4]
+    known = middle[np.isfinite(middle)]
+    if known.size < _FEW:
+        return None
+    near = np.quantile(known, 0.2)
+    return float(np.median(known[known < near + _DEEP]))
+
+
+def _is_flat(samples: NDArray[np.float64]) -> bool | None:
+    """Whether all of a box lies in one plane, None where too little of it is known.
+
+    In a pinhole's picture the inverse of the depth of a plane is linear in row and column; the plane is fitted by
+    least squares, twice: the second time to what lies near the first.
+    """
+    is_known = np.isfinite(samples) & (samples > 0.0)
+    high, wide = samples.shape
+    middle = is_known[high // 8 : high * 3 // 4, wide // 4 : wide * 3 // 4]
+    if is_known.mean() < 0.4 or middle.mean() < 0.7:  # dark clothes before a wall: only the wall is known
+        return None
+    rows, columns = np.nonzero(is_known)
+    metres = samples[rows, columns]
+    terms = np.column_stack((rows, columns, np.ones(len(rows))))
+    kept = np.ones(len(rows), bool)
+    bound = np.maximum(0.03, 3.0 * _NOISE * metres**2)
+    for _ in range(3):
+        if kept.sum() < len(rows) // 3:
+            return False
+        plane, *_ = np.linalg.lstsq(terms[kept], 1.0 / metres[kept], rcond=None)
+        inverse = terms @ plane
+        fitted = np.where(inverse > 1e-3, 1.0 / np.maximum(inverse, 1e-3), np.inf)
+        kept = np.abs(fitted - metres) < bound
+    return bool(kept.mean() >= _FLAT_SHARE)
+
+
+def _by_lidar(box: Box, view: View, unmapped: Array) -> float | None:
+    """Distance along the optical axis of what the lidar sees in a box and the map does not show [m]."""
+    if not len(unmapped):
+        return None
+    away = unmapped - view.eye[:2]
+    distances, bearings = np.hypot(*away.T), np.arctan2(away[:, 1], away[:, 0])
+    inner = 0.1 * box.width
+    left, right = (view.ray(u, view.lens.cy) for u in (box.xmin + inner, box.xmax - inner))
+    first = math.atan2(right[1], right[0])
+    half = angle_difference(math.atan2(left[1], left[0]), first) / 2.0
+    middle = first + half
+    inside = np.abs(wrap_angles(bearings - middle)) <= abs(half)
+    if inside.sum() < _LEGS:
+        return None
+    near = np.sort(distances[inside])
+    legs = near[near < near[_LEGS - 1] + _DEEP]
+    ahead = math.cos(middle - view.yaw)
+    return float(np.median(legs)) * ahead if ahead > 0.1 else None
+
+
+def _by_floor(box: Box, view: View) -> float | None:
+    """Distance along the optical axis at which the lower edge of a box meets the floor [m]."""
+    if box.ymax >= view.lens.height - _EDGE:
+        return None
+    ray = view.ray((box.xmin + box.xmax) / 2.0, box.ymax)
+    if ray[2] > -0.005:
+        return None
+    along = float(view.eye[2] / -ray[2])
+    return along if 0.2 < along < 15.0 else None

@@ -1,0 +1,80 @@
+"""Keep the camera on a person: the bearing to turn by, how fast, and when to let go.
+
+A pure controller for a base that turns on the spot. It is bounded: whoever stays in view is watched for some seconds
+and then let go, and whoever is lost is waited for a moment, so that a mission goes on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.geometry import angle_difference
+from rosbot_patrol.params import param
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackParams:
+    """How to keep somebody in view."""
+
+    track_time: float = param(8.0, unit="s", lo=0.0, doc="so long the camera is kept on a person, in one go; 0: never")
+    track_lost: float = param(1.5, unit="s", lo=0.1, doc="a person not seen for so long is lost")
+    track_pause: float = param(20.0, unit="s", lo=0.0, doc="after that the patrol goes on for so long whatever it sees")
+    track_gain: float = param(1.5, unit="1/s", lo=0.1, hi=10.0, doc="turning speed for each radian that is missing")
+    track_speed: float = param(0.8, unit="rad/s", lo=0.05, hi=6.0, doc="top turning speed")
+    track_band: float = param(0.08, unit="rad", lo=0.0, hi=1.0, doc="so far beside the middle is good enough")
+
+
+class Track:
+    """Holds the camera on one person at a time."""
+
+    def __init__(self, params: TrackParams | None = None) -> None:
+        self.params = params or TrackParams()
+        self._since: float | None = None
+        self._seen_at = -math.inf
+        self._yaw: float | None = None
+        self._free_at = -math.inf
+
+    @property
+    def is_on(self) -> bool:
+        """Whether it has hold of somebody."""
+        return self._since is not None
+
+    def reset(self) -> None:
+        """Let go and forget, for a new mission."""
+        self._since, self._seen_at, self._yaw, self._free_at = None, -math.inf, None, -math.inf
+
+    def see(self, now: float, bearing: float, yaw: float | None) -> None:
+        """A person is in view.
+
+        Args:
+            now: time [s].
+            bearing: of the person from the camera's middle when the picture was taken, positive to the left [rad].
+            yaw: heading of the robot in odom then [rad], None where it is not known.
+        """
+        if self.params.track_time <= 0.0 or now < self._free_at or yaw is None:
+            return
+        if self._since is None:
+            self._since = now
+        self._seen_at, self._yaw = now, yaw + bearing
+
+    def step(self, now: float, yaw: float | None) -> float | None:
+        """Turning speed that keeps the person in view [rad/s], None where there is nobody to keep."""
+        p = self.params
+        if self._since is None or self._yaw is None:
+            return None
+        if now - self._seen_at > p.track_lost or now < self._since - 1.0:
+            self._let_go(now, pause=0.0)
+            return None
+        if now - self._since > p.track_time:
+            self._let_go(now, pause=p.track_pause)
+            return None
+        if yaw is None:
+            return 0.0
+        off = angle_difference(self._yaw, yaw)
+        if abs(off) <= p.track_band:
+            return 0.0
+        return math.copysign(min(p.track_gain * abs(off), p.track_speed), off)
+
+    def _let_go(self, now: float, *, pause: float) -> None:
+        self._since, self._yaw, self._free_at = None, None, now + pause

@@ -1,0 +1,146 @@
+"""Place and size of a box's object, by depth, lidar and floor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rosbot_patrol.patrol.inputs import Box
+from rosbot_patrol.patrol.person_place import Depth, Lens, View, measure
+
+LENS = Lens(fx=554.38, fy=554.38, cx=320.0, cy=240.0, width=640, height=480)
+HEIGHT = 0.22  # of the camera [m]
+
+
+def view_from(x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> View:
+    c, s = math.cos(yaw), math.sin(yaw)
+    ahead, left = np.array([c, s, 0.0]), np.array([-s, c, 0.0])
+    pose = np.eye(4)
+    pose[:3, :3] = np.column_stack((-left, [0.0, 0.0, -1.0], ahead))
+    pose[:3, 3] = x, y, HEIGHT
+    return View(LENS, pose)
+
+
+def box_of(view: View, x: float, y: float, low: float = 0.0, high: float = 1.7, width: float = 0.5) -> Box:
+    """The box of an upright plate that faces the camera."""
+    optical_from_map = np.linalg.inv(view.map_from_optical)
+    u, v = [], []
+    for z in (low, high):
+        p = optical_from_map @ np.array([x, y, z, 1.0])
+        u.append(LENS.cx + LENS.fx * p[0] / p[2])
+        v.append(LENS.cy + LENS.fy * p[1] / p[2])
+    half = width / 2 * LENS.fx / p[2]
+    clip = lambda value, most: int(min(max(value, 0), most))  # noqa: E731
+    return Box(
+        label="person",
+        probability=0.9,
+        xmin=clip(u[0] - half, 639),
+        xmax=clip(u[0] + half, 639),
+        ymin=clip(v[1], 479),
+        ymax=clip(v[0], 479),
+    )
+
+
+def depth_of(box: Box, metres: float, behind: float = 4.5, share: float = 1.0) -> Depth:
+    """Something round in the box, a wall behind it."""
+    rows, columns = np.mgrid[0:480, 0:640]
+    middle, half = (box.xmin + box.xmax) / 2, (box.xmax - box.xmin) / 2
+    aside = (columns - middle) / half
+    is_body = (np.abs(aside) < 0.7 * share) & (rows >= box.ymin) & (rows <= box.ymax)
+    round_ = metres + 0.15 * aside**2 + 0.05 * np.sin(rows / 15.0)
+    return Depth(np.where(is_body, round_, behind).astype(np.float32), LENS)
+
+
+@pytest.mark.parametrize(("x", "y", "yaw"), [(3.0, 0.5, 0.0), (2.5, -1.0, -0.3), (-3.0, 2.0, 2.5), (4.4, 0.0, 0.1)])
+def test_depth_gives_place_and_height(x: float, y: float, yaw: float) -> None:
+    view = view_from(yaw=yaw)
+    along = x * math.cos(yaw) + y * math.sin(yaw)
+    box = box_of(view, x, y, high=1.2)
+    m = measure(box, view, depth_of(box, along - 0.12, behind=5.0)).measured
+    assert m is not None
+    assert m.source == "depth"
+    assert math.dist((m.x, m.y), (x, y)) < 0.2
+    if box.ymin > 3:
+        assert m.top == pytest.approx(1.2, abs=0.1)
+    assert m.is_flat is False
+
+
+def test_what_stands_behind_is_not_the_person() -> None:
+    view = view_from()
+    box = box_of(view, 3.0, 0.0, high=1.2)
+    m = measure(box, view, depth_of(box, 2.9, behind=3.9, share=0.5)).measured
+    assert m is not None
+    assert m.x == pytest.approx(3.0, abs=0.2)
+
+
+def test_a_poster_is_flat_whatever_its_slant() -> None:
+    view = view_from()
+    box = box_of(view, 2.5, 0.3, low=0.3, high=1.1)
+    columns = np.mgrid[0:480, 0:640][1]
+    slant = 1.0 / (0.42 + 0.0004 * (columns - 320))  # a wall that runs away to the left
+    rng = np.random.default_rng(2)
+    metres = (slant + 0.0012 * slant**2 * rng.standard_normal(slant.shape)).astype(np.float32)
+    m = measure(box, view, Depth(metres, LENS)).measured
+    assert m is not None
+    assert m.is_flat is True
+
+
+def test_dark_clothes_before_a_wall_are_no_poster() -> None:
+    view = view_from()
+    box = box_of(view, 3.0, 0.0, high=1.2)
+    depth = depth_of(box, 2.9, behind=3.5)
+    depth.metres[depth.metres < 3.4] = np.nan
+    m = measure(box, view, depth).measured
+    assert m is None or m.is_flat is None
+
+
+def test_the_lidar_tells_where_depth_does_not() -> None:
+    view = view_from(1.0, 1.0, 0.4)
+    x, y = 1.0 + 6.5 * math.cos(0.5), 1.0 + 6.5 * math.sin(0.5)
+    box = box_of(view, x, y)
+    legs = np.array([[x, y], [x + 0.1, y], [x, y + 0.1], [1.0, 3.0], [8.0, 1.0]])
+    nothing = Depth(np.full((480, 640), np.nan, np.float32), LENS)
+    m = measure(box, view, nothing, legs).measured
+    assert m is not None
+    assert (m.source, m.is_flat) == ("lidar", None)
+    assert math.dist((m.x, m.y), (x, y)) < 0.3
+
+
+def test_the_floor_tells_last_and_says_that_it_is_less_sure() -> None:
+    view = view_from()
+    box = box_of(view, 3.0, 0.2)
+    m = measure(box, view, None, np.empty((0, 2))).measured
+    assert m is not None
+    assert m.source == "floor"
+    assert m.x == pytest.approx(3.0, abs=0.4)
+    assert m.error > 0.9
+
+
+def test_a_box_without_feet_has_no_place() -> None:
+    view = view_from()
+    box = Box(label="person", probability=0.9, xmin=200, ymin=0, xmax=400, ymax=479)
+    assert measure(box, view).measured is None
+    above = Box(label="person", probability=0.9, xmin=200, ymin=20, xmax=400, ymax=200)  # over the horizon
+    assert measure(above, view).measured is None
+
+
+def test_a_box_without_width_is_left_alone() -> None:
+    box = Box(label="person", probability=0.9, xmin=200, ymin=20, xmax=200, ymax=20)
+    assert measure(box, view_from(), Depth(np.ones((480, 640), np.float32), LENS)) == box
+
+
+def test_a_depth_camera_of_another_size_is_looked_up_by_bearing() -> None:
+    view = view_from()
+    box = box_of(view, 3.0, 0.5, high=1.2)
+    whole = depth_of(box, 2.88)
+    half = Depth(whole.metres[::2, ::2], Lens(fx=277.19, fy=277.19, cx=160.0, cy=120.0, width=320, height=240))
+    m = measure(box, view, half).measured
+    assert m is not None
+    assert math.dist((m.x, m.y), (3.0, 0.5)) < 0.2
+
+
+def test_the_lens_tells_how_wide_it_looks() -> None:
+    assert LENS.view_width == pytest.approx(1.047, abs=0.002)
+    assert view_from(yaw=1.2).yaw == pytest.approx(1.2)
