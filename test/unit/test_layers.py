@@ -20,7 +20,7 @@ ROWS: list[set[str]] = [
     {"costmap"},
     {"planning", "amcl", "gmapping", "detection", "rosserial", "control"},
     {"navigation", "patrol", "alerts", "sensors", "simulation"},
-    {"replay", "training"},
+    {"replay", "training", "campaign"},
     {"ros"},
 ]
 ROW_OF = {name: i for i, row in enumerate(ROWS) for name in row}

@@ -37,6 +37,7 @@ class RateParams:
     joints: float = param(10.0, unit="Hz", lo=0.1, hi=100.0, doc="/joint_states (Gazebo: 50)")
     battery: float = param(1.0, unit="Hz", lo=0.01, hi=10.0, doc="/battery")
     ground_truth: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="/ground_truth/odom")
+    actors: float = param(5.0, unit="Hz", lo=0.1, hi=100.0, doc="/ground_truth/actors")
 
 
 class Outputs:
@@ -66,6 +67,7 @@ class Outputs:
         self._battery = publisher("/battery", BatteryState, queue_size=1)
         self._truth = publisher("/ground_truth/odom", Odometry, queue_size=1)
         self._contacts = publisher("/ground_truth/contacts", Contacts, queue_size=10)
+        self._actors = publisher("/ground_truth/actors", TFMessage, queue_size=10)
         self._rgb = publisher("/camera/rgb/image_raw", Image, queue_size=1)
         self._rgb_info = publisher("/camera/rgb/camera_info", CameraInfo, queue_size=1)
         self._depth = publisher("/camera/depth/image_raw", Image, queue_size=1)
@@ -74,6 +76,7 @@ class Outputs:
         self._due: list[tuple[float, int, Callable[[float], None]]] = [
             (rates.odometry, 0, self._send_odometry),
             (rates.ground_truth, 0, self._send_truth),
+            (rates.actors, 0, self._send_actors),
             (rates.scan, 0, self._send_scan),
             (rates.camera, 5, self._send_pictures),
             (rates.imu, 2, self._send_imu),
@@ -122,6 +125,11 @@ class Outputs:
                     self._engine.pose, self._engine.twist, now, "map", z=robot.base_height, child=robot.base, exact=True
                 )
             )
+
+    def _send_actors(self, now: float) -> None:
+        if self._actors.get_num_connections():
+            actors = self._engine.actors
+            self._actors.publish(TFMessage([transform_to_msg(a.pose, "map", a.name, now) for a in actors]))
 
     def _send_contacts(self, now: float) -> None:
         if not self._contacts.get_num_connections():

@@ -21,11 +21,12 @@ from rosbot_patrol.simulation.actors import (
 )
 from rosbot_patrol.simulation.matrices import Matrix
 from rosbot_patrol.simulation.pets import PETS, PetLook, draw_pet, legs_at, pet_body, pet_named, pet_pose_parts
+from rosbot_patrol.simulation.posters import PosterFigure
 from rosbot_patrol.simulation.raycast_kernels import NO_SEGMENTS
 from rosbot_patrol.simulation.scene import Body
 from rosbot_patrol.simulation.slices import Slice, slice_bodies
 
-MODELS = ("person", "fire_hydrant", *PETS)
+MODELS = ("person", "fire_hydrant", *PETS, "poster")
 
 _PACE_OF_FULL_STEPS = 0.25  # a pet that walks slower takes smaller ones [m/s]
 _CYCLE = 1.3  # length of two steps of a person [m]
@@ -173,6 +174,8 @@ def make_figure(name: str, model: str, look: str, posture: str, rng: np.random.G
         raise WorldError(f"actor '{name}'", f"is of the model '{model}', expected one of {', '.join(MODELS)}")
     if held != "standing":
         raise WorldError(f"actor '{name}'", f"cannot be '{posture}', a {model} only stands and walks")
+    if model == "poster":
+        return PosterFigure(name, look_named(look) if look else draw_look(rng))
     if model == "fire_hydrant":
         return HydrantFigure(name)
     return PetFigure(name, pet_named(model, look) if look else draw_pet(model, rng))

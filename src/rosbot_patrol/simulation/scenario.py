@@ -62,7 +62,7 @@ class ActorEntry(Way):
     """Someone who comes, walks, and may go again."""
 
     name: str = param(doc="unique")
-    model: str = param("person", doc="person, fire_hydrant, cat, dog")
+    model: str = param("person", doc="person, fire_hydrant, cat, dog, poster")
     look: str = param("", doc="name of a look, empty: drawn from the seed")
     posture: str = param("", doc="of a person: standing, sitting, crouching, creeping")
     start: list[float] = param(check=_point, doc="where it appears, [x, y] or [x, y, yaw]")

@@ -1,0 +1,172 @@
+"""What came of each patrol: one JSON file a patrol, written whole, so that a campaign goes on where it stopped."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol.campaign.plan import CONFIRMED
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.files import write_atomic
+
+RESULT, PLAN, SETTINGS = "result.json", "patrol.json", "campaign.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What came of one patrol, and what was true; None is what is not known.
+
+    Attributes:
+        verdict: of the mission to the room, "" where there was none; reason: its sentence.
+        problem: why the patrol could not be played to its end, "" where it was.
+        was_there: whether somebody was in the room or in view before the verdict, long enough to be found.
+        in_room, in_view: for how long [s]; views: how often the camera could have seen somebody [1].
+        place_error: of the person, as told and as true [m].
+        share_told, share_true: of the room's floor that was seen.
+        times: seconds of simulated time between two events, by name.
+        contacts: what the robot touched.
+        localisation: mean and largest error of the pose [m].
+        home_error: from where the robot began, at the end [m].
+        mails: that were delivered; missions: that ended.
+        sim_s, wall_s: how long it took.
+    """
+
+    number: int
+    seed: int
+    kind: str
+    house: str
+    room: int
+    title: str
+    expected: str
+    verdict: str = ""
+    reason: str = ""
+    problem: str = ""
+    was_there: bool = False
+    in_room: float = 0.0
+    in_view: float = 0.0
+    place_error: float | None = None
+    share_told: float | None = None
+    share_true: float | None = None
+    times: dict[str, float] = field(default_factory=dict)
+    contacts: list[str] = field(default_factory=list)
+    localisation: tuple[float, float] | None = None
+    home_error: float | None = None
+    home: bool = False
+    mails: int = 0
+    missions: int = 0
+    sim_s: float = 0.0
+    wall_s: float = 0.0
+
+    @property
+    def detected(self) -> bool | None:
+        """Whether who was there was found; None where nobody was."""
+        return self.verdict == CONFIRMED if self.was_there else None
+
+    @property
+    def missed(self) -> bool:
+        """Whether somebody was there and was not found."""
+        return self.detected is False
+
+    @property
+    def false_alarm(self) -> bool:
+        """Whether somebody was found and nobody was there."""
+        return self.verdict == CONFIRMED and not self.was_there
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What did not go as it should have, each in a few words."""
+        found = [self.problem] if self.problem else []
+        found += ["missed"] if self.missed else []
+        found += ["false alarm"] if self.false_alarm else []
+        if not (self.missed or self.false_alarm or self.problem) and not self.was_there and self.verdict != "clear":
+            found.append(f"{self.verdict or 'no verdict'} in a room without anybody")
+        if self.verdict == CONFIRMED and self.mails != 1:
+            found.append(f"{self.mails} mails")
+        found += [f"touched {', '.join(sorted(set(self.contacts)))}"] if self.contacts else []
+        found += ["not home"] if not self.home and not self.problem else []
+        return tuple(found)
+
+    def to_json(self) -> str:
+        """For the file."""
+        return json.dumps(asdict(self), indent=1, ensure_ascii=False)
+
+
+def result_from_plain(tree: Mapping[str, Any]) -> Result:
+    """What a result file holds; what a newer version added is left out.
+
+    Raises:
+        TypeError: a field is missing.
+    """
+    known = {f.name for f in fields(Result)}
+    kept = {key: value for key, value in tree.items() if key in known}
+    if kept.get("localisation"):
+        kept["localisation"] = tuple(kept["localisation"])
+    return Result(**kept)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What a folder's campaign is about; another campaign needs another folder."""
+
+    seed: int
+    houses: tuple[str, ...]
+    kind: str = "patrols"
+
+
+class CampaignFolder:
+    """The files of a campaign.
+
+    Args:
+        folder: is made where it is missing.
+        settings: of the campaign; have to be those that the folder was begun with.
+
+    Raises:
+        ParamError: the folder holds another campaign, or its file cannot be read.
+        OSError: the folder cannot be made.
+    """
+
+    def __init__(self, folder: Path, settings: Settings) -> None:
+        self.folder = folder
+        self.settings = settings
+        path = folder / SETTINGS
+        begun = _read(path)
+        now = json.loads(json.dumps(asdict(settings)))
+        if begun is None:
+            write_atomic(path, json.dumps(now, indent=1).encode())
+        elif begun != now:
+            differs = ", ".join(f"{k} {begun.get(k)}, not {v}" for k, v in now.items() if begun.get(k) != v)
+            raise ParamError(str(folder), f"holds a campaign of another kind ({differs}): name another folder")
+
+    def of(self, number: int) -> Path:
+        """The folder of a patrol."""
+        return self.folder / f"{number:04d}"
+
+    def result(self, number: int) -> Result | None:
+        """What came of a patrol, None where it has not been played."""
+        tree = _read(self.of(number) / RESULT)
+        if tree is None:
+            return None
+        try:
+            return result_from_plain(tree)
+        except TypeError as err:
+            raise ParamError(str(self.of(number) / RESULT), f"is no result ({err}): remove it") from err
+
+    def results(self) -> list[Result]:
+        """All that have been played, in order."""
+        numbers = sorted(int(path.parent.name) for path in self.folder.glob(f"[0-9]*/{RESULT}"))
+        return [result for number in numbers if (result := self.result(number)) is not None]
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as err:
+        raise ParamError(str(path), f"cannot be read ({err}): remove it") from err
+    if not isinstance(tree, dict):
+        raise ParamError(str(path), "is no record of a campaign: remove it")
+    return tree

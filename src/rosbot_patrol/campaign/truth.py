@@ -1,0 +1,99 @@
+"""What really was there during a patrol, from the simulator's own poses: who was in the room, and who was in view."""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.plan import Person
+from rosbot_patrol.geometry import Pose2D
+
+RECOGNISED = 0.3  # share of a body in view from which on it should be recognised
+ENOUGH = 1.5  # in view for so long, somebody has to be found [s]
+_LONGEST = 0.5  # between two poses of the same one; more is a gap [s]
+
+
+@dataclass(frozen=True)
+class Track:
+    """Poses over simulated time [s], in order."""
+
+    times: Sequence[float]
+    poses: Sequence[Pose2D]
+
+    def at(self, time: float) -> Pose2D | None:
+        """The pose at a time, the last one before it; None before the first."""
+        i = bisect.bisect_right(self.times, time) - 1
+        return self.poses[i] if i >= 0 else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Presence:
+    """What was true of the people of a patrol between trigger and verdict.
+
+    Attributes:
+        in_room: seconds that anybody was in the room that was triggered.
+        in_view: seconds that anybody was in the camera's view.
+        first_view: simulated time at which somebody came into view, None where nobody did.
+    """
+
+    in_room: float = 0.0
+    in_view: float = 0.0
+    first_view: float | None = None
+
+    @property
+    def was_there(self) -> bool:
+        """Whether there was somebody to be found."""
+        return self.in_room >= ENOUGH or self.in_view >= ENOUGH
+
+
+def presence(
+    floor: Floor,
+    room: int,
+    people: Sequence[Person],
+    tracks: dict[str, Track],
+    robot: Track,
+    begin: float,
+    end: float,
+) -> Presence:
+    """Who was there from `begin` to `end` [s].
+
+    Args:
+        floor: of the house.
+        room: that was triggered.
+        people: who count.
+        tracks: of each actor, by name.
+        robot: the robot's true poses.
+        begin: of the mission.
+        end: when the verdict was told.
+    """
+    in_room: set[float] = set()
+    in_view: set[float] = set()
+    steps: dict[float, float] = {}
+    for person in people:
+        track = tracks.get(person.name)
+        if track is None:
+            continue
+        for i, (time, pose) in enumerate(zip(track.times, track.poses, strict=True)):
+            if not begin <= time <= end:
+                continue
+            after = track.times[i + 1] if i + 1 < len(track.times) else time
+            steps[time] = min(after - time, _LONGEST)
+            if floor.room_at(pose.x, pose.y) == room:
+                in_room.add(time)
+            at = robot.at(time)
+            if at is not None and floor.in_view(at, pose, person.posture) >= RECOGNISED:
+                in_view.add(time)
+    return Presence(
+        in_room=round(sum(steps[t] for t in in_room), 2),
+        in_view=round(sum(steps[t] for t in in_view), 2),
+        first_view=min(in_view, default=None),
+    )
+
+
+def place_error(tracks: dict[str, Track], people: Sequence[Person], time: float, x: float, y: float) -> float | None:
+    """How far a place that was told is from the nearest of the people at that time [m]; None where nobody is known."""
+    there = [pose for p in people if p.name in tracks and (pose := tracks[p.name].at(time)) is not None]
+    return min((math.dist(pose[:2], (x, y)) for pose in there), default=None)

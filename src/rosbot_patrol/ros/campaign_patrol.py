@@ -1,0 +1,191 @@
+"""Plays one patrol of a campaign in the real house, and writes down what came of it."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.houses import load_house
+from rosbot_patrol.campaign.plan import CONFIRMED, WITHIN, Patrol, patrol_from_plain, scenario_text
+from rosbot_patrol.campaign.record import PLAN, RESULT, Result
+from rosbot_patrol.campaign.truth import Presence, place_error, presence
+from rosbot_patrol.files import write_atomic
+from rosbot_patrol.msg import PatrolState
+from rosbot_patrol.ros.campaign_watch import CampaignWatch, Recording
+from rosbot_patrol.ros.house import House, HouseError, Master
+
+READY = 120.0  # for the house to be on guard [s]
+MAIL = 20.0  # for a mail after the mission [s]
+HOME = 0.35  # from where it began, the robot is home [m]
+
+Times = dict[str, float]
+
+
+def play(folder: Path, root: Path, limit: float) -> Result:
+    """Play the patrol that a folder holds.
+
+    Args:
+        folder: with the plan; gets the result, mails, state and log.
+        root: of the package.
+        limit: for all of it [s] of real time.
+    """
+    patrol = patrol_from_plain(json.loads((folder / PLAN).read_text(encoding="utf-8")))
+    file = folder / "scenario.yaml"
+    write_atomic(file, scenario_text(patrol).encode())
+    began = time.monotonic()
+    os.environ["ROS_HOME"] = os.environ["ROS_LOG_DIR"] = str(folder / "ros")
+    master = Master(folder / "roscore.log")
+    watch = CampaignWatch()
+    arguments: dict[str, Any] = {
+        "scenario": file,
+        "watched": "true",
+        "rate": 0,
+        "teleop": "false",
+        "house": patrol.house,
+    }
+    house = House(folder, "rosbot_patrol", "scenario.launch", seed=patrol.scenario["seed"], **arguments)
+    problem = ""
+    try:
+        house.start()
+        house.wait_ready(min(READY, limit))
+        _wait_for_the_end(house, watch, patrol, began + limit)
+    except HouseError as err:
+        problem = str(err).splitlines()[0]
+    finally:
+        mails = len(house.mails())
+        contacts = [other for kind, other in house.contacts if kind != "floor"]
+        house.stop()
+        watch.stop()
+        master.stop()
+    wall = time.monotonic() - began
+    result = evaluate(patrol, watch.heard, root, problem=problem, mails=mails, contacts=contacts, wall_s=wall)
+    write_atomic(folder / RESULT, result.to_json().encode())
+    return result
+
+
+def _wait_for_the_end(house: House, watch: CampaignWatch, patrol: Patrol, until: float) -> None:
+    """Until the mission to the room is over and its mail is there."""
+
+    def is_over() -> bool:
+        return _mission(watch.heard, patrol.room)[1] is not None
+
+    house.wait(lambda: is_over() or watch.now > WITHIN, until - time.monotonic(), "the end of the patrol")
+    if not is_over():
+        raise HouseError(f"after {WITHIN:.0f} s of simulated time the patrol has not ended")
+    deadline = time.monotonic() + MAIL
+    last = house.state.last_verdict if house.state else ""
+    while last == CONFIRMED and not house.mails() and time.monotonic() < deadline:
+        time.sleep(0.1)
+
+
+def _mission(heard: Recording, room: int) -> tuple[int | None, int | None]:
+    """Where the states of the first mission to a room begin, and where the rest after it."""
+    begin = next((i for i, s in enumerate(heard.states) if s.message.mission and s.message.room_id == room), None)
+    if begin is None:
+        return None, None
+    mission = heard.states[begin].message.mission
+    rest = (i for i, s in enumerate(heard.states[begin:], begin) if s.message.mission != mission)
+    return begin, next(rest, None)
+
+
+def evaluate(
+    patrol: Patrol, heard: Recording, root: Path, *, problem: str, mails: int, contacts: list[str], wall_s: float
+) -> Result:
+    """Judge a recording by the truth."""
+    found = load_house(patrol.house, root)
+    floor = Floor(found.bodies, found.rooms)
+    begin, end = _mission(heard, patrol.room)
+    verdict, reason = "", ""
+    if begin is not None and end is not None:
+        verdict, reason = heard.states[end].message.last_verdict, heard.states[end].message.why
+    times, decided = _times(heard, patrol, begin, end)
+    triggered = next((t for t, room in heard.triggers if room == patrol.room), 0.0)
+    robot, tracks = heard.robot_track(), heard.actor_tracks()
+    last = decided if decided is not None else (robot.times[-1] if robot.times else 0.0)
+    there = presence(floor, patrol.room, patrol.people, tracks, robot, triggered, last)
+    times |= _from_view(there, heard)
+    place = _place(heard, begin, end)
+    home = math.dist(robot.poses[-1][:2], robot.poses[0][:2]) if robot.times else None
+    return Result(
+        number=patrol.number,
+        seed=patrol.seed,
+        kind=patrol.kind,
+        house=patrol.house,
+        room=patrol.room,
+        title=patrol.title,
+        expected=patrol.expected,
+        verdict=verdict,
+        reason=reason,
+        problem=problem,
+        was_there=there.was_there,
+        in_room=there.in_room,
+        in_view=there.in_view,
+        place_error=place_error(tracks, patrol.people, *place) if place else None,
+        share_told=_share(heard, begin, end),
+        times={name: round(value, 2) for name, value in times.items()},
+        contacts=contacts,
+        localisation=heard.localisation(),
+        home_error=home,
+        home=home is not None and home < HOME,
+        mails=mails,
+        missions=len({s.message.mission for s in heard.states if s.message.mission}),
+        sim_s=round(robot.times[-1], 1) if robot.times else 0.0,
+        wall_s=round(wall_s, 1),
+    )
+
+
+def _times(heard: Recording, patrol: Patrol, begin: int | None, end: int | None) -> tuple[Times, float | None]:
+    """Seconds from the trigger to what followed, and when the verdict was told."""
+    if begin is None:
+        return {}, None
+    start = next((t for t, room in heard.triggers if room == patrol.room), heard.states[begin].time)
+    states = heard.states[begin : None if end is None else end + 1]
+    times: Times = {}
+    goal = next((t for t in heard.goals if t >= start), None)
+    if goal is not None:
+        times["goal"] = goal - start
+    for name, phase in (("arrived", PatrolState.LOOKING), ("looked", PatrolState.RETURNING)):
+        at = next((s.time for s in states if s.message.state == phase), None)
+        if at is not None:
+            times[name] = at - start
+    mission = heard.states[begin].message.mission
+    alert = next((t for t, a in heard.alerts if a.id.startswith(mission) and not a.delivered), None)
+    mailed = next((t for t, a in heard.alerts if a.id.startswith(mission) and a.delivered), None)
+    if alert is not None:
+        times["notice"] = alert - start
+    if mailed is not None:
+        times["mail"] = mailed - start
+    if end is not None:
+        times["home"] = heard.states[end].time - start
+    decided = alert if alert is not None else start + times["looked"] if "looked" in times else None
+    return times, decided
+
+
+def _from_view(there: Presence, heard: Recording) -> Times:
+    if there.first_view is None:
+        return {}
+    alert = next((t for t, a in heard.alerts if not a.delivered and t >= there.first_view - 1.0), None)
+    return {} if alert is None else {"seen_to_notice": max(alert - there.first_view, 0.0)}
+
+
+def _place(heard: Recording, begin: int | None, end: int | None) -> tuple[float, float, float] | None:
+    """When and where a person was told to be, None where the guard tells no places (yet)."""
+    for time_, alert in heard.alerts:
+        point = getattr(alert, "place", None)
+        if point is not None and getattr(alert, "has_place", True) and math.isfinite(point.x):
+            return time_, point.x, point.y
+    return None
+
+
+def _share(heard: Recording, begin: int | None, end: int | None) -> float | None:
+    """The share of the floor that the guard says it has seen, None where it does not say."""
+    if begin is None:
+        return None
+    states = heard.states[begin : None if end is None else end + 1]
+    shares = [share for s in states if (share := getattr(s.message, "share_seen", None)) is not None]
+    return float(max(shares)) if shares and max(shares) > 0.0 else None

@@ -1,0 +1,108 @@
+"""Starts programs that may fail, several at once, each in a space of its own and within a time, and goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+GRACE = 30.0  # beyond a program's own limit [s]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A program to run.
+
+    Attributes:
+        name: for people.
+        command: with its arguments; log: where its words go.
+        limit: that it is given to end by itself [s].
+    """
+
+    name: str
+    command: Sequence[str]
+    log: Path
+    limit: float
+
+
+class Runner:
+    """Runs jobs.
+
+    Args:
+        jobs: at once.
+        prefix: command that gives each a space of its own; where it is empty they run one after another.
+        wrap: a command to run each under, such as a lock.
+        done: told of each that ended: its job, and what was wrong, "" if nothing.
+    """
+
+    def __init__(self, jobs: int, prefix: Sequence[str], wrap: Sequence[str], done: Callable[[Job, str], None]) -> None:
+        self._count = jobs if prefix else 1
+        self._prefix, self._wrap, self._done = list(prefix), list(wrap), done
+        self._stopped = threading.Event()
+        self._lock = threading.Lock()
+        self._running: set[subprocess.Popen[bytes]] = set()
+
+    def run(self, jobs: Iterable[Job]) -> None:
+        """Run all; returns when the last has ended, or after `stop`."""
+        waiting = iter(jobs)
+        threads = [threading.Thread(target=self._work, args=(waiting,), daemon=True) for _ in range(self._count)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            while thread.is_alive():
+                thread.join(0.2)  # in pieces, so that Ctrl-C is heard
+
+    def stop(self) -> None:
+        """End those that run, and begin none."""
+        self._stopped.set()
+        with self._lock:
+            for process in self._running:
+                _end(process)
+
+    def _work(self, waiting: Iterable[Job]) -> None:
+        while not self._stopped.is_set():
+            with self._lock:
+                job = next(iter(waiting), None)
+            if job is None:
+                return
+            problem = self._run(job)
+            if not self._stopped.is_set():
+                self._done(job, problem)
+
+    def _run(self, job: Job) -> str:
+        job.log.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            with job.log.open("ab") as out:
+                process = subprocess.Popen(
+                    [*self._wrap, *self._prefix, *job.command],
+                    stdin=subprocess.DEVNULL,
+                    stdout=out,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                )
+        except OSError as err:
+            return f"could not be started: {err}"
+        with self._lock:
+            self._running.add(process)
+        try:
+            # a wrapping lock may be waited for without end; the program keeps its own limit once it runs
+            status = process.wait(None if self._wrap else job.limit + GRACE)
+        except subprocess.TimeoutExpired:
+            _end(process)
+            return f"did not end within {job.limit + GRACE:.0f} s"
+        finally:
+            with self._lock:
+                self._running.discard(process)
+        return "" if status == 0 else f"ended with status {status}, see {job.log}"
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)  # the leader of a space takes all in it along
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(10.0)
