@@ -1,7 +1,7 @@
 """The floor of a house, by the world itself and not by its map: where somebody can stand, where the robot can drive,
 which room a place belongs to, and what is seen from where.
 
-A place belongs to the room whose point is nearest on foot. Cells are of 0.1 m; `cells[iy, ix]` as everywhere.
+Rooms are parted as the patrol parts them (`patrol.room_regions`), but over the floor as it is. Cells are of 0.1 m.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import Pose2D, angle_difference
-from rosbot_patrol.grid import GridInfo
+from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.raster import flood
+from rosbot_patrol.patrol.floor import floor_of
+from rosbot_patrol.patrol.room_regions import NOBODYS, part_rooms
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.simulation.floor_plan import floor_plan
 from rosbot_patrol.simulation.scene import Body
@@ -28,13 +30,16 @@ Mask = NDArray[np.bool_]
 CELL = 0.1
 PERSON_RADIUS, ROBOT_RADIUS = 0.30, 0.24  # that each keeps from furniture [m]
 BODY_RADIUS = 0.25  # of somebody [m]
-PERSON_HEIGHTS = (0.15, 0.45, 0.75, EYE_LEVEL)  # at which somebody meets furniture [m]
+PERSON_HEIGHTS = (0.16, 0.45, 0.75, EYE_LEVEL)  # at which somebody meets furniture [m]
 ROBOT_HEIGHTS = (0.04, 0.1, 0.16, 0.2)
 EYE = 0.22  # height of the robot's camera [m]
-HALF_VIEW = 0.50  # of the camera, to the sides [rad]; a little less than its 0.52
+VIEW_WIDTH = 1.047  # of the camera [rad]
+HALF_VIEW = 0.50  # to each side, a little less [rad]
 VIEW_RANGE = 7.0  # farther off nobody is asked to be recognised [m]
 BODY_HEIGHTS = {"": (0.3, 0.6, 0.9, 1.2, 1.5), "sitting": (0.25, 0.5, 0.75, 1.0), "crouching": (0.2, 0.4, 0.6, 0.8)}
 SIDE = 0.15  # of a body from its middle [m]
+
+_TIGHT = 0.12  # that the robot keeps from furniture where a room's point asks for it [m]
 
 _STEPS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
@@ -54,45 +59,44 @@ class Floor:
         start = (rooms.base.pose.x, rooms.base.pose.y)
         self.ways = Ways(bodies)
         self._sight = Sight(bodies)
-        person = [floor_plan(bodies, self.info, height=h, start=start).cells == 0 for h in PERSON_HEIGHTS]
-        robot = [floor_plan(bodies, self.info, height=h, start=start).cells == 0 for h in ROBOT_HEIGHTS]
-        self.open: Mask = np.logical_and.reduce(robot)
-        self.standable = shrunk(np.logical_and.reduce(person), PERSON_RADIUS)
+        heights = sorted({*PERSON_HEIGHTS, *ROBOT_HEIGHTS})
+        free = {h: floor_plan(bodies, self.info, height=h, start=start).cells == 0 for h in heights}
+        self.open: Mask = np.logical_and.reduce([free[h] for h in ROBOT_HEIGHTS])
+        self.standable = shrunk(np.logical_and.reduce([free[h] for h in PERSON_HEIGHTS]), PERSON_RADIUS)
         drivable = shrunk(self.open, ROBOT_RADIUS)
-        self.room_of, self._far = self._rooms_by_way(drivable)
-        self.drivable: Mask = drivable & (self.room_of >= 0)
+        self.drivable: Mask = self._reached(drivable)
+        self.plan = floor_of(Grid(self.info, np.where(self.open, 0, 100).astype(np.int8)))
+        self.regions = part_rooms(self.plan, rooms)
+        self._room_of = self._room_cells()
+        self._drives: dict[int, NDArray[np.int64]] = {}
 
     def places(self, room: int, mask: Mask) -> NDArray[np.float64]:
         """Middles of the cells of a room that are in a mask, shape (N, 2) [m]."""
-        iy, ix = np.nonzero(mask & (self._spread == room))
+        iy, ix = np.nonzero(mask & (self._room_of == room))
         x0, y0 = self.info.origin_x + CELL / 2.0, self.info.origin_y + CELL / 2.0
         return np.column_stack((x0 + ix * CELL, y0 + iy * CELL))
 
     def room_at(self, x: float, y: float) -> int:
         """Number of the room that a place belongs to, -1 outside of the house."""
         ix, iy = self.info.cell_of(x, y)
-        return int(self._spread[iy, ix]) if self.info.contains_cell(ix, iy) else -1
+        return int(self._room_of[iy, ix]) if self.info.contains_cell(ix, iy) else -1
 
     def can_stand(self, x: float, y: float) -> bool:
         """Whether there is room for somebody."""
         ix, iy = self.info.cell_of(x, y)
         return self.info.contains_cell(ix, iy) and bool(self.standable[iy, ix])
 
-    def way_from_point(self, x: float, y: float) -> float:
-        """How far a place is from its room's point as the robot drives [m], inf where it cannot."""
-        ix, iy = self.info.cell_of(x, y)
-        return float(self._far[iy, ix]) if self.info.contains_cell(ix, iy) else math.inf
-
     def leaves_way(self, room: int, x: float, y: float) -> bool:
         """Whether the robot still comes from the base to a room's point when somebody stands at a place."""
-        iy, ix = np.indices(self.info.shape)
+        apart = (BODY_RADIUS + ROBOT_RADIUS) / CELL + 1.0
         cx, cy = self.info.cell_of(x, y)
-        off = np.hypot(ix - cx, iy - cy) * CELL
-        point = self.rooms.find(room)
-        assert point is not None
-        start, goal = (self.info.cell_of(p.x, p.y) for p in (self.rooms.base.pose, point.pose))
-        way = self.drivable & (off > BODY_RADIUS + ROBOT_RADIUS + CELL)
-        return bool(flood(way, *start)[goal[1], goal[0]])
+        drive = self._drive_to(room)
+        if not len(drive) or np.hypot(drive[:, 0] - cx, drive[:, 1] - cy).min() > apart:
+            return bool(len(drive))
+        iy, ix = np.indices(self.info.shape)
+        way = self.drivable & (np.hypot(ix - cx, iy - cy) > apart)
+        start, goal = drive[0], drive[-1]
+        return bool(flood(way, int(start[0]), int(start[1]))[goal[1], goal[0]])
 
     def share_seen(self, eye: Sequence[float], person: Sequence[float], posture: str = "") -> float:
         """How much of somebody's body is in the line of sight from the robot's camera at a place, 0 to 1.
@@ -118,14 +122,9 @@ class Floor:
 
     def way(self, start: Sequence[float], goal: Sequence[float]) -> list[tuple[float, float]]:
         """Corners of a way on foot from one place to another, both among them, empty where there is none."""
-        end = self.info.cell_of(*start)
-        far, parents = _distances(self.standable, [self.info.cell_of(*goal)], until=end)
-        if not math.isfinite(far[end[1], end[0]]):
+        cells = _cells_between(self.standable, self.info.cell_of(*start), self.info.cell_of(*goal))
+        if not cells:
             return []
-        cells = [end]
-        while parents[cells[-1][1], cells[-1][0]] >= 0:
-            iy, ix = divmod(int(parents[cells[-1][1], cells[-1][0]]), self.info.width)
-            cells.append((ix, iy))
         points = [self.info.centre_of(*cell) for cell in cells]
         return self._straightened([(start[0], start[1]), *points[1:-1], (goal[0], goal[1])])
 
@@ -143,6 +142,15 @@ class Floor:
             return None  # a corner, or a post
         yaw = math.atan2(-math.sin(towards), -math.cos(towards))
         return Pose2D(x + off * math.cos(towards), y + off * math.sin(towards), yaw)
+
+    def _drive_to(self, room: int) -> NDArray[np.int64]:
+        """Cells of the shortest way from the base to a room's point, ix, iy, shape (N, 2)."""
+        if room not in self._drives:
+            known = self.rooms.find(room)
+            assert known is not None
+            base, point = (self.info.cell_of(p.x, p.y) for p in (self.rooms.base.pose, known.pose))
+            self._drives[room] = np.array(_cells_between(self.drivable, base, point), np.int64).reshape(-1, 2)
+        return self._drives[room]
 
     def _straightened(self, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
         kept, at = [points[0]], 0
@@ -162,25 +170,23 @@ class Floor:
             for k in range(count + 1)
         )
 
-    def _rooms_by_way(self, drivable: Mask) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        seeds = [self.info.cell_of(room.pose.x, room.pose.y) for room in self.rooms]
-        near = shrunk(self.open, 0.12)
-        for ix, iy in seeds:  # a point may be given a little nearer to furniture than the robot likes
-            drivable[iy - 2 : iy + 3, ix - 2 : ix + 3] |= near[iy - 2 : iy + 3, ix - 2 : ix + 3]
-        far, parents = _distances(drivable, seeds)
-        order = np.argsort(far, axis=None)
-        rooms = np.full(far.size, -1)
-        for (ix, iy), room in zip(seeds, self.rooms, strict=True):
-            rooms[iy * self.info.width + ix] = room.id
-        flat_parents, flat_far = parents.ravel(), far.ravel()
-        for cell in order:
-            if not math.isfinite(flat_far[cell]):
-                break
-            if rooms[cell] < 0 <= flat_parents[cell]:
-                rooms[cell] = rooms[flat_parents[cell]]
-        by_way = rooms.reshape(far.shape)
-        self._spread = _spread(by_way, self.open)
-        return by_way, far
+    def _reached(self, drivable: Mask) -> Mask:
+        """Where the robot gets to from its base."""
+        base = self.rooms.base.pose
+        near = shrunk(self.open, _TIGHT)
+        for room in self.rooms:  # a point may be given a little nearer to furniture than the robot likes
+            ix, iy = self.info.cell_of(room.pose.x, room.pose.y)
+            about = (slice(iy - 2, iy + 3), slice(ix - 2, ix + 3))
+            drivable[about] |= near[about]
+        return flood(drivable, *self.info.cell_of(base.x, base.y))
+
+    def _room_cells(self) -> NDArray[np.int16]:
+        """Room of each cell, -1 where there is none."""
+        iy, ix = np.indices(self.info.shape).reshape(2, -1)
+        x, y = self.info.origin_x + (ix + 0.5) * CELL, self.info.origin_y + (iy + 0.5) * CELL
+        px, py, inside = self.plan.indices(x, y)
+        found: NDArray[np.int16] = np.where(inside, self.regions.labels[py, px], NOBODYS).reshape(self.info.shape)
+        return found
 
 
 def shrunk(mask: Mask, radius: float) -> Mask:
@@ -195,18 +201,6 @@ def shrunk(mask: Mask, radius: float) -> Mask:
     return kept
 
 
-def _spread(rooms: NDArray[np.int64], is_open: Mask) -> NDArray[np.int64]:
-    """Rooms of all open cells: from those that the robot reaches on to their neighbours."""
-    spread = rooms.copy()
-    for _ in range(12):
-        before = spread.copy()
-        for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-            moved = np.roll(before, (dy, dx), axis=(0, 1))
-            take = is_open & (spread < 0) & (moved >= 0)
-            spread[take] = moved[take]
-    return spread
-
-
 def _info_of(bodies: Sequence[Body]) -> GridInfo:
     ends = np.vstack([slice_bodies(bodies, EYE_LEVEL).segments.reshape(-1, 2)])
     low, high = ends.min(axis=0) - 0.3, ends.max(axis=0) + 0.3
@@ -214,28 +208,28 @@ def _info_of(bodies: Sequence[Body]) -> GridInfo:
     return GridInfo(resolution=CELL, width=width, height=height, origin_x=float(low[0]), origin_y=float(low[1]))
 
 
-def _distances(
-    mask: Mask, seeds: Sequence[tuple[int, int]], *, until: tuple[int, int] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Way from the nearest of some cells over a mask [m], and each cell's parent as an index, -1 for none."""
+def _cells_between(mask: Mask, start: tuple[int, int], goal: tuple[int, int]) -> list[tuple[int, int]]:
+    """Cells of the shortest way over a mask, empty where there is none (Dijkstra 1959)."""
     far = np.full(mask.shape, math.inf)
-    parents = np.full(mask.shape, -1)
-    heap = []
-    for ix, iy in seeds:
-        far[iy, ix] = 0.0
-        heap.append((0.0, ix, iy))
-    heapq.heapify(heap)
+    parents: dict[tuple[int, int], tuple[int, int]] = {}
+    far[goal[1], goal[0]] = 0.0
+    heap = [(0.0, goal)]
     height, width = mask.shape
     while heap:
-        here, ix, iy = heapq.heappop(heap)
+        here, (ix, iy) = heapq.heappop(heap)
+        if (ix, iy) == start:
+            break
         if here > far[iy, ix]:
             continue
-        if (ix, iy) == until:
-            break
         for dx, dy, step in _STEPS:
             x, y = ix + dx, iy + dy
-            if 0 <= x < width and 0 <= y < height and mask[y, x] and here + step * CELL < far[y, x]:
-                far[y, x] = here + step * CELL
-                parents[y, x] = iy * width + ix
-                heapq.heappush(heap, (float(far[y, x]), x, y))
-    return far, parents
+            if 0 <= x < width and 0 <= y < height and mask[y, x] and here + step < far[y, x]:
+                far[y, x] = here + step
+                parents[x, y] = (ix, iy)
+                heapq.heappush(heap, (here + step, (x, y)))
+    if not math.isfinite(far[start[1], start[0]]):
+        return []
+    cells = [start]
+    while cells[-1] != goal:
+        cells.append(parents[cells[-1]])
+    return cells

@@ -177,7 +177,7 @@ def _standing(stage: _Stage) -> _Cast | None:
 
 
 def _walking(stage: _Stage) -> _Cast | None:
-    for _ in range(20):
+    for _ in range(80):
         a, b = stage.in_sight(), stage.in_sight()
         if a is None or b is None:
             return None
@@ -239,7 +239,7 @@ def _late(stage: _Stage) -> _Cast | None:
 
 
 def _two(stage: _Stage) -> _Cast | None:
-    for _ in range(20):
+    for _ in range(80):
         a, b = stage.in_sight(), stage.in_sight()
         if a is None or b is None:
             return None

@@ -14,6 +14,7 @@ import logging
 import os
 import shlex
 import shutil
+import signal
 import sys
 import time
 from pathlib import Path
@@ -169,6 +170,8 @@ def main() -> None:
     """Run the program."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s")
     given = options(sys.argv[1:])
+    for number in (signal.SIGINT, signal.SIGTERM):  # in the background a shell has SIGINT ignored
+        signal.signal(number, signal.default_int_handler)
     try:
         if given.one:
             if given.space:

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import os
 import time
 from pathlib import Path
 from typing import Any
 
+from rosbot_patrol.alerts.incident import Incident
+from rosbot_patrol.alerts.incident_database import NAME
+from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses import load_house
 from rosbot_patrol.campaign.plan import CONFIRMED, WITHIN, Patrol, patrol_from_plain, scenario_text
 from rosbot_patrol.campaign.record import PLAN, RESULT, Result
+from rosbot_patrol.campaign.share import true_share
 from rosbot_patrol.campaign.truth import Presence, place_error, presence
+from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.ros.campaign_watch import CampaignWatch, Recording
@@ -24,6 +30,8 @@ MAIL = 20.0  # for a mail after the mission [s]
 HOME = 0.35  # from where it began, the robot is home [m]
 
 Times = dict[str, float]
+
+log = logging.getLogger(__name__)
 
 
 def play(folder: Path, root: Path, limit: float) -> Result:
@@ -63,7 +71,8 @@ def play(folder: Path, root: Path, limit: float) -> Result:
         watch.stop()
         master.stop()
     wall = time.monotonic() - began
-    result = evaluate(patrol, watch.heard, root, problem=problem, mails=mails, contacts=contacts, wall_s=wall)
+    found: dict[str, Any] = {"problem": problem, "mails": mails, "contacts": contacts, "wall_s": wall}
+    result = evaluate(patrol, watch.heard, root, folder / "state", **found)
     write_atomic(folder / RESULT, result.to_json().encode())
     return result
 
@@ -94,9 +103,17 @@ def _mission(heard: Recording, room: int) -> tuple[int | None, int | None]:
 
 
 def evaluate(
-    patrol: Patrol, heard: Recording, root: Path, *, problem: str, mails: int, contacts: list[str], wall_s: float
+    patrol: Patrol,
+    heard: Recording,
+    root: Path,
+    state_dir: Path,
+    *,
+    problem: str,
+    mails: int,
+    contacts: list[str],
+    wall_s: float,
 ) -> Result:
-    """Judge a recording by the truth."""
+    """Judge a recording, and what the guard kept of it, by the truth."""
     found = load_house(patrol.house, root)
     floor = Floor(found.bodies, found.rooms)
     begin, end = _mission(heard, patrol.room)
@@ -109,7 +126,9 @@ def evaluate(
     last = decided if decided is not None else (robot.times[-1] if robot.times else 0.0)
     there = presence(floor, patrol.room, patrol.people, tracks, robot, triggered, last)
     times |= _from_view(there, heard)
-    place = _place(heard, begin, end)
+    kept = _kept(state_dir, None if begin is None else heard.states[begin].message.mission)
+    person = kept.person if kept is not None else None
+    looked = times.get("looked")
     home = math.dist(robot.poses[-1][:2], robot.poses[0][:2]) if robot.times else None
     return Result(
         number=patrol.number,
@@ -125,8 +144,9 @@ def evaluate(
         was_there=there.was_there,
         in_room=there.in_room,
         in_view=there.in_view,
-        place_error=place_error(tracks, patrol.people, *place) if place else None,
-        share_told=_share(heard, begin, end),
+        place_error=place_error(tracks, patrol.people, last, *person) if person else None,
+        share_told=kept.share_seen if kept is not None else None,
+        share_true=true_share(floor, patrol.room, robot, triggered, triggered + looked) if looked else None,
         times={name: round(value, 2) for name, value in times.items()},
         contacts=contacts,
         localisation=heard.localisation(),
@@ -173,19 +193,13 @@ def _from_view(there: Presence, heard: Recording) -> Times:
     return {} if alert is None else {"seen_to_notice": max(alert - there.first_view, 0.0)}
 
 
-def _place(heard: Recording, begin: int | None, end: int | None) -> tuple[float, float, float] | None:
-    """When and where a person was told to be, None where the guard tells no places (yet)."""
-    for time_, alert in heard.alerts:
-        point = getattr(alert, "place", None)
-        if point is not None and getattr(alert, "has_place", True) and math.isfinite(point.x):
-            return time_, point.x, point.y
-    return None
-
-
-def _share(heard: Recording, begin: int | None, end: int | None) -> float | None:
-    """The share of the floor that the guard says it has seen, None where it does not say."""
-    if begin is None:
+def _kept(state_dir: Path, mission: str | None) -> Incident | None:
+    """The guard's own record of a mission, None where it keeps none."""
+    if mission is None or not (state_dir / NAME).is_file():
         return None
-    states = heard.states[begin : None if end is None else end + 1]
-    shares = [share for s in states if (share := getattr(s.message, "share_seen", None)) is not None]
-    return float(max(shares)) if shares and max(shares) > 0.0 else None
+    try:
+        with IncidentStore(state_dir, read_only=True) as store:
+            return store.get(mission)
+    except StoreError as err:
+        log.error("the incident %s cannot be read: %s", mission, err)
+        return None
