@@ -32,7 +32,6 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 from ros_processes import Process, free_port, wait_for
 
 from rosbot_patrol.alerts.incident import Incident
-from rosbot_patrol.alerts.mail import build_mail, make_envelope
 from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.detection.darknet_cfg import read_cfg
@@ -297,10 +296,9 @@ def put_a_mail_into_the_outbox(folder):
         verdict="confirmed",
         reason="person seen",
     )
-    mail = build_mail(incident_notice(incident, None), make_envelope("owner@example.org", "rosbot@localhost"))
     outbox = folder / "state" / "outbox"
-    Outbox(outbox).put(incident.id, mail)
-    return lambda: list(outbox.glob("*.eml"))
+    Outbox(outbox).put(incident_notice(incident, None))
+    return lambda: list(outbox.glob("*.notice"))
 
 
 def smtp(port, **params):
@@ -323,7 +321,7 @@ def test_a_mail_server_that_is_down_and_comes_up(ros, tmp_path, smtp_server):
     port, waiting = free_port(), put_a_mail_into_the_outbox(tmp_path)
     patrol, probe = start_patrol(ros, tmp_path, **smtp(port))
     patrol.says(f"the mail server localhost:{port} cannot be used: [Errno 111] Connection refused", 20.0)
-    patrol.says(f"the mail stays in {waiting()[0]}, next try in")
+    patrol.says(f"it waits in {tmp_path}/state/outbox, next try in")
     probe.tell(publish=["/motion_trigger", {"id": 1, "move": True}])
     drives_to(probe, 1)
     assert len(waiting()) == 1

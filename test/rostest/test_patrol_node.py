@@ -201,7 +201,7 @@ def test_person_makes_one_mail_with_picture(house):
     (mail,) = house.mails()
     assert mail["Subject"] == "rosbot patrol node"
     parts = list(mail.walk())
-    text = parts[1].get_payload(decode=True).decode()
+    text = parts[2].get_payload(decode=True).decode()
     assert text.startswith("I have found something strange it could be invader")
     assert "2 (square room behind the door)" in text
     picture = parts[-1]
@@ -322,7 +322,7 @@ def test_unreachable_mail_server_loses_and_hangs_nothing(house):
     house.send(2)
     assert house.wait_for_mission().last_verdict == "confirmed"
     assert f"the mail server localhost:{port} cannot be used" in house.log(house.patrol)
-    assert len(list((house.folder / "state" / "outbox").glob("*.eml"))) == 1
+    assert len(list((house.folder / "state" / "outbox").glob("*.notice"))) == 1
 
 
 def test_sigint_cancels_the_goal_and_stops_the_wheels(house):
@@ -388,7 +388,7 @@ def test_the_mail_server_comes_back_and_gets_it_once(house):
         wait_until(lambda: "delivered by smtp" in house.log(house.patrol), 10, "the word about it")
         time.sleep(1.0)
         assert len(server.mails) == 1
-    assert not list((house.folder / "state" / "outbox").glob("*.eml"))
+    assert not list((house.folder / "state" / "outbox").glob("*.notice"))
     assert "1 wait from before" in house.log(house.patrol)
 
 

@@ -34,6 +34,11 @@ FAST = {
 }
 
 
+def plain_text(mail):
+    part = next(part for part in mail.walk() if part.get_content_type() == "text/plain")
+    return part.get_payload(decode=True).decode()
+
+
 def plain(header):
     return str(make_header(decode_header(header)))
 
@@ -99,7 +104,7 @@ def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_p
     assert silent["text"].startswith('sensor 3 "Haustür" in room 5 (corridor hall) is silent')
     probe.expect(lambda said: "sensor_watch: sensor 3 Haust" in str(said.get("status")) and "not: 3" in str(said))
     mail = watch.mail('sensor 3 "Haustür" in room 5 (corridor hall) is silent')
-    text = mail.get_payload(decode=True).decode()
+    text = plain_text(mail)
     assert "Last heard 20" in text
     assert "What to do: see that it has power" in text
     assert "1 of 2 motion sensors are well." in text
@@ -126,7 +131,7 @@ def test_a_bridge_is_killed_and_its_sensors_are_told_as_one(ros, tmp_path):
     first.stop(signal.SIGKILL)
     gone = probe.expect(lambda said: said.get("kind") == "bridge_gone" and said.get("active"))
     assert gone["text"] == "bridge /esp_client1 has gone: nothing is heard of it"
-    mail = watch.mail("bridge /esp_client1 has gone").get_payload(decode=True).decode()
+    mail = plain_text(watch.mail("bridge /esp_client1 has gone"))
     assert "and with it of sensor 1 in room 1 (guest room), sensor 2 in room 2" in mail
     bridge(ros, port)
     for i in (1, 2):
@@ -198,7 +203,7 @@ def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp
     probe.tell(subscribe=EVENTS)
     watch = Watch(ros, tmp_path, [{"id": 7, "room": 7}], start_grace=2.0)
     watch.node.says("watching 1 sensors")
-    outbox = tmp_path / "state" / "sensor_outbox"
+    outbox = tmp_path / "state" / "outbox"
     outbox.rename(tmp_path / "aside")
     outbox.write_text("the disk takes nothing")
     watch.node.says("is silent' cannot be written to")

@@ -14,9 +14,11 @@ from email.message import EmailMessage
 from email.policy import SMTP
 from email.utils import formatdate, getaddresses
 
+from rosbot_patrol.alerts.mail_html import html_page
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.errors import ParamError
 
+_POLICY = SMTP.clone(cte_type="7bit")  # for servers that do not know 8BITMIME
 _USER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]*")  # a user of this machine
 _HOST = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*")
 
@@ -44,7 +46,7 @@ def parse_addresses(name: str, text: str) -> tuple[Address, ...]:
     Raises:
         ParamError: a line break, a control character, or something that is no address.
     """
-    if any(ord(c) < 32 or ord(c) == 127 for c in text):
+    if not text.isprintable():
         raise ParamError(name, f"has a line break or control character: {text!r}")
     if not text.strip():
         return ()
@@ -62,45 +64,74 @@ def parse_addresses(name: str, text: str) -> tuple[Address, ...]:
     return tuple(found)
 
 
-def make_envelope(email_to: str, email_from: str, *, prefix: str = "~", host: str = "localhost") -> Envelope:
-    """Sender and recipients from the tutorial's two parameters; raises ParamError."""
-    to = parse_addresses(prefix + "email_to", email_to)
-    sender = parse_addresses(prefix + "email_from", email_from)
+def make_envelope(
+    to_text: str, from_text: str, *, names: tuple[str, str] = ("~email_to", "~email_from"), host: str = "localhost"
+) -> Envelope:
+    """Sender and recipients.
+
+    Args:
+        to_text: recipients, with commas between.
+        from_text: sender; what is no real address becomes one that servers take.
+        names: what the two are called, for messages.
+        host: of this machine.
+
+    Raises:
+        ParamError: something that is no address.
+    """
+    to = parse_addresses(names[0], to_text)
+    sender = parse_addresses(names[1], from_text)
     if len(sender) > 1:
-        raise ParamError(prefix + "email_from", f"expected one address, got {email_from!r}")
+        raise ParamError(names[1], f"expected one address, got {from_text!r}")
     domain = host if _HOST.fullmatch(host) else "localhost"
     fallback = Address("rosbot patrol", "rosbot_patrol", domain)
     return Envelope(sender=sender[0] if sender and _is_real(sender[0]) else fallback, to=to)
 
 
 def build_mail(notice: Notice, envelope: Envelope) -> EmailMessage:
-    """The mail that tells a notice.
+    """The mail that tells a notice: plain text, the same as a page for phones, and the picture shown in it.
 
     Args:
         notice: what happened; nothing in it can add a header or a line to the table of facts.
         envelope: who to tell.
     """
     mail = _empty_mail(one_line(notice.subject)[:200], notice.id, notice.wall, envelope)
+    mail["X-Rosbot-Patrol-Kind"] = token(notice.kind)
     if notice.incident:
         mail["X-Rosbot-Patrol-Incident"] = token(notice.incident)
     else:
         mail["X-Rosbot-Patrol-Notice"] = token(notice.id)
-    mail.set_content(plain_text(notice), charset="utf-8")
-    if notice.picture is not None:
-        name = token(notice.picture_name)
-        mail.add_attachment(notice.picture, maintype="image", subtype="jpeg", filename=name)
+    mail["MIME-Version"] = "1.0"
+    if notice.picture is None:
+        _set_texts(mail, notice)
+        return mail
+    cid = f"picture.{token(notice.id)}@{envelope.sender.domain or 'localhost'}"
+    texts = EmailMessage(policy=_POLICY)
+    _set_texts(texts, notice, picture_cid=cid)
+    del texts["MIME-Version"]  # it is said at the top
+    mail.make_related()
+    mail.set_param("type", "multipart/alternative")
+    mail.attach(texts)
+    name = token(notice.picture_name)[:100]
+    mail.add_related(
+        notice.picture, maintype="image", subtype="jpeg", filename=name, cid=f"<{cid}>", disposition="inline"
+    )
     return mail
+
+
+def _set_texts(part: EmailMessage, notice: Notice, picture_cid: str = "") -> None:
+    part.set_content(plain_text(notice), charset="utf-8")
+    part.add_alternative(html_page(notice, picture_cid), subtype="html", charset="utf-8")
 
 
 def plain_text(notice: Notice) -> str:
     """What a notice says, for a reader of plain text."""
-    text = notice.text.rstrip("\n")
+    text = "\n".join("".join(c if c.isprintable() else " " for c in line) for line in _lines(notice.text)).rstrip()
     table = "\n".join(f"{one_line(key) + ':':10}{one_line(value)}" for key, value in notice.facts)
     return f"{text}\n\n{table}\n" if table else f"{text}\n"
 
 
 def _empty_mail(subject: str, mail_id: str, wall: float, envelope: Envelope) -> EmailMessage:
-    mail = EmailMessage(policy=SMTP)
+    mail = EmailMessage(policy=_POLICY)
     mail["Subject"] = subject
     mail["From"] = envelope.sender
     if envelope.to:
@@ -121,6 +152,10 @@ def token(text: str) -> str:
 def one_line(text: str) -> str:
     """The text without line breaks and control characters."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def _lines(text: str) -> list[str]:
+    return text.replace("\r\n", "\n").split("\n")
 
 
 def _is_real(address: Address) -> bool:

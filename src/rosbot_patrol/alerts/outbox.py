@@ -1,168 +1,203 @@
-"""Mails that wait for their transport: on disk until it took them.
+"""The spool of notices: a folder in which any process puts, and from which one delivers.
 
-Each is one whole file, written before anything is sent. Order is kept: where the transport is down, all wait for the
-oldest; a mail that the server refuses for good lets the others pass and is tried again later. What was delivered moves
-to the folder `sent`, so that an incident that comes up again after a crash is known. After a crash between sending and
-moving a mail goes again, with the same Message-ID (the Maildir transport notices and keeps one).
+    outbox/000000000012-ID.notice   waits (alerts/notice.py), written whole and synced before `put` returns
+    outbox/taken.jsonl              which channel took what (alerts/receipts.py)
+    outbox/sent/                    the last that every channel took
+    outbox/reserve                  room for some notices where the disk is full
+    outbox/lock                     held by the process that delivers (alerts/postman.py)
+
+Numbers give the order; two processes that put at the same moment may take the same number, their ids then decide.
 """
 
 from __future__ import annotations
 
-import glob
+import errno
 import logging
+import os
 import re
-from dataclasses import dataclass
-from email import message_from_bytes
-from email.message import EmailMessage
-from email.policy import SMTP
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.files import sync_folder, write_atomic
 
 log = logging.getLogger(__name__)
 
-_NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.eml")
+_NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|eml)")
+_SCRATCH = re.compile(r"\..*\.(?P<pid>\d+)\.tmp")
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+RESERVE = 2 << 20  # [bytes]
 
 
-@dataclass(kw_only=True)
-class Entry:
-    """One mail that waits.
+@dataclass(frozen=True, kw_only=True)
+class Waiting:
+    """One notice that waits, without its text and picture.
 
     Attributes:
-        id: of the incident.
-        path: its file.
-        attempts: since the program started.
-        due: not to be tried before [s].
+        name: of its file; names sort by order.
+        id, kind, wall: of the notice.
+        is_urgent: it leaves as a message of its own.
+        channels: that are asked by name; empty: all of its kind.
     """
 
+    name: str
     id: str
-    path: Path
-    attempts: int = 0
-    due: float = float("-inf")
-
-    def mail(self) -> EmailMessage:
-        """The mail. Raises OSError where the file cannot be read, ValueError where it is no mail."""
-        mail = message_from_bytes(self.path.read_bytes(), policy=SMTP)
-        if not isinstance(mail, EmailMessage) or not mail["Message-ID"] or not mail["From"]:
-            raise ValueError("is no mail")
-        return mail
+    kind: str
+    wall: float
+    is_urgent: bool = False
+    channels: tuple[str, ...] = field(default=())
 
 
 class Outbox:
-    """The folder of waiting mails.
+    """The folder of waiting notices.
 
     Args:
-        folder: is made where missing; what lies there already waits, too.
-        interval: least time between two mails [s]: delays, never drops.
-        first_delay: wait after the first failure [s]; doubles with each to at most max_delay.
-        keep: so many delivered mails stay in `sent`.
+        folder: is made where missing.
+        keep: so many delivered notices stay in `sent`.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        *,
-        interval: float = 10.0,
-        first_delay: float = 5.0,
-        max_delay: float = 900.0,
-        keep: int = 200,
-    ) -> None:
-        self.folder = folder
-        self._interval = interval
-        self._first_delay, self._max_delay, self._keep = first_delay, max_delay, keep
-        self._sent = folder / "sent"
-        self._failures = 0
-        self._blocked_until = float("-inf")
-        self._last_delivery = float("-inf")
-        self._sent.mkdir(parents=True, exist_ok=True)
-        self._entries = self._scan()
-        names = [path.name for path in (*folder.glob("*.eml"), *self._sent.glob("*.eml"))]
-        orders = [int(match["order"]) for name in names if (match := _NAME.fullmatch(name))]
-        self._order = max(orders, default=0)
+    def __init__(self, folder: Path, *, keep: int = 200) -> None:
+        self.folder, self.sent = folder, folder / "sent"
+        self._keep = keep
+        self._known: dict[str, Waiting] = {}
+        self._left_alone: set[str] = set()
+        self._order = 0
+        self.sent.mkdir(parents=True, exist_ok=True)
 
-    def __len__(self) -> int:
-        return len(self._entries)
+    def has(self, notice_id: str) -> bool:
+        """Whether a notice of this id waits or was delivered."""
+        return any(found["id"] == notice_id for found in self._all_names())
 
-    def has(self, incident_id: str) -> bool:
-        """Whether a mail of this incident waits or was delivered."""
-        waits = any(entry.id == incident_id for entry in self._entries)
-        return waits or any(True for _ in self._sent.glob(f"*-{glob.escape(incident_id)}.eml"))
+    def put(self, notice: Notice) -> bool:
+        """Keep a notice until it is delivered; returns False where one of its id is known already.
 
-    def put(self, incident_id: str, mail: EmailMessage) -> None:
-        """Keep a mail until it is delivered; nothing where the incident's is known already. Raises OSError."""
-        if self.has(incident_id):
-            return
-        path = self.folder / f"{self._order + 1:012d}-{incident_id}.eml"
-        if not _NAME.fullmatch(path.name):
-            raise ValueError(f"'{incident_id}' is no id for a file")
-        write_atomic(path, mail.as_bytes(policy=SMTP))
-        self._order += 1
-        self._entries.append(Entry(id=incident_id, path=path))
-
-    def due(self, now: float) -> Entry | None:
-        """The mail to be sent now, None where none is due."""
-        if now < self._blocked_until or now - self._last_delivery < self._interval:
-            return None
-        return next((entry for entry in self._entries if entry.due <= now), None)
-
-    def wait(self, now: float) -> float | None:
-        """How long until something is due [s], None where nothing waits."""
-        if not self._entries:
-            return None
-        due = max(min(e.due for e in self._entries), self._blocked_until, self._last_delivery + self._interval)
-        return max(due - now, 0.0)
-
-    def delivered(self, entry: Entry, now: float) -> None:
-        """Move a mail to `sent`. Raises OSError where the disk does not take it (it goes again after a restart)."""
-        self._entries.remove(entry)
-        self._last_delivery = now
-        self._failures, self._blocked_until = 0, float("-inf")
-        entry.path.replace(self._sent / entry.path.name)
-        sync_folder(self._sent)
-        sync_folder(self.folder)
-        for old in sorted(self._sent.glob("*.eml"))[: -self._keep]:
-            old.unlink(missing_ok=True)
-
-    def forget(self, entry: Entry) -> None:
-        """Take an entry whose file is gone off the list."""
-        self._entries.remove(entry)
-
-    def failed(self, entry: Entry, now: float, *, permanent: bool = False) -> float:
-        """Put a mail off; returns how long [s].
-
-        Args:
-            entry: that was tried.
-            now: time [s].
-            permanent: the fault is this mail's, the others may pass.
+        Raises:
+            OSError: the disk does not take it: nothing is kept then.
         """
-        entry.attempts += 1
-        if permanent:
-            delay = self._delay(entry.attempts)
-            entry.due = now + delay
-            return delay
-        self._failures += 1
-        delay = self._delay(self._failures)
-        self._blocked_until = now + delay
-        return delay
+        names = self._all_names()
+        if any(found["id"] == notice.id for found in names):
+            return False
+        self._order = max([self._order, *(int(found["order"]) for found in names)]) + 1
+        path = self.folder / f"{self._order:012d}-{notice.id}.notice"
+        data = notice.to_bytes()
+        try:
+            write_atomic(path, data)
+        except OSError as err:
+            if err.errno not in _FULL or not self._make_room(len(data)):
+                raise
+            log.error("the disk is full: the notice took of what is kept free for it")
+            write_atomic(path, data)
+        return True
 
-    def set_aside(self, entry: Entry) -> Path:
-        """Take a file that is no mail out of the way; it stays on disk under another name. Raises OSError."""
-        self._entries.remove(entry)
-        aside = entry.path.with_suffix(".broken")
-        entry.path.replace(aside)
+    def waiting(self) -> list[Waiting]:
+        """What waits now, oldest first. A file that is no notice is set aside. Raises OSError."""
+        names = sorted(e.name for e in os.scandir(self.folder) if e.name.endswith(".notice"))
+        self._known = {name: self._known[name] for name in names if name in self._known}
+        for name in names:
+            if name not in self._known and name not in self._left_alone:
+                self._look_at(name)
+        return [self._known[name] for name in names if name in self._known]
+
+    def read(self, entry: Waiting) -> Notice:
+        """A notice. Raises OSError where its file cannot be read, ValueError where it is none."""
+        return Notice.from_bytes((self.folder / entry.name).read_bytes())
+
+    def doubt(self, entries: Iterable[Waiting]) -> None:
+        """Look at these files anew in the next `waiting`: one of them could not be read."""
+        for entry in entries:
+            self._known.pop(entry.name, None)
+
+    def finish(self, entry: Waiting) -> None:
+        """Move a notice that every channel took to `sent`. Raises OSError."""
+        try:
+            (self.folder / entry.name).replace(self.sent / entry.name)
+        except FileNotFoundError:
+            log.warning("%s is gone from the outbox", entry.name)
+        self._known.pop(entry.name, None)
+
+    def set_aside(self, name: str) -> Path:
+        """Take a file that is no notice out of the way; it stays under another name. Raises OSError."""
+        aside = (self.folder / name).with_suffix(".broken")
+        (self.folder / name).replace(aside)
         return aside
 
-    def _delay(self, attempts: int) -> float:
-        return float(min(self._first_delay * 2.0 ** min(attempts - 1, 30), self._max_delay))
+    def tidy(self) -> None:
+        """Remove old notices and scratch files, keep the reserve; for the process that delivers. Raises OSError."""
+        for name in sorted(e.name for e in os.scandir(self.sent))[: -self._keep]:
+            (self.sent / name).unlink(missing_ok=True)
+        for scratch in (*self.folder.glob(".*.tmp"), *self.sent.glob(".*.tmp")):
+            if _is_left_over(scratch):
+                scratch.unlink(missing_ok=True)
+        self._keep_reserve()
 
-    def _scan(self) -> list[Entry]:
-        for scratch in self.folder.glob(".*.tmp"):  # what a crash left half written was never promised to anyone
-            scratch.unlink(missing_ok=True)
-        entries = []
-        for path in sorted(self.folder.glob("*.eml")):
-            match = _NAME.fullmatch(path.name)
-            if match:
-                entries.append(Entry(id=match["id"], path=path))
+    # -- inside
+
+    def _all_names(self) -> list[re.Match[str]]:
+        # those that wait first: a notice that moves to `sent` meanwhile is seen at least once
+        waiting = [entry.name for entry in os.scandir(self.folder)]
+        names = waiting + [entry.name for entry in os.scandir(self.sent)]
+        return [found for name in names if (found := _NAME.fullmatch(name))]
+
+    def _look_at(self, name: str) -> None:
+        try:
+            notice = Notice.from_bytes((self.folder / name).read_bytes())
+        except FileNotFoundError:
+            return
+        except ValueError as err:
+            if "this version knows" in str(err):
+                self._left_alone.add(name)
+                log.error("%s %s: it is left alone", self.folder / name, err)
             else:
-                log.warning("%s does not look like a waiting mail and is left alone", path)
-        return entries
+                log.error("%s %s: set aside as %s", self.folder / name, err, self.set_aside(name))
+            return
+        self._known[name] = Waiting(
+            name=name,
+            id=notice.id,
+            kind=notice.kind,
+            wall=notice.wall,
+            is_urgent=notice.is_urgent,
+            channels=notice.channels,
+        )
+
+    def _make_room(self, size: int) -> bool:
+        """Free space on a full disk: of what was delivered, then of the reserve; returns whether there was some."""
+        freed = 0
+        for name in sorted(e.name for e in os.scandir(self.sent))[:-20]:
+            freed += (self.sent / name).stat().st_size
+            (self.sent / name).unlink(missing_ok=True)
+        reserve = self.folder / "reserve"
+        if freed < 2 * size and reserve.exists():
+            left = reserve.stat().st_size
+            freed += min(left, size + 65536)
+            os.truncate(reserve, max(left - size - 65536, 0))
+        return freed > 0
+
+    def _keep_reserve(self) -> None:
+        reserve = self.folder / "reserve"
+        system = os.statvfs(self.folder)
+        have = reserve.stat().st_size if reserve.exists() else 0
+        if have >= RESERVE or system.f_bavail * system.f_frsize < 8 * RESERVE:
+            return
+        handle = os.open(reserve, os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            os.posix_fallocate(handle, 0, RESERVE)
+        finally:
+            os.close(handle)
+        sync_folder(self.folder)
+
+
+def _is_left_over(scratch: Path) -> bool:
+    """Whether a crash left it: its process has gone, and it is not of this moment."""
+    found = _SCRATCH.fullmatch(scratch.name)
+    try:
+        age = time.clock_gettime(time.CLOCK_REALTIME) - scratch.stat().st_mtime
+        if found is None or age < 60.0:
+            return False
+        os.kill(int(found["pid"]), 0)
+    except (ProcessLookupError, OverflowError):
+        return True
+    except (FileNotFoundError, PermissionError):
+        return False
+    return False

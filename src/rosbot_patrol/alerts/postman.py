@@ -1,107 +1,331 @@
-"""Brings the mails of an outbox to their transport, one at a time, from any number of threads that put some in."""
+"""Brings what waits in the outbox to its channels. Of all processes that could, one does at a time.
+
+Whoever holds the outbox's lock delivers for everybody; the system takes the lock back however that process ends, and
+the next that asks has it. A notice is crossed out for a channel once that took it: after a crash between the two it
+goes to that channel again, with the same id (as Message-ID, file name or idempotency key).
+"""
 
 from __future__ import annotations
 
+import json
 import logging
+import random
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
-from rosbot_patrol.alerts.mail import Envelope, build_mail
+from rosbot_patrol.alerts.channel import Channel, DeliveryError
+from rosbot_patrol.alerts.digest import merge
+from rosbot_patrol.alerts.file_lock import FileLock
+from rosbot_patrol.alerts.lane import Lane
 from rosbot_patrol.alerts.notice import Notice
-from rosbot_patrol.alerts.outbox import Entry, Outbox
-from rosbot_patrol.alerts.transports import DeliveryError, Transport
+from rosbot_patrol.alerts.outbox import Outbox, Waiting
+from rosbot_patrol.alerts.receipts import Receipt, Receipts
+from rosbot_patrol.alerts.upgrade import adopt_mails
+from rosbot_patrol.files import write_atomic
 
 log = logging.getLogger(__name__)
 
-LOOK_AGAIN = 60.0  # [s]
+STATUS = "status.json"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Delivery:
-    """What became of a mail: delivered to `location`, or put off or set aside; `text` says so."""
+    """What became of a message: taken at `where`, or put off; `text` says so."""
 
-    id: str
+    channel: str
+    transport: str
+    ids: tuple[str, ...]
     delivered: bool
-    location: str = ""
+    permanent: bool = False
+    where: str = ""
     text: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class ChannelStatus:
+    """How a channel does.
+
+    Attributes:
+        name: of the channel; describe: where it goes.
+        waiting: how many it has still to take; since: when the oldest of them happened, seconds since 1970.
+        refused: how many of them it refused for good.
+        down_for: so long it has not taken what it should [s]; None: it does.
+        error: what it said last, "" where all is well.
+        next_try: in so long [s], None where nothing waits.
+    """
+
+    name: str
+    describe: str
+    waiting: int
+    since: float | None
+    refused: int
+    down_for: float | None
+    error: str
+    next_try: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clocks:
+    """The times of day and of the machine [s]; tests give their own."""
+
+    now: Callable[[], float] = time.monotonic
+    wall: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_REALTIME)
+
+
 class Postman:
-    """Owns an outbox and its transport.
+    """Owns the channels, and, where it holds the lock, the deliveries.
 
     Args:
-        outbox: mails on disk.
-        transport: how they leave.
-        envelope: whom they go to.
-        clock: monotonic time [s].
+        outbox: notices on disk.
+        channels: ways out.
+        who: this process, for people.
+        clocks: time.
+        seed: for the jitter.
+        legacy: folders of mails that the version before left.
+        down_after: a channel that is down for so long is told on the others [s].
     """
 
     def __init__(
-        self, outbox: Outbox, transport: Transport, envelope: Envelope, clock: Callable[[], float] = time.monotonic
+        self,
+        outbox: Outbox,
+        channels: Sequence[Channel],
+        *,
+        who: str = "",
+        clocks: Clocks | None = None,
+        seed: int | None = None,
+        legacy: Sequence[Path] = (),
+        down_after: float = 1800.0,
     ) -> None:
-        self._outbox, self.transport, self._envelope = outbox, transport, envelope
-        self._clock = clock
-        self._lock = threading.Lock()
-
-    def __len__(self) -> int:
-        with self._lock:
-            return len(self._outbox)
+        self.outbox = outbox
+        self.channels = {channel.name: channel for channel in channels}
+        self.receipts = Receipts(outbox.folder / "taken.jsonl")
+        self.lock = FileLock(outbox.folder / "lock", who)
+        self._clocks = clocks or Clocks()
+        self._rng = random.Random(seed)
+        self._legacy, self._down_after = legacy, down_after
+        self._lanes: dict[str, Lane] = {}
+        self._unwritten: list[Receipt] = []
+        self._waiting: list[Waiting] = []
+        self._guard = threading.RLock()
 
     @property
-    def place(self) -> str:
-        """The outbox's folder."""
-        return str(self._outbox.folder)
+    def is_delivering(self) -> bool:
+        """Whether this process is the one that delivers."""
+        return self.lock.is_held and bool(self._lanes)
 
-    def has(self, mail_id: str) -> bool:
-        """Whether a mail of this id waits or was delivered."""
-        with self._lock:
-            return self._outbox.has(mail_id)
+    def take_over(self) -> bool:
+        """Become the one that delivers, where nobody is. Raises OSError."""
+        with self._guard:
+            if self.is_delivering:
+                return True
+            if not self.lock.take():
+                return False
+            adopt_mails(self.outbox, self._legacy)
+            self.receipts.read_new()
+            now, wall = self._clocks.now(), self._clocks.wall()
+            for name, channel in self.channels.items():
+                ago = max(wall - self.receipts.last.get(name, float("-inf")), 0.0)
+                self._lanes[name] = Lane(channel.pace, self._rng, last=now - ago)
+            self.refresh()
+            self.receipts.compact(entry.id for entry in self._waiting)
+            return True
 
-    def put(self, notice: Notice) -> None:
-        """Keep a notice until it is delivered. Raises OSError."""
-        with self._lock:
-            self._outbox.put(notice.id, build_mail(notice, self._envelope))
+    def hand_over(self) -> None:
+        """Stop delivering; another process may."""
+        with self._guard:
+            self._lanes.clear()
+            self.lock.release()
 
-    def wait(self) -> float | None:
-        """How long until something is due [s], None where nothing waits."""
-        with self._lock:
-            return self._outbox.wait(self._clock())
+    def refresh(self) -> None:
+        """Look at what waits on disk; only where this process delivers. Raises OSError."""
+        with self._guard:
+            self._write_receipts()
+            before = {entry.name for entry in self._waiting}
+            self._waiting = self.outbox.waiting()
+            self._finish()
+            for name, lane in self._lanes.items():
+                lane.offer(e for e in self._waiting if self._is_open(e, name))
+                if any(entry.name not in before for entry in self._waiting):
+                    lane.nudge(self._clocks.now())
+            self.outbox.tidy()
 
-    def pause(self) -> float:
-        """How long until `deliver` may have something to do [s], a minute where nothing waits."""
-        wait = self.wait()
-        return LOOK_AGAIN if wait is None else wait + 0.01
-
-    def deliver(self) -> Delivery | None:
-        """Deliver what is due now, None where nothing is; waits for the transport. Raises OSError."""
-        with self._lock:
-            entry = self._outbox.due(self._clock())
-        if entry is None:
+    def deliver(self, name: str) -> Delivery | None:
+        """Send what is due on a channel, None where nothing is; waits for the transport. Raises OSError."""
+        with self._guard:
+            lane = self._lanes.get(name)
+            batch = lane.due(self._clocks.now()) if lane else []
+            if not lane or not batch:
+                return None
+            notice = self._compose(batch)
+        if notice is None:
+            self.refresh()
             return None
+        channel = self.channels[name]
+        ids = tuple(entry.id for entry in batch)
         try:
-            mail = entry.mail()
-        except FileNotFoundError:
-            with self._lock:
-                self._outbox.forget(entry)
-            return self._failed(entry, f"{entry.path} is gone from the outbox")
-        except (OSError, ValueError) as err:
-            with self._lock:
-                aside = self._outbox.set_aside(entry)
-            return self._failed(entry, f"{entry.path} cannot be sent ({err}), set aside as {aside}")
-        try:
-            location = self.transport.send(entry.id, mail)
+            where = _send(channel, notice)
         except DeliveryError as err:
-            with self._lock:
-                delay = self._outbox.failed(entry, self._clock(), permanent=err.permanent)
-            return self._failed(entry, f"{err}; the mail stays in {entry.path}, next try in {delay:.0f} s")
-        with self._lock:
-            self._outbox.delivered(entry, self._clock())
-        text = f"mail {entry.id} delivered by {self.transport.name}: {location}"
+            with self._guard:
+                put_off = lane.failed(batch, self._clocks.now(), str(err), permanent=err.permanent, delay=err.delay)
+            rest = " for good; it stays in" if err.permanent else "; it waits in"
+            text = (
+                f"{_told(batch)} not taken by '{name}'{rest} {self.outbox.folder}, next try in {put_off:.0f} s: {err}"
+            )
+            log.error("%s", text)
+            return Delivery(
+                channel=name,
+                transport=channel.transport.name,
+                ids=ids,
+                delivered=False,
+                permanent=err.permanent,
+                text=text,
+            )
+        with self._guard:
+            self._cross_out(channel, lane, batch, where)
+        text = f"{_told(batch)} delivered by {channel.transport.name}: {where}"
         log.info("%s", text)
-        return Delivery(id=entry.id, delivered=True, location=location, text=text)
+        return Delivery(channel=name, transport=channel.transport.name, ids=ids, delivered=True, where=where, text=text)
 
-    def _failed(self, entry: Entry, text: str) -> Delivery:
-        log.error("%s", text)
-        return Delivery(id=entry.id, delivered=False, text=text)
+    def pause(self, name: str, most: float = 60.0) -> float:
+        """How long until `deliver` may have something to do [s]."""
+        with self._guard:
+            lane = self._lanes.get(name)
+            wait = lane.wait(self._clocks.now()) if lane else None
+        return most if wait is None else min(wait + 0.01, most)
+
+    def nudge(self, *, all_: bool = False) -> None:
+        """Try again at once: the network came back; `all_`: somebody asks for it, refused ones too."""
+        with self._guard:
+            for lane in self._lanes.values():
+                lane.nudge(self._clocks.now(), all_=all_)
+
+    def statuses(self) -> list[ChannelStatus]:
+        """How the channels do; only where this process delivers."""
+        with self._guard:
+            return [self._status(name, lane) for name, lane in self._lanes.items()]
+
+    def tell_faults(self) -> None:
+        """Tell of a channel that is down for long, or refuses a notice for good, on the others. Raises OSError."""
+        with self._guard:
+            for name, lane in self._lanes.items():
+                others = tuple(other for other in self._lanes if other != name and not self._is_down(other))
+                if not others:
+                    continue
+                if lane.oldest is not None and self._is_down(name):
+                    self._tell_down(name, lane, lane.oldest, others)
+                for entry, error in lane.refused:
+                    self._tell_refused(name, entry, error, others)
+
+    def write_status(self) -> None:
+        """Leave for others how the channels do. Raises OSError."""
+        tree = {
+            "wall": self._clocks.wall(),
+            "who": self.lock.holder(),
+            "channels": [asdict(s) for s in self.statuses()],
+        }
+        write_atomic(self.outbox.folder / STATUS, json.dumps(tree, indent=1).encode())
+
+    # -- inside
+
+    def _is_open(self, entry: Waiting, name: str) -> bool:
+        return self.channels[name].takes(entry) and name not in self.receipts.taken.get(entry.id, ())
+
+    def _finish(self) -> None:
+        """Cross out for good what every channel took that is asked."""
+        for entry in list(self._waiting):
+            if not any(self._is_open(entry, name) for name in self.channels):
+                if entry.id not in self.receipts.taken:
+                    log.warning("notice %s is of kind '%s', which no channel takes", entry.id, entry.kind)
+                self.outbox.finish(entry)
+                self._waiting.remove(entry)
+
+    def _compose(self, batch: list[Waiting]) -> Notice | None:
+        try:
+            notices = [self.outbox.read(entry) for entry in batch]
+        except (OSError, ValueError) as err:
+            log.error("%s: a notice cannot be read: %s", self.outbox.folder, err)
+            self.outbox.doubt(batch)
+            return None
+        return notices[0] if len(notices) == 1 else merge(notices)
+
+    def _cross_out(self, channel: Channel, lane: Lane, batch: list[Waiting], where: str) -> None:
+        receipt = Receipt(
+            channel=channel.name,
+            transport=channel.transport.name,
+            ids=tuple(entry.id for entry in batch),
+            wall=self._clocks.wall(),
+            where=where,
+        )
+        lane.delivered(batch, self._clocks.now())
+        self._unwritten.append(receipt)
+        try:
+            self._write_receipts()
+            self._finish()
+        except OSError as err:
+            log.error("the delivery of %s cannot be written down: %s; trying on", ", ".join(receipt.ids), err)
+
+    def _write_receipts(self) -> None:
+        while self._unwritten:
+            self.receipts.add(self._unwritten[0])
+            self._unwritten.pop(0)
+
+    def _status(self, name: str, lane: Lane) -> ChannelStatus:
+        now, oldest = self._clocks.now(), lane.oldest
+        return ChannelStatus(
+            name=name,
+            describe=self.channels[name].transport.describe(),
+            waiting=len(lane),
+            since=oldest.wall if oldest else None,
+            refused=len(lane.refused),
+            down_for=None if lane.down_since is None else now - lane.down_since,
+            error=lane.error or (lane.refused[0][1] if lane.refused else ""),
+            next_try=lane.wait(now),
+        )
+
+    def _is_down(self, name: str) -> bool:
+        since = self._lanes[name].down_since
+        return since is not None and self._clocks.now() - since >= self._down_after
+
+    def _tell_down(self, name: str, lane: Lane, oldest: Waiting, others: tuple[str, ...]) -> None:
+        when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(oldest.wall))
+        text = (
+            f"The channel '{name}' ({self.channels[name].transport.describe()}) takes nothing: {lane.error}\n\n"
+            f"{len(lane)} notices wait for it, the oldest of {when}. They are kept and tried on."
+        )
+        self._tell(f"{oldest.id[:90]}-down-{name[:40]}", f"the channel '{name}' is down", text, others)
+
+    def _tell_refused(self, name: str, entry: Waiting, error: str, others: tuple[str, ...]) -> None:
+        text = (
+            f"The channel '{name}' ({self.channels[name].transport.describe()}) refused the notice {entry.id}"
+            f" ({entry.kind}): {error}\n\nIt is kept and tried again now and then; the others pass."
+        )
+        self._tell(f"{entry.id[:90]}-refused-{name[:40]}", f"the channel '{name}' refused a notice", text, others)
+
+    def _tell(self, notice_id: str, subject: str, text: str, others: tuple[str, ...]) -> None:
+        notice = Notice(
+            id=notice_id,
+            wall=self._clocks.wall(),
+            kind="fault",
+            subject=f"rosbot patrol: {subject}",
+            text=text,
+            channels=others,
+        )
+        if self.outbox.put(notice):
+            log.error("told on %s: %s", ", ".join(others), subject)
+
+
+def _send(channel: Channel, notice: Notice) -> str:
+    try:
+        return channel.transport.send(notice)
+    except DeliveryError:
+        raise
+    except Exception as err:  # whatever one notice does to a channel, the others have to pass
+        log.error("channel '%s' stumbled over notice %s", channel.name, notice.id, exc_info=True)
+        raise DeliveryError(f"the channel stumbled over it: {err!r}", permanent=True) from err
+
+
+def _told(batch: Sequence[Waiting]) -> str:
+    return f"notice {batch[0].id}" if len(batch) == 1 else f"a digest of {len(batch)} notices"

@@ -22,7 +22,7 @@ def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: 
     """
     return Notice(
         id=token(incident.id),
-        wall=incident.wall,
+        wall=_moment(incident),
         kind="incident",
         subject=SUBJECT,
         text=f"{FIRST_SENTENCE}.",
@@ -37,7 +37,7 @@ def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: 
 
 
 def _facts(incident: Incident, picture_note: str) -> tuple[tuple[str, str], ...]:
-    when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(incident.wall))
+    when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(_moment(incident)))
     seen = f"{incident.object_class}, probability {incident.probability:.2f}, in {incident.pictures} pictures"
     rows = [
         ("Room", f"{incident.room_id} ({incident.room_name})"),
@@ -50,3 +50,7 @@ def _facts(incident: Incident, picture_note: str) -> tuple[tuple[str, str], ...]
         x, y, yaw = incident.pose
         rows.append(("Robot", f"x {x:.2f} m, y {y:.2f} m, heading {yaw:.2f} rad in the map"))
     return (*rows, ("Picture", picture_note or "attached"), ("Incident", incident.id))
+
+
+def _moment(incident: Incident) -> float:
+    return incident.wall if incident.confirmed is None else incident.confirmed

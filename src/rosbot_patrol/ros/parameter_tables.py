@@ -7,7 +7,7 @@ import sys
 import typing
 from pathlib import Path
 
-from rosbot_patrol.alerts.transports import MailParams
+from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.control.teleop import TeleopParams
 from rosbot_patrol.costmap.params import (

@@ -1,4 +1,4 @@
-"""The alert desk: one thread writes notices to disk, another delivers them, and neither ever stops the patrol."""
+"""The alert desk: a thread writes notices to disk, the post delivers them, and neither ever stops the patrol."""
 
 from __future__ import annotations
 
@@ -14,16 +14,14 @@ import rospy
 
 from rosbot_patrol.alerts.incident import Incident
 from rosbot_patrol.alerts.incident_json import load_incident, save_incident
-from rosbot_patrol.alerts.mail import Envelope, one_line
-from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.mail import one_line
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
-from rosbot_patrol.alerts.postman import Postman
-from rosbot_patrol.alerts.transports import Transport
+from rosbot_patrol.alerts.postman import Delivery
 from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.commands import Notice
-from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.owner_mail import OwnerPost
 from rosbot_patrol.ros.patrol_images import PictureRing
 
 log = logging.getLogger(__name__)
@@ -35,41 +33,31 @@ class AlertDesk:
     """Takes notices, keeps them, delivers them.
 
     Args:
-        outbox: mails on disk.
-        transport: how they leave.
-        envelope: whom they go to.
+        post: keeps notices and delivers them.
         pictures: the camera's last pictures.
         incidents: folder of the records.
-        health: where to say how it goes.
     """
 
     def __init__(
         self,
-        outbox: Outbox,
-        transport: Transport,
-        envelope: Envelope,
+        post: OwnerPost,
         pictures: PictureRing,
         incidents: Path,
-        health: Health,
     ) -> None:
-        self._postman, self._transport = Postman(outbox, transport, envelope), transport
-        self._pictures, self._incidents, self._health = pictures, incidents, health
+        self._post, self._pictures, self._incidents = post, pictures, incidents
         self._jobs: deque[tuple[Incident, Notice]] = deque()
         self._finals: deque[tuple[str, str, str, int]] = deque()
         self._memory: Callable[[], None] | None = None
-        self._to_record, self._to_deliver = threading.Event(), threading.Event()
+        self._to_record = threading.Event()
+        self._told: dict[str, Incident] = {}
+        self._telling = threading.Lock()
         self._publisher = rospy.Publisher("/patrol/alerts", Alert, queue_size=10)
 
     def start(self) -> None:
         """Begin to work."""
-        waiting = f", {len(self._postman)} wait from before" if len(self._postman) else ""
-        log.info("alert mails go to %s (transport %s)%s", self._transport.describe(), self._transport.name, waiting)
-        self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
-        for name, work, wake in (
-            ("record", self._record_next, self._to_record),
-            ("deliver", self._deliver_next, self._to_deliver),
-        ):
-            threading.Thread(target=_repeat, args=(work, wake), name=name, daemon=True).start()
+        self._post.on_delivery(self._delivered)
+        self._post.start()
+        threading.Thread(target=_repeat, args=(self._record_next, self._to_record), name="record", daemon=True).start()
 
     @property
     def is_recorded(self) -> bool:
@@ -133,35 +121,29 @@ class AlertDesk:
             self._memory = None
         return True
 
-    def _deliver_next(self) -> float:
-        done = self._postman.deliver()
-        if done is None:
-            return self._postman.pause()
-        if done.delivered:
-            self._health.set("mail", OK, f"mails go to {self._transport.describe()}")
-            incident = load_incident(self._incidents, done.id)
-            self._publish(incident, delivered=True, location=done.location, text=done.text, incident_id=done.id)
-        else:
-            self._health.set("mail", WARN, f"{len(self._postman)} mails wait: {done.text}")
-        return 0.0
+    def _delivered(self, delivery: Delivery) -> None:
+        for notice_id in delivery.ids if delivery.delivered else ():
+            with self._telling:  # first that it is on disk, then that it was delivered
+                incident = self._told.get(notice_id) or load_incident(self._incidents, notice_id)
+                if incident is not None:
+                    self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
     def _record(self, incident: Incident, notice: Notice) -> bool:
-        if self._postman.has(incident.id):  # the program was killed after it was written
+        if self._post.has(incident.id):  # the program was killed after it was written
             self._jobs.popleft()
             return True
         picture, note = self._picture(notice)
-        try:
-            self._postman.put(incident_notice(incident, picture, picture_note=note))
-        except OSError as err:
-            log.error(
-                "the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, self._postman.place, err
-            )
-            self._health.set("mail", WARN, f"the outbox cannot be written: {err}")
-            return False
+        place = self._post.place
+        with self._telling:
+            try:
+                self._post.put(incident_notice(incident, picture, picture_note=note))
+            except OSError as err:
+                log.error("the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, place, err)
+                return False
+            self._told[incident.id] = incident
+            self._publish(incident, transport="", location=place, text=incident.sentence)
         log.warning("ALERT: %s; the notice is on disk", incident.sentence)
         self._jobs.popleft()
-        self._to_deliver.set()
-        self._publish(incident, delivered=False, location=self._postman.place, text=incident.sentence)
         self._save(incident, picture)
         return True
 
@@ -201,15 +183,12 @@ class AlertDesk:
             )
             self._save(closed, None)
 
-    def _publish(
-        self, incident: Incident | None, *, delivered: bool, location: str, text: str, incident_id: str = ""
-    ) -> None:
-        message = Alert(id=incident_id, delivered=delivered, location=location, text=text)
+    def _publish(self, incident: Incident, *, transport: str, location: str, text: str) -> None:
+        """Tell the topic; without a transport the notice is not delivered yet."""
+        message = Alert(id=incident.id, delivered=bool(transport), transport=transport, location=location, text=text)
         message.header.stamp = rospy.Time.now()
-        message.transport = self._transport.name
-        if incident is not None:
-            message.id, message.room_id, message.room_name = incident.id, incident.room_id, incident.room_name
-            message.object_class, message.probability = incident.object_class, incident.probability
+        message.room_id, message.room_name = incident.room_id, incident.room_name
+        message.object_class, message.probability = incident.object_class, incident.probability
         self._publisher.publish(message)
 
 

@@ -11,9 +11,7 @@ and gives up its goal when it is ended. Only one action client, one tf listener 
 from __future__ import annotations
 
 import logging
-import os
 import signal
-import socket
 import threading
 import time
 from collections import deque
@@ -27,9 +25,7 @@ from darknet_ros_msgs.msg import BoundingBoxes, ObjectCount
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
-from rosbot_patrol.alerts.mail import make_envelope
-from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.transports import MailParams, make_transport
+from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, transform_points
 from rosbot_patrol.msg import EspTrigger, PatrolState, SensorEvent
@@ -51,6 +47,7 @@ from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import Loop, load_params, now, ros_home, run_node
+from rosbot_patrol.ros.owner_mail import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.patrol_alerts import AlertDesk
 from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.ros.patrol_images import PictureRing
@@ -108,21 +105,18 @@ class PatrolNode:
 
     def __init__(self) -> None:
         tree = rospy.get_param("~", {}) or {}
+        refuse_passwords(tree)
         self.params = load_flat(NodeParams, tree)
         mail = load_flat(MailParams, tree)
-        prefix = rospy.get_name() + "/"
         battery = load_flat(BatteryParams, tree)
-        check_battery(battery, prefix)
+        check_battery(battery, rospy.get_name() + "/")
         rooms = load_rooms(Path(self.params.path_to_params).expanduser())
         names = {room.id: room.name for room in rooms}
         self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
-        envelope = make_envelope(mail.email_to, mail.email_from, prefix=prefix, host=socket.getfqdn())
-        transport = make_transport(mail, envelope, home=ros_home(), environ=os.environ, prefix=prefix)
         folder = Path(self.params.state_dir).expanduser() if self.params.state_dir else ros_home() / "rosbot_patrol"
-        outbox = Outbox(folder / "outbox", interval=mail.mail_interval, first_delay=mail.mail_retry)
         self.health = Health()
         self.pictures = PictureRing(self.params.image_topic)
-        self.desk = AlertDesk(outbox, transport, envelope, self.pictures, folder / "incidents", self.health)
+        self.desk = AlertDesk(OwnerPost(mail, folder, self.health), self.pictures, folder / "incidents")
         self.store = PatrolStore(folder / "patrol.json", str(rospy.get_param("/run_id", "")))
         self.manager = PatrolManager(
             rooms,

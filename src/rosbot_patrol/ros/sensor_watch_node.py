@@ -1,8 +1,8 @@
 """sensor_watch: knows which motion sensor is well, and tells who asks, and the owner, when one is not.
 
 Listens to /motion_trigger, whoever publishes there, and to the bridges' /sensors/links. Publishes /sensors/states
-(latched), /sensors/events and /diagnostics, and mails the owner through an outbox of its own below ~state_dir, so that
-it depends on no other node.
+(latched), /sensors/events and /diagnostics, and tells the owner through the outbox in ~state_dir, which it shares with
+the patrol but needs no other node to deliver.
 
 All durations are of the wall: sensors send their heartbeats in real time, whatever /clock does.
 """
@@ -20,14 +20,15 @@ from typing import Any
 
 import rospy
 
-from rosbot_patrol.alerts.transports import MailParams
+from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.notice import Notice as PostNotice
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.ros.diagnostics import Health
 from rosbot_patrol.ros.node import Worker, load_params, ros_home, run_node
-from rosbot_patrol.ros.owner_mail import RETRY, OwnerMail
+from rosbot_patrol.ros.owner_mail import RETRY, OwnerPost, refuse_passwords
 from rosbot_patrol.ros.sensor_reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.ros.serial_links import links_from_msg
 from rosbot_patrol.sensors.looks import Looks
@@ -81,12 +82,13 @@ class SensorWatch:
 
     def __init__(self) -> None:
         tree = rospy.get_param("~", {}) or {}
+        refuse_passwords(tree)
         params = load_group(SensorWatchParams, tree)
         sensors = load_list(params)
         folder = Path(params.state_dir).expanduser() if params.state_dir else ros_home() / "rosbot_patrol"
         self._memory = folder / "sensors.json"
         self._health = Health("motion sensors")
-        self._mail = OwnerMail(load_group(MailParams, tree), folder / "sensor_outbox", self._health)
+        self._post = OwnerPost(load_group(MailParams, tree), folder, self._health)
         self._watch = Supervisor(sensors, load_group(WatchTimes, tree), time.monotonic())
         self._notices = Notices(load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory))
         self._looks = Looks(load_group(LookTimes, tree))
@@ -105,7 +107,7 @@ class SensorWatch:
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
         rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=1000)
         rospy.Subscriber("/sensors/links", SensorLinks, self._on_links, queue_size=100)
-        self._mail.start()
+        self._post.start()
         Worker(self._work, name="watch").start()
         rospy.spin()
 
@@ -169,8 +171,11 @@ class SensorWatch:
             log.warning("notice to the owner: %s", self._unwritten.subject)
         if now < self._retry_at:
             return
-        notice = self._unwritten
-        if not self._mail.put(notice.id, notice.subject, notice.text):
+        try:
+            self._post.put(to_post(self._unwritten))
+        except OSError as err:
+            subject, place = self._unwritten.subject, self._post.place
+            log.error("the notice '%s' cannot be written to %s: %s; trying on", subject, place, err)
             self._retry_at = now + RETRY
             return
         self._unwritten = None
@@ -178,6 +183,11 @@ class SensorWatch:
             write_atomic(self._memory, json.dumps(self._notices.snapshot(), indent=1).encode())
         except OSError as err:
             log.error("what was told cannot be kept in %s: %s; it is told again after a restart", self._memory, err)
+
+
+def to_post(notice: Notice) -> PostNotice:
+    """The notice as the outbox takes it."""
+    return PostNotice(id=notice.id, wall=time.time(), kind="sensor", subject=notice.subject, text=notice.text)
 
 
 def read_memory(path: Path) -> Mapping[str, Any] | None:

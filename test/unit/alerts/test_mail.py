@@ -22,7 +22,7 @@ def test_the_mail_is_the_tutorials_and_a_proper_one(make_incident, envelope):
     assert mail["Message-ID"] == "<20261121T010203Z-1@example.org>"
     assert mail["Date"].datetime.timestamp() == 1_790_000_000
     assert mail["MIME-Version"] == "1.0"
-    body = mail.get_body()
+    body = mail.get_body(("plain",))
     assert body.get_content_charset() == "utf-8"
     text = body.get_content()
     assert text.startswith("I have found something strange it could be invader")
@@ -40,7 +40,7 @@ def test_without_a_picture_the_mail_says_why(make_incident, envelope):
         build_mail(incident_notice(make_incident(), None, picture_note="none came from the camera"), envelope)
     )
     assert list(mail.iter_attachments()) == []
-    assert "none came from the camera" in mail.get_body().get_content()
+    assert "none came from the camera" in mail.get_body(("plain",)).get_content()
 
 
 @pytest.mark.parametrize("evil", ["a\nBcc: evil@x.org", "a\r\n\r\nnew body", "a\x00b", "a\u2028b", "\n.\n"])
@@ -50,7 +50,7 @@ def test_no_field_can_inject_a_header_or_a_line(make_incident, envelope, field, 
     assert mail["Bcc"] is None
     assert mail["Subject"] == "rosbot patrol node"
     assert sorted(mail.keys()) == sorted(read_back(build_mail(incident_notice(make_incident(), JPEG), envelope)).keys())
-    lines = mail.get_body().get_content().splitlines()
+    lines = mail.get_body(("plain",)).get_content().splitlines()
     assert not any(line.startswith(("Bcc", "new body", ".")) for line in lines)
     assert len(list(mail.iter_attachments())) == 1
 

@@ -1,176 +1,219 @@
+import errno
+import multiprocessing
 import os
 import subprocess
 import sys
 
 import pytest
 
-from rosbot_patrol.alerts.mail import build_mail
+from rosbot_patrol.alerts import outbox as outbox_module
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.wording import incident_notice
 
 
-@pytest.fixture
-def put(make_incident, envelope):
-    def put(outbox, *names):
-        for name in names:
-            outbox.put(name, build_mail(incident_notice(make_incident(id=name), b"picture"), envelope))
-
-    return put
+def make(name, **given):
+    return Notice(**{"id": name, "wall": 1.79e9, "kind": "incident", "subject": "s", "text": "t", **given})
 
 
-def drain(outbox, now=0.0):
-    sent = []
-    while entry := outbox.due(now):
-        sent.append(entry.id)
-        outbox.delivered(entry, now)
-    return sent
+def ids(outbox):
+    return [entry.id for entry in outbox.waiting()]
 
 
-def test_mails_leave_in_order_and_are_gone_then(tmp_path, put):
-    outbox = Outbox(tmp_path / "out", interval=0.0)
-    put(outbox, "b", "a", "c")
-    assert drain(outbox) == ["b", "a", "c"]
-    assert list(tmp_path.glob("out/*.eml")) == []
-    assert outbox.wait(0.0) is None
+def test_notices_wait_in_order_and_survive_the_program(tmp_path):
+    first = Outbox(tmp_path / "out")
+    for name in ("b", "a"):
+        assert first.put(make(name))
+    again = Outbox(tmp_path / "out")
+    again.put(make("c", picture=b"\xff\xd8"))
+    assert ids(first) == ids(again) == ["b", "a", "c"]
+    assert first.read(first.waiting()[2]) == make("c", picture=b"\xff\xd8")
 
 
-def test_they_survive_the_program_in_order(tmp_path, put):
-    put(Outbox(tmp_path), "b", "a")
-    again = Outbox(tmp_path, interval=0.0)
-    put(again, "c")
-    assert drain(again) == ["b", "a", "c"]
-
-
-def test_the_same_incident_waits_once(tmp_path, put):
+def test_the_same_notice_waits_once_and_is_known_when_it_was_delivered(tmp_path):
     outbox = Outbox(tmp_path)
-    put(outbox, "a", "a")
-    assert len(outbox) == 1
-    assert len(Outbox(tmp_path)) == 1
+    assert [outbox.put(make("a")), outbox.put(make("a"))] == [True, False]
+    outbox.finish(outbox.waiting()[0])
+    assert outbox.waiting() == []
+    assert Outbox(tmp_path).has("a")
+    assert not Outbox(tmp_path).put(make("a"))
+    assert not Outbox(tmp_path).has("a-2")
 
 
-def test_what_was_delivered_does_not_wait_again(tmp_path, put):
-    outbox = Outbox(tmp_path, interval=0.0)
-    put(outbox, "a", "b")
-    assert drain(outbox) == ["a", "b"]
-    again = Outbox(tmp_path, interval=0.0)
-    put(again, "a", "c")
-    assert drain(again) == ["c"]
-    assert [path.name[-5:] for path in sorted((tmp_path / "sent").iterdir())] == ["a.eml", "b.eml", "c.eml"]
-
-
-def test_only_the_last_delivered_are_kept(tmp_path, put):
-    outbox = Outbox(tmp_path, interval=0.0, keep=2)
-    put(outbox, "a", "b", "c")
-    drain(outbox)
-    assert [path.name for path in sorted((tmp_path / "sent").iterdir())] == [
-        "000000000002-b.eml",
-        "000000000003-c.eml",
-    ]
-
-
-def test_the_interval_delays_and_never_drops(tmp_path, put):
-    outbox = Outbox(tmp_path, interval=10.0)
-    put(outbox, "a", "b")
-    first = outbox.due(100.0)  # at once, however lately the program began
-    outbox.delivered(first, 100.0)
-    assert outbox.due(109.0) is None
-    assert outbox.wait(109.0) == pytest.approx(1.0)
-    assert outbox.due(110.0).id == "b"
-
-
-def test_a_transport_that_is_down_is_tried_ever_more_seldom_and_keeps_the_order(tmp_path, put):
-    outbox = Outbox(tmp_path, interval=0.0, first_delay=5.0, max_delay=60.0)
-    put(outbox, "a", "b")
-    now, delays = 0.0, []
-    for _ in range(7):
-        delays.append(outbox.failed(outbox.due(now), now))
-        assert outbox.due(now + delays[-1] - 0.01) is None
-        now += delays[-1]
-        assert outbox.due(now).id == "a"
-    assert delays == [5, 10, 20, 40, 60, 60, 60]
-    assert drain(outbox, now) == ["a", "b"]
-
-
-def test_a_mail_refused_for_good_lets_the_others_pass_and_stays(tmp_path, put):
-    outbox = Outbox(tmp_path, interval=0.0)
-    put(outbox, "bad", "good")
-    outbox.failed(outbox.due(0.0), 0.0, permanent=True)
-    assert drain(outbox, 1.0) == ["good"]
-    assert outbox.due(5.0).id == "bad"
-    assert len(Outbox(tmp_path)) == 1
-
-
-def test_what_is_kept_is_the_mail(tmp_path, put):
+def test_order_goes_on_after_all_were_delivered(tmp_path):
     outbox = Outbox(tmp_path)
-    put(outbox, "a")
-    mail = Outbox(tmp_path).due(0.0).mail()
-    assert mail["Subject"] == "rosbot patrol node"
-    (picture,) = mail.iter_attachments()
-    assert picture.get_content() == b"picture"
+    outbox.put(make("a"))
+    outbox.finish(outbox.waiting()[0])
+    Outbox(tmp_path).put(make("b"))
+    assert Outbox(tmp_path).waiting()[0].name == "000000000002-b.notice"
 
 
-@pytest.mark.parametrize("content", [b"", b"\x00\xff garbage", b"no mail"])
-def test_a_file_that_is_no_mail_is_set_aside(tmp_path, put, content):
-    (tmp_path / "000000000001-x.eml").write_bytes(content)
-    outbox = Outbox(tmp_path, interval=0.0)
-    put(outbox, "a")
-    entry = outbox.due(0.0)
-    with pytest.raises(ValueError, match="is no mail"):
-        entry.mail()
-    assert outbox.set_aside(entry).read_bytes() == content
-    assert drain(outbox) == ["a"]
-    assert len(Outbox(tmp_path)) == 0
-
-
-def test_strange_names_are_left_alone(tmp_path, caplog):
-    (tmp_path / "notes.eml").write_text("mine")
-    assert len(Outbox(tmp_path)) == 0
-    assert (tmp_path / "notes.eml").exists()
-    assert "left alone" in caplog.text
-
-
-def test_an_id_that_is_no_file_name_is_refused(tmp_path, put):
-    with pytest.raises(ValueError, match="is no id"):
-        put(Outbox(tmp_path), "../escape")
-
-
-def test_a_disk_that_does_not_take_it_leaves_no_half_file(tmp_path, put, monkeypatch):
+def test_what_a_lane_has_to_know_is_known_without_the_text(tmp_path):
     outbox = Outbox(tmp_path)
-    with monkeypatch.context() as patched:
-        patched.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-        with pytest.raises(OSError, match="No space left"):
-            put(outbox, "a")
+    outbox.put(make("a", kind="sensor", channels=("phone",)))
+    outbox.put(make("b"))
+    sensor, incident = outbox.waiting()
+    assert (sensor.kind, sensor.channels, sensor.is_urgent, sensor.wall) == ("sensor", ("phone",), False, 1.79e9)
+    assert incident.is_urgent
+
+
+def test_only_the_last_delivered_are_kept(tmp_path):
+    outbox = Outbox(tmp_path, keep=2)
+    for name in ("a", "b", "c"):
+        outbox.put(make(name))
+        outbox.finish(outbox.waiting()[0])
+    outbox.tidy()
+    assert sorted(path.name for path in outbox.sent.iterdir()) == ["000000000002-b.notice", "000000000003-c.notice"]
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\xff garbage", b"{}"])
+def test_a_file_that_is_no_notice_is_set_aside(tmp_path, content, caplog):
+    outbox = Outbox(tmp_path)
+    (tmp_path / "000000000001-x.notice").write_bytes(content)
+    outbox.put(make("a"))
+    assert ids(outbox) == ["a"]
+    assert (tmp_path / "000000000001-x.broken").read_bytes() == content
+    assert "000000000001-x.notice is no notice" in caplog.text
+
+
+def test_a_notice_of_a_newer_version_is_left_alone_and_said_once(tmp_path, caplog):
+    outbox = Outbox(tmp_path)
+    data = make("x").to_bytes().replace(b'"format": 1', b'"format": 9')
+    (tmp_path / "000000000001-x.notice").write_bytes(data)
+    assert outbox.waiting() == outbox.waiting() == []
+    assert (tmp_path / "000000000001-x.notice").read_bytes() == data
+    assert caplog.text.count("is of format 9") == 1
+
+
+def full_for(times, monkeypatch):
+    """os.fsync fails so often as on a full disk."""
+    real, left = os.fsync, [times]
+
+    def fsync(handle):
+        if left[0] > 0:
+            left[0] -= 1
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(handle)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+
+
+def test_a_disk_that_does_not_take_it_leaves_no_half_file(tmp_path, monkeypatch):
+    outbox = Outbox(tmp_path)
+    full_for(1, monkeypatch)
+    with pytest.raises(OSError, match="No space left"):
+        outbox.put(make("a"))
     assert [path.name for path in tmp_path.iterdir()] == ["sent"]
-    put(outbox, "a")
-    assert len(outbox) == 1
+    outbox.put(make("a"))
+    assert ids(outbox) == ["a"]
+
+
+def test_a_full_disk_takes_a_notice_out_of_the_reserve(tmp_path, monkeypatch, caplog):
+    outbox = Outbox(tmp_path)
+    outbox.tidy()
+    assert (tmp_path / "reserve").stat().st_size == outbox_module.RESERVE
+    full_for(1, monkeypatch)
+    outbox.put(make("a", picture=b"x" * 100_000))
+    assert ids(outbox) == ["a"]
+    assert (tmp_path / "reserve").stat().st_size < outbox_module.RESERVE - 100_000
+    assert "the disk is full" in caplog.text
+    outbox.tidy()
+    assert (tmp_path / "reserve").stat().st_size == outbox_module.RESERVE
+
+
+FULL = """
+import logging, sys
+from pathlib import Path
+from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.outbox import Outbox
+place = Path(sys.argv[1])
+box = Outbox(place / "outbox")
+import rosbot_patrol.alerts.outbox as module
+module.RESERVE = 300_000
+box.tidy()
+with (place / "filler").open("wb", buffering=0) as file:
+    try:
+        while True:
+            file.write(b"x" * 4096)
+    except OSError as err:
+        print("full:", err.errno)
+count = 0
+try:
+    for i in range(100):
+        box.put(Notice(id=f"n{i}", wall=1.0, kind="incident", subject="s", text="t", picture=b"p" * 30_000))
+        count += 1
+except OSError as err:
+    print("refused:", err.errno)
+print("kept:", count, "read:", sum(len(box.read(e).picture) == 30_000 for e in Outbox(place / "outbox").waiting()))
+(place / "filler").unlink()
+print("again:", box.put(Notice(id="late", wall=1.0, kind="incident", subject="s", text="t")))
+"""
+
+
+def test_a_really_full_disk(tmp_path):
+    """A file system of 3 MB, filled to the last block: what was promised is there whole, the rest is refused."""
+    mount = f'mount -t tmpfs -o size=3m none {tmp_path} && exec {sys.executable} -c "$1" {tmp_path}'
+    done = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", mount, "sh", FULL], capture_output=True, text=True, check=False
+    )
+    if "unshare" in done.stderr or "mount" in done.stderr:
+        pytest.skip(f"no file system of its own can be made here: {done.stderr.strip()}")
+    said = dict(line.split(":", 1) for line in done.stdout.splitlines())
+    assert said["full"] == said["refused"] == f" {errno.ENOSPC}", done.stdout + done.stderr
+    kept = int(said["kept"].split()[0])
+    assert kept >= 3
+    assert f"read: {kept}" in said["kept"]
+    assert said["again"] == " True"
 
 
 KILLED = """
 import os, sys
 from pathlib import Path
-from email.message import EmailMessage
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
-mail = EmailMessage()
-mail["From"], mail["Message-ID"] = "a@b.org", "<1@b.org>"
-mail.set_content("x" * 100000)
-point = sys.argv[2]
-real = os.fsync
-if point == "write":
+if sys.argv[2] == "write":
     os.fsync = lambda handle: os._exit(9)
-box = Outbox(Path(sys.argv[1]), interval=0.0)
-box.put("a", mail)
-if point == "sent":
-    box.due(0.0)
-    os._exit(9)
+box = Outbox(Path(sys.argv[1]))
+box.put(Notice(id="a", wall=1.0, kind="incident", subject="s", text="x" * 100000))
+os._exit(9)
 """
 
 
-@pytest.mark.parametrize(("point", "kept"), [("write", 0), ("sent", 1)])
-def test_a_kill_at_any_point_leaves_a_whole_mail_or_none(tmp_path, point, kept):
+@pytest.mark.parametrize(("point", "kept"), [("write", 0), ("after", 1)])
+def test_a_kill_at_any_point_leaves_a_whole_notice_or_none(tmp_path, point, kept):
     done = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path), point], check=False)
     assert done.returncode == 9
     outbox = Outbox(tmp_path)
-    assert len(outbox) == kept
+    assert len(ids(outbox)) == kept
+    for scratch in tmp_path.glob(".*.tmp"):
+        os.utime(scratch, (0, 0))
+    outbox.tidy()
     assert not list(tmp_path.glob(".*"))
-    if kept:
-        assert outbox.due(0.0).mail().get_content().strip() == "x" * 100000
+
+
+def test_the_scratch_file_of_a_process_that_lives_is_left_alone(tmp_path):
+    outbox = Outbox(tmp_path)
+    scratch = tmp_path / f".x.{os.getppid()}.tmp"
+    scratch.write_text("")
+    os.utime(scratch, (0, 0))
+    outbox.tidy()
+    assert scratch.exists()
+
+
+def put_many(folder, name, count):
+    outbox = Outbox(folder)
+    for i in range(count):
+        outbox.put(make(f"{name}-{i}"))
+
+
+def test_several_processes_put_at_once(tmp_path):
+    context = multiprocessing.get_context("fork")
+    workers = [context.Process(target=put_many, args=(tmp_path, name, 40)) for name in "abc"]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    found = ids(Outbox(tmp_path))
+    assert len(found) == 120
+    for name in "abc":
+        own = [int(i.split("-")[1]) for i in found if i.startswith(name)]
+        assert own == sorted(own)

@@ -1,75 +1,281 @@
+import json
+
 import pytest
+from post import Box, Time, channel, deliver_all, notice, postman
 
-from rosbot_patrol.alerts.mail import build_mail
-from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.postman import Postman
-from rosbot_patrol.alerts.transports import DeliveryError, MaildirTransport
+from rosbot_patrol.alerts.postman import STATUS
 
 
-class Clock:
-    now = 100.0
-
-    def __call__(self):
-        return self.now
-
-
-class Down:
-    name = "down"
-
-    def send(self, incident_id, mail):
-        clock.now += 30.0  # a time-out
-        raise DeliveryError("the server does not answer")
-
-    def describe(self):
-        return "nowhere"
+def test_a_notice_goes_to_every_channel_and_is_crossed_out_then(tmp_path):
+    mail, phone = Box(), Box()
+    post = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    for name in ("a", "b"):
+        post.outbox.put(notice(name))
+    assert post.take_over()
+    done = deliver_all(post)
+    assert mail.ids == phone.ids == ["a", "b"]
+    assert [d.text for d in done][:1] == ["notice a delivered by box: in the box"]
+    assert post.outbox.waiting() == []
+    assert sorted(path.name[13:] for path in post.outbox.sent.iterdir()) == ["a.notice", "b.notice"]
 
 
-clock = Clock()
+def test_a_channel_that_is_down_holds_up_only_itself(tmp_path):
+    time = Time()
+    mail, phone = Box(time), Box()
+    mail.down = "no server"
+    post = postman(tmp_path, channel("mail", mail), channel("phone", phone), time=time)
+    for name in ("a", "b"):
+        post.outbox.put(notice(name))
+    post.take_over()
+    deliver_all(post)
+    assert phone.ids == ["a", "b"]
+    assert len(post.outbox.waiting()) == 2
+    (status, _) = post.statuses()
+    assert (status.name, status.waiting, status.error) == ("mail", 2, "no server")
+    assert status.since == 1_790_000_000.0
+    mail.down, time.now = "", time.now + 6.5
+    deliver_all(post)
+    assert (mail.ids, phone.ids) == (["a", "b"], ["a", "b"])
+    assert post.outbox.waiting() == []
 
 
-@pytest.fixture
-def outbox(tmp_path):
-    return Outbox(tmp_path / "outbox", interval=0.0, first_delay=5.0)
+def test_what_one_channel_took_is_not_sent_to_it_again_after_a_crash(tmp_path):
+    mail, phone = Box(), Box()
+    phone.down = "no network"
+    post = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    post.outbox.put(notice("a"))
+    post.take_over()
+    deliver_all(post)
+    post.lock.release()  # as the system does when the process is killed
+    phone.down = ""
+    again = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    again.take_over()
+    deliver_all(again)
+    assert (mail.ids, phone.ids) == (["a"], ["a"])
+    assert again.outbox.waiting() == []
 
 
-def notice(name="20261121T010203Z-sensors1", subject="sensor 3 is silent"):
-    return Notice(id=name, wall=1_790_000_000.0, kind="sensor", subject=subject, text="text\n")
+def test_one_delivers_and_the_other_takes_over(tmp_path):
+    first, second = Box(), Box()
+    a, b = (postman(tmp_path, channel("mail", box)) for box in (first, second))
+    assert a.take_over()
+    assert not b.take_over()
+    b.outbox.put(notice("x"))
+    assert b.deliver("mail") is None
+    deliver_all(a)
+    assert first.ids == ["x"]
+    a.hand_over()
+    assert b.take_over()
+    b.outbox.put(notice("y"))
+    deliver_all(b)
+    assert second.ids == ["y"]
+    assert "test (process" in b.lock.holder()
 
 
-def test_a_mail_is_delivered_once_and_put_off_from_the_end_of_a_failure(tmp_path, outbox, envelope):
-    postman = Postman(outbox, Down(), envelope, clock)
-    postman.put(notice("n1"))
-    done = postman.deliver()
-    assert not done.delivered
-    assert "next try in 5 s" in done.text
-    assert postman.deliver() is None
-    assert postman.wait() == pytest.approx(5.0)
-    postman.transport = MaildirTransport(tmp_path / "mail")
-    clock.now += 5.0
-    assert postman.deliver().delivered
-    assert (len(postman), postman.wait(), postman.has("n1")) == (0, None, True)
+def test_channels_take_the_kinds_that_they_ask_for(tmp_path, caplog):
+    everything, phone = Box(), Box()
+    post = postman(
+        tmp_path, channel("phone", phone, kinds=("incident",)), channel("mail", everything, kinds=("sensor",))
+    )
+    for name, kind in (("i", "incident"), ("s", "sensor"), ("v", "verdict")):
+        post.outbox.put(notice(name, kind))
+    post.take_over()
+    deliver_all(post)
+    assert (phone.ids, everything.ids) == (["i"], ["s"])
+    assert "notice v is of kind 'verdict', which no channel takes" in caplog.text
+    assert post.outbox.waiting() == []
 
 
-def test_a_file_that_is_gone_or_no_mail_does_not_stop_the_others(tmp_path, outbox, envelope):
-    postman = Postman(outbox, MaildirTransport(tmp_path / "mail"), envelope, clock)
-    for name in ("n1", "n2", "n3"):
-        postman.put(notice(name))
-    files = sorted(outbox.folder.glob("*.eml"))
+def test_an_hour_without_a_server_then_all_in_order_once(tmp_path):
+    time = Time()
+    mail, phone = Box(time), Box()
+    post = postman(tmp_path, channel("mail", mail, interval=1.0), channel("phone", phone), time=time, down_after=1800.0)
+    post.take_over()
+    mail.down, began, names = "no answer within 30 s", time.now, []
+    while time.now - began < 3600.0:
+        if len(names) < (time.now - began) / 60.0:
+            names.append(f"n{len(names):02d}")
+            post.outbox.put(notice(names[-1]))
+        time.now += 1.0
+        deliver_all(post)
+        post.tell_faults()
+    assert [i for i in phone.ids if i in names] == names
+    assert 20 < mail.tries < 100  # each new notice is a reason to try, and no more than one
+    faults = [n for n in phone.taken if n.kind == "fault"]
+    assert [n.subject for n in faults] == ["rosbot patrol: the channel 'mail' is down"]
+    assert "no answer within 30 s" in faults[0].text
+    mail.down, back = "", time.now
+    while post.outbox.waiting():
+        time.now += 1.0
+        deliver_all(post)
+    assert mail.ids == names
+    assert time.now - back < 900.0 * 1.2 + 2 * len(names)
+
+
+def test_without_new_notices_a_server_that_is_down_is_tried_ever_more_seldom(tmp_path):
+    time, mail = Time(), Box()
+    mail.down = "no server"
+    post = postman(tmp_path, channel("mail", mail), time=time)
+    post.outbox.put(notice("a"))
+    post.take_over()
+    for _ in range(3600):
+        time.now += 1.0
+        deliver_all(post)
+    assert 8 <= mail.tries <= 13
+    post.nudge(all_=True)  # the network came back, or somebody asks
+    mail.down = ""
+    deliver_all(post)
+    assert mail.ids == ["a"]
+
+
+def test_a_notice_refused_for_good_lets_the_others_pass_and_is_told_elsewhere_once(tmp_path):
+    time, mail, phone = Time(), Box(), Box()
+    post = postman(tmp_path, channel("mail", mail), channel("phone", phone), time=time)
+    post.outbox.put(notice("bad"))
+    mail.down, mail.permanent = "550 not you", True
+    post.take_over()
+    (done, _) = deliver_all(post)
+    assert done.permanent
+    assert "not taken by 'mail' for good" in done.text
+    mail.down = ""
+    post.outbox.put(notice("good"))
+    for _ in range(3):
+        deliver_all(post)
+        post.tell_faults()
+        time.now += 60.0
+    assert mail.ids == ["good"]
+    assert phone.ids == ["bad", "good", "bad-refused-mail"]
+    assert "550 not you" in phone.taken[-1].text
+    assert post.statuses()[0].refused == 1
+    time.now += 900.0
+    deliver_all(post)
+    assert mail.ids == ["good", "bad"]
+
+
+def test_a_storm_of_sensor_notices_is_a_few_digests_and_incidents_stay_alone(tmp_path):
+    time, mail = Time(), Box()
+    post = postman(tmp_path, channel("mail", mail, interval=10.0), time=time)
+    post.take_over()
+    put = []
+    for _ in range(80):
+        for _ in range(5 if len(put) < 300 else 0):
+            kind = "incident" if len(put) % 75 == 30 else "sensor"
+            put.append((f"n{len(put):04d}", kind))
+            post.outbox.put(notice(*put[-1]))
+        time.now += 1.0
+        deliver_all(post)
+    assert post.outbox.waiting() == []
+    kinds = [n.kind for n in mail.taken]
+    assert kinds.count("incident") == 4
+    assert len(kinds) < 20
+    told = sum(int(n.subject.split()[2]) if n.kind == "digest" else 1 for n in mail.taken)
+    assert told == len(put)
+    incidents = [i for i, n in enumerate(mail.taken) if n.kind == "incident"]
+    for i in incidents:  # order: nothing younger before it
+        assert mail.taken[i].id not in mail.taken[i - 1].text
+    assert "about n0001" in mail.taken[0].text
+
+
+def test_the_same_digest_after_a_crash_has_the_same_id(tmp_path):
+    mail = Box()
+    ids = []
+    for name in ("first", "again"):
+        post = postman(tmp_path / name, channel("mail", mail))
+        for i in range(4):
+            post.outbox.put(notice(f"s{i}", "sensor", text=f"text {i}"))
+        post.take_over()
+        deliver_all(post)
+        ids.append(mail.taken[-1].id)
+    assert ids[0] == ids[1]
+    assert "text 3" in mail.taken[-1].text
+
+
+def test_a_disk_that_takes_no_receipt_leads_to_no_second_mail_while_the_program_lives(tmp_path, monkeypatch, caplog):
+    mail = Box()
+    post = postman(tmp_path, channel("mail", mail))
+    post.outbox.put(notice("a"))
+    post.take_over()
+
+    def full(receipt):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(post.receipts, "add", full)
+        assert post.deliver("mail").delivered
+        assert "cannot be written down" in caplog.text
+        with pytest.raises(OSError, match="No space"):
+            post.refresh()
+        assert post.deliver("mail") is None
+    deliver_all(post)
+    assert mail.ids == ["a"]
+    assert post.outbox.waiting() == []
+
+
+def test_a_channel_that_stumbles_over_one_notice_takes_the_others(tmp_path, caplog):
+    mail = Box()
+    real = mail.send
+    mail.send = lambda n: 1 / 0 if n.id == "bad" else real(n)
+    post = postman(tmp_path, channel("mail", mail))
+    for name in ("bad", "good"):
+        post.outbox.put(notice(name))
+    post.take_over()
+    deliver_all(post)
+    assert mail.ids == ["good"]
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_a_notice_whose_file_is_taken_away_or_spoiled_does_not_stop_the_others(tmp_path):
+    mail = Box()
+    post = postman(tmp_path, channel("mail", mail))
+    for name in ("a", "b", "c"):
+        post.outbox.put(notice(name))
+    post.take_over()
+    files = sorted(tmp_path.glob("*.notice"))
     files[0].unlink()
     files[1].write_bytes(b"\0\0")
-    results = [postman.deliver() for _ in range(3)]
-    assert [r.delivered for r in results] == [False, False, True]
-    assert "is gone" in results[0].text
-    assert "set aside" in results[1].text
+    deliver_all(post, look=False)
+    deliver_all(post, look=False)
+    deliver_all(post)
+    assert mail.ids == ["c"]
 
 
-@pytest.mark.parametrize("evil", ["a\nBcc: evil@x.org", "a\r\n\r\nbody", "a\0", "x" * 5000])
-def test_nothing_in_a_notices_subject_can_inject(envelope, evil):
-    mail = build_mail(notice(subject=evil), envelope)
-    text = mail.as_bytes().decode()
-    assert mail["Bcc"] is None
-    assert "\nBcc:" not in text
-    assert len(mail["Subject"]) <= 200
-    assert mail.get_content() == "text\n"
-    assert mail["Message-ID"] == "<20261121T010203Z-sensors1@example.org>"
+def test_the_interval_outlives_the_program(tmp_path):
+    time, mail = Time(), Box()
+    post = postman(tmp_path, channel("mail", mail, interval=10.0), time=time)
+    post.outbox.put(notice("a"))
+    post.take_over()
+    deliver_all(post)
+    post.hand_over()
+    time.now += 4.0
+    post.outbox.put(notice("b"))
+    assert post.take_over()
+    assert post.deliver("mail") is None
+    assert post.pause("mail") == pytest.approx(6.01)
+    time.now += 6.0
+    assert post.deliver("mail").delivered
+
+
+def test_how_it_goes_lies_on_disk(tmp_path):
+    mail = Box()
+    mail.down = "no server"
+    post = postman(tmp_path, channel("mail", mail))
+    post.outbox.put(notice("a"))
+    post.take_over()
+    deliver_all(post)
+    post.write_status()
+    (told,) = json.loads((tmp_path / STATUS).read_text())["channels"]
+    assert (told["waiting"], told["error"], told["describe"]) == (1, "no server", "a box")
+
+
+def test_a_channel_that_is_gone_from_the_configuration_holds_nothing_up(tmp_path):
+    mail, phone = Box(), Box()
+    phone.down = "gone for ever"
+    post = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    post.outbox.put(notice("a"))
+    post.take_over()
+    deliver_all(post)
+    post.hand_over()
+    without = postman(tmp_path, channel("mail", mail))
+    without.take_over()
+    assert Outbox(tmp_path).waiting() == []

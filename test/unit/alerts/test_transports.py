@@ -1,3 +1,4 @@
+import dataclasses
 import mailbox
 import socket
 import time
@@ -6,32 +7,25 @@ from email.policy import default
 import pytest
 from smtp_server import SmtpServer
 
-from rosbot_patrol.alerts import transports
-from rosbot_patrol.alerts.mail import build_mail, make_envelope
-from rosbot_patrol.alerts.transports import (
-    DeliveryError,
-    MaildirTransport,
-    MailParams,
-    SendmailTransport,
-    SmtpTransport,
-    make_transport,
-    read_password,
-)
+from rosbot_patrol.alerts.channel import DeliveryError
+from rosbot_patrol.alerts.maildir import MaildirTransport
+from rosbot_patrol.alerts.sendmail import SendmailTransport
+from rosbot_patrol.alerts.smtp import SmtpServer as Server
+from rosbot_patrol.alerts.smtp import SmtpTransport
 from rosbot_patrol.alerts.wording import incident_notice
-from rosbot_patrol.errors import ParamError
 
 
 @pytest.fixture
-def mail(make_incident, envelope):
-    return build_mail(incident_notice(make_incident(), b"\xff\xd8 a picture"), envelope)
+def told(make_incident):
+    return incident_notice(make_incident(), b"\xff\xd8 a picture")
 
 
 def smtp(server, envelope, **given):
-    return SmtpTransport(MailParams(smtp_host="localhost", smtp_port=server.port, mail_timeout=1.0, **given), envelope)
+    return SmtpTransport(Server(host="localhost", port=server.port, timeout=1.0, **given), envelope)
 
 
-def test_a_maildir_reads_back(tmp_path, mail):
-    place = MaildirTransport(tmp_path / "mail").send("20261121T010203Z-1", mail)
+def test_a_maildir_reads_back(tmp_path, told, envelope):
+    place = MaildirTransport(tmp_path / "mail", envelope).send(told)
     factory = mailbox.Maildir(tmp_path / "mail", create=False)
     ((key, _),) = factory.items()
     read = mailbox.email.message_from_bytes(factory.get_bytes(key), policy=default)
@@ -42,9 +36,9 @@ def test_a_maildir_reads_back(tmp_path, mail):
 
 
 @pytest.mark.parametrize("seen", [False, True])
-def test_a_maildir_takes_an_incident_once(tmp_path, mail, seen):
-    transport = MaildirTransport(tmp_path)
-    first = transport.send("i-1", mail)
+def test_a_maildir_takes_an_incident_once(tmp_path, told, envelope, seen):
+    transport = MaildirTransport(tmp_path, envelope)
+    first = transport.send(told)
     if seen:
         box = mailbox.Maildir(tmp_path, create=False)
         key = box.keys()[0]
@@ -52,27 +46,27 @@ def test_a_maildir_takes_an_incident_once(tmp_path, mail, seen):
         message.set_subdir("cur")
         message.add_flag("S")
         box[key] = message
-    again = transport.send("i-1", mail)
+    again = transport.send(told)
     assert len(mailbox.Maildir(tmp_path, create=False)) == 1
     assert seen or again == first
-    transport.send("i-10", mail)
+    transport.send(dataclasses.replace(told, id=told.id + "0"))
     assert len(mailbox.Maildir(tmp_path, create=False)) == 2
 
 
-def test_a_maildir_that_cannot_be_written_is_named(tmp_path, mail):
+def test_a_maildir_that_cannot_be_written_is_named(tmp_path, told, envelope):
     (tmp_path / "file").write_text("")
     with pytest.raises(DeliveryError, match=f"the Maildir {tmp_path}/file does not take the mail"):
-        MaildirTransport(tmp_path / "file").send("i", mail)
+        MaildirTransport(tmp_path / "file", envelope).send(told)
 
 
-def test_smtp_delivers_the_whole_mail(mail, envelope):
+def test_smtp_delivers_the_whole_mail(told, envelope):
     with SmtpServer() as server:
-        assert smtp(server, envelope).send("i", mail) == "owner@example.org"
+        assert smtp(server, envelope).send(told) == "owner@example.org"
         ((commands, data),) = server.mails
     assert commands[0].startswith("mail FROM:<robot@example.org>")
     assert commands[1:] == ["rcpt TO:<owner@example.org>"]
     read = mailbox.email.message_from_bytes(data, policy=default)
-    assert read["Message-ID"] == mail["Message-ID"]
+    assert read["Message-ID"] == "<20261121T010203Z-1@example.org>"
     assert [part.get_content() for part in read.iter_attachments()] == [b"\xff\xd8 a picture"]
 
 
@@ -92,41 +86,41 @@ def test_smtp_delivers_the_whole_mail(mail, envelope):
         ({"": "garbage"}, False),
     ],
 )
-def test_what_a_server_refuses_is_said_with_its_name(mail, envelope, replies, permanent):
+def test_what_a_server_refuses_is_said_with_its_name(told, envelope, replies, permanent):
     with SmtpServer(replies) as server:
         with pytest.raises(DeliveryError, match=f"localhost:{server.port}") as caught:
-            smtp(server, envelope).send("i", mail)
+            smtp(server, envelope).send(told)
         assert caught.value.permanent is permanent
         assert server.mails == []
 
 
 @pytest.mark.parametrize("bye", ["421 closing", None])
-def test_a_mail_that_was_taken_counts_whatever_comes_after(mail, envelope, bye):
+def test_a_mail_that_was_taken_counts_whatever_comes_after(told, envelope, bye):
     with SmtpServer({"QUIT": bye}) as server:
-        smtp(server, envelope).send("i", mail)
+        smtp(server, envelope).send(told)
         assert len(server.mails) == 1
 
 
-def test_a_silent_server_costs_no_more_than_the_time_out(mail, envelope):
+def test_a_silent_server_costs_no_more_than_the_time_out(told, envelope):
     began = time.monotonic()
     with SmtpServer(silent=True) as server, pytest.raises(DeliveryError, match="cannot be used: no answer within"):
-        smtp(server, envelope).send("i", mail)
+        smtp(server, envelope).send(told)
     assert time.monotonic() - began < 3.0
 
 
-def test_no_server(mail, envelope):
+def test_no_server(told, envelope):
     with socket.create_server(("localhost", 0)) as free:
         port = free.getsockname()[1]
-    transport = SmtpTransport(MailParams(smtp_host="localhost", smtp_port=port), envelope)
+    transport = SmtpTransport(Server(host="localhost", port=port), envelope)
     with pytest.raises(DeliveryError, match=f"the mail server localhost:{port} cannot be used: .*refused") as caught:
-        transport.send("i", mail)
+        transport.send(told)
     assert not caught.value.permanent
 
 
-def test_starttls_that_is_not_offered_is_no_clear_text(mail, envelope):
+def test_starttls_that_is_not_offered_is_no_clear_text(told, envelope):
     with SmtpServer() as server:
         with pytest.raises(DeliveryError):
-            smtp(server, envelope, smtp_security="starttls").send("i", mail)
+            smtp(server, envelope, security="starttls").send(told)
         assert "MAIL" not in server.verbs
 
 
@@ -141,9 +135,9 @@ def program(tmp_path):
     return make
 
 
-def test_sendmail_gets_the_mail_and_the_recipients(tmp_path, program, mail, envelope):
+def test_sendmail_gets_the_mail_and_the_recipients(tmp_path, program, told, envelope):
     path = program(f'echo "$@" > {tmp_path}/args; cat > {tmp_path}/mail')
-    assert SendmailTransport(path, envelope, 5.0).send("i", mail) == "owner@example.org"
+    assert SendmailTransport(path, envelope, 5.0).send(told) == "owner@example.org"
     assert (tmp_path / "args").read_text().split() == ["-i", "-f", "robot@example.org", "--", "owner@example.org"]
     text = (tmp_path / "mail").read_bytes()
     assert b"\r\n" not in text
@@ -159,60 +153,7 @@ def test_sendmail_gets_the_mail_and_the_recipients(tmp_path, program, mail, enve
         ("exec sleep 20", "did not end within 0.3 s", False),
     ],
 )
-def test_a_sendmail_that_fails_is_said(program, mail, envelope, script, said, permanent):
+def test_a_sendmail_that_fails_is_said(program, told, envelope, script, said, permanent):
     with pytest.raises(DeliveryError, match=said) as caught:
-        SendmailTransport(program(script), envelope, 0.3).send("i", mail)
+        SendmailTransport(program(script), envelope, 0.3).send(told)
     assert caught.value.permanent is permanent
-
-
-def choose(tmp_path, envelope=None, environ=None, **given):
-    params = MailParams(**given)
-    envelope = envelope or make_envelope(params.email_to, params.email_from)
-    return make_transport(params, envelope, home=tmp_path, environ=environ or {})
-
-
-def test_auto_takes_sendmail_for_a_real_address(tmp_path, program):
-    path = program("exit 0")
-    assert choose(tmp_path, email_to="a@b.org", sendmail=path).name == "sendmail"
-    assert choose(tmp_path, email_to="*****@****.***", sendmail=path).name == "maildir"
-    assert choose(tmp_path, email_to="", sendmail=path).name == "maildir"
-
-
-def test_auto_without_a_sendmail_takes_the_maildir(tmp_path, monkeypatch):
-    monkeypatch.setattr(transports, "SENDMAILS", ())
-    transport = choose(tmp_path, email_to="a@b.org")
-    assert transport.describe() == f"the Maildir {tmp_path}/rosbot_patrol/mail"
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"transport": "sendmail", "sendmail": "/nowhere/sendmail", "email_to": "a@b.org"}, "no program at /nowhere"),
-        ({"transport": "smtp"}, "~email_to: expected a real address for smtp"),
-        ({"transport": "smtp", "email_to": "a@b.org", "smtp_user": "me"}, "~smtp_security: expected starttls or tls"),
-        (
-            {"transport": "smtp", "email_to": "a@b.org", "smtp_user": "me", "smtp_security": "tls"},
-            "needs a password, from this file or the variable ROSBOT_PATROL_SMTP_PASSWORD",
-        ),
-    ],
-)
-def test_what_a_transport_lacks_is_a_sentence(tmp_path, given, said):
-    with pytest.raises(ParamError, match=said):
-        choose(tmp_path, **given)
-
-
-def test_the_password_comes_from_a_private_file_or_the_environment(tmp_path):
-    path = tmp_path / "password"
-    path.write_text("secret\n")
-    params = MailParams(smtp_password_file=str(path))
-    path.chmod(0o644)
-    with pytest.raises(ParamError, match="can be read by others"):
-        read_password(params, {})
-    path.chmod(0o600)
-    assert read_password(params, {}) == "secret"
-    assert read_password(MailParams(), {"ROSBOT_PATROL_SMTP_PASSWORD": "other"}) == "other"
-    path.write_text("")
-    with pytest.raises(ParamError, match="is empty"):
-        read_password(params, {})
-    with pytest.raises(ParamError, match="cannot be read"):
-        read_password(MailParams(smtp_password_file=str(tmp_path / "none")), {})

@@ -1,0 +1,60 @@
+"""What a channel is: a name, a way out, and what it is asked to take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from rosbot_patrol.alerts.lane import Pace
+from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.outbox import Waiting
+from rosbot_patrol.errors import AlertError
+
+
+class DeliveryError(AlertError):
+    """A transport did not take a notice.
+
+    Args:
+        problem: what happened, and where.
+        permanent: it is this notice's fault: others may pass.
+        delay: that the other side asked for [s].
+    """
+
+    def __init__(self, problem: str, *, permanent: bool = False, delay: float | None = None) -> None:
+        super().__init__(problem)
+        self.permanent, self.delay = permanent, delay
+
+
+class Transport(Protocol):
+    """Takes notices."""
+
+    name: str
+
+    def describe(self) -> str:
+        """Where they go, for people."""
+
+    def send(self, notice: Notice) -> str:
+        """Deliver; returns the place (a file, the addresses, an answer). Never hangs. Raises DeliveryError."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One way to the owner.
+
+    Attributes:
+        name: for people, and in the receipts.
+        transport: how notices leave.
+        kinds: of notices that it takes; empty: all.
+        pace: how fast.
+    """
+
+    name: str
+    transport: Transport
+    kinds: tuple[str, ...] = ()
+    pace: Pace = field(default_factory=Pace)
+
+    def takes(self, entry: Waiting) -> bool:
+        """Whether a notice is for this channel."""
+        if entry.channels:
+            return self.name in entry.channels
+        return not self.kinds or entry.kind in self.kinds

@@ -1,0 +1,79 @@
+"""What went wrong on the way to a server, in words that say what to look at."""
+
+from __future__ import annotations
+
+import errno
+import http.client
+import smtplib
+import socket
+import ssl
+import threading
+from collections.abc import Callable
+from types import TracebackType
+
+WHOLE_EXCHANGE = 4.0  # a whole exchange may take so many times the time-out of one answer
+
+
+def explain(err: BaseException, where: str, timeout: float) -> str:
+    """One clause, without a full stop.
+
+    Args:
+        err: what was raised.
+        where: host and port.
+        timeout: that was given for each answer [s].
+    """
+    host = where.rpartition(":")[0]
+    if isinstance(err, socket.gaierror):
+        return f"the name '{host}' cannot be found (DNS: {err.strerror}); is it right, and is the network up?"
+    if isinstance(err, ssl.SSLCertVerificationError):
+        return f"its TLS certificate is not to be trusted: {err.verify_message}"
+    if isinstance(err, TimeoutError) or isinstance(err.__context__, TimeoutError):  # smtplib says "closed"
+        return f"no answer within {timeout:g} s"
+    if isinstance(err, ssl.SSLError):
+        return f"it does not speak TLS as it should ({err.reason or err}); is that its TLS port?"
+    if isinstance(err, ConnectionRefusedError):
+        return f"[Errno {errno.ECONNREFUSED}] Connection refused: nothing listens there"
+    if isinstance(err, smtplib.SMTPNotSupportedError):
+        return f"it does not offer what is asked for: {_tidy(err)}"
+    if isinstance(err, (smtplib.SMTPServerDisconnected, http.client.RemoteDisconnected, ConnectionResetError)):
+        return f"it closed the connection ({_tidy(err)})"
+    return _tidy(err)
+
+
+class Deadline:
+    """Cuts a connection off that has taken too long in all, as one does that sends a byte now and then.
+
+    Args:
+        seconds: for the whole exchange.
+        socket_of: gives the socket, None before there is one.
+    """
+
+    def __init__(self, seconds: float, socket_of: Callable[[], socket.socket | None]) -> None:
+        self._seconds, self._socket_of = seconds, socket_of
+        self._timer = threading.Timer(seconds, self._cut)
+        self._timer.daemon = True
+        self._is_over = False
+
+    def __enter__(self) -> Deadline:
+        self._timer.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._timer.cancel()
+        if self._is_over and isinstance(value, Exception):
+            raise TimeoutError(f"not done within {self._seconds:g} s") from value
+
+    def _cut(self) -> None:
+        self._is_over = True
+        connection = self._socket_of()
+        if connection is not None:
+            try:
+                connection.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                return  # it is closed already
+
+
+def _tidy(err: BaseException) -> str:
+    return " ".join(str(err).split())[:300] or type(err).__name__

@@ -1,0 +1,119 @@
+"""Who took what: a file to which each delivery adds one line, synced before the next begins.
+
+Only the process that delivers writes it; others read it along. A line that a crash cut short counts as not written.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rosbot_patrol.files import write_atomic
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Receipt:
+    """One delivery.
+
+    Attributes:
+        channel: that took it.
+        transport: of the channel: smtp, maildir, ...
+        ids: of the notices, several where they left as one digest.
+        wall: when, seconds since 1970.
+        where: the place, for people.
+    """
+
+    channel: str
+    transport: str
+    ids: tuple[str, ...]
+    wall: float
+    where: str
+
+
+class Receipts:
+    """The file of deliveries.
+
+    Args:
+        path: of the file; need not be there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.taken: dict[str, set[str]] = {}
+        self.last: dict[str, float] = {}
+        self._inode, self._offset = -1, 0
+
+    def read_new(self) -> list[Receipt]:
+        """What was added since the last call, the whole file in the first. Raises OSError."""
+        try:
+            file = self.path.open("rb")
+        except FileNotFoundError:
+            return []
+        with file:
+            inode = os.fstat(file.fileno()).st_ino
+            if inode != self._inode:  # the first time, or it was written anew
+                self._inode, self._offset = inode, 0
+            file.seek(self._offset)
+            data = file.read()
+        whole = data[: data.rfind(b"\n") + 1]
+        self._offset += len(whole)
+        found = [r for r in map(_parse, whole.splitlines()) if r is not None]
+        return [r for r in found if self._note(r)]
+
+    def add(self, receipt: Receipt) -> None:
+        """Write a delivery down. Raises OSError where the disk does not take it."""
+        self._note(receipt)
+        line = json.dumps(asdict(receipt)).encode("ascii") + b"\n"
+        handle = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        try:
+            size = os.fstat(handle).st_size
+            cut = size > 0 and os.pread(handle, 1, size - 1) != b"\n"
+            written = os.write(handle, b"\n" + line if cut else line)  # a cut line stays, and is read as none
+            if written != len(line) + cut:
+                os.ftruncate(handle, size)
+                raise OSError(28, "No space left on device", str(self.path))
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+    def compact(self, keep: Iterable[str], *, lines: int = 500) -> None:
+        """Write the file anew with the last `lines` and what was taken of `keep`. Raises OSError."""
+        wanted = set(keep)
+        try:
+            found = self.path.read_bytes().splitlines()
+        except FileNotFoundError:
+            return
+        early = found[:-lines]
+        kept = [line for line in early if (r := _parse(line)) is not None and wanted & set(r.ids)]
+        if len(kept) < len(early):
+            write_atomic(self.path, b"".join(line + b"\n" for line in kept + found[-lines:]))
+
+    def _note(self, receipt: Receipt) -> bool:
+        """Remember a delivery; returns whether it is news."""
+        fresh = any(receipt.channel not in self.taken.get(name, ()) for name in receipt.ids)
+        for name in receipt.ids:
+            self.taken.setdefault(name, set()).add(receipt.channel)
+        self.last[receipt.channel] = max(receipt.wall, self.last.get(receipt.channel, 0.0))
+        return fresh
+
+
+def _parse(line: bytes) -> Receipt | None:
+    try:
+        tree = json.loads(line)
+        return Receipt(
+            channel=str(tree["channel"]),
+            transport=str(tree["transport"]),
+            ids=tuple(map(str, tree["ids"])),
+            wall=float(tree["wall"]),
+            where=str(tree["where"]),
+        )
+    except (ValueError, KeyError, TypeError):
+        if line.strip():
+            log.warning("a line of the receipts makes no sense and counts for nothing: %r", line[:80])
+        return None

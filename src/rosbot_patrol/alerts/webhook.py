@@ -1,0 +1,174 @@
+"""A notice as a JSON document, sent by POST to a web address (Home Assistant, ntfy, Node-RED, your own).
+
+    POST /path                                     Content-Type: application/json
+    Idempotency-Key: ID                            the same when a notice goes again: take it once
+    X-Rosbot-Patrol-Timestamp: SECONDS
+    X-Rosbot-Patrol-Signature: sha256=HEX          HMAC-SHA256 with the secret over "SECONDS." and the body
+
+2xx is taken. Redirects are not followed: the notice, its picture and the signature go to the address that was named,
+and to no other.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import http.client
+import json
+import ssl
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from rosbot_patrol.alerts.channel import DeliveryError
+from rosbot_patrol.alerts.mail import plain_text
+from rosbot_patrol.alerts.network_words import WHOLE_EXCHANGE, Deadline, explain
+from rosbot_patrol.alerts.notice import Notice
+
+_THIS_NOTICES_FAULT = {400, 409, 411, 413, 415, 422, 431}
+
+
+@dataclass(frozen=True, kw_only=True)
+class WebAddress:
+    """Where to, and what goes along.
+
+    Attributes:
+        url: http or https.
+        secret: of the signature; "" for none.
+        token: for `Authorization: Bearer`; "" for none.
+        with_picture: send the picture, in base64.
+        timeout: for each answer [s].
+        ca_file: certificates to trust besides the system's; "" for none.
+    """
+
+    url: str
+    secret: str = ""
+    token: str = ""
+    with_picture: bool = True
+    timeout: float = 30.0
+    ca_file: str = ""
+
+
+def check_url(url: str) -> str | None:
+    """What is wrong with a web address, None where nothing is."""
+    if any(c.isspace() or not c.isprintable() for c in url) or not url.isascii():
+        return "has a blank, a line break or a letter that a web address cannot have"
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError as err:
+        return f"is no web address: {err}"
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        return "is no web address, expected http://... or https://..."
+    if parts.username is not None or parts.password is not None:
+        return "has a user or password in it: use token_file or token_env"
+    return "has no port 0" if port == 0 else None
+
+
+class WebhookTransport:
+    """Posts notices.
+
+    Args:
+        address: where to.
+        wall: seconds since 1970, for the signature.
+    """
+
+    name = "webhook"
+
+    def __init__(
+        self, address: WebAddress, wall: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_REALTIME)
+    ) -> None:
+        self._address, self._wall = address, wall
+        self._parts = urlsplit(address.url)
+        self._tls = self._parts.scheme == "https"
+        self._where = f"{self._parts.hostname}:{self._parts.port or (443 if self._tls else 80)}"
+
+    def describe(self) -> str:
+        """Where its notices go; without the query, which may hold a key."""
+        return f"the webhook {self._parts.scheme}://{self._where}{self._parts.path}"
+
+    def send(self, notice: Notice) -> str:
+        """Post the notice."""
+        body = document(notice, with_picture=self._address.with_picture)
+        try:
+            status, reason, said, retry_after = self._post(notice.id, body)
+        except (OSError, http.client.HTTPException, ValueError) as err:
+            problem = explain(err, self._where, self._address.timeout)
+            raise DeliveryError(f"{self.describe()} cannot be used: {problem}") from err
+        answer = " ".join(f"{status} {reason} {said}".split())
+        if 200 <= status < 300:
+            return f"{self.describe()} ({status} {reason})".replace(" )", ")")
+        if 300 <= status < 400:
+            raise DeliveryError(f"{self.describe()} answered {answer}: redirects are not followed, name the final url")
+        raise DeliveryError(
+            f"{self.describe()} answered {answer}", permanent=status in _THIS_NOTICES_FAULT, delay=retry_after
+        )
+
+    def _post(self, notice_id: str, body: bytes) -> tuple[int, str, str, float | None]:
+        connection = self._connection()
+        with Deadline(WHOLE_EXCHANGE * self._address.timeout, lambda: connection.sock):
+            try:
+                path = self._parts.path or "/"
+                target = f"{path}?{self._parts.query}" if self._parts.query else path
+                connection.request("POST", target, body, self._headers(notice_id, body))
+                answer = connection.getresponse()
+                said = answer.read(300).decode("utf-8", "replace")
+                after = answer.getheader("Retry-After", "")
+                return answer.status, answer.reason, _printable(said), float(after) if after.isdigit() else None
+            finally:
+                connection.close()
+
+    def _connection(self) -> http.client.HTTPConnection:
+        host, port = self._parts.hostname or "", self._parts.port
+        if not self._tls:
+            return http.client.HTTPConnection(host, port, timeout=self._address.timeout)
+        context = ssl.create_default_context()
+        if self._address.ca_file:
+            context.load_verify_locations(self._address.ca_file)
+        return http.client.HTTPSConnection(host, port, timeout=self._address.timeout, context=context)
+
+    def _headers(self, notice_id: str, body: bytes) -> dict[str, str]:
+        stamp = str(int(self._wall()))
+        headers = {
+            "Content-Type": "application/json",
+            "User-Agent": "rosbot_patrol",
+            "Idempotency-Key": notice_id,
+            "X-Rosbot-Patrol-Timestamp": stamp,
+        }
+        if self._address.secret:
+            headers["X-Rosbot-Patrol-Signature"] = sign(self._address.secret, stamp, body)
+        if self._address.token:
+            headers["Authorization"] = f"Bearer {self._address.token}"
+        return headers
+
+
+def sign(secret: str, stamp: str, body: bytes) -> str:
+    """The signature header: who knows the secret can check that body and time are ours."""
+    digest = hmac.new(secret.encode(), stamp.encode() + b"." + body, hashlib.sha256)
+    return f"sha256={digest.hexdigest()}"
+
+
+def document(notice: Notice, *, with_picture: bool = True) -> bytes:
+    """The body that is posted."""
+    tree = {
+        "id": notice.id,
+        "time": notice.wall,
+        "kind": notice.kind,
+        "subject": notice.subject,
+        "text": plain_text(notice),
+        "facts": dict(notice.facts),
+        "verdict": notice.verdict,
+        "incident": notice.incident,
+    }
+    if notice.room_id >= 0:
+        tree["room"] = {"id": notice.room_id, "name": notice.room_name}
+    if notice.picture is not None and with_picture:
+        data = base64.b64encode(notice.picture).decode("ascii")
+        tree["picture"] = {"name": notice.picture_name, "type": "image/jpeg", "base64": data}
+    return json.dumps(tree).encode("ascii")
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in text)

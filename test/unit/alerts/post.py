@@ -1,0 +1,76 @@
+"""For tests of the post: a clock that the test moves, and channels that fail as told."""
+
+from pathlib import Path
+
+from rosbot_patrol.alerts.channel import Channel, DeliveryError
+from rosbot_patrol.alerts.lane import Pace
+from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.postman import Clocks, Postman
+
+
+class Time:
+    """Seconds since 1970, and those of the machine."""
+
+    def __init__(self, now=1000.0, wall=1_790_000_000.0):
+        self.now, self._offset = now, wall - now
+
+    @property
+    def wall(self):
+        return self.now + self._offset
+
+    @property
+    def clocks(self):
+        return Clocks(now=lambda: self.now, wall=lambda: self.wall)
+
+
+class Box:
+    """A channel's other end: `down` is what it says instead of taking a notice."""
+
+    name = "box"
+
+    def __init__(self, time=None):
+        self.taken, self.down, self.permanent, self.tries, self._time = [], "", False, 0, time
+
+    def describe(self):
+        return "a box"
+
+    def send(self, notice):
+        self.tries += 1
+        if self.down and self._time:
+            self._time.now += 30.0  # a time-out
+        if self.down:
+            raise DeliveryError(self.down, permanent=self.permanent)
+        self.taken.append(notice)
+        return "in the box"
+
+    @property
+    def ids(self):
+        return [notice.id for notice in self.taken]
+
+
+def notice(name, kind="incident", **given):
+    return Notice(
+        **{"id": name, "wall": 1_790_000_000.0, "kind": kind, "subject": f"about {name}", "text": "t", **given}
+    )
+
+
+def channel(name, transport, *, kinds=(), interval=0.0, first_delay=5.0):
+    pace = Pace(interval=interval, first_delay=first_delay)
+    return Channel(name=name, transport=transport, kinds=kinds, pace=pace)
+
+
+def postman(folder: Path, *channels, time=None, **given):
+    time = time or Time()
+    return Postman(Outbox(folder), channels, clocks=time.clocks, seed=1, who="test", **given)
+
+
+def deliver_all(post, *, look=True):
+    """Whatever is due on any channel."""
+    done = []
+    if look:
+        post.refresh()
+    for name in post.channels:
+        while (delivery := post.deliver(name)) is not None:
+            done.append(delivery)
+    return done
