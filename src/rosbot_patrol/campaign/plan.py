@@ -167,6 +167,11 @@ class _Stage:
         return round(float(self.rng.uniform(-math.pi, math.pi)), 2)
 
 
+def plain_place(floor: Floor, room: int, rng: np.random.Generator) -> tuple[float, float] | None:
+    """A place in plain sight of a room's point, where the robot can pass; None where there is none [m]."""
+    return _Stage(floor, room, rng).in_sight()
+
+
 def _standing(stage: _Stage) -> _Cast | None:
     place = stage.in_sight()
     if place is None:

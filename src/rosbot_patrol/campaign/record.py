@@ -22,7 +22,7 @@ class Result:
     Attributes:
         verdict: of the mission to the room, "" where there was none; reason: its sentence.
         problem: why the patrol could not be played to its end, "" where it was.
-        was_there: whether somebody was in the room or in view before the verdict, long enough to be found.
+        was_there: whether somebody was in the room or in view before the verdict, long enough to be found, or found.
         in_room, in_view: for how long [s]; views: how often the camera could have seen somebody [1].
         place_error: of the person, as told and as true [m].
         share_told, share_true: of the room's floor that was seen.
@@ -30,6 +30,7 @@ class Result:
         contacts: what the robot touched.
         localisation: mean and largest error of the pose [m].
         home_error: from where the robot began, at the end [m].
+        home: whether it came back; None where it went on to another room, or nobody knows.
         mails: that were delivered; missions: that ended.
         sim_s, wall_s: how long it took.
     """
@@ -54,7 +55,7 @@ class Result:
     contacts: list[str] = field(default_factory=list)
     localisation: tuple[float, float] | None = None
     home_error: float | None = None
-    home: bool = False
+    home: bool | None = None
     mails: int = 0
     missions: int = 0
     sim_s: float = 0.0
@@ -86,7 +87,7 @@ class Result:
         if self.verdict == CONFIRMED and self.mails != 1:
             found.append(f"{self.mails} mails")
         found += [f"touched {', '.join(sorted(set(self.contacts)))}"] if self.contacts else []
-        found += ["not home"] if not self.home and not self.problem else []
+        found += ["not home"] if self.home is False else []
         return tuple(found)
 
     def to_json(self) -> str:

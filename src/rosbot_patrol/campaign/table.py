@@ -43,7 +43,7 @@ def shares(results: Sequence[Result]) -> list[Share]:
         Share("detected, of those who were there", sum(bool(r.detected) for r in there), len(there)),
         Share("false alarms, where nobody was", sum(r.false_alarm for r in nobody), len(nobody)),
         Share("a verdict", sum(bool(r.verdict) for r in results), len(results)),
-        Share("home again", sum(r.home for r in played), len(played)),
+        Share("home again", sum(r.home is True for r in played), sum(r.home is not None for r in played)),
         Share("without touching anything", sum(not r.contacts for r in played), len(played)),
         Share(
             "one mail for each confirmed",
@@ -66,7 +66,7 @@ def measures(results: Sequence[Result]) -> list[tuple[str, str, float, float, in
         ("share of the floor, told less true", "", _share_error),
         ("localisation, mean error of a patrol", "m", lambda r: r.localisation[0] if r.localisation else None),
         ("localisation, largest error of a patrol", "m", lambda r: r.localisation[1] if r.localisation else None),
-        ("home, off the start", "m", lambda r: r.home_error),
+        ("home, off the start", "m", lambda r: r.home_error if r.home is not None else None),
     ]
     asked += [(f"time: {_TOLD[name]}", "s", lambda r, name=name: r.times.get(name)) for name in TIMES]  # type: ignore[misc]
     found = []

@@ -48,6 +48,11 @@ class Presence:
         """Whether there was somebody to be found."""
         return self.in_room >= ENOUGH or self.in_view >= ENOUGH
 
+    @property
+    def was_seen(self) -> bool:
+        """Whether anybody was in the room or in view at all: too short to be asked for, enough to be right."""
+        return self.in_room > 0.0 or self.in_view > 0.0
+
 
 def presence(
     floor: Floor,

@@ -2,6 +2,7 @@
 
     rosrun rosbot_patrol campaign FOLDER --patrols 60
     rosrun rosbot_patrol campaign FOLDER --only 17        # one of them again
+    rosrun rosbot_patrol campaign FOLDER --crash 200      # patrols in which programs are killed
 
 Run again it goes on where it stopped. Exit status: 0, or 1 where anything was not as it should have been.
 """
@@ -21,17 +22,20 @@ from pathlib import Path
 
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses import HOUSES, HouseFiles, load_house
+from rosbot_patrol.campaign.page import page
 from rosbot_patrol.campaign.plan import Patrol, house_of, plan_patrol
 from rosbot_patrol.campaign.progress import progress_line
 from rosbot_patrol.campaign.record import PLAN, RESULT, CampaignFolder, Result, Settings
 from rosbot_patrol.campaign.table import HEADINGS, figures, markdown_table, row, summary, text_table
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.files import write_atomic
+from rosbot_patrol.ros.campaign_crash import CrashLife
+from rosbot_patrol.ros.campaign_crashes import CrashCampaign
 from rosbot_patrol.ros.campaign_patrol import play
 from rosbot_patrol.ros.campaign_rooms import own_space, raise_loopback
 from rosbot_patrol.ros.campaign_runner import Job, Runner
+from rosbot_patrol.ros.house import HouseError
 
-ROOT = Path(__file__).resolve().parents[3]
 KEPT_FOR_GOOD = (RESULT, PLAN, "scenario.yaml", "mail")  # of a patrol that went as it should
 
 
@@ -55,6 +59,10 @@ def options(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--timeout", type=float, default=600.0, help="for a patrol [s] of real time")
     parser.add_argument("--only", type=int, nargs="+", help="numbers of the patrols to play, again where played")
     parser.add_argument("--wrap", default="", help="command to run each patrol under, such as 'flock FILE'")
+    parser.add_argument(
+        "--crash", type=int, metavar="KILLS", help="kill programs instead, so often; see docs/campaign.md"
+    )
+    parser.add_argument("--life", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # the program in its own space
     parser.add_argument("--space", action="store_true", help=argparse.SUPPRESS)
     return parser.parse_args(arguments)
@@ -163,7 +171,26 @@ class Campaign:
         folder = self._folder.folder
         table = markdown_table(HEADINGS, map(row, results))
         write_atomic(folder / "results.md", f"{table}\n\n{summary(results)}\n\n{self._failures(results)}\n".encode())
+        subtitle = f"seed {self._given.seed}, houses {', '.join(self._given.houses)}, {os.cpu_count()} cores"
+        write_atomic(folder / "index.html", page(results, self.command, subtitle=subtitle).encode())
         write_atomic(folder / "results.json", json.dumps(figures(results), indent=1).encode())
+
+
+def in_its_space(given: argparse.Namespace) -> int:
+    """The program as it was started by itself: one patrol, or one life of a crash campaign; the exit status."""
+    if given.space:
+        raise_loopback()
+    status = 0
+    try:
+        if given.one:
+            play(given.one, package_root(), given.timeout)
+        else:
+            CrashLife(given.folder, package_root(), given.seed, given.crash).run()
+    except HouseError as err:
+        print(err)
+        status = 1
+    sys.stdout.flush()
+    return status
 
 
 def main() -> None:
@@ -173,12 +200,11 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):  # in the background a shell has SIGINT ignored
         signal.signal(number, signal.default_int_handler)
     try:
-        if given.one:
-            if given.space:
-                raise_loopback()
-            play(given.one, package_root(), given.timeout)
-            sys.stdout.flush()
-            os._exit(0)  # rospy's threads would linger
+        if given.one or given.life:
+            os._exit(in_its_space(given))  # rospy's threads would linger
+        if given.crash is not None:
+            wrap = shlex.split(given.wrap)
+            sys.exit(CrashCampaign(given.folder, given.seed, given.crash, wrap).run())
         sys.exit(Campaign(given).run())
     except (PatrolError, OSError) as err:
         sys.exit(f"campaign: {err}")

@@ -129,6 +129,7 @@ def evaluate(
     kept = _kept(state_dir, None if begin is None else heard.states[begin].message.mission)
     person = kept.person if kept is not None else None
     looked = times.get("looked")
+    went_on = end is None or bool(heard.states[end].message.mission)
     home = math.dist(robot.poses[-1][:2], robot.poses[0][:2]) if robot.times else None
     return Result(
         number=patrol.number,
@@ -141,7 +142,7 @@ def evaluate(
         verdict=verdict,
         reason=reason,
         problem=problem,
-        was_there=there.was_there,
+        was_there=there.was_there or (verdict == CONFIRMED and there.was_seen),
         in_room=there.in_room,
         in_view=there.in_view,
         place_error=place_error(tracks, patrol.people, last, *person) if person else None,
@@ -151,7 +152,7 @@ def evaluate(
         contacts=contacts,
         localisation=heard.localisation(),
         home_error=home,
-        home=home is not None and home < HOME,
+        home=None if home is None or went_on else home < HOME,
         mails=mails,
         missions=len({s.message.mission for s in heard.states if s.message.mission}),
         sim_s=round(robot.times[-1], 1) if robot.times else 0.0,

@@ -54,6 +54,11 @@ class Master:
         rospy.set_param("/use_sim_time", False)
         rospy.init_node("house_watch", anonymous=True, disable_signals=True)
 
+    def kill(self) -> None:
+        """End it at once, as `kill -9` does."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._core.pid, signal.SIGKILL)
+
     def stop(self) -> None:
         """End the roscore."""
         rospy.signal_shutdown("done")
@@ -191,6 +196,18 @@ class House:
                     os.kill(pid, signal.SIGKILL)
             self._process.wait()
             self._process = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the launch has not ended."""
+        return self._process is not None and self._process.poll() is None
+
+    @property
+    def pid(self) -> int:
+        """Of roslaunch. Raises HouseError where there is none."""
+        if self._process is None:
+            raise HouseError("the house is not started")
+        return self._process.pid
 
     def wait_ready(self, timeout: float = 60.0) -> float:
         """Wait until it is on guard; returns the seconds since the launch."""

@@ -54,7 +54,7 @@ def test_an_interval_of_more_than_all_is_refused() -> None:
         ({"mails": 2}, ("2 mails",)),
         ({"contacts": ["sofa", "sofa"]}, ("touched sofa",)),
         ({"home": False}, ("not home",)),
-        ({"problem": "did not end within 630 s", "verdict": "", "was_there": False, "mails": 0, "home": False},
+        ({"problem": "did not end within 630 s", "verdict": "", "was_there": False, "mails": 0, "home": None},
          ("did not end within 630 s",)),
     ],
 )  # fmt: skip
@@ -92,7 +92,7 @@ def test_shares_count_what_they_say() -> None:
         result(1, verdict="clear", mails=0),
         result(2, **EMPTY),
         result(3, **{**EMPTY, "verdict": "confirmed", "mails": 1}),
-        result(4, problem="did not end", verdict="", was_there=False, home=False, mails=0),
+        result(4, problem="did not end", verdict="", was_there=False, home=None, mails=0),
     ]
     counted = [(share.hits, share.trials) for share in shares(results)]
     assert counted == [(1, 2), (1, 2), (4, 5), (4, 4), (4, 4), (2, 2)]

@@ -1,0 +1,215 @@
+"""The books of a crash campaign: what was called for and what was killed, written before it is done, and whether every
+call got its verdict and every confirmed incident its one mail.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol.campaign.crash_plan import ALL
+from rosbot_patrol.campaign.intervals import wilson
+
+CLOCK_SLACK = 1.0  # between the clocks of two programs [s]
+
+
+class Journal:
+    """Lines of JSON, each on the disk before `add` returns. One program writes at a time.
+
+    Args:
+        path: of the file; what a crash left half written at its end is passed over.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def add(self, kind: str, **facts: Any) -> None:
+        """Write a line. Raises OSError."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"kind": kind, **facts}, ensure_ascii=False) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+    def read(self) -> list[dict[str, Any]]:
+        """All lines so far."""
+        try:
+            text = self.path.read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return []
+        found = []
+        for line in text.splitlines():
+            try:
+                found.append(dict(json.loads(line)))
+            except ValueError:
+                continue
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptRecord:
+    """What of an incident's record is asked for here."""
+
+    id: str
+    room: int
+    verdict: str
+    closed: float | None
+    is_confirmed: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptMail:
+    """A mail as it arrived: its Message-ID and the incident that it names."""
+
+    message_id: str
+    incident: str
+
+
+@dataclass(frozen=True)
+class Books:
+    """What came of a crash campaign.
+
+    Attributes:
+        kills: by victim.
+        moments: by moment.
+        calls: triggers that were raised; answered: those that got a verdict, by verdict.
+        lost: sentences on those that got none.
+        confirmed: incidents; mails: how many of them have so many mails.
+        strangers: sentences on mails without an incident, incidents without a mail or with several.
+        repeated: mails that came more than once under one Message-ID.
+        verified: what the check of the database said, "" for all well, None where it was not asked.
+        waiting: notices left in the outbox at the end.
+    """
+
+    kills: Mapping[str, int]
+    moments: Mapping[str, int]
+    calls: int
+    answered: Mapping[str, int]
+    lost: Sequence[str]
+    confirmed: int
+    mails: Mapping[int, int]
+    strangers: Sequence[str]
+    repeated: int
+    verified: str | None
+    waiting: int
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing was lost, doubled or broken."""
+        return not (self.lost or self.strangers or self.repeated or self.verified or self.waiting)
+
+    def text(self) -> str:
+        """For people."""
+        kills = sum(self.kills.values())
+        answered = sum(self.answered.values())
+        low, high = wilson(answered, self.calls)
+        one = self.mails.get(1, 0)
+        mail_low, mail_high = wilson(one, self.confirmed)
+        verdicts = ", ".join(f"{name} {count}" for name, count in sorted(self.answered.items()))
+        lines = [
+            f"{kills} kills: {', '.join(f'{name} {count}' for name, count in sorted(self.kills.items()))}",
+            f"at these moments: {', '.join(f'{name} {count}' for name, count in sorted(self.moments.items()))}",
+            f"calls with a verdict: {answered} of {self.calls} ({low:.1%} to {high:.1%}); {verdicts}",
+            f"confirmed incidents with one mail: {one} of {self.confirmed} ({mail_low:.1%} to {mail_high:.1%})",
+            f"mails that came twice under one Message-ID: {self.repeated}",
+            f"notices left in the outbox: {self.waiting}",
+            "database: " + ("not checked" if self.verified is None else self.verified or "verifies"),
+        ]
+        return "\n".join([*lines, *self.lost, *self.strangers])
+
+
+def balance(
+    journal: Iterable[Mapping[str, Any]],
+    records: Sequence[KeptRecord],
+    mails: Sequence[KeptMail],
+    *,
+    verified: str | None,
+    waiting: int,
+) -> Books:
+    """Hold calls, records and mails against each other.
+
+    Args:
+        journal: lines of the campaign.
+        records: that the guard kept.
+        mails: that arrived, each as often as it did.
+        verified: what the check of the database said.
+        waiting: notices in the outbox.
+    """
+    lines = list(journal)
+    kills = [line for line in lines if line["kind"] == "kill"]
+    calls = [line for line in lines if line["kind"] == "call"]
+    seen = {line["call"]: line["verdict"] for line in lines if line["kind"] == "verdict"}
+    answered: Counter[str] = Counter()
+    lost = []
+    for call in calls:
+        verdict = seen.get(call["call"]) or _verdict_of(call, records)
+        if verdict:
+            answered[verdict] += 1
+        else:
+            hit = [f"{k['victim']} {k['moment']}+{k['delay']:.2f} s" for k in kills if k["call"] == call["call"]]
+            lost.append(
+                f"call {call['call']} of room {call['room']} has no verdict (killed: {', '.join(hit) or 'none'})"
+            )
+    confirmed = [record for record in records if record.is_confirmed]
+    by_incident: dict[str, set[str]] = {}
+    for mail in mails:
+        by_incident.setdefault(mail.incident, set()).add(mail.message_id)
+    strangers = [
+        f"incident {record.id} has {len(by_incident.get(record.id, ()))} mails"
+        for record in confirmed
+        if len(by_incident.get(record.id, ())) != 1
+    ]
+    known = {record.id for record in confirmed}
+    strangers += [
+        f"a mail tells of the incident {name}, which is not kept" for name in by_incident if name not in known
+    ]
+    copies = Counter(mail.message_id for mail in mails)
+    return Books(
+        kills=Counter(str(kill["victim"]) for kill in kills),
+        moments=Counter(str(kill["moment"]) for kill in kills),
+        calls=len(calls),
+        answered=answered,
+        lost=lost,
+        confirmed=len(confirmed),
+        mails=Counter(len(by_incident.get(record.id, ())) for record in confirmed),
+        strangers=strangers,
+        repeated=sum(count - 1 for count in copies.values()),
+        verified=verified,
+        waiting=waiting,
+    )
+
+
+def _verdict_of(call: Mapping[str, Any], records: Sequence[KeptRecord]) -> str:
+    """The verdict that the guard kept for a call: of the first record of its room that was completed after it."""
+    later = [
+        record
+        for record in records
+        if record.room == call["room"]
+        and record.verdict
+        and record.closed is not None
+        and record.closed >= call["wall"] - CLOCK_SLACK
+    ]
+    return min(later, key=lambda record: record.closed or 0.0).verdict if later else ""
+
+
+def next_patrol(journal: Iterable[Mapping[str, Any]]) -> int:
+    """The number of the patrol to go on with."""
+    begun = [int(line["patrol"]) for line in journal if line["kind"] == "call"]
+    return max(begun, default=-1) + 1
+
+
+def open_call(journal: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """The last call, where nobody has written down what became of it."""
+    calls = [line for line in journal if line["kind"] == "call"]
+    done = {line["call"] for line in journal if line["kind"] in ("verdict", "given_up")}
+    return calls[-1] if calls and calls[-1]["call"] not in done else None
+
+
+def everything_killed(journal: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the last that was written is that all were killed."""
+    return bool(journal) and journal[-1]["kind"] == "kill" and journal[-1]["victim"] == ALL

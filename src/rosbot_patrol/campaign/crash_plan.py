@@ -1,0 +1,73 @@
+"""Which program is killed when, drawn from a seed: one to three kills in each patrol, and now and then all at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+ALL = "all"
+GUARD = "patrolling_node"
+
+# Each block of kills has these once, in an order of its own: every node of the launch, the patrol itself more often.
+VICTIMS = (
+    GUARD, GUARD, GUARD, GUARD, ALL, ALL, "move_base", "amcl", "map_server", "twist_mux", "darknet_ros", "sensor_watch",
+    "esp_client1", "rgb_compress", "robot_state_publisher", "laser_broadcaster",
+)  # fmt: skip
+
+# What happens to a patrol, in order, and until how long after it a kill comes [s].
+MOMENTS = {"called": 0.5, "driving": 6.0, "seen": 0.4, "looking": 6.0, "returning": 4.0}
+_MOST = 3  # kills in one patrol
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kill:
+    """One kill.
+
+    Attributes:
+        number: in the campaign.
+        victim: name of the node, or ALL.
+        moment: one of MOMENTS.
+        delay: after it [s].
+    """
+
+    number: int
+    victim: str
+    moment: str
+    delay: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrashPatrol:
+    """A patrol with its kills in order; where all are killed, that is the last."""
+
+    number: int
+    kills: tuple[Kill, ...]
+
+
+def victim_of(seed: int, number: int) -> str:
+    """Whom a kill of the campaign hits."""
+    block, place = divmod(number, len(VICTIMS))
+    return VICTIMS[int(np.random.default_rng([seed, block, 11]).permutation(len(VICTIMS))[place])]
+
+
+def plan_crashes(seed: int, kills: int) -> list[CrashPatrol]:
+    """The patrols of a campaign of so many kills; those of a shorter one are the first of a longer one's."""
+    patrols: list[CrashPatrol] = []
+    number = 0
+    while number < kills:
+        rng = np.random.default_rng([seed, number, 12])
+        names = list(MOMENTS)
+        count = int(rng.integers(1, _MOST + 1))
+        moments = sorted(rng.choice(len(names), size=count, replace=False))
+        planned: list[Kill] = []
+        for moment in moments[: kills - number]:
+            name = names[int(moment)]
+            victim = victim_of(seed, number)
+            delay = round(float(rng.uniform(0.0, MOMENTS[name])), 3)
+            planned.append(Kill(number=number, victim=victim, moment=name, delay=delay))
+            number += 1
+            if victim == ALL:
+                break
+        patrols.append(CrashPatrol(number=len(patrols), kills=tuple(planned)))
+    return patrols

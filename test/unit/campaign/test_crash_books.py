@@ -1,0 +1,110 @@
+"""Kills by the seed, and the books that say whether anything was lost."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rosbot_patrol.campaign.crash_ledger import (
+    Journal,
+    KeptMail,
+    KeptRecord,
+    balance,
+    everything_killed,
+    next_patrol,
+    open_call,
+)
+from rosbot_patrol.campaign.crash_plan import ALL, MOMENTS, VICTIMS, plan_crashes
+
+
+def call(name: str, wall: float, patrol: int = 0, room: int = 1) -> dict[str, Any]:
+    return {"kind": "call", "call": name, "patrol": patrol, "room": room, "wall": wall}
+
+
+def kill(of: str, victim: str = "amcl") -> dict[str, Any]:
+    return {"kind": "kill", "call": of, "victim": victim, "moment": "driving", "delay": 1.0}
+
+
+def record(name: str, closed: float | None, verdict: str = "confirmed", room: int = 1) -> KeptRecord:
+    return KeptRecord(id=name, room=room, verdict=verdict, closed=closed, is_confirmed=verdict == "confirmed")
+
+
+VERDICT = {"kind": "verdict", "call": "p0", "verdict": "confirmed"}
+MAIL = KeptMail(message_id="<1@x>", incident="a")
+
+
+def test_every_victim_has_its_turn_and_a_shorter_campaign_is_the_beginning_of_a_longer() -> None:
+    patrols = plan_crashes(1, 200)
+    kills = [kill for patrol in patrols for kill in patrol.kills]
+    assert [kill.number for kill in kills] == list(range(200))
+    assert Counter(kill.victim for kill in kills[: len(VICTIMS)]) == Counter(VICTIMS)
+    assert {kill.moment for kill in kills} == set(MOMENTS)
+    assert all(0.0 <= kill.delay <= MOMENTS[kill.moment] for kill in kills)
+    assert plan_crashes(1, 50)[:-1] == patrols[: len(plan_crashes(1, 50)) - 1]
+    assert plan_crashes(2, 50) != plan_crashes(1, 50)
+
+
+def test_kills_of_a_patrol_come_in_the_order_of_its_moments_and_all_comes_last() -> None:
+    order = list(MOMENTS)
+    for patrol in plan_crashes(3, 100):
+        places = [order.index(kill.moment) for kill in patrol.kills]
+        assert places == sorted(places)
+        assert ALL not in [kill.victim for kill in patrol.kills[:-1]]
+
+
+def test_a_clean_campaign() -> None:
+    books = balance([call("p0", 10.0), kill("p0"), VERDICT], [record("a", 30.0)], [MAIL], verified="", waiting=0)
+    assert books.is_clean
+    assert "calls with a verdict: 1 of 1 (20.7% to 100.0%); confirmed 1" in books.text()
+    assert "database: verifies" in books.text()
+
+
+@pytest.mark.parametrize(
+    ("mails", "told"),
+    [
+        ([], "incident a has 0 mails"),
+        ([MAIL, KeptMail(message_id="<2@x>", incident="a")], "incident a has 2 mails"),
+        ([MAIL, KeptMail(message_id="<3@x>", incident="b")], "a mail tells of the incident b, which is not kept"),
+        ([MAIL, MAIL], "mails that came twice under one Message-ID: 1"),
+    ],
+)
+def test_mails_that_do_not_add_up(mails: list[KeptMail], told: str) -> None:
+    books = balance([call("p0", 10.0), VERDICT], [record("a", 30.0)], mails, verified="", waiting=0)
+    assert not books.is_clean
+    assert told in books.text()
+
+
+def test_a_verdict_that_nobody_saw_counts_by_the_record() -> None:
+    journal = [call("p0", 100.0), kill("p0", ALL)]
+    late = balance(journal, [record("a", 130.0, "unverified")], [], verified=None, waiting=0)
+    assert dict(late.answered) == {"unverified": 1}
+    for other in (record("a", 50.0, "clear"), record("a", 130.0, "clear", room=2), record("a", None, "")):
+        lost = balance(journal, [other], [], verified=None, waiting=0)
+        assert lost.lost == ["call p0 of room 1 has no verdict (killed: all driving+1.00 s)"]
+        assert not lost.is_clean
+
+
+def test_what_is_left_over_is_not_clean() -> None:
+    journal = [call("p0", 10.0), VERDICT]
+    assert not balance(journal, [record("a", 30.0)], [MAIL], verified="", waiting=1).is_clean
+    assert not balance(journal, [record("a", 30.0)], [MAIL], verified="link 3 is broken", waiting=0).is_clean
+
+
+def test_the_journal_goes_on_where_a_kill_cut_it(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "deep" / "journal.jsonl")
+    assert journal.read() == []
+    assert next_patrol([]) == 0
+    journal.add("call", call="p4", patrol=4, room=1, wall=1.0)
+    with journal.path.open("a") as file:
+        file.write('{"kind": "kil')
+    lines = journal.read()
+    assert next_patrol(lines) == 5
+    open_one = open_call(lines)
+    assert open_one is not None
+    assert open_one["call"] == "p4"
+    assert not everything_killed(lines)
+    assert open_call([*lines, {"kind": "verdict", "call": "p4"}]) is None
+    assert everything_killed([*lines, kill("p4", ALL)])
