@@ -35,6 +35,7 @@ ROBOT_HEIGHTS = (0.04, 0.1, 0.16, 0.2)
 EYE = 0.22  # height of the robot's camera [m]
 VIEW_WIDTH = 1.047  # of the camera [rad]
 HALF_VIEW = 0.50  # to each side, a little less [rad]
+RECOGNISED = 0.3  # share of a body in view from which on it should be recognised
 VIEW_RANGE = 7.0  # farther off nobody is asked to be recognised [m]
 BODY_HEIGHTS = {"": (0.3, 0.6, 0.9, 1.2, 1.5), "sitting": (0.25, 0.5, 0.75, 1.0), "crouching": (0.2, 0.4, 0.6, 0.8)}
 SIDE = 0.15  # of a body from its middle [m]
@@ -90,7 +91,7 @@ class Floor:
         """Whether the robot still comes from the base to a room's point when somebody stands at a place."""
         apart = (BODY_RADIUS + ROBOT_RADIUS) / CELL + 1.0
         cx, cy = self.info.cell_of(x, y)
-        drive = self._drive_to(room)
+        drive = self._cells_to(room)
         if not len(drive) or np.hypot(drive[:, 0] - cx, drive[:, 1] - cy).min() > apart:
             return bool(len(drive))
         iy, ix = np.indices(self.info.shape)
@@ -143,7 +144,13 @@ class Floor:
         yaw = math.atan2(-math.sin(towards), -math.cos(towards))
         return Pose2D(x + off * math.cos(towards), y + off * math.sin(towards), yaw)
 
-    def _drive_to(self, room: int) -> NDArray[np.int64]:
+    def drive_to(self, room: int) -> NDArray[np.float64]:
+        """The shortest way for the robot from the base to a room's point, x, y, shape (N, 2) [m]."""
+        origin = np.array([self.info.origin_x, self.info.origin_y])
+        found: NDArray[np.float64] = origin + (self._cells_to(room) + 0.5) * CELL
+        return found
+
+    def _cells_to(self, room: int) -> NDArray[np.int64]:
         """Cells of the shortest way from the base to a room's point, ix, iy, shape (N, 2)."""
         if room not in self._drives:
             known = self.rooms.find(room)

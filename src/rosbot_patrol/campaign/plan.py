@@ -4,8 +4,8 @@ Patrol k of seed s is the same whatever else is run: the seed of everything in i
 `len(KINDS)` patrols has every kind once, in an order of its own; the houses take turns.
 
 Nobody is put into a wall or into the robot's only way: every place is one where somebody has room to stand by the
-world's own shapes. Somebody hidden is out of sight from the room's point, but not from everywhere that the robot can
-reach in that room.
+world's own shapes. Somebody hidden is out of sight from the room's point, and where the house allows it from the
+way there, but not from everywhere that the robot can reach in that room.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -20,7 +21,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.floor import RECOGNISED, VIEW_RANGE, Floor
 from rosbot_patrol.campaign.houses import HouseFiles
 from rosbot_patrol.errors import WorldError
 
@@ -113,10 +114,11 @@ def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor) -> Patr
     kind = kind_of(seed, number)
     rng = np.random.default_rng([seed, number, 2])
     rooms = [room.id for room in floor.rooms if room.id != floor.rooms.base.id]
-    for room in rng.permutation(rooms):
-        cast = _CASTS[kind](_Stage(floor, int(room), rng))
-        if cast is not None:
-            return _patrol(seed, number, kind, files, floor, int(room), cast)
+    for make in _CASTS[kind]:
+        for room in rng.permutation(rooms):
+            cast = make(_Stage(floor, int(room), rng))
+            if cast is not None:
+                return _patrol(seed, number, kind, files, floor, int(room), cast)
     raise WorldError(files.name, f"has no room with a place for a patrol of the kind '{kind}'")
 
 
@@ -157,6 +159,12 @@ class _Stage:
                 return _rounded(place)
         return None
 
+    def is_hidden_from_the_way(self, place: Sequence[float], posture: str) -> bool:
+        """Whether too little of a body to be recognised is seen from the robot's way to the room."""
+        drive = self.floor.drive_to(self.room)
+        near = drive[np.hypot(*(drive - place).T) < VIEW_RANGE][::4]
+        return all(self.floor.share_seen(eye, place, posture) < RECOGNISED for eye in near)
+
     def is_walkable(self, a: Sequence[float], b: Sequence[float]) -> bool:
         """Whether somebody can go to and fro between two places, and stop for the robot anywhere between them."""
         count = max(int(math.dist(a, b) / 0.3), 1)
@@ -196,7 +204,7 @@ def _walking(stage: _Stage) -> _Cast | None:
     return None
 
 
-def _hidden(stage: _Stage) -> _Cast | None:
+def _hidden(stage: _Stage, *, also_from_the_way: bool = False) -> _Cast | None:
     floor = stage.floor
     posture = ("standing", "sitting", "crouching")[int(stage.rng.integers(3))]
     views = stage.rng.permutation(floor.places(stage.room, floor.drivable))
@@ -204,6 +212,8 @@ def _hidden(stage: _Stage) -> _Cast | None:
         if math.dist(place, stage.point) > FARTHEST + 1.0:
             continue
         if floor.share_seen(stage.point, place, posture) > HIDDEN or not floor.leaves_way(stage.room, *place):
+            continue
+        if also_from_the_way and not stage.is_hidden_from_the_way(place, posture):
             continue
         for view in views:
             if not VIEWPOINT[0] <= math.dist(view, place) <= VIEWPOINT[1]:
@@ -287,15 +297,16 @@ def _empty(stage: _Stage) -> _Cast | None:
     return _Cast(told="nobody")
 
 
-_CASTS: dict[str, Callable[[_Stage], _Cast | None]] = {
-    "standing": _standing,
-    "walking": _walking,
-    "hidden": _hidden,
-    "late": _late,
-    "two": _two,
-    "pets": _pets,
-    "poster": _poster,
-    "empty": _empty,
+# How to cast each kind; the next way only where no room of the house has a place for the one before.
+_CASTS: dict[str, tuple[Callable[[_Stage], _Cast | None], ...]] = {
+    "standing": (_standing,),
+    "walking": (_walking,),
+    "hidden": (partial(_hidden, also_from_the_way=True), _hidden),
+    "late": (_late,),
+    "two": (_two,),
+    "pets": (_pets,),
+    "poster": (_poster,),
+    "empty": (_empty,),
 }
 
 

@@ -7,11 +7,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.floor import RECOGNISED, Floor
 from rosbot_patrol.campaign.plan import Person
 from rosbot_patrol.geometry import Pose2D
 
-RECOGNISED = 0.3  # share of a body in view from which on it should be recognised
 ENOUGH = 1.5  # in view for so long, somebody has to be found [s]
 _LONGEST = 0.5  # between two poses of the same one; more is a gap [s]
 

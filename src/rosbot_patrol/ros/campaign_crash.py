@@ -23,7 +23,7 @@ from rosbot_patrol.ros.campaign_mail import MailSink
 from rosbot_patrol.ros.house import House, HouseError, Master, child_pids
 
 HOUSE = "flat"  # its rooms are near: short patrols
-PATROLS = 6  # in one life
+PATROLS = 4  # in one life
 READY, ENDS, MOMENT, DELIVERED = 120.0, 240.0, 60.0, 40.0  # longest waits [s]
 JOURNAL = "journal.jsonl"
 
@@ -165,4 +165,4 @@ class CrashLife:
 
 def waiting(state_dir: Path) -> int:
     """Notices that no transport has taken yet."""
-    return sum(1 for path in (state_dir / "outbox").glob("*.*") if path.suffix in (".eml", ".json"))
+    return sum(1 for _ in (state_dir / "outbox").glob("[0-9]*.notice"))

@@ -13,6 +13,7 @@ from rosbot_patrol.alerts.incident import Incident
 from rosbot_patrol.alerts.incident_database import NAME
 from rosbot_patrol.alerts.incident_json import load_incident
 from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.alerts.incident_verify import verify
 from rosbot_patrol.campaign.crash_ledger import Books, Journal, KeptRecord, balance, everything_killed, next_patrol
 from rosbot_patrol.campaign.crash_plan import plan_crashes
 from rosbot_patrol.campaign.plan import CONFIRMED
@@ -129,7 +130,11 @@ def kept_records(state_dir: Path) -> list[KeptRecord]:
 
 def _verified(state_dir: Path) -> str | None:
     """What the check of the database says, "" for all well; None where there is none to check."""
-    return None
+    if not (state_dir / NAME).is_file():
+        return None
+    with IncidentStore(state_dir, read_only=True) as store:
+        found = verify(store)
+    return "" if found.fits else "; ".join(found.problems)
 
 
 def summary_json(books: Books) -> str:
