@@ -43,6 +43,17 @@ class RawPicture:
 
 
 @dataclass(frozen=True, kw_only=True)
+class EncodedPicture:
+    """JPEG or PNG as a camera sends it (sensor_msgs/CompressedImage), and when it was taken [s]."""
+
+    stamp: float
+    data: bytes
+
+
+Picture = RawPicture | EncodedPicture
+
+
+@dataclass(frozen=True, kw_only=True)
 class LabelledBox:
     """A box to draw: label and corners [px]."""
 
@@ -53,19 +64,28 @@ class LabelledBox:
     ymax: int
 
 
-def to_jpeg(picture: RawPicture, boxes: Sequence[LabelledBox] = (), *, quality: int = 88) -> bytes:
-    """The picture with its boxes.
+def to_jpeg(picture: Picture, boxes: Sequence[LabelledBox] = (), *, quality: int = 88) -> bytes:
+    """The picture with its boxes; one that is JPEG already, and gets none, stays as it is.
 
     Raises:
         AlertError: an encoding that is not known, or too few bytes.
     """
-    image = _decode(picture)
+    if isinstance(picture, EncodedPicture) and not boxes and picture.data.startswith(b"\xff\xd8"):
+        return picture.data
+    image = _decode_encoded(picture) if isinstance(picture, EncodedPicture) else _decode(picture)
     draw = ImageDraw.Draw(image)
     for box in boxes:
         _draw_box(draw, box)
     out = io.BytesIO()
     image.save(out, "JPEG", quality=quality)
     return out.getvalue()
+
+
+def _decode_encoded(picture: EncodedPicture) -> Image.Image:
+    try:
+        return Image.open(io.BytesIO(picture.data)).convert("RGB")
+    except (OSError, SyntaxError, Image.DecompressionBombError) as err:
+        raise AlertError(f"a compressed picture of {len(picture.data)} bytes cannot be read: {err}") from err
 
 
 def _decode(picture: RawPicture) -> Image.Image:
