@@ -43,7 +43,7 @@ class EvidenceRing:
         fresh: pictures younger than this [s] are all kept.
     """
 
-    def __init__(self, *, seconds: float, rate: float, max_bytes: float, fresh: float = 1.5) -> None:
+    def __init__(self, *, seconds: float, rate: float, max_bytes: float, fresh: float = 3.0) -> None:
         self._seconds, self._gap, self._max_bytes, self._fresh = seconds, 1.0 / rate, max_bytes, fresh
         self._old: deque[Picture] = deque()
         self._new: deque[Picture] = deque()
@@ -56,6 +56,12 @@ class EvidenceRing:
     def newest(self) -> Picture | None:
         """The picture that came last."""
         return self._new[-1] if self._new else None
+
+    def snapshot(self) -> EvidenceRing:
+        """The ring as it is now, for another thread."""
+        other = EvidenceRing(seconds=self._seconds, rate=1.0 / self._gap, max_bytes=self._max_bytes, fresh=self._fresh)
+        other._old, other._new, other.bytes = self._old.copy(), self._new.copy(), self.bytes
+        return other
 
     def clear(self) -> None:
         """Forget all."""

@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Collection
 from dataclasses import replace
 
 from rosbot_patrol.alerts import chain, incident_json
@@ -47,12 +48,12 @@ def repair(store: IncidentStore, *, wall: float) -> list[str]:
     return said
 
 
-def close_abandoned(store: IncidentStore, running: str, *, wall: float) -> list[str]:
+def close_abandoned(store: IncidentStore, running: Collection[str], *, wall: float) -> list[str]:
     """Close records of missions that no longer run: the program ended, and nobody goes on with them.
 
     Args:
         store: of the incidents.
-        running: id of the mission that goes on, "" for none; further persons of it have "-2" and so on behind.
+        running: ids of the missions that go on; further persons of one have "-2" and so on behind.
         wall: now, seconds since 1970.
 
     Returns:
@@ -60,7 +61,7 @@ def close_abandoned(store: IncidentStore, running: str, *, wall: float) -> list[
     """
     said = []
     for incident_id in store.open_ids():
-        if running and (incident_id == running or incident_id.startswith(running + "-")):
+        if any(incident_id == mission or incident_id.startswith(mission + "-") for mission in running):
             continue
         kept = store.get(incident_id)
         reason = (kept.reason if kept else "") or "the program ended before there was a verdict"

@@ -84,18 +84,28 @@ class IncidentStore:
             for event in incident.events:
                 insert_event(self.connection, incident.id, event)
 
-    def update(self, incident_id: str, **changes: Any) -> None:
-        """Change fields of an open record, such as `times`. Raises StoreError, also where it is not open."""
+    def record(self, incident_id: str, *, add: Iterable[Event] = (), **changes: Any) -> None:
+        """Add to an open record, all or nothing. Raises StoreError, also where it is not open.
+
+        Args:
+            incident_id: of the record.
+            add: events.
+            changes: fields with a new value, such as `times`.
+        """
         with transaction(self.connection, self.path):
-            incident = replace(self._open(incident_id), **changes)
-            update_incident(self.connection, incident)
+            incident = self._open(incident_id)
+            if changes:
+                update_incident(self.connection, replace(incident, **changes))
+            for event in add:
+                insert_event(self.connection, incident_id, event)
+
+    def update(self, incident_id: str, **changes: Any) -> None:
+        """As `record`, fields only."""
+        self.record(incident_id, **changes)
 
     def add_events(self, incident_id: str, events: Iterable[Event]) -> None:
-        """Add to what happened in an open record. Raises StoreError."""
-        with transaction(self.connection, self.path):
-            self._open(incident_id)
-            for event in events:
-                insert_event(self.connection, incident_id, event)
+        """As `record`, events only."""
+        self.record(incident_id, add=events)
 
     def add_event(self, incident_id: str, event: Event) -> None:
         """As `add_events`."""

@@ -178,8 +178,9 @@ def _hashes(incident: Incident, link: Link | None) -> str:
     rows = ((_text(f.name), f.size, _text(f.sha256)) for f in incident.files)
     files = "".join(f"<tr><td>{name}</td><td>{size}</td><td><code>{sha}</code></td></tr>" for name, size, sha in rows)
     table = f"<details><summary>{len(incident.files)} files</summary><table>{files}</table></details>" if files else ""
+    check = "<code>rosrun rosbot_patrol incidents verify</code> checks all of it."
     return f"""<h2>Proof</h2><p class="faint">{chained}</p>{table}
-<footer><p>Incident {_text(incident.id)}. <code>rosrun rosbot_patrol incidents verify</code> checks all of it.</p></footer>"""
+<footer><p>Incident {_text(incident.id)}. {check}</p></footer>"""
 
 
 def _figure(uri: str, caption: str) -> str:

@@ -34,6 +34,7 @@ figure img { display: block; width: 100%; height: auto; border-radius: .4rem; ba
 code { font: .8rem/1.3 ui-monospace, "DejaVu Sans Mono", monospace; word-break: break-all; }
 details summary { cursor: pointer; color: var(--faint); }
 @media print { :root { --ink:#000; --faint:#444; --paper:#fff; --line:#bbb; --card:#fff; }
-  body { max-width: none; padding: 0; font-size: 11pt; } figure, tr, .phases { break-inside: avoid; } h2 { break-after: avoid; }
+  body { max-width: none; padding: 0; font-size: 11pt; }
+  figure, tr, .phases { break-inside: avoid; } h2 { break-after: avoid; }
   .phases span { -webkit-print-color-adjust: exact; print-color-adjust: exact; } }
 """

@@ -1,4 +1,4 @@
-"""The camera's last pictures, kept only while a mission runs, and whether they show anything.
+"""The camera's last pictures, kept only while they are wanted, and whether they show anything.
 
 A camera that is covered or hung still sends: a picture that is black counts as none, and one that is the one before,
 byte for byte, is no new one (a real camera's noise is never twice the same).
@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 
 import rospy
 from sensor_msgs.msg import Image
 
-from rosbot_patrol.alerts.picture import RawPicture
+from rosbot_patrol.alerts.evidence import EvidenceParams, EvidenceRing
+from rosbot_patrol.alerts.picture import Picture, RawPicture
 from rosbot_patrol.ros.node import now
 
 _SAMPLED = 211  # one byte of so many is looked at: 4,367 of a picture of 640 x 480
 _BLACK = 12  # of 255: a covered camera's noise stays below
+_MB = 1_000_000
 
 
 class PictureRing:
@@ -25,13 +26,15 @@ class PictureRing:
 
     Args:
         topic: of the camera; "" for none.
-        length: how many pictures to keep (0.9 MB each at 640 x 480).
+        params: how many pictures to keep.
     """
 
-    def __init__(self, topic: str, length: int = 30) -> None:
+    def __init__(self, topic: str, params: EvidenceParams | None = None) -> None:
         self._topic = topic
         self._lock = threading.Lock()
-        self._ring: deque[Image] = deque(maxlen=length)
+        given = params or EvidenceParams()
+        seconds = given.evidence_before + 1.0
+        self._ring = EvidenceRing(seconds=seconds, rate=given.evidence_rate, max_bytes=given.evidence_mb * _MB)
         self._subscriber: rospy.Subscriber | None = None
         self._seen_at = self._changed_at = float("-inf")
 
@@ -66,22 +69,17 @@ class PictureRing:
             self._ring.clear()
             self._seen_at = self._changed_at = float("-inf")
 
-    def find(self, stamp: float, tolerance: float = 0.002) -> RawPicture | None:
+    def snapshot(self) -> EvidenceRing:
+        """What is there now, for threads that take their time."""
+        with self._lock:
+            return self._ring.snapshot()
+
+    def find(self, stamp: float, tolerance: float = 0.002) -> Picture | None:
         """The picture nearest to a time [s], None where none lies within the tolerance."""
         with self._lock:
-            best = min(self._ring, key=lambda m: abs(m.header.stamp.to_sec() - stamp), default=None)
-        if best is None or abs(best.header.stamp.to_sec() - stamp) > tolerance:
-            return None
-        return RawPicture(
-            stamp=best.header.stamp.to_sec(),
-            width=best.width,
-            height=best.height,
-            encoding=best.encoding,
-            step=best.step,
-            data=bytes(best.data),
-        )
+            return self._ring.find(stamp, tolerance)
 
-    def wait_for(self, stamp: float, seconds: float) -> RawPicture | None:
+    def wait_for(self, stamp: float, seconds: float) -> Picture | None:
         """`find`, again and again for some seconds of wall time; for threads that may wait."""
         deadline = time.monotonic() + seconds
         while True:
@@ -91,14 +89,24 @@ class PictureRing:
             time.sleep(0.02)
 
     def _store(self, message: Image) -> None:
+        data = bytes(message.data)
+        picture = RawPicture(
+            stamp=message.header.stamp.to_sec(),
+            width=message.width,
+            height=message.height,
+            encoding=message.encoding,
+            step=message.step,
+            data=data,
+        )
         with self._lock:
             if self._subscriber is None:
                 return
-            if not self._ring or message.data != self._ring[-1].data:
+            newest = self._ring.newest
+            if newest is None or data != newest.data:
                 self._changed_at = now()
-            if not is_black(message.data):
+            if not is_black(data):
                 self._seen_at = now()
-            self._ring.append(message)
+            self._ring.add(picture)
 
 
 def is_black(data: bytes) -> bool:

@@ -25,7 +25,7 @@ def say(*words):
 store, said = open_store(Path(sys.argv[1]), wall=1.0)
 assert not said, said
 repair(store, wall=1.0)
-close_abandoned(store, "", wall=1.0)
+close_abandoned(store, [], wall=1.0)
 say("ready")
 for i in itertools.count():
     name = f"r{sys.argv[2]}-{i}"
@@ -70,7 +70,7 @@ def test_a_kill_at_any_moment_leaves_a_database_that_verifies(quick_disk):
         _check_all_is_there(store, said)
         store.close_database()
     store, _ = open_store(quick_disk, wall=1.0)
-    close_abandoned(store, "", wall=1.0)
+    close_abandoned(store, [], wall=1.0)
     done = verify(store)
     assert done.fits, done.problems
     assert done.open == 0

@@ -141,7 +141,7 @@ def test_what_a_crash_left_between_folder_and_database_is_put_right(quick_disk, 
     assert not (root / "m000" / ".half.jpg.77.tmp").exists()
     assert [file.name for file in store.get("m000").files] == ["a.jpg", "late.jpg"]
     assert repair(store, wall=WALL) == []
-    said = close_abandoned(store, "m001", wall=WALL)
+    said = close_abandoned(store, ["m001"], wall=WALL)
     assert said == ["incident m000 was still open and is closed now, confirmed: " + "x" * 500]
     assert verify(store).fits
 
