@@ -82,7 +82,7 @@ class House:
 
         self.folder = folder
         self.processes = []
-        self.states, self.alerts, self.twists = [], [], []
+        self.states, self.alerts, self.verdicts, self.twists = [], [], [], []
         self.person, self.detecting, self.running = False, True, True
         self.boxes = rospy.Publisher("/darknet_ros/bounding_boxes", BoundingBoxes, queue_size=1)
         self.count = rospy.Publisher("/darknet_ros/found_object", ObjectCount, queue_size=1)
@@ -90,11 +90,14 @@ class House:
         self.trigger = rospy.Publisher("/motion_trigger", EspTrigger, queue_size=10)
         self.ends = [
             rospy.Subscriber("/patrol/state", PatrolState, self.states.append),
-            rospy.Subscriber("/patrol/alerts", Alert, self.alerts.append),
+            rospy.Subscriber("/patrol/alerts", Alert, self._on_alert),
             rospy.Subscriber("/cmd_vel", Twist, lambda m: self.twists.append(m.angular.z)),
         ]
         self.thread = threading.Thread(target=self._camera, daemon=True)
         self.thread.start()
+
+    def _on_alert(self, message):
+        (self.verdicts if message.kind == "verdict" else self.alerts).append(message)
 
     def _camera(self):
         from darknet_ros_msgs.msg import BoundingBox, BoundingBoxes, ObjectCount
@@ -165,6 +168,15 @@ class House:
         names = [s.state for s in self.states]
         return [n for i, n in enumerate(names) if i == 0 or names[i - 1] != n]
 
+    def incident(self, incident_id):
+        from rosbot_patrol.alerts.incident_store import IncidentStore
+        from rosbot_patrol.alerts.incident_verify import verify
+
+        with IncidentStore(self.folder / "state", read_only=True) as store:
+            done = verify(store)
+            assert done.fits, done.problems
+            return store.get(incident_id)
+
     def mails(self):
         folder = self.folder / "mail"
         return list(mailbox.Maildir(folder, create=False)) if folder.exists() else []
@@ -210,6 +222,21 @@ def test_person_makes_one_mail_with_picture(house):
     assert Path(house.alerts[-1].location).exists()
     assert house.alerts[0].room_id == 2
     assert house.alerts[0].object_class == "person"
+    wait_until(lambda: house.verdicts, 10, "the verdict on /patrol/alerts")
+    assert [(a.kind, a.verdict) for a in (*house.alerts, *house.verdicts)] == [
+        ("seen", "confirmed"),
+        ("delivered", "confirmed"),
+        ("verdict", "confirmed"),
+    ]
+    stop(house.patrol)  # the record is completed at once
+    incident = house.incident(house.alerts[0].id)
+    assert (incident.verdict, incident.object_class, incident.origin) == ("confirmed", "person", "trigger")
+    assert [phase for phase, _ in incident.times] == ["driving", "looking", "returning"]
+    assert incident.events[0].text == "motion sensor 2 sees motion"
+    roles = {file.role for file in incident.files}
+    assert roles >= {"detection", "best", "after", "look", "map"}
+    report = (house.folder / "state" / "incidents" / incident.id / "report.html").read_text()
+    assert "square room behind the door" in report
 
 
 def test_empty_room_makes_none_and_the_turn_ends_with_zero(house):
@@ -223,6 +250,9 @@ def test_empty_room_makes_none_and_the_turn_ends_with_zero(house):
     assert house.twists[-1] == 0.0
     turned = float(last.why.split("turned ")[1].split()[0])
     assert abs(turned - 360) <= 6
+    wait_until(lambda: house.verdicts, 10, "the verdict on /patrol/alerts")
+    kept = house.incident(house.verdicts[0].id)
+    assert (kept.verdict, house.verdicts[0].verdict) == ("clear", "clear")
 
 
 def test_dead_detector_is_never_clear(house):

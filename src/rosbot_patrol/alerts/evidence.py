@@ -161,8 +161,11 @@ def best_pictures(candidates: Iterable[Candidate], count: int = 3) -> list[str]:
 
 
 def sharpness(jpeg: bytes) -> float:
-    """How much detail a picture shows: the variance of its edges when it is small."""
-    image = Image.open(io.BytesIO(jpeg))
-    image.draft("L", (_SHARP_WIDTH, _SHARP_WIDTH))
-    small = image.convert("L").resize((_SHARP_WIDTH, max(_SHARP_WIDTH * image.height // image.width, 1)))
+    """How much detail a picture shows: the variance of its edges when it is small; 0 where it cannot be read."""
+    try:
+        image = Image.open(io.BytesIO(jpeg))
+        image.draft("L", (_SHARP_WIDTH, _SHARP_WIDTH))
+        small = image.convert("L").resize((_SHARP_WIDTH, max(_SHARP_WIDTH * image.height // image.width, 1)))
+    except (OSError, SyntaxError, Image.DecompressionBombError):
+        return 0.0
     return float(ImageStat.Stat(small.filter(ImageFilter.FIND_EDGES)).var[0])

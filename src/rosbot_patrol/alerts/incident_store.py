@@ -243,3 +243,12 @@ class IncidentStore:
     def _files(self, incident_id: str) -> tuple[StoredFile, ...]:
         rows = self.connection.execute("SELECT * FROM files WHERE incident=? ORDER BY rowid", (incident_id,))
         return tuple(StoredFile(**{key: row[key] for key in row.keys() if key != "incident"}) for row in rows)  # noqa: SIM118
+
+
+def recall_incident(state_dir: Path, incident_id: str) -> Incident | None:
+    """A record, read beside whoever writes; None where there is none or it cannot be read."""
+    try:
+        with IncidentStore(state_dir, read_only=True) as store:
+            return store.get(incident_id)
+    except StoreError:
+        return None

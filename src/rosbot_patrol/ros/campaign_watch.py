@@ -105,6 +105,8 @@ class CampaignWatch:
             self.heard.states.append(State(message.header.stamp.to_sec(), message))
 
     def _on_alert(self, message: Alert) -> None:
+        if message.kind == Alert.VERDICT:
+            return  # the state tells it
         with self._lock:
             self.heard.alerts.append((message.header.stamp.to_sec(), message))
 

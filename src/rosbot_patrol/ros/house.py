@@ -321,6 +321,8 @@ class House:
                 mission.verdict = state.last_verdict
 
     def _on_alert(self, alert: Alert) -> None:
+        if alert.kind == Alert.VERDICT:
+            return  # the state tells it
         with self._lock:
             self.alerts.append(alert)
             if self._mission is not None:

@@ -11,7 +11,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import rospy
@@ -19,12 +19,12 @@ import rospy
 from rosbot_patrol.alerts.album import Album, Sighting
 from rosbot_patrol.alerts.evidence import EvidenceParams
 from rosbot_patrol.alerts.incident import Event, Incident
-from rosbot_patrol.alerts.incident_files import REPORT, NewFile
+from rosbot_patrol.alerts.incident_files import NewFile
 from rosbot_patrol.alerts.incident_repair import close_abandoned, repair
+from rosbot_patrol.alerts.incident_report import write_report
 from rosbot_patrol.alerts.incident_salvage import open_store
 from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.alerts.map_picture import MapView, Marks, crop_map, draw_map, view_of_marks
-from rosbot_patrol.alerts.report import Evidence, render_report
 from rosbot_patrol.alerts.retention import RetentionParams, keep_reserve, make_room, prune
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.params import param
@@ -71,7 +71,7 @@ class IncidentKeeper:
         pictures: the camera's last ones.
         health: where to say how it goes.
         evidence, retention, records: parameters.
-        on_closed: is called on the keeper's thread for each record that is complete.
+        on_verdict: is called on the keeper's thread when a mission is over and its verdict on the disk.
     """
 
     def __init__(
@@ -83,10 +83,10 @@ class IncidentKeeper:
         evidence: EvidenceParams | None = None,
         retention: RetentionParams | None = None,
         records: RecordParams | None = None,
-        on_closed: Callable[[Incident], None] = lambda _: None,
+        on_verdict: Callable[[Incident], None] = lambda _: None,
     ) -> None:
         self.state_dir = state_dir
-        self._pictures, self._health, self._on_closed = pictures, health, on_closed
+        self._pictures, self._health, self._on_verdict = pictures, health, on_verdict
         self._evidence = evidence or EvidenceParams()
         self._retention, self._records = retention or RetentionParams(), records or RecordParams()
         self._album = Album(self._evidence)
@@ -96,6 +96,7 @@ class IncidentKeeper:
         self._seen: deque[tuple[str, float]] = deque()
         self._closing: dict[str, _Closing] = {}
         self._looking = ""
+        self._is_ending = False
         self._lost = 0
         self._tidy_at = 0.0
         self._map: MapView | None = None
@@ -115,13 +116,18 @@ class IncidentKeeper:
 
     @property
     def is_written(self) -> bool:
-        """Whether all entries are on the disk (pictures may still come)."""
-        return not self._entries
+        """Whether all entries are on the disk (pictures may still come, until `finish`)."""
+        return not self._entries and not (self._is_ending and self._closing)
 
     @property
     def needs_pictures(self) -> bool:
         """Whether pictures are wanted although no mission runs."""
         return self._evidence.evidence_always or bool(self._closing) or self._album.is_waiting
+
+    def finish(self) -> None:
+        """The program ends: complete what is over without waiting for more pictures."""
+        self._is_ending = True
+        self._wake.set()
 
     def put(self, entries: Sequence[Entry]) -> None:
         """Take entries."""
@@ -159,7 +165,7 @@ class IncidentKeeper:
                 pause = self._work()
             except StoreError as err:
                 pause = self._trouble(err)
-            except Exception:  # noqa: BLE001 - records have to outlive whatever one of them does
+            except Exception:
                 log.error("the keeping of incidents stumbled, and goes on", exc_info=True)
                 self._forget_store()
                 pause = DISK_RETRY
@@ -226,6 +232,7 @@ class IncidentKeeper:
         if entry.closed is not None:
             deadline = time.monotonic() + self._evidence.evidence_after + _PATIENCE
             self._closing[entry.incident] = _Closing(wall=entry.closed, deadline=deadline)
+            self._on_verdict(replace(kept, **changes))
 
     # -- pictures
 
@@ -246,7 +253,9 @@ class IncidentKeeper:
         self._album.problems.clear()
 
     def _is_due(self, incident_id: str, closing: _Closing) -> bool:
-        return time.monotonic() > closing.deadline or self._album.is_over(incident_id, self._pictures.snapshot())
+        if self._is_ending or time.monotonic() > closing.deadline:
+            return True
+        return self._album.is_over(incident_id, self._pictures.snapshot())
 
     def _close(self, store: IncidentStore, incident_id: str, closing: _Closing) -> None:
         kept = store.get(incident_id)
@@ -260,7 +269,6 @@ class IncidentKeeper:
             write_report(store, incident)
         log.info("incident %s is on record: %s", incident.id, incident.verdict)
         self._tidy_at = 0.0
-        self._on_closed(incident)
 
     def _draw(self, incident: Incident) -> list[NewFile]:
         marks = Marks(path=incident.path, robot=incident.pose, person=incident.person)
@@ -312,26 +320,6 @@ class IncidentKeeper:
         if self._store is not None:
             self._store.close_database()
         self._store = None
-
-
-def write_report(store: IncidentStore, incident: Incident) -> Path:
-    """Write an incident's report into its folder; returns where it lies. Raises StoreError."""
-    html = make_report(store, incident)
-    store.folder.write(incident.id, [NewFile(name=REPORT, role="other", data=html.encode("utf-8"))])
-    return store.folder.path(incident.id, REPORT)
-
-
-def make_report(store: IncidentStore, incident: Incident) -> str:
-    """An incident's report. Raises StoreError."""
-
-    def read(name: str) -> bytes | None:
-        try:
-            return store.folder.read(incident.id, name)
-        except StoreError:
-            return None  # the report says so
-
-    evidence = Evidence(read=read, link=store.link(incident.id), amendments=store.amendments(incident.id))
-    return render_report(incident, evidence)
 
 
 def _amend(store: IncidentStore, kept: Incident, entry: Entry) -> None:

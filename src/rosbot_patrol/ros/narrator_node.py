@@ -107,6 +107,8 @@ class NarratorNode:
                 self._print([self.params.on_guard_hint] if self.params.on_guard_hint else [])
 
     def _on_alert(self, message: Alert) -> None:
+        if message.kind == Alert.VERDICT:
+            return  # the state tells it
         told = AlertTelling(
             id=message.id,
             room=f"room {message.room_id} ({message.room_name})",

@@ -8,6 +8,8 @@ import typing
 from pathlib import Path
 
 from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.evidence import EvidenceParams
+from rosbot_patrol.alerts.retention import RetentionParams
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.control.teleop import TeleopParams
 from rosbot_patrol.costmap.params import (
@@ -35,6 +37,7 @@ from rosbot_patrol.planning.navfn import NavfnParams
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
 from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 from rosbot_patrol.ros.demo_intruder_node import DemoParams
+from rosbot_patrol.ros.incident_keeper import RecordParams
 from rosbot_patrol.ros.map_server_node import MapServerParams
 from rosbot_patrol.ros.narrator_node import NarratorParams
 from rosbot_patrol.ros.patrol_node import NodeParams
@@ -60,6 +63,9 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
             ("", SpinParams),
             ("", PriorityParams),
             ("", BatteryParams),
+            ("", EvidenceParams),
+            ("", RetentionParams),
+            ("", RecordParams),
         ],
     ),
     (

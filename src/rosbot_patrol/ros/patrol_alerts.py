@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import logging
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from pathlib import Path
 
 import rospy
 
 from rosbot_patrol.alerts.incident import Incident
-from rosbot_patrol.alerts.incident_json import load_incident, save_incident
+from rosbot_patrol.alerts.incident_database import FOLDER
+from rosbot_patrol.alerts.incident_files import NewFile
+from rosbot_patrol.alerts.incident_store import recall_incident
 from rosbot_patrol.alerts.mail import one_line
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
 from rosbot_patrol.alerts.postman import Delivery
@@ -21,12 +21,14 @@ from rosbot_patrol.alerts.wording import incident_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.commands import Notice
+from rosbot_patrol.ros.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.owner_mail import OwnerPost
 from rosbot_patrol.ros.patrol_images import PictureRing
 
 log = logging.getLogger(__name__)
 
 DISK_RETRY = 5.0  # [s] between attempts to write where the disk does not take it
+RECORD_WAIT = 2.0  # [s] that the patrol's memory waits for the records
 
 
 class AlertDesk:
@@ -35,19 +37,19 @@ class AlertDesk:
     Args:
         post: keeps notices and delivers them.
         pictures: the camera's last pictures.
-        incidents: folder of the records.
+        keeper: of the records.
     """
 
     def __init__(
         self,
         post: OwnerPost,
         pictures: PictureRing,
-        incidents: Path,
+        keeper: IncidentKeeper,
     ) -> None:
-        self._post, self._pictures, self._incidents = post, pictures, incidents
+        self._post, self._pictures, self._keeper = post, pictures, keeper
         self._jobs: deque[tuple[Incident, Notice]] = deque()
-        self._finals: deque[tuple[str, str, str, int]] = deque()
         self._memory: Callable[[], None] | None = None
+        self._memory_due = 0.0
         self._to_record = threading.Event()
         self._told: dict[str, Incident] = {}
         self._telling = threading.Lock()
@@ -82,18 +84,17 @@ class AlertDesk:
             pose=(pose.x, pose.y, pose.yaw) if pose else None,
         )
         self._jobs.append((incident, notice))
-        self._to_record.set()
-
-    def close_incident(self, mission_id: str, verdict: str, reason: str, sightings: int) -> None:
-        """Complete the record of a mission that is over; returns at once."""
-        self._finals.append((mission_id, verdict, reason, sightings))
+        self._keeper.see(incident.id, seen.stamp)
         self._to_record.set()
 
     def remember(self, save: Callable[[], None]) -> None:
         """Save the patrol's memory once every notice taken so far is on disk; returns at once.
 
-        A mission is never remembered as one that gave its notice before the notice is there.
+        A mission is never remembered as one that gave its notice before the notice is there, nor, where the records'
+        disk takes them, as one that is over before its record says so.
         """
+        if self._memory is None:
+            self._memory_due = time.monotonic() + RECORD_WAIT
         self._memory = save
         self._to_record.set()
 
@@ -104,12 +105,11 @@ class AlertDesk:
         if self._jobs:
             return 0.0 if self._record(*self._jobs[0]) else DISK_RETRY
         save = self._memory
-        if save is not None:
-            return 0.0 if self._remember(save) else DISK_RETRY
-        if self._finals:
-            self._complete(*self._finals.popleft())
-            return 0.0
-        return 60.0
+        if save is None:
+            return 60.0
+        if not self._keeper.is_written and time.monotonic() < self._memory_due:
+            return 0.02
+        return 0.0 if self._remember(save) else DISK_RETRY
 
     def _remember(self, save: Callable[[], None]) -> bool:
         try:
@@ -124,7 +124,7 @@ class AlertDesk:
     def _delivered(self, delivery: Delivery) -> None:
         for notice_id in delivery.ids if delivery.delivered else ():
             with self._telling:  # first that it is on disk, then that it was delivered
-                incident = self._told.get(notice_id) or load_incident(self._incidents, notice_id)
+                incident = self._told.get(notice_id) or recall_incident(self._keeper.state_dir, notice_id)
                 if incident is not None:
                     self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
@@ -144,7 +144,9 @@ class AlertDesk:
             self._publish(incident, transport="", location=place, text=incident.sentence)
         log.warning("ALERT: %s; the notice is on disk", incident.sentence)
         self._jobs.popleft()
-        self._save(incident, picture)
+        if picture is not None:
+            file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=notice.seen.stamp, caption=note)
+            self._keeper.put_picture(incident.id, file)
         return True
 
     def _picture(self, notice: Notice) -> tuple[bytes | None, str]:
@@ -169,26 +171,20 @@ class AlertDesk:
             log.error("%s", err)
             return None, f"none: {err}"
 
-    def _save(self, incident: Incident, picture: bytes | None) -> None:
-        try:
-            save_incident(self._incidents, incident, picture)
-        except OSError as err:
-            log.error("the record of incident %s cannot be written: %s", incident.id, err)
+    def tell_verdict(self, incident: Incident) -> None:
+        """Publish the verdict of a mission whose record is on the disk."""
+        place = str(self._keeper.state_dir / FOLDER / incident.id)
+        self._publish(incident, transport="", location=place, text=incident.sentence, kind=Alert.VERDICT)
 
-    def _complete(self, mission_id: str, verdict: str, reason: str, sightings: int) -> None:
-        incident = load_incident(self._incidents, mission_id)
-        if incident is not None:
-            closed = dataclasses.replace(
-                incident, verdict=verdict, reason=reason, sightings=sightings, closed=time.time()
-            )
-            self._save(closed, None)
-
-    def _publish(self, incident: Incident, *, transport: str, location: str, text: str) -> None:
+    def _publish(self, incident: Incident, *, transport: str, location: str, text: str, kind: str = "") -> None:
         """Tell the topic; without a transport the notice is not delivered yet."""
         message = Alert(id=incident.id, delivered=bool(transport), transport=transport, location=location, text=text)
         message.header.stamp = rospy.Time.now()
         message.room_id, message.room_name = incident.room_id, incident.room_name
         message.object_class, message.probability = incident.object_class, incident.probability
+        message.kind = kind or (Alert.DELIVERED if transport else Alert.SEEN)
+        message.verdict = incident.verdict
+        message.share_seen = -1.0 if incident.share_seen is None else incident.share_seen
         self._publisher.publish(message)
 
 

@@ -15,6 +15,7 @@ import signal
 import threading
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,12 +26,19 @@ from darknet_ros_msgs.msg import BoundingBoxes, ObjectCount
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
+from rosbot_patrol.alerts.album import Sighting
 from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.evidence import EvidenceParams
+from rosbot_patrol.alerts.incident import Event
+from rosbot_patrol.alerts.mail import one_line
+from rosbot_patrol.alerts.picture import LabelledBox
+from rosbot_patrol.alerts.retention import RetentionParams
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, transform_points
 from rosbot_patrol.msg import EspTrigger, PatrolState, SensorEvent
 from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.battery import BatteryParams, check_battery
+from rosbot_patrol.patrol.chronicle import Chronicle
 from rosbot_patrol.patrol.commands import Commands, Report
 from rosbot_patrol.patrol.drive import DriveParams
 from rosbot_patrol.patrol.inputs import Box, Frame, Inputs
@@ -45,6 +53,7 @@ from rosbot_patrol.patrol.store import PatrolStore
 from rosbot_patrol.patrol.watch import WatchParams
 from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.incident_keeper import IncidentKeeper, RecordParams
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import Loop, load_params, now, ros_home, run_node
 from rosbot_patrol.ros.owner_mail import OwnerPost, refuse_passwords
@@ -91,7 +100,8 @@ class NodeParams:
     watch: WatchParams = WatchParams()
 
 
-FLAT = (NodeParams, MailParams, DriveParams, LookParams, SpinParams, PriorityParams, BatteryParams)
+RECORDS = (EvidenceParams, RetentionParams, RecordParams)
+FLAT = (NodeParams, MailParams, DriveParams, LookParams, SpinParams, PriorityParams, BatteryParams, *RECORDS)
 
 
 def load_flat(cls: type[P], tree: dict[str, Any]) -> P:
@@ -115,8 +125,19 @@ class PatrolNode:
         self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
         folder = Path(self.params.state_dir).expanduser() if self.params.state_dir else ros_home() / "rosbot_patrol"
         self.health = Health()
-        self.pictures = PictureRing(self.params.image_topic)
-        self.desk = AlertDesk(OwnerPost(mail, folder, self.health), self.pictures, folder / "incidents")
+        evidence = load_flat(EvidenceParams, tree)
+        self.pictures = PictureRing(self.params.image_topic, evidence)
+        self.chronicle = Chronicle()
+        self.keeper = IncidentKeeper(
+            folder,
+            self.pictures,
+            self.health,
+            evidence=evidence,
+            retention=load_flat(RetentionParams, tree),
+            records=load_flat(RecordParams, tree),
+            on_verdict=lambda incident: self.desk.tell_verdict(incident),
+        )
+        self.desk = AlertDesk(OwnerPost(mail, folder, self.health), self.pictures, self.keeper)
         self.store = PatrolStore(folder / "patrol.json", str(rospy.get_param("/run_id", "")))
         self.manager = PatrolManager(
             rooms,
@@ -140,6 +161,7 @@ class PatrolNode:
 
     def _make_ends(self) -> None:
         self._triggers: deque[tuple[int, str]] = deque(maxlen=1000)  # room, sender where it latches
+        self._heard: deque[Event] = deque(maxlen=1000)
         self._frames: deque[Frame] = deque(maxlen=200)
         self._detector: Latest[int] = Latest()
         self._scan: Latest[LaserScanMsg] = Latest()
@@ -167,6 +189,8 @@ class PatrolNode:
         for number in (signal.SIGINT, signal.SIGTERM):
             self._note_signal(number)
         rospy.on_shutdown(self._stop)
+        mission = [self.manager.mission.id] if self.manager.mission is not None else []
+        self.keeper.start([*mission, *(request.id for request in self.manager.queue if request.id)])
         self.desk.start()
         Loop(self.params.rate, self._step, name="patrol").start()
         rospy.spin()
@@ -185,6 +209,7 @@ class PatrolNode:
         room = self._room_of(message.id)
         if room is None:
             return
+        self._hear(f"motion sensor {message.id} sees motion", sensor=message.id, room=room)
         if is_latched and is_first and is_early and self.store.is_handled(sender, room):
             log.info("the latched trigger for room %d from %s was taken before the restart", room, sender)
             return
@@ -199,7 +224,12 @@ class PatrolNode:
             log.error("motion trigger refused: %s", self.sensors.refusal(sensor_id))
         return room
 
+    def _hear(self, text: str, **data: object) -> None:
+        self._heard.append(Event(wall=time.time(), kind="sensor", text=text, data=data))
+
     def _on_sensor_event(self, message: SensorEvent) -> None:
+        if message.text:
+            self._hear(message.text, sensor=message.id, room=message.room, what=message.kind)
         if message.kind == SensorEvent.LOOK and message.active and message.room >= 0:
             log.warning("%s: the robot looks at room %d", message.text, message.room)
             self._triggers.append((message.room, ""))
@@ -215,6 +245,18 @@ class PatrolNode:
             for b in message.bounding_boxes
         )
         self._frames.append(Frame(stamp=stamp, boxes=boxes))
+        self._note_sighting(stamp, boxes)
+
+    def _note_sighting(self, stamp: float, boxes: Sequence[Box]) -> None:
+        alarms = [box for box in boxes if box.label in self.params.alarm_classes]
+        if alarms and self.manager.mission is not None:
+            drawn = [
+                LabelledBox(
+                    text=f"{one_line(b.label)} {b.probability:.2f}", xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax
+                )
+                for b in alarms
+            ]
+            self.keeper.note(Sighting(stamp=stamp, probability=max(b.probability for b in alarms), boxes=drawn))
 
     def _on_count(self, message: ObjectCount) -> None:
         self._detector.set(1, now())
@@ -229,7 +271,8 @@ class PatrolNode:
     def _step(self, time_now: float) -> None:
         with self._stepping:
             if not self._is_over:
-                self._publish(time_now, self.manager.step(time_now, self._inputs(time_now)))
+                inputs = self._inputs(time_now)
+                self._publish(time_now, inputs, self.manager.step(time_now, inputs))
 
     def _inputs(self, time_now: float) -> Inputs:
         looking = self.manager.mission is not None and self.manager.mission.phase is Phase.LOOKING
@@ -281,7 +324,7 @@ class PatrolNode:
 
     # -- publish
 
-    def _publish(self, time_now: float, commands: Commands) -> None:
+    def _publish(self, time_now: float, inputs: Inputs, commands: Commands) -> None:
         if commands.cancel:
             self.move_base.cancel()
         if commands.goal is not None:
@@ -291,14 +334,20 @@ class PatrolNode:
             self._publish_state(time_now, commands.report)
         if commands.notice is not None:
             self.desk.take(commands.notice, time_now)
-        for ended in commands.ended:
-            verdict = ended.verdict.value if ended.verdict else ""
-            self.desk.close_incident(ended.id, verdict, ended.reason, ended.sightings)
-        if self.manager.mission is not None:
+        self._record(time_now, commands, inputs.pose)
+        if self.manager.mission is not None or self.keeper.needs_pictures:
             self.pictures.start()
         elif self.desk.is_recorded:
             self.pictures.stop()
         self._save(commands.changed)
+
+    def _record(self, time_now: float, commands: Commands, pose: Pose2D | None = None) -> None:
+        mission = self.manager.mission
+        entries = self.chronicle.step(
+            now=time_now, wall=time.time(), mission=mission, commands=commands, pose=pose, heard=_drain(self._heard)
+        )
+        self.keeper.put(entries)
+        self.keeper.look(mission.id if mission is not None and mission.phase is Phase.LOOKING else "")
 
     def _turn(self, speed: float | None) -> None:
         if speed is None:
@@ -359,14 +408,14 @@ class PatrolNode:
         with self._stepping:
             self._is_over = True
             if self._is_signalled:
-                for ended in self.manager.abandon("the patrol was ended").ended:
-                    self.desk.close_incident(ended.id, "unverified", ended.reason, ended.sightings)
+                self._record(now(), self.manager.abandon("the patrol was ended"))
             self.move_base.cancel()
             if self._turning:
                 self._cmd_vel.publish(convert.twist_to_msg(STOP))
             self._save(changed=True)
+        self.keeper.finish()
         deadline = time.monotonic() + 2.0
-        while not self.desk.is_recorded and time.monotonic() < deadline:
+        while not (self.desk.is_recorded and self.keeper.is_written) and time.monotonic() < deadline:
             time.sleep(0.02)
         time.sleep(0.1)  # let the two messages leave
 
