@@ -1,0 +1,36 @@
+#!/usr/bin/env python3
+"""Alerts and incidents: how fast they are kept, found and sent.
+
+    benchmarks/alerts.py [--only PART ...] [--json FILE]
+
+Parts: search (100,000 incidents: lists, searches, one record, verification).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import alerts_search
+
+PARTS: dict[str, Callable[[], dict[str, float]]] = {"search": alerts_search.measure}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts to measure")
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    arguments = parser.parse_args()
+    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    figures: dict[str, float] = {}
+    for part in arguments.only:
+        figures |= PARTS[part]()
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

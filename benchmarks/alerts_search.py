@@ -1,0 +1,129 @@
+"""100,000 incidents, as a guarded house leaves them in years: how soon a list or a search shows the newest fifty.
+
+Each record has a dozen events and ten files, so that a body takes 4 kB. The figure search_100k_ms is the slowest of the
+medians; the files themselves are not made.
+"""
+
+from __future__ import annotations
+
+import random
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rosbot_patrol.alerts.incident import Event, Incident, StoredFile
+from rosbot_patrol.alerts.incident_database import transaction
+from rosbot_patrol.alerts.incident_query import Query, find_incidents
+from rosbot_patrol.alerts.incident_rows import close_incident, insert_incident
+from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.alerts.incident_verify import verify
+
+COUNT = 100_000
+ROOMS = ("Küche", "hall", "square room behind the door", "west alcove", "台所", "corridor", "library", "bathroom")
+START = 1_600_000_000.0
+STEP = 1500.0  # [s] from one to the next
+REPEATS = 31
+
+
+def measure(count: int = COUNT) -> dict[str, float]:
+    with tempfile.TemporaryDirectory() as folder, IncidentStore(Path(folder), wall=START) as store:
+        began = time.perf_counter()
+        fill(store, count)
+        print(f"{count} incidents made in {time.perf_counter() - began:.0f} s, {size_mb(Path(folder)):.0f} MB")
+        now = START + count * STEP
+        middle = f"m{count // 2}"
+        cases: dict[str, Callable[[], object]] = {
+            "list": find(store),
+            "list --room 3": find(store, room=3),
+            "list --verdict confirmed": find(store, verdict="confirmed"),
+            "list --room 3 --verdict unverified --since half": find(
+                store, room=3, verdict="unverified", since=START + count * STEP / 2
+            ),
+            "list --since 90d": find(store, since=now - 90 * 86_400),
+            "list --until half": find(store, until=START + count * STEP / 2),
+            "search nobody (90,000 have it)": find(store, text="nobody"),
+            "search nobody --since half": find(store, text="nobody", since=START + count * STEP / 2),
+            "search nobody --until a month after the start": find(store, text="nobody", until=START + 30 * 86_400),
+            "search kuche alcove (none has both)": find(store, text="kuche alcove"),
+            "search person --room 5 --verdict confirmed": find(store, text="person", room=5, verdict="confirmed"),
+            "search s (a letter, all have it)": find(store, text="s"),
+            "search of a record's own word": find(store, text=f"word{count // 3}"),
+            "one record": lambda: store.get(middle),
+        }
+        medians = {}
+        print(f"{'':52}{'median ms':>10}{'worst ms':>10}{'found':>7}")
+        for name, call in cases.items():
+            times, found = timed(call)
+            medians[name] = statistics.median(times)
+            print(f"{name:52}{1000 * medians[name]:10.2f}{1000 * max(times):10.2f}{found:7}")
+        slowest = 1000 * max(medians.values())
+        print(f"search_100k_ms {slowest:.1f} (aim <= 20)")
+        write = write_one(store)
+        print(f"a record of twelve writes, each on the disk: {1000 * write:.1f} ms a write")
+        began = time.perf_counter()
+        done = verify(store, files=False)
+        assert done.fits, done.problems
+        print(f"verify without files: {time.perf_counter() - began:.1f} s")
+    return {"search_100k_ms": round(slowest, 2)}
+
+
+def fill(store: IncidentStore, count: int) -> None:
+    dice = random.Random(1)
+    for first in range(0, count, 5000):
+        with transaction(store.connection, store.path):
+            for number in range(first, min(first + 5000, count)):
+                incident = make(number, dice)
+                insert_incident(store.connection, incident)
+                close_incident(store.connection, incident, incident.closed or 0.0)
+
+
+def make(number: int, dice: random.Random) -> Incident:
+    verdict = dice.choices(("clear", "confirmed", "unverified", "unreachable"), (90, 4, 4, 2))[0]
+    room = number % len(ROOMS)
+    wall = START + number * STEP
+    seen = f"person seen in room {room}" if verdict == "confirmed" else f"nobody seen in room {room}, turned once"
+    events = tuple(Event(wall=wall + i, kind="state", text=f"driving to {ROOMS[room]}, step {i}") for i in range(12))
+    files = tuple(StoredFile(name=f"look-{i}.jpg", role="look", sha256="0" * 64, size=40_000) for i in range(10))
+    return Incident(
+        id=f"m{number}",
+        wall=wall,
+        room_id=room,
+        room_name=ROOMS[room],
+        verdict=verdict,
+        reason=f"{seen} word{number}",
+        share_seen=dice.random(),
+        closed=wall + 60.0,
+        events=events,
+        files=files,
+    )
+
+
+def find(store: IncidentStore, **given: object) -> Callable[[], object]:
+    query = Query(**given)  # type: ignore[arg-type]
+    return lambda: find_incidents(store.connection, store.path, query)
+
+
+def timed(call: Callable[[], object]) -> tuple[list[float], int]:
+    result = call()  # warms the cache, as the second question of a person does
+    times = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - began)
+    return times, len(result) if isinstance(result, list) else int(result is not None)
+
+
+def write_one(store: IncidentStore) -> float:
+    """Seconds that one write of a record takes, on this disk."""
+    began = time.perf_counter()
+    store.begin(Incident(id="timed", wall=START, room_id=1, room_name="hall"))
+    for i in range(10):
+        store.add_event("timed", Event(wall=START, kind="state", text=f"event {i}"))
+    store.close("timed", wall=START, verdict="clear")
+    return (time.perf_counter() - began) / 12
+
+
+def size_mb(folder: Path) -> float:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
