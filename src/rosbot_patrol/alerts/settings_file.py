@@ -12,6 +12,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.alerts.mail import token
@@ -76,7 +77,7 @@ def differences(folder: Path, who: str, mail: MailParams) -> list[str]:
     return sentences
 
 
-def state_of(folder: Path) -> Mapping[str, object] | None:
+def state_of(folder: Path) -> Mapping[str, Any] | None:
     """What the program that delivers last wrote about its channels; None where there is nothing."""
     try:
         tree = json.loads((folder / "status.json").read_bytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import smtplib
 import socket
 import ssl
@@ -106,13 +107,24 @@ class SmtpTransport:
             server.starttls(context=self._context() if s.security == "starttls" else _any_certificate())
             server.ehlo_or_helo_if_needed()
         if s.user:
-            server.login(s.user, s.password)
+            _login(server, s.user, s.password)
 
     def _context(self) -> ssl.SSLContext:
         context = ssl.create_default_context()
         if self._server.ca_file:
             context.load_verify_locations(self._server.ca_file)
         return context
+
+
+def _login(server: smtplib.SMTP, user: str, password: str) -> None:
+    # smtplib's own takes ASCII only, and after a refusal goes on with other mechanisms, which servers count as attacks
+    if "PLAIN" not in server.esmtp_features.get("auth", "").upper().split():
+        server.login(user, password)
+        return
+    answer = base64.b64encode(f"\0{user}\0{password}".encode()).decode("ascii")
+    code, text = server.docmd("AUTH", f"PLAIN {answer}")
+    if code not in (235, 503):  # 503: it takes us for logged in already
+        raise smtplib.SMTPAuthenticationError(code, text)
 
 
 def _hang_up(server: smtplib.SMTP) -> None:
