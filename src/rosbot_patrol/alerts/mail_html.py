@@ -27,7 +27,7 @@ rosbot_patrol &middot; $id</div>
 """)
 _PICTURE = Template('<img src="cid:$cid" alt="what the camera saw" style="display:block;width:100%;height:auto">\n')
 _ROW = Template(
-    '<tr><td style="padding:7px 12px 7px 0;color:#5c6b74;font-size:14px;vertical-align:top;white-space:nowrap;'
+    '<tr><td style="padding:7px 12px 7px 0;color:#5c6b74;font-size:14px;vertical-align:baseline;white-space:nowrap;'
     'border-top:1px solid #e3e8eb">$name</td><td style="padding:7px 0;border-top:1px solid #e3e8eb;'
     'overflow-wrap:anywhere">$value</td></tr>\n'
 )

@@ -1,0 +1,50 @@
+"""A process to be killed: `post_process.py put FOLDER NAME` or `post_process.py deliver FOLDER MAILDIR PORT`."""
+
+import itertools
+import sys
+import time
+from pathlib import Path
+
+from rosbot_patrol.alerts.channel import Channel
+from rosbot_patrol.alerts.lane import Pace
+from rosbot_patrol.alerts.mail import make_envelope
+from rosbot_patrol.alerts.maildir import MaildirTransport
+from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.postman import Postman
+from rosbot_patrol.alerts.smtp import SmtpServer, SmtpTransport
+
+ENVELOPE = make_envelope("owner@example.org", "robot@example.org")
+
+
+def put(folder, name):
+    """Put notices for ever; a line on stdout is the promise that one is kept."""
+    outbox = Outbox(folder)
+    for i in itertools.count():
+        notice = Notice(id=f"{name}-{i}", wall=1.79e9, kind="incident", subject="s", text="t", picture=b"\xff" * 20_000)
+        outbox.put(notice)
+        print(notice.id, flush=True)
+
+
+def deliver(folder, maildir, port):
+    """Deliver for ever, on both channels."""
+    pace = Pace(interval=0.0, first_delay=0.05)
+    channels = [
+        Channel(name="disk", transport=MaildirTransport(Path(maildir), ENVELOPE), pace=pace),
+        Channel(name="mail", transport=SmtpTransport(SmtpServer(host="localhost", port=port), ENVELOPE), pace=pace),
+    ]
+    postman = Postman(Outbox(folder), channels)
+    while not postman.take_over():
+        time.sleep(0.01)
+    print("delivers", flush=True)
+    while True:
+        postman.refresh()
+        if not any(postman.deliver(name) for name in postman.channels):
+            time.sleep(0.005)
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "put":
+        put(Path(sys.argv[2]), sys.argv[3])
+    else:
+        deliver(Path(sys.argv[2]), sys.argv[3], int(sys.argv[4]))
