@@ -50,8 +50,10 @@ class Process:
         assert text in self.output, self.output
 
     def stop(self, sig=signal.SIGINT):
+        """End it; with None it was told already."""
         if self.popen.poll() is None:
-            self.popen.send_signal(sig)
+            if sig is not None:
+                self.popen.send_signal(sig)
             try:
                 self.popen.wait(8.0)
             except subprocess.TimeoutExpired:
@@ -97,8 +99,11 @@ class Ros:
         return Teller(process)
 
     def stop_nodes(self):
+        for process in reversed(self.processes):  # told one and all, so that their ends take the time of one
+            if process.popen.poll() is None:
+                process.popen.send_signal(signal.SIGINT)
         for process in reversed(self.processes):
-            process.stop()
+            process.stop(None)
         self.processes.clear()
 
     def stop(self):
