@@ -33,6 +33,22 @@ def say(**what):
         print(json.dumps({"t": time.monotonic(), **what}), flush=True)
 
 
+class Client(actionlib.SimpleActionClient):
+    """Debian's drops a transition that comes before send_goal has returned, as on a busy machine: it waits here."""
+
+    def __init__(self, *where):
+        self.sending = threading.RLock()
+        super().__init__(*where)
+
+    def send_goal(self, *goal, **callbacks):
+        with self.sending:
+            super().send_goal(*goal, **callbacks)
+
+    def _handle_transition(self, gh):
+        with self.sending:
+            super()._handle_transition(gh)
+
+
 def make_goal(x, y, yaw, frame="map"):
     goal = MoveBaseGoal()
     pose = goal.target_pose
@@ -55,7 +71,7 @@ def on_feedback(message):
 
 def main():
     rospy.init_node("client", anonymous=True, disable_signals=True)
-    client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
+    client = Client("move_base", MoveBaseAction)
     goals = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=5)
     cancels = rospy.Publisher("move_base/cancel", GoalID, queue_size=5)
     rospy.Subscriber("move_base/result", MoveBaseActionResult, on_result, tcp_nodelay=True)
@@ -63,7 +79,7 @@ def main():
     rospy.Subscriber("/cmd_vel", Twist, lambda m: say(v=m.linear.x, w=m.angular.z), tcp_nodelay=True)
     rospy.Subscriber("move_base/recovery_status", RecoveryStatus, lambda m: say(recovery=m.recovery_behavior_name))
     rospy.Subscriber("move_base/current_goal", PoseStamped, lambda m: say(current=m.pose.position.x))
-    say(ready=client.wait_for_server(rospy.Duration(20.0)))
+    say(ready=client.wait_for_server(rospy.Duration(40.0)))
 
     def done(status, _result):
         say(done=GoalStatus.to_string(status), text=client.get_goal_status_text())

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import yaml
-from ros_processes import Process, Teller, wait_for
+from ros_processes import PATIENCE, Process, Teller, wait_for
 
 HERE = Path(__file__).resolve().parent
 TUNED = HERE.parents[1] / "config" / "tuned"
@@ -49,9 +49,12 @@ class Client(Teller):
         self.process.popen.stdin.flush()
         return self.expect(lambda said: said.get("count") == self._count)["t"]
 
-    def next(self, t, condition, seconds=10.0, what="what comes next"):
+    def next(self, t, condition, seconds=PATIENCE, what="what comes next"):
         """The first thing said after a time that meets a condition."""
-        return wait_for(lambda: next((s for s in self.since(t) if condition(s)), None), seconds, what)
+        try:
+            return wait_for(lambda: next((s for s in self.since(t) if condition(s)), None), seconds, what)
+        except AssertionError as err:
+            raise AssertionError(f"{err}; said before and since: {self.heard()[-60:]}") from err
 
     def speed(self):
         said = [s for s in self.heard() if "v" in s]
