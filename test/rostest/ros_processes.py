@@ -18,7 +18,10 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def wait_for(condition, seconds=10.0, what="the condition"):
+PATIENCE = 30.0  # [s] what is only waited for may take that long on a busy machine; it is seen at once where it comes
+
+
+def wait_for(condition, seconds=PATIENCE, what="the condition"):
     until = time.monotonic() + seconds
     while not (found := condition()):
         assert time.monotonic() < until, f"{what} did not come within {seconds} s"
@@ -44,7 +47,7 @@ class Process:
     def output(self):
         return "\n".join(self.lines)
 
-    def says(self, text, seconds=10.0):
+    def says(self, text, seconds=PATIENCE):
         wait_for(lambda: text in self.output or self.popen.poll() is not None, seconds, f"'{text}'")
         time.sleep(0.1)
         assert text in self.output, self.output
@@ -116,14 +119,14 @@ class Teller:
 
     def __init__(self, process):
         self.process = process
-        self.expect(lambda said: said.get("ready"), 15.0)
+        self.expect(lambda said: said.get("ready"), 2.0 * PATIENCE)
 
     def heard(self, **fields):
         """Everything said so far that has these fields."""
         said = [json.loads(line) for line in list(self.process.lines) if line.startswith("{")]
         return [each for each in said if all(each.get(key) == value for key, value in fields.items())]
 
-    def expect(self, condition, seconds=10.0):
+    def expect(self, condition, seconds=PATIENCE):
         """The first thing said, from now or before, that meets a condition."""
         return wait_for(lambda: next((s for s in self.heard() if condition(s)), None), seconds, "what the probe awaits")
 

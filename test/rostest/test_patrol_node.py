@@ -32,7 +32,7 @@ def stop(process, sig=signal.SIGINT):
             process.wait()
 
 
-def wait_until(condition, seconds=20.0, what="the condition"):
+def wait_until(condition, seconds=30.0, what="the condition"):
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         if condition():

@@ -97,7 +97,7 @@ def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_p
         add_key(tmp_path / "keys.yaml", i, key)
     bridge(ros, port, f"_key_file:={tmp_path}/keys.yaml", name="with_keys")  # parameters outlive their node
     sensors = [EspClient("127.0.0.1", port, i, key=key).start() for i, key in keys.items()]
-    probe.expect(lambda said: said.get("text") == "2 of 2 sensors are well")
+    probe.expect(lambda said: said.get("text") == "2 of 2 sensors are well" and str(said).count("/with_keys") == 3)
     sensors[0].set_link(LinkQuality(loss=1.0))  # says nothing more on a link that stays open
     silent = probe.expect(event("silent", 3, True))
     assert (silent["room"], silent["name"], silent["bridge"]) == (5, "Haustür", "/with_keys")
