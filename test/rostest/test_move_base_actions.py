@@ -33,7 +33,7 @@ def client(started):
     """The client, the robot idle before and after."""
     node, client, _ = started
     yield client
-    t = client.tells(cancel_id=["", 0.0])  # until now: it may come behind the next test's goal, on a connection of its own
+    t = client.tells(cancel_id=["", 0.0])  # until now, as the next goal may overtake it
     wait_for(lambda: [s for s in client.heard() if "v" in s][-1:] == [] or client.speed() == (0.0, 0.0), 5.0, "rest")
     assert node.popen.poll() is None, node.output
     assert "Traceback" not in node.output

@@ -1,5 +1,7 @@
 """The pre-shared key: both sides' frames against openssl's figures, and whatever is no proof."""
 
+import itertools
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -73,6 +75,7 @@ def test_nothing_is_told_before_the_proof():
         (encode(9, PROOF[7:-2]), "49 bytes that are no proof"),
         (encode(9, b"\x01" + bytes.fromhex(BRIDGE_MAC)), "33 bytes that are no proof"),
     ],
+    ids=itertools.count(),  # a proof holds random bytes
 )
 def test_what_proves_nothing_ends_the_connection(proof, reason):
     it = keyed()
