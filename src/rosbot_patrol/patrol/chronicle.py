@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rosbot_patrol.alerts.incident import Event, Incident
@@ -82,8 +82,12 @@ class Chronicle:
             elif heard:
                 entries.append(Entry(incident=mission.id, events=tuple(heard)))
             entries += self._follow(now, wall, mission, commands, pose)
-        if commands.notice is not None:
-            entries.append(_seen(wall, commands.notice))
+        for notice in commands.notices:
+            if (
+                mission is not None and notice.mission.id != mission.id
+            ):  # somebody else elsewhere, with a record of their own
+                entries.append(self._opened(now, wall, notice.mission))
+            entries.append(_seen(wall, notice))
         ignored = (i for i in commands.ignored if i.mission)
         entries += [Entry(incident=i.mission, events=(Event(wall=i.wall, kind="sensor", text=i.why),)) for i in ignored]
         for ended in commands.ended:
@@ -151,6 +155,9 @@ class Chronicle:
         why = commands.report.why if commands.report is not None else mission.reason
         event = Event(wall=wall, kind="state", text=why, data={"spent": dict(mission.times)})
         entries.append(Entry(incident=mission.id, changes=_state(mission), path=path, events=(event,), closed=wall))
+        for number in range(2, len(mission.people) + 1):
+            other = replace(mission, id=f"{mission.id}-{number}", place=mission.people[number - 1])
+            entries.append(Entry(incident=other.id, changes=_state(other), events=(event,), closed=wall))
         if is_own:
             self._id = ""
         return entries

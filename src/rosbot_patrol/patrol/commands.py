@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.inputs import Goal
 from rosbot_patrol.patrol.mission import Mission, Phase
+from rosbot_patrol.patrol.people import Person
 from rosbot_patrol.patrol.watch import Confirmation
 
 
@@ -28,10 +29,10 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Notice:
-    """A confirmed intruder, the first of its mission.
+    """A confirmed intruder: the first of its mission, or somebody else elsewhere.
 
     Attributes:
-        mission: a copy of what it was at that moment.
+        mission: a copy of what it was at that moment; for somebody else with an id of its own, "ID-2", ...
         seen: what the detector saw; phase: what the robot did; pose: where it was in map.
         is_held: an entry delay runs: keep all of it, but tell nobody until a `Release` says so.
     """
@@ -92,11 +93,12 @@ class Commands:
         goal: to be sent; cancel: give up the goal that runs; cancel_all: and everybody else's.
         speed: turning speed to command [rad/s], None where the patrol has no wish (the wheels are another's).
         report: the state, where it changed.
-        notice: an intruder was confirmed: keep it, send it.
+        notices: intruders that were confirmed: keep each, send it.
         releases: what becomes of notices that were held.
         ended: missions that are over, with their verdicts; the robot may not be at home yet.
         ignored: calls that start no mission.
         words: for the owner.
+        people: those met on the mission, where one of them was seen in this step.
         changed: what has to outlive the program has changed.
     """
 
@@ -105,9 +107,10 @@ class Commands:
     cancel_all: bool = False
     speed: float | None = None
     report: Report | None = None
-    notice: Notice | None = None
+    notices: tuple[Notice, ...] = ()
     releases: tuple[Release, ...] = ()
     ended: tuple[Mission, ...] = ()
     ignored: tuple[Ignored, ...] = ()
     words: tuple[Word, ...] = ()
+    people: tuple[Person, ...] = ()
     changed: bool = False

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.geometry import Pose2D, wrap_angles
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.floor import Array, Floor, Mask
+from rosbot_patrol.patrol.inputs import Eye as Eye
 from rosbot_patrol.scan import LaserScan
 
 _FRAY = (
@@ -84,10 +85,9 @@ def sight_on_map(floor: Floor, x: float, y: float, reach: float, first: float = 
     step = width / count
     bearings = first + step * np.arange(count if width >= math.tau else count + 1)
     along = np.arange(1, math.ceil(reach / floor.info.resolution) + 1) * floor.info.resolution
-    ix, iy, inside = floor.indices(
+    stopped = ~floor.are_free(
         x + np.cos(bearings)[:, None] * along[None, :], y + np.sin(bearings)[:, None] * along[None, :]
     )
-    stopped = ~(inside & floor.free[iy, ix])
     lengths = np.where(stopped.any(axis=1), along[stopped.argmax(axis=1)], reach)
     return Sight(x, y, first, step, lengths)
 
@@ -100,14 +100,6 @@ def sight_of_scan(scan: LaserScan, map_from_laser: Pose2D, floor: Floor, reach: 
     walls = by_map.lengths[np.rint(turned / by_map.step).astype(np.int64) % len(by_map.lengths)]
     lengths = np.where(scan.is_hit, np.minimum(np.where(scan.is_hit, scan.ranges, 0.0), walls + _FRAY), walls)
     return Sight(at.x, at.y, at.yaw + scan.angle_min, scan.angle_increment, np.minimum(lengths, reach))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Eye:
-    """A camera over the floor: its place and heading in map, and the width of its view [rad]."""
-
-    pose: Pose2D
-    width: float
 
 
 class Coverage:

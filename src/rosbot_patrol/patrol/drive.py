@@ -87,6 +87,12 @@ class Drive:
             return DriveStep(cancel=True, problem=f"not there after {self._timeout:.0f} s")
         return DriveStep()
 
+    def pause(self) -> None:
+        """The goal is given up by whoever calls this; the next step sends it again, and the pause does not count."""
+        self._tag = ""
+        self._retry_at = None
+        self._last = None
+
     def _wait(self, passed: float) -> DriveStep:
         self._tag = ""  # a server that comes back has forgotten the goal
         self._retry_at = None

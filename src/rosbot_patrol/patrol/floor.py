@@ -70,6 +70,15 @@ class Floor:
         inside = (ix >= 0) & (iy >= 0) & (ix < i.width) & (iy < i.height)
         return ix.clip(0, i.width - 1), iy.clip(0, i.height - 1), inside
 
+    def are_free(self, xs: Array, ys: Array) -> Mask:
+        """Whether points lie on the floor."""
+        i = self.info
+        ix = ((xs - i.origin_x) * (1.0 / i.resolution)).astype(np.int32)  # rounds towards 0, where there is no floor
+        iy = ((ys - i.origin_y) * (1.0 / i.resolution)).astype(np.int32)
+        found: Mask = self.free.take(iy * i.width + ix, mode="clip")
+        found &= (ix >= 0) & (iy >= 0) & (ix < i.width) & (iy < i.height)
+        return found
+
     def mark_near(self, points: Array, radius: float) -> Mask:
         """Cells whose centre lies within a radius [m] of any point, shape (N, 2)."""
         hit = np.zeros(self.info.shape, bool)

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.grid import Grid
 from rosbot_patrol.patrol.request import Request
+from rosbot_patrol.patrol.room_regions import RoomRegions
+from rosbot_patrol.scan import LaserScan
 
 
 class GoalState(Enum):
@@ -98,33 +96,48 @@ class Box:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Eye:
+    """A camera over the floor when it took a picture.
+
+    Attributes:
+        pose: in map.
+        width: angle that the picture spans [rad].
+        columns: width of the picture [px].
+    """
+
+    pose: Pose2D
+    width: float
+    columns: int = 640
+
+    def bearing(self, column: float) -> float:
+        """Of a column of the picture from its middle, positive to the left [rad]."""
+        half = self.columns / 2.0
+        return math.atan((half - column) / half * math.tan(self.width / 2.0))
+
+
+@dataclass(frozen=True, kw_only=True)
 class Frame:
     """What the detector saw in one picture.
 
     Attributes:
         stamp: when the picture was taken [s], None where that is not known (darknet_ros tells it only with boxes).
         boxes: nothing seen if empty.
+        eye: the camera then, None where its place or its lens is not known.
+        counts: False where its boxes could not be measured yet, so that they prove nothing.
     """
 
     stamp: float | None = None
     boxes: tuple[Box, ...] = ()
+    eye: Eye | None = None
+    counts: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScanView:
-    """One scan as it lies around the robot.
+    """One scan, and from where it was taken: the lidar's pose in map."""
 
-    Attributes:
-        stamp: when it was taken [s].
-        points: where the beams ended, in base_link [m], shape (N, 2); beams that met nothing are left out.
-        pose: of base_link in map at that moment, None where it is not known.
-        range_max: how far the lidar sees [m].
-    """
-
-    stamp: float
-    points: NDArray[np.float64]
-    pose: Pose2D | None = None
-    range_max: float = 12.0
+    scan: LaserScan
+    map_from_laser: Pose2D
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,8 +195,8 @@ class Inputs:
         detector_at: when the detector was last heard [s].
         camera_at: when a picture came last that was not black [s].
         camera_changed_at: when one came last that differs from the one before [s], inf where nobody compares.
-        scan: the newest scan, while a mission runs; None where it is silent.
-        map: of the house, None until it was heard.
+        scan: the newest scan, while a mission runs; None where it is silent or the robot's place is not known.
+        house: the map's floor and its rooms, None until the map was heard.
         battery: None where nobody tells of one.
         guarded: what is armed.
         stop: why the emergency stop holds the robot, "" where it does not.
@@ -201,7 +214,7 @@ class Inputs:
     camera_at: float = -math.inf
     camera_changed_at: float = math.inf
     scan: ScanView | None = None
-    map: Grid | None = None
+    house: RoomRegions | None = None
     battery: Battery | None = None
     guarded: Guarded = Guarded()
     stop: str = ""

@@ -59,11 +59,14 @@ class Look:
 
     Args:
         needs_camera: whether pictures come to this program, too, so that a silent camera can be told.
+        turn: to the left [rad]; 0 is a look ahead.
     """
 
-    def __init__(self, params: LookParams, spin: SpinParams, *, needs_camera: bool = True) -> None:
+    def __init__(
+        self, params: LookParams, spin: SpinParams, *, needs_camera: bool = True, turn: float = math.tau
+    ) -> None:
         self.params = params
-        self.spin = Spin(math.tau, clockwise=False, params=spin)
+        self.spin = Spin(turn, clockwise=False, params=spin)
         self._needs_camera = needs_camera
         self._began: float | None = None
         self._turning = False
@@ -77,17 +80,19 @@ class Look:
         self._held_since: float | None = None
         self._held_out_until = -math.inf
 
-    def step(self, now: float, inputs: Inputs, *, candidate: bool) -> LookStep:
+    def step(self, now: float, inputs: Inputs, *, candidate: bool, held: bool = False) -> LookStep:
         """Wait for the eyes, turn, linger.
 
         Args:
             now: time [s].
             inputs: of this step.
             candidate: something is in view that may become an intruder.
+            held: another has the wheels for now: measure what it turns, and wait.
         """
         if self._began is None or now < self._began - 1.0:
             self._began = now
         if self._turned_at is not None:
+            self._turned_at = now if held else self._turned_at
             return self._linger(now, inputs)
         if not self._turning:
             blind = self._blind(now, inputs)
@@ -97,7 +102,7 @@ class Look:
         self._note_blindness(now, inputs)
         self._measure_in_map(inputs.pose)
         spin = self._correction or self.spin
-        step = spin.step(now, inputs.yaw, inputs.clearance, hold=self._hold(now, candidate))
+        step = spin.step(now, inputs.yaw, inputs.clearance, hold=held or self._hold(now, candidate))
         if step.done and spin is self.spin and not step.problem and self._is_off():
             self._correction = Spin(abs(self._left()), clockwise=self._left() < 0.0, params=self._spin_params)
         elif step.done:
@@ -120,13 +125,14 @@ class Look:
         self._map_yaw = pose.yaw
 
     def _left(self) -> float:
-        return math.tau - self._map_turned
+        return self.spin.target - self._map_turned
 
     def _is_off(self) -> bool:
         return self.params.correction_min < abs(self._left()) <= self.params.correction_max
 
     def _progress(self) -> str:
-        return f"{max(self.spin.turned_deg, 0.0) // 30 * 30:.0f} of 360 degrees"
+        whole = math.degrees(self.spin.target)
+        return f"{max(self.spin.turned_deg, 0.0) // 30 * 30:.0f} of {whole:.0f} degrees"
 
     def _linger(self, now: float, inputs: Inputs) -> LookStep:
         assert self._turned_at is not None

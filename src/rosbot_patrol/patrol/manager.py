@@ -11,7 +11,8 @@ Differs (CONTRACTS, Settled 4 to 8; A0, quirks):
   reported as unreachable, and the robot does not turn elsewhere. A room that the points file lacks is refused.
 - Every mission ends in a verdict: confirmed, clear, unreachable, or unverified where detector, camera or turn failed,
   the battery or the emergency stop ended it, or a person did.
-- A mission gives one notice, at its first confirmation.
+- A mission gives one notice, at its first confirmation, and one more for each further person elsewhere (`people`).
+- While a person is in view the robot stops and keeps the camera on them, for a bounded time (`track`).
 - Times are bounded in steady time: a clock that is set ends no drive and no turn.
 """
 
@@ -29,11 +30,13 @@ from rosbot_patrol.patrol import recall, saying
 from rosbot_patrol.patrol.battery import BatteryParams, BatteryWatch
 from rosbot_patrol.patrol.commands import Commands, Notice, Release, Report, Word
 from rosbot_patrol.patrol.drive import Drive, DriveParams
-from rosbot_patrol.patrol.inputs import Inputs
+from rosbot_patrol.patrol.inputs import Frame, Inputs
 from rosbot_patrol.patrol.intake import Intake
+from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.own_motion import OwnMotion
+from rosbot_patrol.patrol.people import People, PeopleParams, Person
 from rosbot_patrol.patrol.phases import LookAround, LookParts, OneTurn, Trip, Views
 from rosbot_patrol.patrol.queueing import MissionQueue, PriorityParams
 from rosbot_patrol.patrol.readiness import Readiness
@@ -41,6 +44,7 @@ from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Room, Rooms
 from rosbot_patrol.patrol.spin import SpinParams
 from rosbot_patrol.patrol.steady import Heard, SteadyClock
+from rosbot_patrol.patrol.track import Track, TrackParams
 from rosbot_patrol.patrol.watch import Confirmation, Watch, WatchParams
 
 log = logging.getLogger(__name__)
@@ -69,6 +73,8 @@ class ManagerParams:
     look: LookParams = LookParams()
     spin: SpinParams = SpinParams()
     watch: WatchParams = WatchParams()
+    people: PeopleParams = PeopleParams()
+    track: TrackParams = TrackParams()
     priorities: PriorityParams = PriorityParams()
     battery: BatteryParams = BatteryParams()
 
@@ -83,6 +89,7 @@ class PatrolManager:
         needs_camera: pictures come in, so that a silent camera can be told.
         views: what was seen of a room, and from where to see the rest.
         viewpoints: further poses from which a room is seen, where its own cannot be reached.
+        judge: who refuses what cannot be an intruder.
     """
 
     def __init__(
@@ -94,6 +101,7 @@ class PatrolManager:
         needs_camera: bool = True,
         views: Views | None = None,
         viewpoints: Viewpoints | None = None,
+        judge: Judge | None = None,
     ) -> None:
         self.rooms = rooms
         self.params = params or ManagerParams()
@@ -101,7 +109,11 @@ class PatrolManager:
         self.queue = MissionQueue()
         self.last_verdict = ""
         self.held: dict[str, float] = {}  # notices of missions that wait for an entry delay, until [s since 1970]
-        self._watch = Watch(tuple(self.params.alarm_classes), self.params.watch)
+        self._judge = judge or Judge()
+        self._watch = Watch(tuple(self.params.alarm_classes), self.params.watch, self._judge)
+        self._people = People(self.params.people)
+        self._track = Track(self.params.track)
+        self._is_tracking = False
         self._parts = LookParts(
             look=self.params.look, spin=self.params.spin, drive=self.params.drive, needs_camera=needs_camera
         )
@@ -159,6 +171,11 @@ class PatrolManager:
             return out
         self._count(passed, inputs)
         self._watch_frames(inputs, out)
+        if self.mission.phase is not Phase.RETURNING:
+            self._views.see(self._clock.time, inputs)
+            self.mission.share_seen = self._views.share()
+        if self._keep_in_view(inputs, out):
+            return out
         if self.mission.phase is Phase.LOOKING:
             self._step_look(inputs, out)
         else:
@@ -253,6 +270,11 @@ class PatrolManager:
         assert self.mission is not None
         self.mission.started = self._now
         self._watch.start(self._now)
+        self._track.reset()
+        self._is_tracking = False
+        self._people = People(self.params.people)
+        self._people.recall(self.mission.people, self._clock.time)
+        self._views.start(self.mission)
         self._enter(phase, inputs)
 
     def _go_on(self, inputs: Inputs) -> None:
@@ -317,8 +339,8 @@ class PatrolManager:
         mission, look = self.mission, self._look
         assert mission is not None
         assert look is not None
-        held = mission.sightings == 0 and self._watch.candidate(self._now)
-        step = look.step(self._clock.time, inputs, candidate=held)
+        candidate = mission.sightings == 0 and self._watch.candidate(self._now)
+        step = look.step(self._clock.time, inputs, candidate=candidate)
         out.speed, out.goal = step.speed, step.goal
         out.cancel |= step.cancel
         out.changed |= step.progress
@@ -326,12 +348,13 @@ class PatrolManager:
             self._say(out, Phase.LOOKING, f"{step.why}, in {mission.room.title}")
             return
         mission.looked = self._now
-        if step.problem:
-            self._decide(Verdict.UNVERIFIED, f"{mission.room.title} could not be verified: {step.problem}")
+        problem = step.problem or self._views.blind()
+        if problem:
+            moved = self._views.moved()
+            also = f"; {moved}" if moved else ""
+            self._decide(Verdict.UNVERIFIED, f"{mission.room.title} could not be verified: {problem}{also}")
         else:
-            seen = "" if mission.share_seen is None else f", {mission.share_seen:.0%} of its floor seen"
-            turned = f"turned {look.turned_deg:.0f} degrees"
-            self._decide(Verdict.CLEAR, f"nobody seen in {mission.room.title}, {turned}{seen}")
+            self._decide(Verdict.CLEAR, saying.clear(mission, look.turned_deg, self._watch.refusals))
         self._turn_home(inputs, out)
 
     def _decide(self, verdict: Verdict, reason: str) -> None:
@@ -516,23 +539,85 @@ class PatrolManager:
     def _watch_frames(self, inputs: Inputs, out: Commands) -> None:
         mission = self.mission
         assert mission is not None
-        for seen in [seen for frame in inputs.frames for seen in self._watch.add(self._now, frame)]:
-            mission.sightings += 1
-            if mission.best is None or seen.probability > mission.best.probability:
-                mission.best = seen
-            if mission.verdict is not Verdict.CONFIRMED:
-                self._decide(Verdict.CONFIRMED, saying.sighting(mission, seen))
-            if not mission.notified:
-                mission.notified = True
-                out.changed = True
-                out.notice = self._notice(mission, inputs, seen)
+        if inputs.house is not None:
+            self._judge.floor = inputs.house.floor
+        for frame in inputs.frames:
+            for seen in self._watch.add(self._now, frame):
+                self._note(mission, seen, inputs, out)
+            self._point_at(frame, inputs)
 
-    def _notice(self, mission: Mission, inputs: Inputs, seen: Confirmation) -> Notice:
+    def _note(self, mission: Mission, seen: Confirmation, inputs: Inputs, out: Commands) -> None:
+        """Somebody was confirmed."""
+        mission.sightings += 1
+        if mission.best is None or seen.probability > mission.best.probability:
+            mission.best = seen
+        person, is_new = self._people.note(self._clock.time, seen.measured)
+        person.label, person.room = seen.label, self._room_at(person, inputs)
+        mission.people = self._people.places
+        mission.place = mission.people[0]
+        out.people = tuple(self._people.met)
+        if mission.verdict is not Verdict.CONFIRMED:
+            self._decide(Verdict.CONFIRMED, saying.sighting(mission, seen, person.room))
+        if is_new:
+            if person.number > 1:
+                log.warning(
+                    "a second incident, %s: %s", f"{mission.id}-{person.number}", saying.sighting(mission, seen)
+                )
+            mission.notified = out.changed = True
+            out.notices += (self._notice(mission, inputs, seen, person.number),)
+
+    def _room_at(self, person: Person, inputs: Inputs) -> str:
+        """The room in which a person is, "" where that is not known."""
+        if inputs.house is None or person.x is None or person.y is None:
+            return ""
+        room = self.rooms.find(inputs.house.room_at(person.x, person.y))
+        return room.title if room else ""
+
+    def _notice(self, mission: Mission, inputs: Inputs, seen: Confirmation, number: int) -> Notice:
+        copy = dataclasses.replace(mission, people=list(mission.people))
+        if number > 1:
+            copy.id, copy.place = f"{mission.id}-{number}", mission.people[number - 1]
         until = inputs.guarded.holds_until
         if until is not None:
-            self.held[mission.id] = until
-        copy = dataclasses.replace(mission)
+            self.held[copy.id] = until
         return Notice(mission=copy, seen=seen, phase=mission.phase, pose=inputs.pose, is_held=until is not None)
+
+    # -- the camera is kept on a person
+
+    def _point_at(self, frame: Frame, inputs: Inputs) -> None:
+        boxes = self._watch.plausible(frame)
+        if not boxes or (self._watch.lately(self._now) < 2 and not self._track.is_on):
+            return  # a single picture stops no drive
+        if frame.eye is None:
+            return
+        column = (boxes[0].xmin + boxes[0].xmax) / 2.0
+        self._track.see(self._clock.time, frame.eye.bearing(column), frame.eye.pose.yaw)
+
+    def _keep_in_view(self, inputs: Inputs, out: Commands) -> bool:
+        """Turn towards whom the camera has in view; what the robot was about waits."""
+        speed = self._track.step(self._clock.time, inputs.pose.yaw if inputs.pose else None)
+        mission, was_tracking = self.mission, self._is_tracking
+        assert mission is not None
+        self._is_tracking = speed is not None
+        if speed is None:
+            return False
+        if not was_tracking:
+            out.cancel |= self._interrupt()
+        if self._look is not None and not self._look.drives:
+            self._look.step(self._clock.time, inputs, candidate=False, held=True)
+        near = inputs.clearance is not None and inputs.clearance < self.params.spin.spin_clearance
+        out.speed = 0.0 if near else speed
+        self._say(out, mission.phase, f"keeping the camera on somebody, {saying.phase_text(mission)}")
+        return True
+
+    def _interrupt(self) -> bool:
+        """Leave off driving; whether there is a goal to give up."""
+        if self._look is not None:
+            self._look.pause()
+            return self._look.drives
+        if self._trip is not None:
+            self._trip.pause()
+        return self._trip is not None
 
     def _release(self, inputs: Inputs, out: Commands) -> None:
         """Notices whose entry delay is over, or that were disarmed in time."""

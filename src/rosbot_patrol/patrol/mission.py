@@ -56,6 +56,7 @@ class Mission:
         views_done: poses from which the room was looked at in a full turn.
         share_seen: of the room's floor, 0 to 1, None where nobody measures.
         place: x, y of the person in map [m], None where it is not known.
+        people: where each of those met was last, likewise; each of them gets a notice.
         own_motion: rooms whose sensor called while the robot passed them, with seconds since 1970: not followed.
     """
 
@@ -81,6 +82,7 @@ class Mission:
     views_done: list[View] = field(default_factory=list)
     share_seen: float | None = None
     place: tuple[float, float] | None = None
+    people: list[tuple[float, float] | None] = field(default_factory=list)
     own_motion: list[tuple[float, int]] = field(default_factory=list)
 
 
@@ -110,6 +112,7 @@ def mission_to_plain(mission: Mission) -> dict[str, Any]:
         "views_done": [list(view) for view in mission.views_done],
         "share_seen": mission.share_seen,
         "place": list(mission.place) if mission.place else None,
+        "people": [list(place) if place else None for place in mission.people],
         "own_motion": [list(item) for item in mission.own_motion],
     }
 
@@ -144,5 +147,6 @@ def mission_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Mission | None
         views_done=[(float(x), float(y), float(yaw)) for x, y, yaw in plain["views_done"]],
         share_seen=None if share is None else float(share),
         place=None if place is None else (float(place[0]), float(place[1])),
+        people=[None if each is None else (float(each[0]), float(each[1])) for each in plain["people"]],
         own_motion=[(float(wall), int(room_id)) for wall, room_id in plain["own_motion"]],
     )

@@ -7,6 +7,7 @@ whose place is not known is the one that was seen last.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from rosbot_patrol.params import param
@@ -24,7 +25,13 @@ class PeopleParams:
 
 @dataclass(kw_only=True)
 class Person:
-    """One who was met: running number from 1, last place in map [m] and time [s], how often confirmed."""
+    """One who was met.
+
+    Attributes:
+        number: from 1 on.
+        x: last place in map [m]; y: likewise; error: of it [m]; at: when [s].
+        sightings: how often confirmed; label: class of object; room: where, for people.
+    """
 
     number: int
     x: float | None
@@ -32,6 +39,8 @@ class Person:
     error: float
     at: float
     sightings: int = 0
+    label: str = ""
+    room: str = ""
 
 
 class People:
@@ -40,6 +49,17 @@ class People:
     def __init__(self, params: PeopleParams | None = None) -> None:
         self.params = params or PeopleParams()
         self.met: list[Person] = []
+
+    def recall(self, places: Iterable[tuple[float, float] | None], now: float) -> None:
+        """Those met before the program ended, as if they had been seen now."""
+        for place in places:
+            x, y = place or (None, None)
+            self.met.append(Person(number=len(self.met) + 1, x=x, y=y, error=0.3, at=now))
+
+    @property
+    def places(self) -> list[tuple[float, float] | None]:
+        """Where each was last."""
+        return [None if p.x is None or p.y is None else (p.x, p.y) for p in self.met]
 
     def note(self, now: float, measured: Measured | None) -> tuple[Person, bool]:
         """Somebody was confirmed; who it is, and whether for the first time."""
@@ -60,9 +80,8 @@ class People:
         latest = max(self.met, key=lambda person: person.at)
         if measured is None:
             return latest
-        reached = [(self._gap(now, person, measured), person.number) for person in self.met]
-        gap, number = min(reached)
-        return self.met[number - 1] if gap <= 0.0 else None
+        may_be = [person for person in self.met if self._gap(now, person, measured) <= 0.0]
+        return min(may_be, key=lambda person: _apart(person, measured), default=None)
 
     def _gap(self, now: float, person: Person, measured: Measured) -> float:
         """How much farther apart than one can have walked [m], 0 or less where it may be the same."""
@@ -70,5 +89,11 @@ class People:
         if person.x is None or person.y is None:
             return 0.0
         walked = min(p.walking_speed * max(now - person.at, 0.0), p.walked_most)
-        apart = math.hypot(measured.x - person.x, measured.y - person.y)
-        return apart - p.same_person - walked - min(measured.error, 1.0) - min(person.error, 1.0)
+        return _apart(person, measured) - p.same_person - walked - min(measured.error, 1.0) - min(person.error, 1.0)
+
+
+def _apart(person: Person, measured: Measured) -> float:
+    """How far a place is from where a person was last [m], inf where that is not known."""
+    if person.x is None or person.y is None:
+        return math.inf
+    return math.hypot(measured.x - person.x, measured.y - person.y)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -12,6 +13,7 @@ from rosbot_patrol.patrol.inputs import GoalLink, Inputs
 from rosbot_patrol.patrol.look import Look, LookParams, LookStep
 from rosbot_patrol.patrol.mission import Mission
 from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.viewpoints import Viewpoint
 
 Choose = Callable[[], Sequence[Pose2D]]
 
@@ -39,6 +41,10 @@ class Trip:
         """Whether it still goes to the first pose."""
         return self._tried == 0
 
+    def pause(self) -> None:
+        """The drive is interrupted; the next step takes it up again."""
+        self._drive.pause()
+
     def step(self, now: float, link: GoalLink, pose: Pose2D | None) -> DriveStep:
         """Drive on."""
         step = self._drive.step(now, link, pose)
@@ -61,16 +67,25 @@ class Views(Protocol):
     """What has been seen of a room, and from where to see the rest."""
 
     def start(self, mission: Mission) -> None:
-        """A look begins, or goes on after a restart: `mission.views_done` says what was done."""
+        """A mission begins, or goes on after a restart: `mission.views_done` says what was done."""
 
     def see(self, now: float, inputs: Inputs) -> None:
-        """One step of the look."""
+        """One step of the drive to the room or of the look."""
 
-    def next(self, inputs: Inputs) -> Pose2D | None:
-        """Where to look from next after a full turn, None where the room is seen well enough."""
+    def next(self, inputs: Inputs) -> Viewpoint | None:
+        """Where to look from next, None where the room is seen well enough or there is nowhere."""
+
+    def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
+        """How far to turn to the left at a viewpoint, now that the robot is there [rad]."""
 
     def share(self) -> float | None:
         """Share of the room's floor that was seen, None where nobody measures."""
+
+    def blind(self) -> str:
+        """Why what was seen is too little for a verdict, "" where it is not."""
+
+    def moved(self) -> str:
+        """What moved in the room as far as the lidar tells, "" where nothing did."""
 
 
 class OneTurn:
@@ -82,13 +97,25 @@ class OneTurn:
     def see(self, now: float, inputs: Inputs) -> None:
         """Nothing to see."""
 
-    def next(self, inputs: Inputs) -> Pose2D | None:
+    def next(self, inputs: Inputs) -> Viewpoint | None:
         """One turn is enough."""
         return None
+
+    def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
+        """As planned."""
+        return view.turn
 
     def share(self) -> float | None:
         """Nobody measures."""
         return None
+
+    def blind(self) -> str:
+        """Nobody measures."""
+        return ""
+
+    def moved(self) -> str:
+        """Nobody watches."""
+        return ""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -102,7 +129,7 @@ class LookParts:
 
 
 class LookAround:
-    """A full turn at the first viewpoint, then one at each further one that `views` asks for.
+    """A full turn at the first viewpoint, then as much of one at each further one as `views` asks for.
 
     Args:
         mission: whose room; its views_done and share_seen are kept up.
@@ -114,28 +141,37 @@ class LookAround:
     def __init__(self, mission: Mission, views: Views, parts: LookParts, pose: Pose2D | None) -> None:
         self._mission, self._views, self._parts = mission, views, parts
         self._drive: Drive | None = None
+        self._view: Viewpoint | None = None
         self._at = pose
         self.turned_deg = 360.0 * len(mission.views_done)
         self._goes_on = bool(mission.views_done)
-        views.start(mission)
         self._look: Look = self._new_look()
 
-    def step(self, now: float, inputs: Inputs, *, candidate: bool) -> LookStep:
+    @property
+    def drives(self) -> bool:
+        """Whether it is on its way to a further viewpoint."""
+        return self._drive is not None
+
+    def pause(self) -> None:
+        """The drive is interrupted; the next step takes it up again."""
+        if self._drive is not None:
+            self._drive.pause()
+
+    def step(self, now: float, inputs: Inputs, *, candidate: bool, held: bool = False) -> LookStep:
         """Look on.
 
         Args:
             now: steady time [s]; the stamps of `inputs` are of it, too.
             inputs: of this step.
             candidate: something is in view that may become an intruder.
+            held: another has the wheels for now.
         """
-        self._views.see(now, inputs)
-        self._mission.share_seen = self._views.share()
         if self._goes_on:  # after a restart: what was looked at need not be again
             self._goes_on = False
             return self._go_on(inputs, LookStep(done=True))
         if self._drive is not None:
-            return self._step_drive(now, inputs)
-        step = self._look.step(now, inputs, candidate=candidate)
+            return LookStep(why="driving to a further viewpoint") if held else self._step_drive(now, inputs)
+        step = self._look.step(now, inputs, candidate=candidate, held=held)
         if not step.done:
             return step
         self.turned_deg += self._look.turned_deg
@@ -145,14 +181,14 @@ class LookAround:
             self._mission.views_done.append((self._at.x, self._at.y, self._at.yaw))
         return self._go_on(inputs, step)
 
-    def _new_look(self) -> Look:
-        return Look(self._parts.look, self._parts.spin, needs_camera=self._parts.needs_camera)
+    def _new_look(self, turn: float = math.tau) -> Look:
+        return Look(self._parts.look, self._parts.spin, needs_camera=self._parts.needs_camera, turn=turn)
 
     def _go_on(self, inputs: Inputs, step: LookStep) -> LookStep:
-        pose = self._views.next(inputs)
-        if pose is None:
+        self._view = self._views.next(inputs)
+        if self._view is None:
             return step
-        self._at = pose
+        self._at = pose = self._view.pose
         name = f"{self._mission.id}/view{len(self._mission.views_done)}"
         once = dataclasses.replace(self._parts.drive, goal_attempts=1)
         self._drive = Drive(name, pose, once)
@@ -167,6 +203,6 @@ class LookAround:
             return dataclasses.replace(next_step, cancel=step.cancel)
         if step.reached:
             self._drive = None
-            self._look = self._new_look()
+            self._look = self._new_look(self._views.turn_from(inputs.pose, self._view) if self._view else math.tau)
             return LookStep(why="at a further viewpoint")
         return LookStep(speed=None, goal=step.goal, cancel=step.cancel, why="driving to a further viewpoint")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from rosbot_patrol.patrol.commands import Report
 from rosbot_patrol.patrol.mission import Mission, Phase
 from rosbot_patrol.patrol.queueing import MissionQueue
@@ -15,11 +17,31 @@ def verdict(mission: Mission) -> str:
     return f"{mission.verdict.value}: {mission.reason}" if mission.verdict else "without a verdict"
 
 
-def sighting(mission: Mission, seen: Confirmation) -> str:
-    """That somebody was seen."""
+def sighting(mission: Mission, seen: Confirmation, room: str = "") -> str:
+    """That somebody was seen; `room` is the one in which they are, where that is known."""
     where = _WHERE.get(mission.phase, "on the way back from")
     sure = f"probability {seen.probability:.2f} over {seen.pictures} pictures"
-    return f"{seen.label} seen {where} {mission.room.title}, {sure}"
+    place = ""
+    if seen.measured is not None:
+        about = "about " if seen.measured.error > 0.5 else ""
+        inside = f" in {room}" if room and room != mission.room.title else ""
+        place = f", {about}at ({seen.measured.x:.1f}, {seen.measured.y:.1f}){inside}"
+    return f"{seen.label} seen {where} {mission.room.title}{place}, {sure}"
+
+
+def clear(mission: Mission, turned_deg: float, refusals: Mapping[str, int]) -> str:
+    """That nobody was seen, and how thorough the look was."""
+    parts = [f"nobody seen in {mission.room.title}", f"turned {turned_deg:.0f} degrees"]
+    if mission.share_seen is not None:
+        parts.append(f"{mission.share_seen:.0%} of its floor seen")
+    if refusals:
+        parts.append(f"something like a person was no person: {max(refusals, key=lambda why: refusals[why])}")
+    return ", ".join(parts)
+
+
+def phase_text(mission: Mission) -> str:
+    """Where on its way a mission is."""
+    return f"{_WHERE.get(mission.phase, 'on the way back from')} {mission.room.title}"
 
 
 def rooms_open(mission: Mission | None, queue: MissionQueue) -> str:

@@ -87,6 +87,8 @@ class Watch:
 
     def add(self, now: float, frame: Frame) -> tuple[Confirmation, ...]:
         """Take one picture's boxes; a confirmation for each intruder that they make."""
+        if not frame.counts:
+            return ()
         stamp = now if frame.stamp is None else frame.stamp
         if frame.stamp is not None:
             if stamp <= self._newest or now - stamp > self.params.max_age:
@@ -105,6 +107,14 @@ class Watch:
     def candidate(self, now: float, recent: float = 0.6) -> bool:
         """Whether a picture that came lately shows something that may become an intruder."""
         return any(view.boxes and abs(now - view.arrived) <= recent for view in self._views)
+
+    def plausible(self, frame: Frame) -> list[Box]:
+        """Boxes of a picture that may show an intruder, the surest first."""
+        return sorted((box for box in frame.boxes if self._is_plausible(box)), key=_score, reverse=True)
+
+    def lately(self, now: float, recent: float = 1.0) -> int:
+        """How many of the pictures that came lately show something that may become an intruder."""
+        return sum(bool(view.boxes) and abs(now - view.arrived) <= recent for view in self._views)
 
     def _is_plausible(self, box: Box) -> bool:
         if box.label not in self._classes or not 0.0 < box.probability <= 1.0:

@@ -40,17 +40,25 @@ from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.battery import BatteryParams, check_battery
 from rosbot_patrol.patrol.chronicle import Chronicle
 from rosbot_patrol.patrol.commands import Commands, Report
+from rosbot_patrol.patrol.coverage import CoverageParams
 from rosbot_patrol.patrol.drive import DriveParams
+from rosbot_patrol.patrol.eyes import Eyes, EyesParams
 from rosbot_patrol.patrol.inputs import Box, Frame, Inputs
+from rosbot_patrol.patrol.judge import Judge, JudgeParams
+from rosbot_patrol.patrol.known_objects import load_known
 from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.people import PeopleParams
 from rosbot_patrol.patrol.queueing import PriorityParams
 from rosbot_patrol.patrol.repeats import Repeats
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.spin import SpinParams
 from rosbot_patrol.patrol.store import PatrolStore
+from rosbot_patrol.patrol.track import TrackParams
+from rosbot_patrol.patrol.viewpoints import ViewpointParams
 from rosbot_patrol.patrol.watch import WatchParams
+from rosbot_patrol.patrol.witness import WitnessParams
 from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.incident_keeper import IncidentKeeper, RecordParams
@@ -58,8 +66,10 @@ from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import Loop, load_params, now, ros_home, run_node
 from rosbot_patrol.ros.owner_mail import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.patrol_alerts import AlertDesk
+from rosbot_patrol.ros.patrol_eyes import EyesTopics, PatrolEyes
 from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.ros.patrol_images import PictureRing
+from rosbot_patrol.ros.people_markers import PeopleMarkers
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.scan import scan_points
 from rosbot_patrol.sensors.sensor_file import load_sensors
@@ -97,7 +107,21 @@ class NodeParams:
     latched_window: float = param(
         10.0, unit="s", lo=0.0, doc="so long after its start a latched trigger that it had before is not taken again"
     )
+    look_around: str = param(
+        "full", choices=("full", "spin"), doc="full: from further viewpoints, too; spin: one turn at the room's point"
+    )
+    clear_share: float = param(
+        0.5, lo=0.0, hi=1.0, doc="with less of the floor seen a room is not clear but unverified"
+    )
+    known_objects: str = param("", doc="file of things that look like somebody (patrol/known_objects); empty: none")
     watch: WatchParams = WatchParams()
+    judge: JudgeParams = JudgeParams()
+    coverage: CoverageParams = CoverageParams()
+    viewpoints: ViewpointParams = ViewpointParams()
+    witness: WitnessParams = WitnessParams()
+    track: TrackParams = TrackParams()
+    people: PeopleParams = PeopleParams()
+    eyes: EyesTopics = EyesTopics()
 
 
 RECORDS = (EvidenceParams, RetentionParams, RecordParams)
@@ -139,6 +163,15 @@ class PatrolNode:
         )
         self.desk = AlertDesk(OwnerPost(mail, folder, self.health), self.pictures, self.keeper)
         self.store = PatrolStore(folder / "patrol.json", str(rospy.get_param("/run_id", "")))
+        views = Eyes(
+            EyesParams(
+                look_around=self.params.look_around,
+                clear_share=self.params.clear_share,
+                coverage=self.params.coverage,
+                viewpoints=self.params.viewpoints,
+                witness=self.params.witness,
+            )
+        )
         self.manager = PatrolManager(
             rooms,
             ManagerParams(
@@ -152,17 +185,21 @@ class PatrolNode:
                 look=load_flat(LookParams, tree),
                 spin=load_flat(SpinParams, tree),
                 watch=self.params.watch,
+                people=self.params.people,
+                track=self.params.track,
             ),
             memory=self.store.memory,
             needs_camera=self.pictures.is_wanted,
+            views=views,
+            viewpoints=views.instead,
+            judge=Judge(self.params.judge, load_known(self.params.known_objects)),
         )
         log.info("%d rooms in %s", len(rooms), rooms.source)
-        self._make_ends()
+        self._make_ends(rooms)
 
-    def _make_ends(self) -> None:
+    def _make_ends(self, rooms: Rooms) -> None:
         self._triggers: deque[tuple[int, str]] = deque(maxlen=1000)  # room, sender where it latches
         self._heard: deque[Event] = deque(maxlen=1000)
-        self._frames: deque[Frame] = deque(maxlen=200)
         self._detector: Latest[int] = Latest()
         self._scan: Latest[LaserScanMsg] = Latest()
         self._stepping = threading.Lock()
@@ -175,6 +212,18 @@ class PatrolNode:
         self._refused = Repeats()
         self._report: Report | None = None
         self.transforms = Transforms()
+        self.eyes = PatrolEyes(
+            self.params.eyes,
+            rooms,
+            self.params.alarm_classes,
+            self.transforms,
+            map_frame=self.params.map_frame,
+            odom_frame=self.params.odom_frame,
+            health=self.health,
+        )
+        self.markers = PeopleMarkers(self.params.map_frame)
+        self._shown = ""
+        self._nearest: tuple[LaserScanMsg, float | None] | None = None
         self.move_base = MoveBase(self.params.map_frame)
         self._cmd_vel = rospy.Publisher("/cmd_vel", Twist, queue_size=1)
         self._state = rospy.Publisher("/patrol/state", PatrolState, queue_size=10, latch=True)
@@ -244,7 +293,7 @@ class PatrolNode:
             Box(label=b.Class, probability=b.probability, xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax)
             for b in message.bounding_boxes
         )
-        self._frames.append(Frame(stamp=stamp, boxes=boxes))
+        self.eyes.add(Frame(stamp=stamp, boxes=boxes), stamp)
         self._note_sighting(stamp, boxes)
 
     def _note_sighting(self, stamp: float, boxes: Sequence[Box]) -> None:
@@ -261,7 +310,7 @@ class PatrolNode:
     def _on_count(self, message: ObjectCount) -> None:
         self._detector.set(1, now())
         if message.count == 0:  # other counts come with their boxes
-            self._frames.append(Frame())
+            self.eyes.add(Frame(), message.header.stamp.to_sec())
 
     def _on_scan(self, message: LaserScanMsg) -> None:
         self._scan.set(message, now())
@@ -275,14 +324,18 @@ class PatrolNode:
                 self._publish(time_now, inputs, self.manager.step(time_now, inputs))
 
     def _inputs(self, time_now: float) -> Inputs:
-        looking = self.manager.mission is not None and self.manager.mission.phase is Phase.LOOKING
+        busy = self.manager.mission is not None
+        scan = self._fresh_scan(time_now) if busy else None
+        view = self.eyes.look(scan)
         return Inputs(
             wall=time.time(),
             triggers=self._take_triggers(),
-            frames=tuple(_drain(self._frames)),
+            frames=tuple(self.eyes.take(is_busy=busy)),
             yaw=self._yaw(time_now),
             pose=self._pose(),
-            clearance=self._clearance(time_now) if looking else None,
+            clearance=self._clearance(scan),
+            scan=view,
+            house=self.eyes.house,
             link=self.move_base.link(),
             detector_at=self._detector.stamp,
             camera_at=self.pictures.seen_at,
@@ -310,17 +363,22 @@ class PatrolNode:
         except TransformError:
             return None
 
-    def _clearance(self, time_now: float) -> float | None:
-        message = self._scan.get()
-        if message is None or not self._scan.fresh(time_now, self.params.scan_timeout):
+    def _fresh_scan(self, time_now: float) -> LaserScanMsg | None:
+        return self._scan.get() if self._scan.fresh(time_now, self.params.scan_timeout) else None
+
+    def _clearance(self, message: LaserScanMsg | None) -> float | None:
+        """From the robot's centre to the nearest thing [m]; reckoned once for each scan."""
+        if message is None:
             return None
-        scan = convert.scan_from_msg(message)
-        try:
-            base_from_laser = self.transforms.lookup(self.params.base_frame, scan.frame_id)
-        except TransformError:
-            return None
-        points = transform_points(base_from_laser, scan_points(scan))
-        return float(np.hypot(points[:, 0], points[:, 1]).min()) if len(points) else None
+        if self._nearest is None or self._nearest[0] is not message:
+            scan = convert.scan_from_msg(message)
+            try:
+                base_from_laser = self.transforms.lookup(self.params.base_frame, scan.frame_id)
+            except TransformError:
+                return None
+            points = transform_points(base_from_laser, scan_points(scan))
+            self._nearest = message, float(np.hypot(*points.T).min()) if len(points) else None
+        return self._nearest[1]
 
     # -- publish
 
@@ -332,9 +390,10 @@ class PatrolNode:
         self._turn(commands.speed)
         if commands.report is not None:
             self._publish_state(time_now, commands.report)
-        if commands.notice is not None:
-            self.desk.take(commands.notice, time_now)
+        for notice in commands.notices:
+            self.desk.take(notice, time_now)
         self._record(time_now, commands, inputs.pose)
+        self._show_people(time_now, commands)
         if self.manager.mission is not None or self.keeper.needs_pictures:
             self.pictures.start()
         elif self.desk.is_recorded:
@@ -348,6 +407,14 @@ class PatrolNode:
         )
         self.keeper.put(entries)
         self.keeper.look(mission.id if mission is not None and mission.phase is Phase.LOOKING else "")
+
+    def _show_people(self, time_now: float, commands: Commands) -> None:
+        mission = self.manager.mission
+        if mission is not None and mission.id != self._shown:
+            self._shown = mission.id
+            self.markers.clear()
+        if commands.people:
+            self.markers.show(commands.people, time_now, mission.room.title if mission else "")
 
     def _turn(self, speed: float | None) -> None:
         if speed is None:

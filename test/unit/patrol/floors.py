@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.patrol.coverage import sight_on_map
 from rosbot_patrol.patrol.floor import Floor, floor_of
 from rosbot_patrol.patrol.rooms import Room, Rooms
+from rosbot_patrol.scan import LaserScan
 
+BEAMS = 720
+NOISE = np.random.default_rng(5).standard_normal((50, BEAMS))
 EDGE = 0.5  # of a letter [m]
 VALUES = {"#": 100, ".": 0, " ": -1}
 
@@ -41,3 +47,28 @@ TWO_ROOMS = (
     "#........#........#",
     "###################",
 )  # 9.5 x 4.5 m, a door of 1 m in the middle at y 1.5 to 2.5
+
+
+def scan_over(
+    floor: Floor, pose: Pose2D, stamp: float, things: list[tuple[float, float, float]], noise: float = 0.01
+) -> LaserScan:
+    """A scan of a drawn house and of upright cylinders (x, y, radius) in it; angle 0 is the robot's x axis."""
+    angles = -math.pi + math.tau / BEAMS * np.arange(BEAMS)
+    bearings = pose.yaw + angles
+    sight = sight_on_map(floor, pose.x, pose.y, 12.0)
+    ranges = sight.lengths[np.rint((bearings % math.tau) / sight.step).astype(int) % len(sight.lengths)].copy()
+    for x, y, radius in things:
+        away, towards = math.hypot(x - pose.x, y - pose.y), math.atan2(y - pose.y, x - pose.x)
+        aside = np.abs((bearings - towards + math.pi) % math.tau - math.pi)
+        hit = aside < math.asin(min(radius / away, 1.0))
+        ranges[hit] = np.minimum(ranges[hit], away - radius)
+    ranges += noise * NOISE[round(stamp * 100) % len(NOISE)]
+    return LaserScan(
+        stamp=stamp,
+        frame_id="laser",
+        angle_min=-math.pi,
+        angle_increment=math.tau / BEAMS,
+        range_min=0.1,
+        range_max=12.0,
+        ranges=ranges,
+    )

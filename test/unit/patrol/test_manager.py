@@ -75,7 +75,7 @@ class World:
             self.yaw += out.speed * 0.04
         self.speeds.append(out.speed)
         self.reports += [out.report] if out.report else []
-        self.notices += [out.notice] if out.notice else []
+        self.notices += out.notices
         self.ended += out.ended
 
     def _glide(self):

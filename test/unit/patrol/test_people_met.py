@@ -49,3 +49,14 @@ def test_the_place_is_the_last_sure_one() -> None:
     assert people.met[0].x == 1.0
     people.note(0.4, at(1.2))
     assert people.met[0].x == 1.2
+
+
+def test_of_two_who_may_be_it_the_nearer_is() -> None:
+    people = People()
+    people.note(0.0, at(0.0))
+    people.note(0.1, at(4.0))
+    for t in range(1, 30):
+        people.note(t, at(0.0))
+    assert people.note(30.0, at(4.0))[0].number == 2
+    assert people.note(30.1, at(0.0))[0].number == 1
+    assert len(people.met) == 2

@@ -1,0 +1,203 @@
+"""What the look around has seen of a room, where to look from next, and what moved there: the `Views` of a mission."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rosbot_patrol.geometry import Pose2D, angle_difference, transform_points
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
+from rosbot_patrol.patrol.floor import Mask
+from rosbot_patrol.patrol.inputs import Eye, Inputs
+from rosbot_patrol.patrol.mission import Mission
+from rosbot_patrol.patrol.room_regions import RoomRegions
+from rosbot_patrol.patrol.rooms import Room
+from rosbot_patrol.patrol.viewpoints import Viewpoint, ViewpointParams, ViewpointPlanner
+from rosbot_patrol.patrol.witness import Witness, WitnessParams, off_the_map
+from rosbot_patrol.scan import scan_points
+
+log = logging.getLogger(__name__)
+
+VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
+_ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
+_LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EyesParams:
+    """How thoroughly a room is looked at."""
+
+    look_around: str = param(
+        "full", choices=("full", "spin"), doc="full: from further viewpoints, too; spin: one turn at the room's point"
+    )
+    clear_share: float = param(
+        0.5, lo=0.0, hi=1.0, doc="with less of the floor seen a room is not clear but unverified"
+    )
+    coverage: CoverageParams = CoverageParams()
+    viewpoints: ViewpointParams = ViewpointParams()
+    witness: WitnessParams = WitnessParams()
+
+
+class Eyes:
+    """Keeps what was seen of the room of one mission.
+
+    Args:
+        params: how thoroughly to look.
+    """
+
+    def __init__(self, params: EyesParams | None = None) -> None:
+        self.params = params or EyesParams()
+        self.coverage: Coverage | None = None
+        self._witness = Witness(self.params.witness)
+        self._mission: Mission | None = None
+        self._house: RoomRegions | None = None
+        self._planner: ViewpointPlanner | None = None
+        self._width = VIEW_WIDTH
+        self._has_eye = False
+        self._began: float | None = None
+        self._now = 0.0
+        self._views = 0
+        self._tried: list[tuple[float, float]] = []
+
+    # -- Views
+
+    def start(self, mission: Mission) -> None:
+        """Begin with a room; what earlier viewpoints showed before a restart is taken from the map."""
+        self._mission, self.coverage, self._began = mission, None, None
+        self._views, self._tried, self._has_eye = 0, [], False
+        self._witness.start()
+
+    def see(self, now: float, inputs: Inputs) -> None:
+        """Take in what detector and lidar saw since the last step."""
+        self._now = now
+        self._settle_in(inputs)
+        if self._house is None:
+            return
+        view = inputs.scan
+        if view is not None:
+            self._witness.see(view.scan, view.map_from_laser, self._house.floor)
+        sight: Sight | None = None
+        for frame in inputs.frames:
+            if frame.eye is None or self.coverage is None:
+                continue
+            self._has_eye, self._width = True, frame.eye.width
+            sight = sight or self._sight(inputs, frame.eye)
+            self.coverage.look(frame.eye, sight)
+
+    def next(self, inputs: Inputs) -> Viewpoint | None:
+        """The best further viewpoint within the bounds."""
+        p, mission = self.params, self._mission
+        self._began = self._now if self._began is None else self._began
+        if p.look_around == "spin" or mission is None or self.coverage is None or inputs.pose is None:
+            return None
+        if not self._has_eye or self.coverage.share >= p.viewpoints.coverage_goal:
+            return None
+        late = self._now - self._began > p.viewpoints.viewpoints_time
+        if late or self._views >= p.viewpoints.viewpoints_most:
+            log.info("%s: no further viewpoint, %s", mission.room.title, "time is up" if late else "enough were tried")
+            return None
+        assert self._planner is not None
+        found = self._planner.next(
+            inputs.pose,
+            self._room(mission.room),
+            self.coverage.unseen(),
+            width=self._width,
+            stands=self._stands(inputs),
+            tried=tuple(self._tried),
+        )
+        if found is not None:
+            self._views += 1
+            self._tried.append((found.pose.x, found.pose.y))
+            log.info(
+                "%s: %.0f %% of the floor seen, on to (%.1f, %.1f), which shows %.1f m2 more",
+                mission.room.title,
+                100.0 * self.coverage.share,
+                found.pose.x,
+                found.pose.y,
+                found.gain,
+            )
+        return found
+
+    def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
+        """How far to turn from where the robot stands [rad]: to the beginning first, where it is not yet there."""
+        if pose is None or view.turn >= math.tau:
+            return view.turn
+        ahead = angle_difference(view.pose.yaw, pose.yaw)
+        if not view.turn:
+            return ahead % math.tau if abs(ahead) > _LATE else 0.0
+        return min(max(view.turn + (ahead if ahead > -_LATE else ahead + math.tau), 0.0), math.tau)
+
+    def share(self) -> float | None:
+        """Of the room's floor that was seen, None where there is no map or no camera that tells what it sees."""
+        return self.coverage.share if self.coverage is not None and self._has_eye else None
+
+    def blind(self) -> str:
+        """Why what was seen is too little."""
+        share = self.share()
+        if share is None or share >= self.params.clear_share:
+            return ""
+        return f"only {share:.0%} of its floor could be seen"
+
+    def moved(self) -> str:
+        """What the lidar saw move."""
+        return self._witness.text()
+
+    # -- for a room whose own point cannot be reached
+
+    def instead(self, room: Room, inputs: Inputs, most: int = 3) -> list[Pose2D]:
+        """Other poses from which a room is seen, the best first."""
+        self._settle_in(inputs)
+        if self._house is None or self._planner is None or inputs.pose is None:
+            return []
+        tried = [(room.pose.x, room.pose.y)]
+        found: list[Pose2D] = []
+        for _ in range(most):
+            view = self._planner.instead(inputs.pose, self._room(room), tried=tuple(tried), width=self._width)
+            if view is None:
+                break
+            found.append(view.pose)
+            tried.append((view.pose.x, view.pose.y))
+        return found
+
+    # -- parts
+
+    def _settle_in(self, inputs: Inputs) -> None:
+        """Take the newest map of the house, and begin with the room where it has not yet."""
+        p = self.params
+        if inputs.house is not None and inputs.house is not self._house and self.coverage is None:
+            self._house = inputs.house
+            self._planner = ViewpointPlanner(inputs.house.floor, p.viewpoints, p.coverage)
+        if self._house is None or self._mission is None or self.coverage is not None:
+            return
+        self.coverage = Coverage(self._house.floor, self._room(self._mission.room), p.coverage)
+        for x, y, yaw in self._mission.views_done:
+            self._recall_turn(x, y, yaw)
+
+    def _recall_turn(self, x: float, y: float, yaw: float) -> None:
+        assert self.coverage is not None
+        assert self._house is not None
+        sight = sight_on_map(self._house.floor, x, y, self.params.coverage.view_range)
+        for k in range(12 * self.params.coverage.seen_in):
+            self.coverage.look(Eye(pose=Pose2D(x, y, yaw + math.tau * k / 12.0), width=self._width), sight)
+
+    def _room(self, room: Room) -> Mask:
+        assert self._house is not None
+        return self._house.mask(room.id)
+
+    def _sight(self, inputs: Inputs, eye: Eye) -> Sight:
+        assert self._house is not None
+        floor, reach = self._house.floor, self.params.coverage.view_range
+        if inputs.scan is None:
+            return sight_on_map(floor, eye.pose.x, eye.pose.y, reach)
+        return sight_of_scan(inputs.scan.scan, inputs.scan.map_from_laser, floor, reach)
+
+    def _stands(self, inputs: Inputs) -> Mask | None:
+        if inputs.scan is None or self._house is None:
+            return None
+        points = transform_points(inputs.scan.map_from_laser, scan_points(inputs.scan.scan))
+        off = off_the_map(self._house.floor, points, self.params.witness.off_map)
+        return self._house.floor.mark_near(off, _ROBOT) if len(off) else np.zeros(self._house.floor.info.shape, bool)

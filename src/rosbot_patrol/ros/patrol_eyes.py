@@ -1,0 +1,324 @@
+"""What the patrol needs of camera, depth, lidar and map to know what was seen, and where a person stands.
+
+The depth camera is listened to only for some seconds after the detector saw something: a depth picture of 640 x 480 is
+1.2 MB, and at ten a second they would cost more than all the rest of the patrol. Pictures that wait for depth are held
+back for a quarter of a second at most; those that came before the first depth picture prove nothing.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import rospy
+from nav_msgs.msg import OccupancyGrid
+from numpy.typing import NDArray
+from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import LaserScan as LaserScanMsg
+
+from rosbot_patrol.errors import ImageError, MapError, TransformError
+from rosbot_patrol.geometry import Pose2D, transform_points
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.floor import floor_of
+from rosbot_patrol.patrol.inputs import Eye, Frame, ScanView
+from rosbot_patrol.patrol.person_place import Depth, Lens, View, measure
+from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
+from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.patrol.witness import off_the_map
+from rosbot_patrol.ros import convert
+from rosbot_patrol.ros.convert_images import picture_from_msg
+from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.grids import GridMsg
+from rosbot_patrol.ros.inputs import Latest
+from rosbot_patrol.ros.node import now
+from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.scan import LaserScan, scan_points
+
+log = logging.getLogger(__name__)
+
+_SAME = 0.06  # a depth picture of that time is of the same moment [s]
+_HELD = 0.25  # so long a picture waits for its depth, wall time [s]
+_STARTING = 1.0  # so long after it was asked for depth may need to come, wall time [s]
+_KEEP = 8.0  # so long after the last box depth is listened to, wall time [s]
+_GIVE_UP = 60.0  # so long a depth camera that is silent is not asked again, wall time [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EyesTopics:
+    """Where camera, depth and map are heard."""
+
+    camera_info_topic: str = param("/camera/rgb/camera_info", doc="lens of the camera that the detector looks through")
+    depth_topic: str = param(
+        "/camera/depth/image_raw", doc="depth in m (32FC1) or mm (16UC1), for places and posters; empty: none"
+    )
+    depth_info_topic: str = param(
+        "/camera/depth/camera_info", doc="lens of the depth camera; silent: the colour camera's"
+    )
+    floor_height: float = param(
+        -0.04, unit="m", doc="height of the floor in the map's frame: base_link is at the axles"
+    )
+    off_map: float = param(
+        0.3, unit="m", lo=0.05, hi=1.0, doc="a lidar's point so far from all on the map is not of it"
+    )
+
+
+class Lenses:
+    """The lens of a camera, of its first camera_info."""
+
+    def __init__(self, topic: str) -> None:
+        self.lens: Lens | None = None
+        self.frame = ""
+        self._subscriber = rospy.Subscriber(topic, CameraInfo, self._on_info, queue_size=1) if topic else None
+
+    def _on_info(self, message: CameraInfo) -> None:
+        k = message.K
+        if message.width <= 0 or message.height <= 0 or k[0] <= 0.0 or k[4] <= 0.0:
+            log.warning("a camera_info of width %d and focal length %g tells no lens", message.width, k[0])
+            return
+        self.frame = message.header.frame_id.lstrip("/")
+        self.lens = Lens(fx=k[0], fy=k[4], cx=k[2], cy=k[5], width=message.width, height=message.height)
+        if self._subscriber is not None:
+            self._subscriber.unregister()
+            self._subscriber = None
+
+
+class DepthRing:
+    """The last depth pictures, listened to only while somebody wants them."""
+
+    def __init__(self, topic: str, info_topic: str, health: Health) -> None:
+        self._topic, self._health = topic, health
+        self._lens = Lenses(info_topic if topic else "")
+        self._lock = threading.Lock()
+        self._ring: deque[Image] = deque(maxlen=6)
+        self._subscriber: rospy.Subscriber | None = None
+        self._asked = self._wanted = self._silent_since = float("-inf")
+        self._problem = ""
+
+    def want(self, wall: float) -> None:
+        """Somebody needs depth about now."""
+        self._wanted = wall
+        if self._topic and self._subscriber is None and wall - self._silent_since > _GIVE_UP:
+            self._asked = wall
+            self._subscriber = rospy.Subscriber(
+                self._topic, Image, self._store, queue_size=2, buff_size=1 << 23, tcp_nodelay=True
+            )
+
+    def tend(self, wall: float, *, is_over: bool = False) -> None:
+        """Stop listening where nobody needs it any more or nothing comes."""
+        if self._subscriber is None:
+            return
+        silent = not self._ring and wall - self._asked > _STARTING
+        if silent:
+            self._silent_since = wall
+            log.warning(
+                "%s: no depth comes; the lidar and the boxes tell places, and posters are not told", self._topic
+            )
+            self._health.set("depth", WARN, f"nothing comes on {self._topic}")
+        if silent or is_over or wall - self._wanted > _KEEP:
+            self._subscriber.unregister()
+            with self._lock:
+                self._subscriber = None
+                self._ring.clear()
+
+    def may_come(self, stamp: float) -> bool:
+        """Whether the depth of a moment [s] is still to be waited for."""
+        newest = self._newest()
+        return self._subscriber is not None and (newest is None or newest < stamp)
+
+    def is_flowing(self, stamp: float) -> bool:
+        """Whether depth comes, or is about to, so that a picture of a moment [s] without it proves nothing."""
+        newest = self._newest()
+        return self._subscriber is not None and (newest is None or stamp - newest < 1.0)
+
+    def _newest(self) -> float | None:
+        with self._lock:
+            return self._ring[-1].header.stamp.to_sec() if self._ring else None
+
+    def find(self, stamp: float, colour: Lens) -> Depth | None:
+        """The depth picture of a moment [s], None where there is none or it cannot be read."""
+        with self._lock:
+            best = min(self._ring, key=lambda m: abs(m.header.stamp.to_sec() - stamp), default=None)
+        if best is None or abs(best.header.stamp.to_sec() - stamp) > _SAME:
+            return None
+        try:
+            metres = _metres(best)
+        except ImageError as err:
+            if str(err) != self._problem:
+                log.error("%s: %s", self._topic, err)
+            self._problem = str(err)
+            return None
+        self._health.set("depth", OK, "depth comes where it is asked for")
+        return Depth(metres, self._lens.lens or replace(colour, width=best.width, height=best.height))
+
+    def _store(self, message: Image) -> None:
+        with self._lock:
+            if self._subscriber is not None:
+                self._ring.append(message)
+
+
+@dataclass(frozen=True)
+class _Pending:
+    frame: Frame
+    stamp: float
+    came: float
+
+
+class PatrolEyes:
+    """Gives frames their eyes and boxes their places; keeps the house's floor and the newest scan's place.
+
+    Args:
+        topics: where to listen.
+        rooms: of the points file.
+        alarm_classes: boxes of others are not measured.
+        transforms: the node's tf listener.
+        map_frame: frame of the map; odom_frame: frame in which a moment's pose is known at once.
+        health: where to say how it goes.
+    """
+
+    def __init__(
+        self,
+        topics: EyesTopics,
+        rooms: Rooms,
+        alarm_classes: Iterable[str],
+        transforms: Transforms,
+        *,
+        map_frame: str,
+        odom_frame: str,
+        health: Health,
+    ) -> None:
+        self._topics, self._rooms, self._transforms = topics, rooms, transforms
+        self._map_frame, self._odom_frame = map_frame, odom_frame
+        self._classes = frozenset(alarm_classes)
+        self._lenses = Lenses(topics.camera_info_topic)
+        self.depth = DepthRing(topics.depth_topic, topics.depth_info_topic, health)
+        self._waiting: deque[_Pending] = deque(maxlen=50)
+        self._scan: tuple[LaserScanMsg, ScanView] | None = None
+        self._maps: Latest[OccupancyGrid] = Latest()
+        self._has_map = threading.Event()
+        self.house: RoomRegions | None = None
+        threading.Thread(target=self._part_maps, name="rooms", daemon=True).start()
+        rospy.Subscriber("/map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 24)
+
+    # -- frames
+
+    def add(self, frame: Frame, stamp: float) -> None:
+        """Take what the detector saw in a picture of a time [s], from a callback."""
+        self._waiting.append(_Pending(frame, stamp, time.monotonic()))
+
+    def take(self, *, is_busy: bool) -> list[Frame]:
+        """The frames that are ready.
+
+        Args:
+            is_busy: a mission runs; without one nothing is measured.
+        """
+        wall = time.monotonic()
+        self.depth.tend(wall, is_over=not is_busy)
+        out: list[Frame] = []
+        while self._waiting:
+            pending = self._waiting[0]
+            ready = self._see(pending, wall) if is_busy else pending.frame
+            if ready is None:
+                break
+            self._waiting.popleft()
+            out.append(ready)
+        return out
+
+    def _see(self, pending: _Pending, wall: float) -> Frame | None:
+        """The frame with eye and places, None where it has to wait for depth."""
+        frame, stamp, lens = pending.frame, pending.stamp, self._lenses.lens
+        pose = self._camera(stamp) if lens is not None and stamp > 0.0 else None
+        if pose is None or lens is None:
+            return frame
+        view = View(lens, pose)
+        place = Pose2D(float(pose[0, 3]), float(pose[1, 3]), view.yaw)
+        frame = replace(frame, eye=Eye(pose=place, width=lens.view_width, columns=lens.width))
+        if not any(box.label in self._classes for box in frame.boxes):
+            return frame
+        self.depth.want(wall)
+        depth = self.depth.find(stamp, lens)
+        if depth is None and self.depth.may_come(stamp) and wall - pending.came < _HELD:
+            return None
+        off = self._off()
+        boxes = tuple(measure(box, view, depth, off) if box.label in self._classes else box for box in frame.boxes)
+        return replace(frame, boxes=boxes, counts=depth is not None or not self.depth.is_flowing(stamp))
+
+    def _camera(self, stamp: float) -> NDArray[np.float64] | None:
+        """Pose of the camera in map at a moment, z from the floor, None where it is not known."""
+        frame = self._lenses.frame
+        try:
+            pose = self._transforms.lookup_matrix(self._map_frame, frame, stamp)
+        except TransformError:
+            try:  # the map's part of it comes later than odometry
+                odom_from_camera = self._transforms.lookup_matrix(self._odom_frame, frame, stamp)
+                pose = self._transforms.lookup_matrix(self._map_frame, self._odom_frame, 0.0) @ odom_from_camera
+            except TransformError:
+                return None
+        pose[2, 3] -= self._topics.floor_height
+        return pose
+
+    # -- lidar
+
+    def look(self, message: LaserScanMsg | None) -> ScanView | None:
+        """The newest scan with its place in map, None where either is not known; a scan is converted once."""
+        if message is None:
+            return None
+        if self._scan is not None and self._scan[0] is message:
+            return self._scan[1]
+        scan: LaserScan = convert.scan_from_msg(message)
+        try:
+            pose = self._transforms.lookup(self._map_frame, scan.frame_id, scan.stamp)
+        except TransformError:
+            return self._scan[1] if self._scan is not None and scan.stamp - self._scan[1].scan.stamp < 0.5 else None
+        view = ScanView(scan=scan, map_from_laser=pose)
+        self._scan = message, view
+        return view
+
+    def _off(self) -> NDArray[np.float64] | None:
+        """What the lidar hits where the map shows nothing [m]."""
+        if self._scan is None or self.house is None:
+            return None
+        view = self._scan[1]
+        points = transform_points(view.map_from_laser, scan_points(view.scan))
+        return off_the_map(self.house.floor, points, self._topics.off_map)
+
+    # -- map
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        self._maps.set(message, now())
+        self._has_map.set()
+
+    def _part_maps(self) -> None:
+        while not rospy.is_shutdown():
+            self._has_map.wait(1.0)
+            self._has_map.clear()
+            message = self._maps.take()
+            if message is not None:
+                self._part(message)
+
+    def _part(self, message: OccupancyGrid) -> None:
+        try:
+            house = part_rooms(floor_of(convert.grid_from_msg(message)), self._rooms)
+        except MapError as err:
+            log.error("rooms cannot be told from the map: %s; shares of floor seen are not known", err)
+            return
+        if self.house is None:
+            areas = ", ".join(f"{room.id}: {house.area(room.id):.0f}" for room in self._rooms)
+            log.info("floor of the rooms [m2]: %s", areas)
+            for room_id in house.lost:
+                log.warning("the point of room %d is not on the map's floor: what is seen of it is not known", room_id)
+        self.house = house
+
+
+def _metres(message: Image) -> NDArray[np.float32]:
+    picture = picture_from_msg(message)
+    if picture.encoding not in ("32FC1", "16UC1", "mono16"):
+        raise ImageError(f"pictures are {picture.encoding}, expected depth as 32FC1 or 16UC1")
+    pixels = picture.pixels[:, :, 0]
+    if picture.encoding == "32FC1":
+        return np.asarray(pixels, np.float32)
+    return np.where(pixels > 0, pixels * np.float32(0.001), np.float32(np.nan))

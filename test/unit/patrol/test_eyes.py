@@ -1,0 +1,309 @@
+"""The look around with a map: a robot that glides over a drawn house, a camera that sees people in its view."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import pytest
+from floors import drawn_floor, points, scan_over
+
+from rosbot_patrol.geometry import Pose2D, wrap_angle
+from rosbot_patrol.patrol.coverage import sight_on_map
+from rosbot_patrol.patrol.eyes import Eyes, EyesParams
+from rosbot_patrol.patrol.inputs import Box, Eye, Frame, GoalLink, GoalState, Inputs, Measured, ScanView
+from rosbot_patrol.patrol.judge import Judge, Known
+from rosbot_patrol.patrol.manager import ManagerParams, PatrolManager
+from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.room_regions import part_rooms
+from rosbot_patrol.patrol.viewpoints import ViewpointParams
+
+WIDTH = 1.047
+HOUSE = (
+    "########################",
+    "#......................#",
+    "#......................#",
+    "#......................#",
+    "#......................#",
+    "#......................#",
+    "#########..#############",
+    "#########..#############",
+    "#....#.................#",
+    "#....#.................#",
+    "#....#.................#",
+    "#......................#",
+    "#......................#",
+    "########################",
+)  # the room at the bottom has a corner on the left that its point does not see
+FLOOR = drawn_floor(*HOUSE)
+ROOMS = points((2.0, 4.7), (9.5, 2.0))
+REGIONS = part_rooms(FLOOR, ROOMS)
+
+Place = tuple[float, float]
+
+
+class World:
+    """12.5 steps a second, a picture and a scan at each other one.
+
+    Args:
+        people: gives where people are at a time [s].
+        camera: whether it shows anything.
+    """
+
+    def __init__(
+        self,
+        people: Callable[[float], list[Place]] = lambda now: [],
+        *,
+        params: ManagerParams | None = None,
+        eyes: EyesParams | None = None,
+        judge: Judge | None = None,
+        memory: dict | None = None,
+        camera: bool = True,
+        refused: Callable[[Pose2D], bool] = lambda pose: False,
+    ) -> None:
+        self.views = Eyes(eyes)
+        self.manager = PatrolManager(
+            ROOMS, params, views=self.views, viewpoints=self.views.instead, judge=judge, memory=memory
+        )
+        self.people, self.camera, self.refused = people, camera, refused
+        self.now, self.pose = 100.0, ROOMS.base.pose
+        self.view: ScanView | None = None
+        self.link = GoalLink(is_up=True)
+        self.camera_at = self.now
+        self.triggers: tuple[int, ...] = ()
+        self.goals, self.notices, self.ended, self.reports, self.tracked = [], [], [], [], []
+        self.cancels, self.flat, self.count = 0, False, 0
+
+    def frame(self) -> Frame:
+        sight = sight_on_map(FLOOR, self.pose.x, self.pose.y, 8.0)
+        boxes = []
+        for x, y in self.people(self.now):
+            dx, dy = x - self.pose.x, y - self.pose.y
+            away, bearing = math.hypot(dx, dy), wrap_angle(math.atan2(dy, dx) - self.pose.yaw)
+            seen = sight_reaches(sight, math.atan2(dy, dx), away - 0.2)
+            if abs(bearing) < WIDTH / 2 and away < 7.0 and seen:
+                boxes.append(self.box(x, y, away, bearing))
+        eye = Eye(pose=self.pose, width=WIDTH, columns=640)
+        return Frame(stamp=self.now - 0.05 if boxes else None, boxes=tuple(boxes), eye=eye)
+
+    def box(self, x: float, y: float, away: float, bearing: float) -> Box:
+        middle = 320 - 554 * math.tan(bearing)
+        measured = Measured(x=x, y=y, error=0.15, away=away, top=1.7, height=1.6, width=0.5, is_flat=self.flat)
+        left, right = round(max(middle - 40, 0)), round(min(middle + 40, 640))
+        return Box(label="person", probability=0.9, xmin=left, xmax=right, ymin=20, ymax=300, measured=measured)
+
+    def step(self) -> None:
+        self.count += 1
+        has_picture = self.count % 2 == 0 and self.camera
+        self.camera_at = self.now if has_picture else self.camera_at
+        if self.count % 2 == 0:
+            scan = scan_over(FLOOR, self.pose, self.now, [(x, y, 0.15) for x, y in self.people(self.now)])
+            self.view = ScanView(scan=scan, map_from_laser=self.pose)
+        out = self.manager.step(
+            self.now,
+            Inputs(
+                wall=1.7e9 + self.now,
+                triggers=self.triggers,
+                frames=(self.frame(),) if has_picture else (),
+                yaw=self.pose.yaw,
+                pose=self.pose,
+                link=self.link,
+                detector_at=self.now,
+                camera_at=self.camera_at,
+                scan=self.view,
+                house=REGIONS,
+            ),
+        )
+        self.triggers = ()
+        self.cancels += out.cancel
+        if out.cancel:
+            self.link = dataclasses.replace(self.link, state=GoalState.FAILED)
+        if out.goal:
+            self.goals.append(out.goal.pose)
+            state = GoalState.FAILED if self.refused(out.goal.pose) else GoalState.ACTIVE
+            self.link = GoalLink(is_up=True, tag=out.goal.tag, state=state)
+        if self.link.state is GoalState.ACTIVE:
+            self.glide(self.goals[-1])
+        if out.speed is not None:
+            self.pose = self.pose._replace(yaw=wrap_angle(self.pose.yaw + out.speed * 0.08))
+        self.notices += out.notices
+        self.ended += out.ended
+        self.reports += [out.report] if out.report else []
+        self.now += 0.08
+
+    def glide(self, goal: Pose2D) -> None:
+        """By the straight line, as if there were no walls; a metre a second."""
+        left = math.dist(self.pose[:2], goal[:2])
+        if left < 0.08:
+            self.pose = goal
+            self.link = dataclasses.replace(self.link, state=GoalState.SUCCEEDED)
+            return
+        share = min(0.08 / left, 1.0)
+        x, y = self.pose.x + (goal.x - self.pose.x) * share, self.pose.y + (goal.y - self.pose.y) * share
+        self.pose = Pose2D(x, y, math.atan2(goal.y - self.pose.y, goal.x - self.pose.x))
+
+    def mission(self, room: int = 1, limit: float = 200.0):
+        self.triggers = (room,)
+        return self.until(lambda w: bool(w.ended), limit).ended[-1]
+
+    def until(self, is_so: Callable[[World], bool], limit: float = 200.0) -> World:
+        end = self.now + limit
+        while not is_so(self):
+            self.step()
+            assert self.now < end, self.reports[-1]
+        return self
+
+    @property
+    def phase(self) -> Phase | None:
+        return self.manager.mission.phase if self.manager.mission else None
+
+
+def sight_reaches(sight, bearing: float, away: float) -> bool:
+    return away <= sight.lengths[round((bearing % math.tau) / sight.step) % len(sight.lengths)]
+
+
+def test_a_room_is_looked_at_from_further_viewpoints_until_enough_is_seen() -> None:
+    world = World()
+    mission = world.mission()
+    assert mission.verdict.value == "clear"
+    assert mission.share_seen >= 0.95
+    assert len(mission.views_done) == 2
+    assert mission.views_done[1][0] < 5.0  # where the corner shows
+    assert f"{mission.share_seen:.0%} of its floor seen" in mission.reason
+
+
+def test_a_spin_leaves_it_at_the_turn_and_says_what_it_saw() -> None:
+    world = World(eyes=EyesParams(look_around="spin"))
+    mission = world.mission()
+    assert len(world.goals) == 2
+    assert 0.7 < mission.share_seen < 0.95
+
+
+def test_viewpoints_are_bounded_in_number_and_time() -> None:
+    for bound in (ViewpointParams(viewpoints_most=0), ViewpointParams(viewpoints_time=0.0, viewpoints_most=9)):
+        world = World(eyes=EyesParams(viewpoints=bound))
+        assert len(world.mission().views_done) <= 2
+        assert len(world.goals) <= 3
+
+
+def test_at_a_further_viewpoint_only_what_is_unseen_is_turned_over() -> None:
+    world = World()
+    world.triggers = (1,)
+    world.until(lambda w: len(w.goals) == 2)  # on its way to the second
+    turned, last = 0.0, None
+    while len(world.goals) == 2:
+        world.step()
+        if world.link.state is GoalState.SUCCEEDED:
+            turned += 0.0 if last is None else abs(wrap_angle(world.pose.yaw - last))
+            last = world.pose.yaw
+    assert turned < math.pi
+
+
+def test_too_little_seen_is_unverified() -> None:
+    world = World(eyes=EyesParams(look_around="spin", clear_share=0.97))
+    mission = world.mission()
+    assert mission.verdict.value == "unverified"
+    assert "of its floor could be seen" in mission.reason
+
+
+def test_a_viewpoint_that_cannot_be_reached_is_given_up_for_another() -> None:
+    world = World(refused=lambda goal: 2.6 < goal.x < 4.2 and goal.y < 3.2)
+    mission = world.mission()
+    assert mission.verdict.value == "clear"
+
+
+def test_a_room_whose_point_cannot_be_reached_is_looked_at_from_elsewhere() -> None:
+    world = World(refused=lambda goal: goal[:2] == (9.5, 2.0))
+    mission = world.mission()
+    assert mission.verdict.value == "clear"
+    assert mission.share_seen > 0.9
+
+
+def walks(now: float) -> list[Place]:
+    return [(7.0, 0.8 + abs((0.5 * (now - 100.0)) % 3.0 - 1.5))]
+
+
+def test_a_dead_camera_is_unverified_and_the_lidar_tells_that_something_moved() -> None:
+    world = World(walks, camera=False)
+    mission = world.mission()
+    assert mission.verdict.value == "unverified"
+    assert "the camera" in mission.reason
+    assert "something moved by" in mission.reason
+
+
+def test_a_dead_camera_in_an_empty_room_is_unverified_without_that() -> None:
+    assert "moved" not in World(camera=False).mission().reason
+
+
+def test_somebody_in_the_room_is_confirmed_with_their_place() -> None:
+    world = World(lambda now: [(7.0, 1.0)])
+    mission = world.mission()
+    assert mission.verdict.value == "confirmed"
+    assert mission.place == pytest.approx((7.0, 1.0))
+    assert "at (7.0, 1.0)" in mission.reason
+    assert len(world.notices) == 1
+
+
+def test_two_at_once_are_two_incidents_and_nobody_twice() -> None:
+    world = World(lambda now: [(7.0, 1.0), (11.0, 3.0)])
+    mission = world.mission()
+    assert [notice.mission.id for notice in world.notices] == [mission.id, f"{mission.id}-2"]
+    assert sorted(mission.people) == [(7.0, 1.0), (11.0, 3.0)]
+    assert mission.sightings > 10
+
+
+def test_one_who_was_met_before_a_restart_makes_no_second_notice() -> None:
+    world = World(lambda now: [(7.0, 1.0)])
+    world.triggers = (1,)
+    world.until(lambda w: bool(w.notices))
+    again = World(lambda now: [(7.0, 1.0)], memory=world.manager.snapshot())
+    again.pose = world.pose
+    again.until(lambda w: bool(w.ended))
+    assert again.notices == []
+    assert again.ended[-1].verdict.value == "confirmed"
+
+
+def test_the_robot_stops_for_whom_it_sees_on_its_way_and_goes_on() -> None:
+    world = World(lambda now: [(6.5, 4.5)])  # in the first room, beside the way
+    world.triggers = (1,)
+    world.until(lambda w: w.cancels == 1)
+    assert world.phase is Phase.DRIVING
+    stopped = world.pose
+    for _ in range(50):
+        world.step()
+    assert math.dist(world.pose[:2], stopped[:2]) == 0.0
+    assert abs(wrap_angle(math.atan2(4.5 - stopped.y, 6.5 - stopped.x) - world.pose.yaw)) < 0.15
+    mission = world.until(lambda w: bool(w.ended)).ended[-1]
+    assert mission.arrived is not None
+    assert mission.verdict.value == "confirmed"
+
+
+def test_one_who_walks_in_the_room_is_kept_in_view() -> None:
+    world = World(walks)
+    world.triggers = (1,)
+    world.until(lambda w: w.phase is Phase.LOOKING and bool(w.notices))
+    kept = []
+    for _ in range(75):
+        world.step()
+        x, y = world.people(world.now)[0]
+        kept.append(abs(wrap_angle(math.atan2(y - world.pose.y, x - world.pose.x) - world.pose.yaw)))
+    assert max(kept) < WIDTH / 2
+    world.until(lambda w: bool(w.ended))
+
+
+def test_a_poster_and_a_known_object_are_told_and_do_not_alarm() -> None:
+    world = World(lambda now: [(7.0, 1.0)])
+    world.flat = True
+    mission = world.mission()
+    assert mission.verdict.value == "clear"
+    assert "it is flat" in mission.reason
+    judge = Judge(known=(Known(x=7.0, y=1.0, name="the coat stand"),))
+    assert "the coat stand" in World(lambda now: [(7.0, 1.0)], judge=judge).mission().reason
+
+
+def test_without_a_map_a_turn_is_all_and_no_share_is_told() -> None:
+    views = Eyes()
+    assert views.share() is None
+    assert views.blind() == ""
+    assert views.instead(ROOMS.base, Inputs()) == []
