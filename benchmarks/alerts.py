@@ -3,7 +3,8 @@
 
     benchmarks/alerts.py [--only PART ...] [--json FILE]
 
-Parts: search (100,000 incidents: lists, searches, one record, verification).
+Parts: search (100,000 incidents: lists, searches, one record, verification), chain (sensor to goal, person to disk
+and mail server, with the real nodes).
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import alerts_chain
 import alerts_search
 
-PARTS: dict[str, Callable[[], dict[str, float]]] = {"search": alerts_search.measure}
+PARTS: dict[str, Callable[[], dict[str, float]]] = {"search": alerts_search.measure, "chain": alerts_chain.measure}
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import threading
+import time
 
 from aiosmtpd.smtp import SMTP
 
@@ -11,7 +12,7 @@ class RealSmtp:
     """A real SMTP server; `mails` holds what it was given: sender, recipients, bytes, whether there was a login."""
 
     def __init__(self, port=0, ssl=None, **options):
-        self.mails = []
+        self.mails, self.times = [], []
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -22,6 +23,7 @@ class RealSmtp:
         self._server = asyncio.run_coroutine_threadsafe(made, self._loop).result(10)
 
     async def handle_DATA(self, server, session, envelope):  # aiosmtpd's name
+        self.times.append(time.monotonic())
         self.mails.append((envelope.mail_from, envelope.rcpt_tos, envelope.content, session.authenticated))
         return "250 taken"
 
