@@ -17,6 +17,9 @@ from pathlib import Path
 import pytest
 from ros_processes import free_port
 
+from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.outbox import Outbox
+
 rospy = pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -389,6 +392,7 @@ def test_rosnode_kill_and_respawn_goes_on(house):
         ({"email_to": "a@b.org\nBcc: x@y.org"}, "email_to: has a line break"),
         ({"transport": "smtp"}, "email_to: expected a real address for smtp"),
         ({"spin_speed": "fast"}, "spin_speed: expected a number"),
+        ({"smtp_password": "geheim"}, "smtp_password: a password may not stand on the parameter server"),
     ],
 )
 def test_bad_parameter_is_one_sentence_and_exit_1(house, params, said):
@@ -420,6 +424,34 @@ def test_the_mail_server_comes_back_and_gets_it_once(house):
         assert len(server.mails) == 1
     assert not list((house.folder / "state" / "outbox").glob("*.notice"))
     assert "1 wait from before" in house.log(house.patrol)
+
+
+def test_two_programs_share_an_outbox_and_one_takes_over(house):
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    said = {}
+    end = rospy.Subscriber(
+        "/diagnostics", DiagnosticArray, lambda m: said.update({s.name: s.message for s in m.status})
+    )
+    house.ends.append(end)
+    house.start_move_base()
+    house.start_patrol(notify_verdicts=["clear"])
+    same = {name: str(house.folder / place) for name, place in (("state_dir", "state"), ("maildir", "mail"))}
+    rooms = str(ROOT / "params" / "room_points.yaml")
+    command = ["rosrun", "rosbot_patrol", "sensor_watch"]
+    watch = house._start(command, {"path_to_params": rooms, "transport": "maildir", "mail_interval": 0, **same})
+    what = "sensor_watch: outbox"
+    wait_until(lambda: "/patrolling_node (process" in said.get(what, ""), 20, "who delivers, and different parameters")
+    house.send(1)
+    wait_until(lambda: house.mails(), 40, "the mail of the verdict")
+    assert house.mails()[0]["Subject"] == "rosbot patrol: room 1 (guest room): clear"
+    os.killpg(house.patrol.pid, signal.SIGKILL)
+    wait_until(lambda: said.get(what, "").endswith("/sensor_watch delivers"), 20, "the other")
+    note = Notice(id="from-here", wall=time.time(), kind="incident", subject="s", text="t")
+    Outbox(house.folder / "state" / "outbox").put(note)
+    wait_until(lambda: len(house.mails()) == 2, 10, "the mail that another program put")
+    wait_until(lambda: "notice from-here delivered by maildir" in house.log(watch), 10, "the word about it")
+    assert said["sensor_watch: mail"].startswith("notices go to the Maildir")
 
 
 def test_a_state_folder_that_cannot_be_written_is_said_at_start(house):

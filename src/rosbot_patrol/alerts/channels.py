@@ -72,6 +72,11 @@ class MailParams:
     )
     smtp_ca_file: str = param("", doc="certificates to trust, where the mail server's is none of the system's")
     channels: str = param("", doc="file of further channels (docs/alerts.md); empty: none")
+    notify_verdicts: list[str] = param(
+        [],
+        choices=("clear", "unreachable", "unverified"),
+        doc="missions that end so are told, too; that somebody was seen is told in any case (patrol_robot)",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -36,6 +36,38 @@ def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: 
     )
 
 
+def verdict_notice(incident: Incident) -> Notice:
+    """The notice of how a mission ended in which nobody was seen."""
+    share = "" if incident.share_seen is None else f"{100.0 * incident.share_seen:.0f} % of the floor"
+    rows = [
+        ("Room", f"{incident.room_id} ({incident.room_name})"),
+        ("Time", time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(incident.wall))),
+        ("Verdict", incident.verdict),
+        ("Why", incident.reason),
+        ("Seen", share),
+        ("Incident", incident.id),
+    ]
+    return Notice(
+        id=f"{token(incident.id)}-verdict",
+        wall=incident.wall,
+        kind="verdict",
+        subject=f"rosbot patrol: {incident.room}: {incident.verdict}",
+        text=_VERDICTS.get(incident.verdict, "A patrol is over."),
+        facts=tuple((name, value) for name, value in rows if value),
+        room_id=incident.room_id,
+        room_name=incident.room_name,
+        verdict=incident.verdict,
+        incident=incident.id,
+    )
+
+
+_VERDICTS = {
+    "clear": "The robot looked, and nobody was there.",
+    "unreachable": "The robot could not get into the room, so nobody knows whether somebody is there.",
+    "unverified": "The robot was there but could not be sure: somebody may be there.",
+}
+
+
 def _facts(incident: Incident, picture_note: str) -> tuple[tuple[str, str], ...]:
     when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(_moment(incident)))
     seen = f"{incident.object_class}, probability {incident.probability:.2f}, in {incident.pictures} pictures"

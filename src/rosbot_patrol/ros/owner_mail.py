@@ -10,6 +10,7 @@ import os
 import socket
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,7 @@ class OwnerPost:
         self._wake = threading.Event()
         self._listeners: list[Callable[[Delivery], None]] = []
         self._putting = threading.Lock()
+        self._kept: deque[Notice] = deque()
         self._seen_mtime = 0
         self._housekept = float("-inf")
         self._network = network_mark()
@@ -90,6 +92,16 @@ class OwnerPost:
             raise
         self._wake.set()
 
+    def keep(self, notice: Notice) -> None:
+        """Put a notice as soon as the disk takes it; returns at once."""
+        self._kept.append(notice)
+        self._wake.set()
+
+    @property
+    def notify_verdicts(self) -> tuple[str, ...]:
+        """Verdicts that the owner wants to be told, besides that somebody was seen."""
+        return tuple(self._mail.notify_verdicts)
+
     def start(self) -> None:
         """Begin to deliver, or to wait for the turn."""
         waiting = len(self._outbox.waiting())
@@ -119,6 +131,9 @@ class OwnerPost:
             self._wake.clear()
 
     def _look(self) -> None:
+        while self._kept:
+            self.put(self._kept[0])
+            self._kept.popleft()
         was_delivering = self._postman.is_delivering
         if not self._postman.take_over():
             self._look_on()

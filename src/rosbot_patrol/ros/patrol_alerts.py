@@ -17,7 +17,7 @@ from rosbot_patrol.alerts.incident_store import recall_incident
 from rosbot_patrol.alerts.mail import one_line
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
 from rosbot_patrol.alerts.postman import Delivery
-from rosbot_patrol.alerts.wording import incident_notice
+from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.commands import Notice
@@ -175,6 +175,8 @@ class AlertDesk:
         """Publish the verdict of a mission whose record is on the disk."""
         place = str(self._keeper.state_dir / FOLDER / incident.id)
         self._publish(incident, transport="", location=place, text=incident.sentence, kind=Alert.VERDICT)
+        if incident.verdict in self._post.notify_verdicts:
+            self._post.keep(verdict_notice(incident))
 
     def _publish(self, incident: Incident, *, transport: str, location: str, text: str, kind: str = "") -> None:
         """Tell the topic; without a transport the notice is not delivered yet."""

@@ -4,7 +4,7 @@ from email.policy import SMTP, default
 import pytest
 
 from rosbot_patrol.alerts.mail import build_mail, make_envelope
-from rosbot_patrol.alerts.wording import incident_notice
+from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
 from rosbot_patrol.errors import ParamError
 
 JPEG = b"\xff\xd8\xff\xe0 picture \x00\x01\n.\nFrom \r\n\xff\xd9"
@@ -103,3 +103,12 @@ def test_the_tutorials_placeholder_as_sender_becomes_an_address_that_servers_tak
         read_back(build_mail(incident_notice(make_incident(), None), envelope))["From"]
         == "rosbot patrol <rosbot_patrol@localhost>"
     )
+
+
+def test_a_verdict_without_anybody_is_told_in_its_own_words(make_incident, envelope):
+    notice = verdict_notice(make_incident(verdict="unverified", share_seen=0.42, object_class=""))
+    mail = read_back(build_mail(notice, envelope))
+    assert mail["Subject"] == "rosbot patrol: room 3 (Küche – 台所): unverified"
+    text = mail.get_body(("plain",)).get_content()
+    assert text.startswith("The robot was there but could not be sure")
+    assert "42 % of the floor" in text
