@@ -21,7 +21,7 @@ from rosbot_patrol.campaign.share import true_share
 from rosbot_patrol.campaign.truth import Presence, place_error, presence
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import write_atomic
-from rosbot_patrol.msg import PatrolState
+from rosbot_patrol.msg import Alert, PatrolState
 from rosbot_patrol.ros.campaign_watch import CampaignWatch, Recording
 from rosbot_patrol.ros.house import House, HouseError, Master
 
@@ -146,7 +146,7 @@ def evaluate(
         in_room=there.in_room,
         in_view=there.in_view,
         place_error=place_error(tracks, patrol.people, last, *person) if person else None,
-        share_told=kept.share_seen if kept is not None else None,
+        share_told=kept.share_seen if kept is not None else _share(heard, begin, end),
         share_true=true_share(floor, patrol.room, robot, triggered, triggered + looked) if looked else None,
         times={name: round(value, 2) for name, value in times.items()},
         contacts=contacts,
@@ -175,8 +175,8 @@ def _times(heard: Recording, patrol: Patrol, begin: int | None, end: int | None)
         if at is not None:
             times[name] = at - start
     mission = heard.states[begin].message.mission
-    alert = next((t for t, a in heard.alerts if a.id.startswith(mission) and not a.delivered), None)
-    mailed = next((t for t, a in heard.alerts if a.id.startswith(mission) and a.delivered), None)
+    alert = next((t for t, a in heard.alerts if a.id.startswith(mission) and a.kind == Alert.SEEN), None)
+    mailed = next((t for t, a in heard.alerts if a.id.startswith(mission) and a.kind == Alert.DELIVERED), None)
     if alert is not None:
         times["notice"] = alert - start
     if mailed is not None:
@@ -190,7 +190,7 @@ def _times(heard: Recording, patrol: Patrol, begin: int | None, end: int | None)
 def _from_view(there: Presence, heard: Recording) -> Times:
     if there.first_view is None:
         return {}
-    alert = next((t for t, a in heard.alerts if not a.delivered and t >= there.first_view - 1.0), None)
+    alert = next((t for t, a in heard.alerts if a.kind == Alert.SEEN and t >= there.first_view - 1.0), None)
     return {} if alert is None else {"seen_to_notice": max(alert - there.first_view, 0.0)}
 
 
@@ -204,3 +204,11 @@ def _kept(state_dir: Path, mission: str | None) -> Incident | None:
     except StoreError as err:
         log.error("the incident %s cannot be read: %s", mission, err)
         return None
+
+
+def _share(heard: Recording, begin: int | None, end: int | None) -> float | None:
+    """The share of the floor that the guard has told during a mission, None where it told none."""
+    if begin is None:
+        return None
+    shares = [float(s.message.share_seen) for s in heard.states[begin : None if end is None else end + 1]]
+    return max(shares) if shares and max(shares) >= 0.0 else None
