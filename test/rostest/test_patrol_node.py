@@ -122,7 +122,7 @@ class House:
     def start_move_base(self, **params):
         self.move_base = self._start([sys.executable, str(HERE / "move_base_like.py")], params)
 
-    def start_patrol(self, wait=True, **params):
+    def start_patrol(self, wait=True, inside=(), **params):
         values = {
             "path_to_params": str(ROOT / "params" / "room_points.yaml"),
             "state_dir": str(self.folder / "state"),
@@ -138,7 +138,7 @@ class House:
             **params,
         }
         self.states.clear()
-        command = ["rosrun", "rosbot_patrol", "patrol_robot", "__name:=patrolling_node"]
+        command = [*inside, "rosrun", "rosbot_patrol", "patrol_robot", "__name:=patrolling_node"]
         self.patrol = self._start(command, values)
         if wait:
             wait_until(lambda: self.states and self.states[-1].state == "idle", 25, "on guard")
@@ -452,6 +452,45 @@ def test_two_programs_share_an_outbox_and_one_takes_over(house):
     wait_until(lambda: len(house.mails()) == 2, 10, "the mail that another program put")
     wait_until(lambda: "notice from-here delivered by maildir" in house.log(watch), 10, "the word about it")
     assert said["sensor_watch: mail"].startswith("notices go to the Maildir")
+
+
+def fill(path):
+    with path.open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+
+
+def test_a_full_disk_is_said_the_patrol_goes_on_and_the_mail_comes_when_there_is_room(house):
+    """A file system of 8 MB for the node alone, filled to the last block before the trigger."""
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    state, errors = house.folder / "state", []
+    state.mkdir()
+
+    def hear(message):
+        errors.extend(status.message for status in message.status if status.name == "patrolling_node: outbox")
+
+    house.ends.append(rospy.Subscriber("/diagnostics", DiagnosticArray, hear))
+    mount = f'mount -t tmpfs -o size=8m none {state} && exec "$@"'
+    probe = subprocess.run(["unshare", "-rm", "sh", "-c", mount, "sh", "true"], capture_output=True, check=False)
+    if probe.returncode:
+        pytest.skip(f"no file system of its own can be made here: {probe.stderr.decode()}")
+    house.start_move_base()
+    house.start_patrol(inside=["unshare", "-rm", "sh", "-c", mount, "sh"])
+    inside = Path(f"/proc/{house.patrol.pid}/root{state}")
+    with pytest.raises(OSError, match="No space left"):
+        fill(inside / "filler")
+    house.person = True
+    house.send(2)
+    last = house.wait_for_mission()
+    assert last.last_verdict == "confirmed"
+    assert "cannot be written to" in house.log(house.patrol)
+    assert any("the outbox cannot be written: [Errno 28]" in text for text in errors)
+    assert house.mails() == []
+    (inside / "filler").unlink()
+    wait_until(lambda: house.mails(), 20, "the mail")
+    wait_until(lambda: errors[-1].endswith("delivers"), 10, "that all is well")
+    assert len(house.mails()) == 1
 
 
 def test_a_state_folder_that_cannot_be_written_is_said_at_start(house):

@@ -116,6 +116,12 @@ class Postman:
         """Whether this process is the one that delivers."""
         return self.lock.is_held and bool(self._lanes)
 
+    @property
+    def has_trouble(self) -> bool:
+        """Whether a channel does not take what it should."""
+        with self._guard:
+            return any(lane.down_since is not None for lane in self._lanes.values())
+
     def take_over(self) -> bool:
         """Become the one that delivers, where nobody is. Raises OSError."""
         with self._guard:

@@ -21,18 +21,18 @@ from rosbot_patrol.alerts.channels import MailParams, Surroundings, make_channel
 from rosbot_patrol.alerts.network_state import network_mark
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.postman import ChannelStatus, Delivery, Postman
+from rosbot_patrol.alerts.postman import Delivery, Postman
 from rosbot_patrol.alerts.secrets_on_disk import refuse_secrets
-from rosbot_patrol.alerts.settings_file import Settings, differences, state_of, write_settings
-from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.alerts.settings_file import Settings, write_settings
+from rosbot_patrol.ros.diagnostics import Health
 from rosbot_patrol.ros.node import Worker, ros_home
+from rosbot_patrol.ros.post_health import PostHealth
 
 log = logging.getLogger(__name__)
 
 LOOK = 0.2  # [s] between looks at the folder, in which other programs put
 RETRY = 5.0  # [s] where the disk does not take something
 HOUSEKEEPING = 2.0  # [s]
-OVERDUE = 120.0  # [s] after which a notice that nobody delivers is a fault
 
 
 class OwnerPost:
@@ -45,7 +45,7 @@ class OwnerPost:
     """
 
     def __init__(self, mail: MailParams, state_dir: Path, health: Health) -> None:
-        self._who, self._mail, self._health = rospy.get_name(), mail, health
+        self._who, self._mail = rospy.get_name(), mail
         around = Surroundings(home=ros_home(), environ=os.environ, host=socket.gethostname())
         channels = make_channels(mail, around, prefix=rospy.get_name() + "/")
         self._outbox = Outbox(state_dir / "outbox")
@@ -59,7 +59,7 @@ class OwnerPost:
         self._seen_mtime = 0
         self._housekept = float("-inf")
         self._network = network_mark()
-        self._parts: set[str] = set()
+        self._reporter = PostHealth(self._who, mail, self._postman, health)
 
     @property
     def place(self) -> str:
@@ -88,8 +88,9 @@ class OwnerPost:
             with self._putting:
                 self._outbox.put(notice)
         except OSError as err:
-            self._health.set("outbox", ERROR, f"the outbox cannot be written: {err}")
+            self._reporter.say_trouble(f"the outbox cannot be written: {err}")
             raise
+        self._reporter.trouble = ""
         self._wake.set()
 
     def keep(self, notice: Notice) -> None:
@@ -119,14 +120,17 @@ class OwnerPost:
     # -- the thread that looks
 
     def _supervise(self) -> None:
+        is_unwell = False
         while not rospy.is_shutdown():
             try:
                 self._look()
+                if is_unwell:
+                    is_unwell, self._reporter.trouble = False, ""
                 pause = LOOK
             except OSError as err:
                 log.error("the outbox %s cannot be used: %s", self.place, err)
-                self._health.set("outbox", ERROR, f"the outbox cannot be used: {err}")
-                pause = RETRY
+                self._reporter.say_trouble(f"the outbox cannot be used: {err}")
+                is_unwell, pause = True, RETRY
             self._wake.wait(pause)
             self._wake.clear()
 
@@ -171,45 +175,20 @@ class OwnerPost:
             wake.set()
 
     def _keep_house(self) -> None:
-        if not self._postman.is_delivering:
-            self._report_from_afar()
-            return
+        if self._postman.is_delivering:
+            self._try_again_where_it_helps()
+            self._postman.tell_faults()
+        self._reporter.report()
+
+    def _try_again_where_it_helps(self) -> None:
         flush = self._outbox.folder / "flush"
-        mark = network_mark()
-        if flush.exists() or mark != self._network:
-            self._postman.nudge(all_=flush.exists())
+        is_asked = flush.exists()
+        mark = network_mark() if self._postman.has_trouble else self._network
+        if is_asked or mark != self._network:
+            self._postman.nudge(all_=is_asked)
             flush.unlink(missing_ok=True)
             self._network = mark
             self._wake_all()
-        self._postman.tell_faults()
-        self._postman.write_status()
-        for status in self._postman.statuses():
-            level, text = judge(status)
-            self._set(status.name, level, text, {"waiting": status.waiting, "refused": status.refused})
-        self._report_differences(f"{self._who} delivers")
-
-    def _report_from_afar(self) -> None:
-        holder = self._postman.lock.holder()
-        late = [entry for entry in self._outbox.waiting() if time.time() - entry.wall > OVERDUE]
-        told = state_of(self._outbox.folder) or {}
-        is_stale = time.time() - float(str(told.get("wall", 0.0))) > OVERDUE
-        for part in self._parts - {"outbox"}:
-            self._health.drop(part)
-        self._parts &= {"outbox"}
-        if late and is_stale:
-            self._set(
-                "outbox", ERROR, f"{len(late)} notices wait, and {holder}, which has to deliver them, does nothing"
-            )
-        else:
-            self._report_differences(f"{holder} delivers")
-
-    def _report_differences(self, text: str) -> None:
-        found = differences(self._outbox.folder, self._who, self._mail)
-        self._set("outbox", WARN if found else OK, "; ".join(found) or text)
-
-    def _set(self, part: str, level: int, text: str, values: dict[str, Any] | None = None) -> None:
-        self._parts.add(part)
-        self._health.set(part, level, text, values)
 
     # -- a thread for each channel
 
@@ -233,18 +212,6 @@ class OwnerPost:
     def _tell(self, delivery: Delivery) -> None:
         for listener in self._listeners:
             listener(delivery)
-
-
-def judge(status: ChannelStatus) -> tuple[int, str]:
-    """Level and sentence about a channel for /diagnostics."""
-    if not status.waiting:
-        return OK, f"notices go to {status.describe}"
-    since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(status.since))
-    waits = f"{status.waiting} notices wait" if status.waiting > 1 else "1 notice waits"
-    if not status.error:
-        return OK, f"{waits} for {status.describe}, since {since}"
-    refused = f", {status.refused} of them refused for good" if status.refused else ""
-    return WARN, f"{waits} since {since}{refused}: {status.error}"
 
 
 def refuse_passwords(tree: dict[str, Any]) -> None:

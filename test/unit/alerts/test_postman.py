@@ -3,6 +3,8 @@ import json
 import pytest
 from post import Box, Time, channel, deliver_all, notice, postman
 
+from rosbot_patrol.alerts.mail import make_envelope
+from rosbot_patrol.alerts.maildir import MaildirTransport
 from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.postman import STATUS
 
@@ -279,3 +281,32 @@ def test_a_channel_that_is_gone_from_the_configuration_holds_nothing_up(tmp_path
     without = postman(tmp_path, channel("mail", mail))
     without.take_over()
     assert Outbox(tmp_path).waiting() == []
+
+
+def test_a_crash_between_taking_and_crossing_out_sends_again_with_the_same_id(tmp_path, monkeypatch):
+    """The one window in which a notice comes twice; a Maildir sees that it is there."""
+
+    class Crash(BaseException):
+        pass
+
+    def crash(receipt):
+        raise Crash
+
+    mail, folder = Box(), tmp_path / "mail"
+    disk = MaildirTransport(folder, make_envelope("", ""))
+    for stage in range(3):
+        post = postman(tmp_path / "outbox", channel("mail", mail), channel("disk", disk))
+        post.outbox.put(notice("a"))
+        assert post.take_over()
+        with monkeypatch.context() as patched:
+            if stage < 2:
+                patched.setattr(post.receipts, "add", crash)
+                for name in post.channels:
+                    with pytest.raises(Crash):
+                        post.deliver(name)
+            else:
+                deliver_all(post)
+        post.lock.release()
+    assert mail.ids == ["a", "a", "a"]
+    assert len(list((folder / "new").iterdir())) == 1
+    assert post.outbox.waiting() == []
