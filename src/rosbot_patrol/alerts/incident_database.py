@@ -6,7 +6,9 @@ returns. Tables:
 - links: the chain (rosbot_patrol.alerts.chain). A closed record is the body of its link, byte for byte.
 - incidents: what lists and searches need of each record, and the whole of those that are open.
 - events, files: of open records only; they move into the link's body on closing.
-- incidents_text: an FTS5 index over two columns of incidents.
+- incidents_text: an FTS5 index over two columns of incidents. `late` marks rows that began, by the clock, before one
+  that was there already (the clock had jumped): all others are in the order of time, so that a search finds the rows of
+  a time span without looking at each.
 
 A file of a later version is never written: a new one is begun beside it, with this version in its name. One that makes
 no sense is renamed, never deleted.
@@ -21,7 +23,7 @@ from pathlib import Path
 
 from rosbot_patrol.errors import StoreError
 
-VERSION = 1
+VERSION = 2
 APPLICATION_ID = 0x52504149  # "RPAI"
 NAME = "incidents.sqlite"
 FOLDER = "incidents"
@@ -36,12 +38,14 @@ CREATE TABLE incidents (
   seq INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, wall REAL NOT NULL, room_id INTEGER NOT NULL,
   room_name TEXT NOT NULL, origin TEXT NOT NULL, verdict TEXT NOT NULL, reason TEXT NOT NULL, share REAL,
   object_class TEXT NOT NULL, closed REAL, link INTEGER, bytes INTEGER NOT NULL DEFAULT 0,
-  tags TEXT NOT NULL, words TEXT NOT NULL, record TEXT);
+  tags TEXT NOT NULL, words TEXT NOT NULL, record TEXT, late INTEGER NOT NULL DEFAULT 0);
 CREATE INDEX incidents_wall ON incidents(wall);
 CREATE INDEX incidents_room ON incidents(room_id, wall);
 CREATE INDEX incidents_verdict ON incidents(verdict, wall);
 CREATE INDEX incidents_both ON incidents(room_id, verdict, wall);
 CREATE INDEX incidents_open ON incidents(seq) WHERE closed IS NULL;
+CREATE INDEX incidents_in_order ON incidents(wall) WHERE late = 0;
+CREATE INDEX incidents_late ON incidents(wall) WHERE late = 1;
 CREATE TABLE events (
   n INTEGER PRIMARY KEY, incident TEXT NOT NULL, wall REAL NOT NULL, kind TEXT NOT NULL, text TEXT NOT NULL,
   data TEXT NOT NULL);
@@ -62,6 +66,18 @@ CREATE TRIGGER incidents_changed AFTER UPDATE OF tags, words ON incidents BEGIN
   INSERT INTO incidents_text(rowid, tags, words) VALUES (new.seq, new.tags, new.words); END;
 """
 
+# from version to version: each brings a database to the next one
+_MIGRATIONS = {
+    1: """
+ALTER TABLE incidents ADD COLUMN late INTEGER NOT NULL DEFAULT 0;
+UPDATE incidents SET late = 1 WHERE seq IN (SELECT seq FROM (SELECT seq, wall,
+  max(wall) OVER (ORDER BY seq ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING) AS newest FROM incidents)
+  WHERE wall < newest);
+CREATE INDEX incidents_in_order ON incidents(wall) WHERE late = 0;
+CREATE INDEX incidents_late ON incidents(wall) WHERE late = 1;
+""",
+}
+
 
 def beside(path: Path) -> Path:
     """Where this version keeps its incidents when the file at `path` is a later version's."""
@@ -79,8 +95,12 @@ def database_path(state_dir: Path) -> tuple[Path, int]:
     return (beside(path), version) if version > VERSION else (path, 0)
 
 
-def open_for_reading(path: Path) -> sqlite3.Connection:
+def open_for_reading(path: Path, *, any_version: bool = False) -> sqlite3.Connection:
     """A connection that writes nothing; works beside a program that writes, and on a disk that takes nothing.
+
+    Args:
+        path: of the database.
+        any_version: an older version will do.
 
     Raises:
         StoreError: there is no such file, or it is no database of incidents.
@@ -97,6 +117,10 @@ def open_for_reading(path: Path) -> sqlite3.Connection:
                 raise
             connection = _connect(path, "immutable=1")
             connection.execute("SELECT n FROM links LIMIT 1").fetchone()
+    version = VERSION if any_version else connection.execute("PRAGMA user_version").fetchone()[0]
+    if version < VERSION:
+        connection.close()
+        raise StoreError(path, f"is of version {version}; the patrol brings it up to date when it starts")
     return connection
 
 
@@ -136,11 +160,13 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
             f"BEGIN IMMEDIATE;{_SCHEMA}PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};COMMIT;"
         )
         return
-    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID or version != VERSION:
+    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID or not 1 <= version <= VERSION:
         raise StoreError(path, "is a database, but not one of incidents", is_corrupt=True)
     problem = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
     if problem != "ok":
         raise StoreError(path, f"is damaged: {problem.splitlines()[0]}", is_corrupt=True)
+    for older in range(version, VERSION):
+        connection.executescript(f"BEGIN IMMEDIATE;{_MIGRATIONS[older]}PRAGMA user_version={older + 1};COMMIT;")
 
 
 def _version(path: Path) -> int:

@@ -9,6 +9,9 @@ from pathlib import Path
 from rosbot_patrol.alerts.incident_database import errors_of
 from rosbot_patrol.alerts.incident_rows import clean, room_tag, verdict_tag
 
+_NO_ROW = 1 << 62
+_ORDERED = "FROM incidents INDEXED BY incidents_in_order WHERE late = 0"
+_LATE = "FROM incidents INDEXED BY incidents_late WHERE late = 1"
 _COLUMNS = "seq, id, wall, room_id, room_name, origin, verdict, reason, share, object_class, closed, bytes"
 
 
@@ -76,14 +79,31 @@ def _by_words(connection: sqlite3.Connection, query: Query, words: list[str]) ->
     terms += [] if query.room is None else [f'tags : "{room_tag(query.room)}"']
     terms += [] if query.verdict is None else [f'tags : "{verdict_tag(query.verdict)}"']
     where, values = _time_limits(query)
-    first = 0
-    if query.since is not None:
-        first = connection.execute("SELECT min(seq) FROM incidents WHERE wall >= ?", (query.since,)).fetchone()[0] or 0
+    first, last = _span(connection, query)
     columns = ", ".join(f"i.{name.strip()}" for name in _COLUMNS.split(","))
     more = "".join(f" AND i.{condition}" for condition in where)
     sql = f"""SELECT {columns} FROM incidents_text t CROSS JOIN incidents i ON i.seq = t.rowid
-        WHERE incidents_text MATCH ? AND t.rowid >= ?{more} ORDER BY t.rowid DESC LIMIT ?"""
-    return connection.execute(sql, (" AND ".join(terms), first, *values, query.limit)).fetchall()
+        WHERE incidents_text MATCH ? AND t.rowid BETWEEN ? AND ?{more} ORDER BY t.rowid DESC LIMIT ?"""
+    return connection.execute(sql, (" AND ".join(terms), first, last, *values, query.limit)).fetchall()
+
+
+def _span(connection: sqlite3.Connection, query: Query) -> tuple[int, int]:
+    """First and last row that can lie in the query's time: rows are in the order of time, but for the few late ones."""
+
+    def seq(sql: str, wall: float) -> int | None:
+        row = connection.execute(sql, (wall,)).fetchone()
+        return row[0] if row else None
+
+    first, last = 0, _NO_ROW
+    if query.since is not None:
+        ordered = seq(f"SELECT seq {_ORDERED} AND wall >= ? ORDER BY wall, seq LIMIT 1", query.since)
+        late = seq(f"SELECT min(seq) {_LATE} AND wall >= ?", query.since)
+        first = min(_NO_ROW if n is None else n for n in (ordered, late))
+    if query.until is not None:
+        ordered = seq(f"SELECT seq {_ORDERED} AND wall < ? ORDER BY wall DESC, seq DESC LIMIT 1", query.until)
+        late = seq(f"SELECT max(seq) {_LATE} AND wall < ?", query.until)
+        last = max(ordered or 0, late or 0)
+    return first, last
 
 
 def _time_limits(query: Query) -> tuple[list[str], list[float | int | str]]:
@@ -103,4 +123,5 @@ def _and(where: list[str]) -> str:
 def _words(text: str) -> list[str]:
     """What people typed as terms of FTS5: each word a prefix, nothing in it means anything else."""
     parts = clean(text).split()
-    return ['"' + part.replace('"', '""') + '"*' for part in parts if any(map(str.isalnum, part))]
+    words = [part for part in parts if any(map(str.isalnum, part))]
+    return ['"' + word.replace('"', '""') + ('"' if len(word) == 1 and word.isascii() else '"*') for word in words]

@@ -36,7 +36,9 @@ def append_link(
 
 def insert_incident(connection: sqlite3.Connection, incident: Incident) -> None:
     """A row for an open record, where there is none of its id."""
-    values = {**columns_of(incident), "record": chain.canonical(_without_lists(incident))}
+    newest = connection.execute("SELECT max(wall) FROM incidents").fetchone()[0]
+    is_late = newest is not None and incident.wall < newest
+    values = {**columns_of(incident), "record": chain.canonical(_without_lists(incident)), "late": int(is_late)}
     names = ", ".join(values)
     marks = ", ".join(f":{name}" for name in values)
     connection.execute(f"INSERT OR IGNORE INTO incidents ({names}) VALUES ({marks})", values)

@@ -111,7 +111,7 @@ def _copy(path: Path, fresh: Path, wall: float, begun: dict[str, Any]) -> int:
 
 def _copy_records(path: Path, new: sqlite3.Connection, wall: float) -> int:
     try:
-        old = open_for_reading(path)
+        old = open_for_reading(path, any_version=True)
     except StoreError:
         return 0  # not even its first page makes sense
     copied = 0

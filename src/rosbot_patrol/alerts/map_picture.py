@@ -78,7 +78,7 @@ def draw_map(view: MapView, marks: Marks) -> bytes:
     _Pen(view, scale, image).draw(marks)
     small = image.resize((max(image.width // _FINE, 1), max(image.height // _FINE, 1)), Image.Resampling.LANCZOS)
     out = io.BytesIO()
-    small.quantize(64).save(out, "PNG", optimize=True)
+    small.save(out, "PNG", optimize=True)
     return out.getvalue()
 
 

@@ -161,16 +161,19 @@ class IncidentKeeper:
 
     def _run(self) -> None:
         while not rospy.is_shutdown():
-            try:
-                pause = self._work()
-            except StoreError as err:
-                pause = self._trouble(err)
-            except Exception:
-                log.error("the keeping of incidents stumbled, and goes on", exc_info=True)
-                self._forget_store()
-                pause = DISK_RETRY
-            self._wake.wait(pause)
+            self._wake.wait(self.step())
             self._wake.clear()
+
+    def step(self) -> float:
+        """Write what there is, whatever the disk says; returns how long to wait for the next step [s]."""
+        try:
+            return self._work()
+        except StoreError as err:
+            return self._trouble(err)
+        except Exception:  # records have to outlive whatever one of them does
+            log.error("the keeping of incidents stumbled, and goes on", exc_info=True)
+            self._forget_store()
+            return DISK_RETRY
 
     def _work(self) -> float:
         """Write what there is; returns how long to wait for more [s]. Raises StoreError."""

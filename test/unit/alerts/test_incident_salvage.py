@@ -88,19 +88,35 @@ def test_a_later_versions_database_is_left_as_it_is(quick_disk, make_incident):
     fill(quick_disk, make_incident)
     path = quick_disk / "incidents.sqlite"
     with sqlite3.connect(path) as later:
-        later.execute("PRAGMA user_version=2")
+        later.execute("PRAGMA user_version=9")
         later.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     before = path.read_bytes()
     for _ in range(2):
         store, said = open_store(quick_disk, wall=WALL)
-        assert "is of version 2" in said[0]
-        assert "incidents.v1.sqlite beside it" in said[0]
+        assert "is of version 9" in said[0]
+        assert "incidents.v2.sqlite beside it" in said[0]
         assert repair(store, wall=WALL) == []
         store.close_database()
     assert path.read_bytes() == before
     assert (quick_disk / "incidents" / "m000" / "a.jpg").exists()
     with IncidentStore(quick_disk, read_only=True) as store:
         assert verify(store).records == 0
+
+
+def test_a_database_of_the_first_version_is_brought_up_to_date(quick_disk, make_incident):
+    with IncidentStore(quick_disk, wall=1.0) as store:
+        for i, wall in enumerate((10.0, 30.0, 20.0, 40.0)):
+            store.begin(make_incident(id=f"m{i}", wall=wall))
+            store.close(f"m{i}", wall=wall)
+        for statement in ("DROP INDEX incidents_late", "DROP INDEX incidents_in_order"):
+            store.connection.execute(statement)
+        store.connection.execute("ALTER TABLE incidents DROP COLUMN late")
+        store.connection.execute("PRAGMA user_version=1")
+    store, said = open_store(quick_disk, wall=WALL)
+    assert said == []
+    rows = store.connection.execute("SELECT late FROM incidents ORDER BY seq").fetchall()
+    assert [row["late"] for row in rows] == [0, 0, 1, 0]
+    assert verify(store).records == 4
 
 
 def test_incidents_of_before_there_was_a_database_are_taken_over(quick_disk):
