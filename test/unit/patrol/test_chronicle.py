@@ -82,7 +82,7 @@ def test_somebody_seen_then_the_verdict_then_the_end(patrol):
     found = mission(verdict=Verdict.CONFIRMED, reason="a person", sightings=1, place=(3.0, 4.0), share_seen=0.5)
     seen = Confirmation(label="person", probability=0.9, stamp=101.5, boxes=(), pictures=3)
     notice = Notice(mission=dataclasses.replace(found), seen=seen, phase=Phase.LOOKING, pose=Pose2D(1.0, 2.0, 0.5))
-    verdict, sighting = patrol.step(found, notice=notice)
+    verdict, sighting = patrol.step(found, notices=(notice,))
     assert verdict.changes["verdict"] == "confirmed"
     assert verdict.events[0].text == "confirmed: a person"
     assert sighting.changes["object_class"] == "person"
