@@ -17,12 +17,15 @@ class DeliveryError(AlertError):
     Args:
         problem: what happened, and where.
         permanent: it is this notice's fault: others may pass.
+        answered: the other side was there and did not want it now: it may be this notice's fault after all.
         delay: that the other side asked for [s].
     """
 
-    def __init__(self, problem: str, *, permanent: bool = False, delay: float | None = None) -> None:
+    def __init__(
+        self, problem: str, *, permanent: bool = False, answered: bool = False, delay: float | None = None
+    ) -> None:
         super().__init__(problem)
-        self.permanent, self.delay = permanent, delay
+        self.permanent, self.answered, self.delay = permanent, answered, delay
 
 
 class Transport(Protocol):

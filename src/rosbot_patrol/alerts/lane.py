@@ -1,7 +1,8 @@
 """One channel's queue: what leaves when. Order is kept, nothing is dropped.
 
 - A channel that is down is tried ever more seldom, with jitter, up to a quarter of an hour; all wait for the oldest.
-- A notice that the channel refuses for good lets the others pass and is tried again rarely.
+- A notice that the channel refuses for good lets the others pass and is tried again rarely. So does one that it did not
+  want "now" again and again, once it is seen to take the next one.
 - Between two messages lies `interval`. What is not urgent gathers meanwhile and leaves as one digest. An urgent notice
   (an intruder) is never merged, and waits for no interval but that of the urgent one before it: what stands in front of
   it leaves at once.
@@ -17,6 +18,7 @@ from rosbot_patrol.alerts.outbox import Waiting
 
 DIGEST_FROM = 3  # so many that are not urgent become one message
 DIGEST_MOST = 500
+DOUBTFUL = 6  # so many times not wanted, though the other side was there
 RARELY = (900.0, 21600.0)  # first and longest pause for a notice that was refused [s]
 
 
@@ -57,6 +59,7 @@ class Lane:
         self._queue: list[Waiting] = []
         self._refused: dict[str, _Refusal] = {}
         self._alone: set[str] = set()
+        self._unwanted: dict[str, int] = {}
         self._last = self._last_urgent = last
         self._failures = 0
         self._blocked_until = self._last_try = float("-inf")
@@ -82,6 +85,7 @@ class Lane:
         ids = {entry.id for entry in self._queue}
         self._refused = {name: state for name, state in self._refused.items() if name in ids}
         self._alone &= ids
+        self._unwanted = {name: times for name, times in self._unwanted.items() if name in ids}
 
     def due(self, now: float) -> list[Waiting]:
         """What to send now as one message: nothing, one notice, or several for a digest."""
@@ -90,6 +94,8 @@ class Lane:
         open_ = [e for e in self._queue if e.id not in self._refused or self._refused[e.id].due <= now]
         if not open_:
             return []
+        if len(open_) > 1 and self._is_doubtful(open_[0]) and self._failures % 2:
+            return open_[1:2]  # does it take any?
         may_urgent = now >= self._last_urgent + self._pace.interval
         if open_[0].is_urgent:
             return open_[:1] if may_urgent else []
@@ -110,6 +116,11 @@ class Lane:
 
     def delivered(self, batch: Sequence[Waiting], now: float) -> None:
         """A message was taken."""
+        for entry in self._queue:
+            if entry.id == batch[0].id:
+                break
+            if self._is_doubtful(entry):  # it took a younger one: once more, and then rarely
+                self._refused.setdefault(entry.id, _Refusal(due=now, error=self.error))
         ids = {entry.id for entry in batch}
         self._queue = [entry for entry in self._queue if entry.id not in ids]
         for name in ids:
@@ -120,7 +131,14 @@ class Lane:
         self._is_up()
 
     def failed(
-        self, batch: Sequence[Waiting], now: float, error: str, *, permanent: bool = False, delay: float | None = None
+        self,
+        batch: Sequence[Waiting],
+        now: float,
+        error: str,
+        *,
+        permanent: bool = False,
+        answered: bool = False,
+        delay: float | None = None,
     ) -> float:
         """A message was not taken; returns how long it is put off [s].
 
@@ -129,10 +147,15 @@ class Lane:
             now: time [s].
             error: why.
             permanent: the fault is this message's, the others may pass.
+            answered: the other side was there and did not want it now.
             delay: that the other side asked for [s].
         """
         self._last_try = now
         self.error = error
+        if answered:
+            for entry in batch:
+                self._unwanted[entry.id] = self._unwanted.get(entry.id, 0) + 1
+            permanent = permanent or any(entry.id in self._refused for entry in batch)
         if permanent:
             self._is_up(error)
             return self._refuse(batch, now, error)
@@ -165,6 +188,9 @@ class Lane:
                 break
             run.append(entry)
         return run[:DIGEST_MOST] if len(run) >= DIGEST_FROM else list(open_[:1])
+
+    def _is_doubtful(self, entry: Waiting) -> bool:
+        return self._unwanted.get(entry.id, 0) >= DOUBTFUL and entry.id not in self._refused
 
     def _refuse(self, batch: Sequence[Waiting], now: float, error: str) -> float:
         if len(batch) > 1:  # one of them is to blame: each by itself, then

@@ -175,7 +175,14 @@ class Postman:
             where = _send(channel, notice)
         except DeliveryError as err:
             with self._guard:
-                put_off = lane.failed(batch, self._clocks.now(), str(err), permanent=err.permanent, delay=err.delay)
+                put_off = lane.failed(
+                    batch,
+                    self._clocks.now(),
+                    str(err),
+                    permanent=err.permanent,
+                    answered=err.answered,
+                    delay=err.delay,
+                )
             rest = " for good; it stays in" if err.permanent else "; it waits in"
             text = (
                 f"{_told(batch)} not taken by '{name}'{rest} {self.outbox.folder}, next try in {put_off:.0f} s: {err}"

@@ -62,13 +62,14 @@ class SmtpTransport:
         except smtplib.SMTPRecipientsRefused as err:
             code, text = next(iter(err.recipients.values()))
             raise DeliveryError(
-                f"{self._where} refused every recipient: {_said(code, text)}", permanent=code >= 500
+                f"{self._where} refused every recipient: {_said(code, text)}", permanent=code >= 500, answered=True
             ) from err
         except smtplib.SMTPAuthenticationError as err:
             raise DeliveryError(f"{self._where} refused the login: {_said(err.smtp_code, err.smtp_error)}") from err
         except (smtplib.SMTPSenderRefused, smtplib.SMTPDataError) as err:
             said = _said(err.smtp_code, err.smtp_error)
-            raise DeliveryError(f"{self._where} refused the mail: {said}", permanent=err.smtp_code >= 500) from err
+            permanent = err.smtp_code >= 500
+            raise DeliveryError(f"{self._where} refused the mail: {said}", permanent=permanent, answered=True) from err
         except (OSError, smtplib.SMTPException, ValueError) as err:
             problem = explain(err, self._where, self._server.timeout)
             raise DeliveryError(f"the mail server {self._where} cannot be used: {problem}") from err

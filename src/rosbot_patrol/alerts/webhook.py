@@ -103,7 +103,10 @@ class WebhookTransport:
         if 300 <= status < 400:
             raise DeliveryError(f"{self.describe()} answered {answer}: redirects are not followed, name the final url")
         raise DeliveryError(
-            f"{self.describe()} answered {answer}", permanent=status in _THIS_NOTICES_FAULT, delay=retry_after
+            f"{self.describe()} answered {answer}",
+            permanent=status in _THIS_NOTICES_FAULT,
+            answered=status >= 500,
+            delay=retry_after,
         )
 
     def _post(self, notice_id: str, body: bytes) -> tuple[int, str, str, float | None]:

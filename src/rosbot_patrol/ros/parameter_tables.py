@@ -7,7 +7,7 @@ import sys
 import typing
 from pathlib import Path
 
-from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.channels import SPECS, MailParams
 from rosbot_patrol.alerts.evidence import EvidenceParams
 from rosbot_patrol.alerts.retention import RetentionParams
 from rosbot_patrol.amcl.parameters import AmclParams
@@ -155,6 +155,9 @@ def document() -> str:
                     place = namespace if namespace.startswith("/") else f"~{namespace}"
                     lines += ["", *([f"`{place}`", ""] if namespace else []), rows]
     lines += ["", "## file of the sensors", "", "`sensors[]`", "", table(SensorSpec)]
+    lines += ["", "## file of the channels"]
+    for kind, spec in sorted(SPECS.items()):
+        lines += ["", f"`channels/NAME/` with `type: {kind}`", "", table(spec)]
     lines += ["", "## scenario file"]
     for place, cls in SCENARIO:
         lines += ["", *([f"`{place}`", ""] if place else []), table(cls)]

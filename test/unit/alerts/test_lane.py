@@ -131,3 +131,45 @@ def test_a_digest_that_is_refused_is_taken_apart():
 
 def test_nothing_to_do_is_no_time():
     assert lane().wait(5.0) is None
+
+
+def serve(made, now, wants, patience=1000.0):
+    """Try what is due until nothing is; returns what was taken, and when all is quiet."""
+    taken = []
+    for _ in range(200):
+        batch = made.due(now)
+        if not batch:
+            wait = made.wait(now)
+            if wait is None or wait > patience:
+                break
+            now += wait
+        elif all(wants(entry.id, now) for entry in batch):
+            taken += [entry.id for entry in batch]
+            made.delivered(batch, now)
+        else:
+            made.failed(batch, now, "500 no", answered=True)
+    return taken, now
+
+
+def test_one_that_is_never_wanted_does_not_hold_up_the_others_for_ever():
+    made = lane("bad", "b", "c", first_delay=1.0)
+    taken, now = serve(made, 0.0, lambda name, _: name != "bad", patience=800.0)
+    assert taken == ["b", "c"]
+    assert now < 200.0
+    assert [entry.id for entry, _ in made.refused] == ["bad"]
+
+
+def test_a_server_that_wants_nothing_for_an_hour_gets_all_then():
+    made = lane("a", "b", "c", first_delay=5.0)
+    taken, now = serve(made, 0.0, lambda _, now: now >= 3600.0)
+    assert sorted(taken) == ["a", "b", "c"]
+    assert taken.index("a") <= 1
+    assert now < 3600.0 + 900.0
+
+
+def test_a_server_that_is_not_there_never_changes_the_order():
+    made, now = lane("a", "b", first_delay=1.0), 0.0
+    for _ in range(20):
+        assert made.due(now)[0].id == "a"
+        now += made.failed(made.due(now), now, "refused")
+    assert drain(made, now) == ["a", "b"]
