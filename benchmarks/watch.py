@@ -53,7 +53,7 @@ def make_engine(world: World) -> Engine:
 def is_inside(engine: Engine, place: Pose2D) -> bool:
     """Whether a robot can stand and turn there, with walls about it."""
     try:
-        engine.set_pose(place)
+        engine.carry(place)
     except WorldError:
         return False
     ranges = engine.scan().ranges
@@ -74,7 +74,7 @@ def draw_places(engine: Engine, rng: np.random.Generator, count: int) -> Iterato
 
 def place_person(engine: Engine, place: Pose2D, rng: np.random.Generator, looks: list[str]) -> bool:
     """A person whom the robot could see from there; False where chance found no spot."""
-    engine.set_pose(place)
+    engine.carry(place)
     scan = engine.scan()
     for _ in range(40):
         beam = int(rng.integers(len(scan.ranges)))
@@ -100,7 +100,7 @@ def turn(engine: Engine, detector: DarknetDetector, place: Pose2D) -> list[Frame
     """Boxes of a full turn, the first half metre of arc repeated."""
     frames = []
     for i in range(round(360.0 / STEP_DEG) + 6):
-        engine.set_pose(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
+        engine.carry(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
         engine.step()
         colour = engine.picture(depth=False).colour
         coded = cv2.imencode(".jpg", colour[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])[1]
@@ -120,8 +120,8 @@ def judge(params: WatchParams, frames: list[Frame]) -> str:
     for frame in frames:
         assert frame.stamp is not None
         found = watch.add(frame.stamp, frame)
-        if found is not None:
-            return found.label
+        if found:
+            return found[0].label
     return ""
 
 
@@ -190,7 +190,7 @@ def main() -> None:
 def save(engine: Engine, place: Pose2D, frames: list[Frame], folder: Path) -> None:
     """The picture with the surest false box of a turn."""
     i = max(range(len(frames)), key=lambda k: max((b.probability for b in frames[k].boxes), default=0.0))
-    engine.set_pose(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
+    engine.carry(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
     colour = engine.picture(depth=False).colour[:, :, ::-1].copy()
     for box in frames[i].boxes:
         cv2.rectangle(colour, (box.xmin, box.ymin), (box.xmax, box.ymax), (0, 0, 255), 2)
