@@ -24,6 +24,7 @@ log = logging.getLogger(__name__)
 
 VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
+_SAME_DOUBT = 1.5  # boxes too far off to be measured that are nearer are of one thing [m]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -40,6 +41,14 @@ class EyesParams:
     coverage: CoverageParams = CoverageParams()
     viewpoints: ViewpointParams = ViewpointParams()
     witness: WitnessParams = WitnessParams()
+
+
+@dataclass
+class _Doubt:
+    x: float
+    y: float
+    pictures: int = 1
+    is_visited: bool = False
 
 
 class Eyes:
@@ -62,13 +71,14 @@ class Eyes:
         self._now = 0.0
         self._views = 0
         self._tried: list[tuple[float, float]] = []
+        self._doubts: list[_Doubt] = []
 
     # -- Views
 
     def start(self, mission: Mission) -> None:
         """Begin with a room; what earlier viewpoints showed before a restart is taken from the map."""
         self._mission, self.coverage, self._began = mission, None, None
-        self._views, self._tried, self._has_eye = 0, [], False
+        self._views, self._tried, self._doubts, self._has_eye = 0, [], [], False
         self._witness.start()
 
     def see(self, now: float, inputs: Inputs) -> None:
@@ -87,6 +97,9 @@ class Eyes:
             self._has_eye, self._width = True, frame.eye.width
             sight = sight or self._sight(inputs, frame.eye)
             self.coverage.look(frame.eye, sight)
+            for box in frame.boxes:
+                if box.doubt is not None:
+                    self._doubt(*box.doubt)
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """The best further viewpoint within the bounds."""
@@ -94,13 +107,23 @@ class Eyes:
         self._began = self._now if self._began is None else self._began
         if p.look_around == "spin" or mission is None or self.coverage is None or inputs.pose is None:
             return None
-        if not self._has_eye or self.coverage.share >= p.viewpoints.coverage_goal:
+        if not self._has_eye:
+            return None
+        is_enough = self.coverage.share >= p.viewpoints.coverage_goal and not self._open_doubts()
+        if is_enough:
             return None
         late = self._now - self._began > p.viewpoints.viewpoints_time
         if late or self._views >= p.viewpoints.viewpoints_most:
             log.info("%s: no further viewpoint, %s", mission.room.title, "time is up" if late else "enough were tried")
             return None
         assert self._planner is not None
+        nearer = self._nearer(inputs)
+        if nearer is not None:
+            self._views += 1
+            log.info("%s: something like a person is to be looked at from near", mission.room.title)
+            return nearer
+        if self.coverage.share >= p.viewpoints.coverage_goal:
+            return None
         found = self._planner.next(
             inputs.pose,
             self._room(mission.room),
@@ -137,6 +160,9 @@ class Eyes:
 
     def blind(self) -> str:
         """Why what was seen is too little."""
+        doubts = self._open_doubts()
+        if doubts:
+            return f"something like a person at about ({doubts[0].x:.1f}, {doubts[0].y:.1f}) was not seen from near"
         share = self.share()
         if share is None or share >= self.params.clear_share:
             return ""
@@ -162,6 +188,40 @@ class Eyes:
             found.append(view.pose)
             tried.append((view.pose.x, view.pose.y))
         return found
+
+    # -- doubts
+
+    def _doubt(self, x: float, y: float) -> None:
+        """Something like a person was seen at about a place, too far off to be measured."""
+        for doubt in self._doubts:
+            if math.hypot(doubt.x - x, doubt.y - y) < _SAME_DOUBT:
+                doubt.pictures += 1
+                return
+        self._doubts.append(_Doubt(x, y))
+
+    def _open_doubts(self) -> list[_Doubt]:
+        """Those of the mission's room, seen in some pictures, that were not looked at from near."""
+        house, mission = self._house, self._mission
+        if house is None or mission is None:
+            return []
+        return [
+            doubt
+            for doubt in self._doubts
+            if not doubt.is_visited
+            and doubt.pictures >= self.params.coverage.seen_in
+            and house.room_at(doubt.x, doubt.y) == mission.room.id
+        ]
+
+    def _nearer(self, inputs: Inputs) -> Viewpoint | None:
+        """A viewpoint for the first doubt that has one."""
+        assert self._planner is not None
+        assert inputs.pose is not None
+        for doubt in self._open_doubts():
+            found = self._planner.near(inputs.pose, doubt.x, doubt.y, stands=self._stands(inputs))
+            if found is not None:
+                doubt.is_visited = True
+                return found
+        return None
 
     # -- parts
 

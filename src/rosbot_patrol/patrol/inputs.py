@@ -74,7 +74,12 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True)
 class Box:
-    """One object in one picture: class, probability, corners [px], and its place where that is known."""
+    """One object in one picture: class, probability, corners [px], and its place where that is known.
+
+    Attributes:
+        measured: place and size.
+        doubt: where it may be, x, y in map [m], where it is too far off to be measured, but could be from near.
+    """
 
     label: str
     probability: float
@@ -83,6 +88,7 @@ class Box:
     xmax: int
     ymax: int
     measured: Measured | None = None
+    doubt: tuple[float, float] | None = None
 
     @property
     def width(self) -> int:

@@ -60,7 +60,7 @@ class Judge:
         """Why a box is no intruder, "" where it may be one."""
         m = box.measured
         if m is None:
-            return ""
+            return "it is too far off to be measured" if box.doubt else ""
         return self._known(box, m) or self._outside(m) or self._picture(m) or self._size(box, m)
 
     def _known(self, box: Box, m: Measured) -> str:

@@ -139,8 +139,13 @@ class Narrator:
             return [f"Not yet on guard: {told.why}."]
         if "waiting" in told.why and "waiting" not in last.why and "last pictures" not in told.why:
             return [f"{told.why[:1].upper()}{told.why[1:]}."]
+        if "keeping the camera" in told.why and "keeping the camera" not in last.why:
+            return ["Somebody is in view: the camera is kept on them."]
+        if "driving to a further viewpoint" in told.why and "driving to a further viewpoint" not in last.why:
+            return [f"On to a further viewpoint in {told.room}."]
         if "turning" in told.why and "turning" not in last.why:
-            return [f"Turning once to look around in {told.room}."]
+            once = "Turning once" if "of 360" in told.why else "Turning"
+            return [f"{once} to look around in {told.room}."]
         return []
 
     @staticmethod

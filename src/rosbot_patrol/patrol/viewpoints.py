@@ -112,6 +112,39 @@ class ViewpointPlanner:
         """Another place to look into a room from whose own point cannot be reached."""
         return self.next(start, room, room, width=width, tried=tried)
 
+    def near(
+        self, start: Pose2D, x: float, y: float, *, stands: Mask | None = None, nearest: float = 1.5, most: float = 3.5
+    ) -> Viewpoint | None:
+        """A place from which another one is looked at from near, on a free line; None where there is none.
+
+        Args:
+            start: where the robot is, in map.
+            x: of what is to be looked at [m].
+            y: of what is to be looked at [m].
+            stands: as for `next`.
+            nearest: no place nearer than that [m].
+            most: none farther [m].
+        """
+        floor, ways = self.floor, self.ways(start, stands)
+        sight = sight_on_map(floor, *self._before(x, y), most)
+        there = np.ones(floor.info.shape, bool)
+        bearings, distances, _ = visible(floor, there, sight, self._coverage)
+        open_ = (sight.reaches(bearings, distances) & (distances >= nearest) & (distances <= most)).reshape(there.shape)
+        good = open_ & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
+        if stands is not None:
+            good &= ~stands
+        if not good.any():
+            return None
+        iy, ix = np.unravel_index(int(np.where(good, ways, _FAR).argmin()), good.shape)
+        at = floor.info.centre_of(int(ix), int(iy))
+        yaw = math.atan2(y - at[1], x - at[0])
+        return Viewpoint(pose=Pose2D(*at, yaw), turn=0.0, gain=0.0, way=float(ways[iy, ix]))
+
+    def _before(self, x: float, y: float) -> tuple[float, float]:
+        """The floor before a wall on which something hangs."""
+        cell = self.floor.nearest(self.floor.clearance >= 0.15, x, y)
+        return (x, y) if cell is None else self.floor.info.centre_of(*cell)
+
     def arc(self, x: float, y: float, unseen: Mask, width: float) -> tuple[float, float]:
         """Heading at which to begin [rad] and how far to turn left [rad], to have all unseen floor in view from there.
 

@@ -94,7 +94,10 @@ class Watch:
             if stamp <= self._newest or now - stamp > self.params.max_age:
                 return ()
             self._newest = stamp
-        view = _View(arrived=now, stamp=stamp, boxes=tuple(box for box in frame.boxes if self._is_plausible(box)))
+        boxes = [box for box in frame.boxes if self._is_likely(box)]
+        refusals = {box: self.judge.refusal(box) for box in boxes}
+        self.refusals.update(why for why in refusals.values() if why)
+        view = _View(arrived=now, stamp=stamp, boxes=tuple(box for box in boxes if not refusals[box]))
         self._views.append(view)
         while now - self._views[0].arrived > self.params.max_age:
             self._views.popleft()
@@ -110,23 +113,19 @@ class Watch:
 
     def plausible(self, frame: Frame) -> list[Box]:
         """Boxes of a picture that may show an intruder, the surest first."""
-        return sorted((box for box in frame.boxes if self._is_plausible(box)), key=_score, reverse=True)
+        likely = (box for box in frame.boxes if self._is_likely(box) and not self.judge.refusal(box))
+        return sorted(likely, key=_score, reverse=True)
 
-    def lately(self, now: float, recent: float = 1.0) -> int:
-        """How many of the pictures that came lately show something that may become an intruder."""
-        return sum(bool(view.boxes) and abs(now - view.arrived) <= recent for view in self._views)
+    def lately(self, now: float, recent: float = 3.0) -> int:
+        """How many of the last three pictures, if they came lately, show something that may become an intruder."""
+        return sum(bool(view.boxes) and abs(now - view.arrived) <= recent for view in list(self._views)[-3:])
 
-    def _is_plausible(self, box: Box) -> bool:
+    def _is_likely(self, box: Box) -> bool:
         if box.label not in self._classes or not 0.0 < box.probability <= 1.0:
             return False
         if box.width <= 0 or box.height < self.params.min_height:
             return False
-        if not self.params.min_aspect <= box.height / box.width <= self.params.max_aspect:
-            return False
-        refusal = self.judge.refusal(box)
-        if refusal:
-            self.refusals[refusal] += 1
-        return not refusal
+        return self.params.min_aspect <= box.height / box.width <= self.params.max_aspect
 
     def _is_same(self, box: Box, label: str, measured: Measured | None) -> bool:
         if box.label != label:

@@ -8,6 +8,7 @@ back for a quarter of a second at most; those that came before the first depth p
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -22,10 +23,10 @@ from sensor_msgs.msg import CameraInfo, Image
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.errors import ImageError, MapError, TransformError
-from rosbot_patrol.geometry import Pose2D, transform_points
+from rosbot_patrol.geometry import Pose2D, transform_points, wrap_angles
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.floor import floor_of
-from rosbot_patrol.patrol.inputs import Eye, Frame, ScanView
+from rosbot_patrol.patrol.inputs import Box, Eye, Frame, ScanView
 from rosbot_patrol.patrol.person_place import Depth, Lens, View, measure
 from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.rooms import Rooms
@@ -45,6 +46,7 @@ _SAME = 0.06  # a depth picture of that time is of the same moment [s]
 _HELD = 0.25  # so long a picture waits for its depth, wall time [s]
 _STARTING = 1.0  # so long after it was asked for depth may need to come, wall time [s]
 _KEEP = 8.0  # so long after the last box depth is listened to, wall time [s]
+_BEFORE = 0.2  # so far before a wall is what hangs on it, or sits behind what the lidar hits [m]
 _GIVE_UP = 60.0  # so long a depth camera that is silent is not asked again, wall time [s]
 
 
@@ -59,6 +61,13 @@ class EyesTopics:
     depth_info_topic: str = param(
         "/camera/depth/camera_info", doc="lens of the depth camera; silent: the colour camera's"
     )
+    depth_reach: float = param(
+        4.5,
+        unit="m",
+        lo=0.0,
+        doc="what is farther than depth tells, and stands on nothing new, is looked at from nearer",
+    )
+    view_range: float = param(8.0, unit="m", lo=0.5, doc="so far off is what no beam comes back from")
     floor_height: float = param(
         -0.04, unit="m", doc="height of the floor in the map's frame: base_link is at the axles"
     )
@@ -124,6 +133,11 @@ class DepthRing:
             with self._lock:
                 self._subscriber = None
                 self._ring.clear()
+
+    @property
+    def is_on(self) -> bool:
+        """Whether depth is listened to."""
+        return self._subscriber is not None
 
     def may_come(self, stamp: float) -> bool:
         """Whether the depth of a moment [s] is still to be waited for."""
@@ -244,8 +258,24 @@ class PatrolEyes:
         if depth is None and self.depth.may_come(stamp) and wall - pending.came < _HELD:
             return None
         off = self._off()
-        boxes = tuple(measure(box, view, depth, off) if box.label in self._classes else box for box in frame.boxes)
+        boxes = tuple(
+            self._doubted(measure(box, view, depth, off), frame.eye) if box.label in self._classes else box
+            for box in frame.boxes
+        )
         return replace(frame, boxes=boxes, counts=depth is not None or not self.depth.is_flowing(stamp))
+
+    def _doubted(self, box: Box, eye: Eye | None) -> Box:
+        """A box whose place nothing tells, though depth would from near: nothing stands there that the map lacks."""
+        if box.measured is not None or eye is None or self._scan is None or self.house is None or not self.depth.is_on:
+            return box
+        scan, pose = self._scan[1].scan, self._scan[1].map_from_laser
+        bearing = eye.pose.yaw + eye.bearing((box.xmin + box.xmax) / 2.0)
+        beam = int(np.abs(wrap_angles(scan.angles + (pose.yaw - bearing))).argmin())
+        away = float(scan.ranges[beam]) if scan.is_hit[beam] else self._topics.view_range
+        if away <= self._topics.depth_reach:
+            return box
+        away -= _BEFORE
+        return replace(box, doubt=(pose.x + away * math.cos(bearing), pose.y + away * math.sin(bearing)))
 
     def _camera(self, stamp: float) -> NDArray[np.float64] | None:
         """Pose of the camera in map at a moment, z from the floor, None where it is not known."""

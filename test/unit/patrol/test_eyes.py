@@ -73,7 +73,7 @@ class World:
         self.camera_at = self.now
         self.triggers: tuple[int, ...] = ()
         self.goals, self.notices, self.ended, self.reports, self.tracked = [], [], [], [], []
-        self.cancels, self.flat, self.count = 0, False, 0
+        self.cancels, self.flat, self.count, self.measures_to = 0, False, 0, 99.0
 
     def frame(self) -> Frame:
         sight = sight_on_map(FLOOR, self.pose.x, self.pose.y, 8.0)
@@ -90,8 +90,18 @@ class World:
     def box(self, x: float, y: float, away: float, bearing: float) -> Box:
         middle = 320 - 554 * math.tan(bearing)
         measured = Measured(x=x, y=y, error=0.15, away=away, top=1.7, height=1.6, width=0.5, is_flat=self.flat)
+        is_far = away > self.measures_to
         left, right = round(max(middle - 40, 0)), round(min(middle + 40, 640))
-        return Box(label="person", probability=0.9, xmin=left, xmax=right, ymin=20, ymax=300, measured=measured)
+        return Box(
+            label="person",
+            probability=0.9,
+            xmin=left,
+            xmax=right,
+            ymin=20,
+            ymax=300,
+            measured=None if is_far else measured,
+            doubt=(x, y) if is_far else None,
+        )
 
     def step(self) -> None:
         self.count += 1
@@ -307,3 +317,20 @@ def test_without_a_map_a_turn_is_all_and_no_share_is_told() -> None:
     assert views.share() is None
     assert views.blind() == ""
     assert views.instead(ROOMS.base, Inputs()) == []
+
+
+@pytest.mark.parametrize(("flat", "verdict"), [(True, "clear"), (False, "confirmed")])
+def test_what_is_too_far_off_to_be_measured_is_looked_at_from_near(flat: bool, verdict: str) -> None:
+    world = World(lambda now: [(3.2, 0.8)])
+    world.flat, world.measures_to = flat, 4.0
+    mission = world.mission()
+    assert mission.verdict.value == verdict
+    assert any(math.dist(view[:2], (3.2, 0.8)) < 3.6 for view in mission.views_done)
+
+
+def test_what_nobody_could_look_at_from_near_is_unverified() -> None:
+    world = World(lambda now: [(3.2, 0.8)], eyes=EyesParams(look_around="spin"))
+    world.measures_to = 4.0
+    mission = world.mission()
+    assert mission.verdict.value == "unverified"
+    assert "something like a person at about (3.2, 0.8)" in mission.reason
