@@ -78,6 +78,10 @@ def _facts(incident: Incident, picture_note: str) -> tuple[tuple[str, str], ...]
         ("Seen", seen),
         ("Why", incident.reason),
     ]
+    if incident.person is not None:
+        x, y = incident.person
+        inside = f", in {incident.person_room}" if incident.person_room else ""
+        rows.append(("Person", f"x {x:.1f} m, y {y:.1f} m in the map{inside}"))
     if incident.pose is not None:
         x, y, yaw = incident.pose
         rows.append(("Robot", f"x {x:.2f} m, y {y:.2f} m, heading {yaw:.2f} rad in the map"))

@@ -139,8 +139,10 @@ class OwnerPost:
             self.put(self._kept[0])
             self._kept.popleft()
         was_delivering = self._postman.is_delivering
-        if not self._postman.take_over():
+        if not was_delivering:
             self._look_on()
+        if not self._postman.take_over():
+            pass
         elif not was_delivering or self._has_changed():
             self._postman.refresh()
             self._wake_all()

@@ -35,6 +35,12 @@ def test_the_mail_is_the_tutorials_and_a_proper_one(make_incident, envelope):
     assert picture.get_filename() == "room3-20261121T010203Z-1.jpg"
 
 
+def test_where_the_person_stood_is_said_where_it_is_known(make_incident, envelope):
+    notice = incident_notice(make_incident(person=(1.25, -3.0), person_room="hall\nBcc: x@y.org"), None)
+    text = read_back(build_mail(notice, envelope)).get_body(("plain",)).get_content()
+    assert "Person:   x 1.2 m, y -3.0 m in the map, in hall Bcc: x@y.org" in text.splitlines()
+
+
 def test_without_a_picture_the_mail_says_why(make_incident, envelope):
     mail = read_back(
         build_mail(incident_notice(make_incident(), None, picture_note="none came from the camera"), envelope)
