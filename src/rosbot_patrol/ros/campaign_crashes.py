@@ -22,8 +22,8 @@ from rosbot_patrol.campaign.record import CampaignFolder, Settings
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.ros.campaign_crash import JOURNAL, waiting
 from rosbot_patrol.ros.campaign_mail import kept_mails
-from rosbot_patrol.ros.campaign_rooms import own_space
 from rosbot_patrol.ros.campaign_runner import Job, Runner
+from rosbot_patrol.ros.campaign_spaces import own_space
 
 LIFE = 1200.0  # longest life [s]
 _FRUITLESS = 3  # lives after each other in which nothing was killed

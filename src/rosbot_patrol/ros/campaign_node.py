@@ -32,8 +32,8 @@ from rosbot_patrol.files import write_atomic
 from rosbot_patrol.ros.campaign_crash import CrashLife
 from rosbot_patrol.ros.campaign_crashes import CrashCampaign
 from rosbot_patrol.ros.campaign_patrol import play
-from rosbot_patrol.ros.campaign_rooms import own_space, raise_loopback
 from rosbot_patrol.ros.campaign_runner import Job, Runner
+from rosbot_patrol.ros.campaign_spaces import own_space, raise_loopback
 from rosbot_patrol.ros.house import HouseError
 
 KEPT_FOR_GOOD = (RESULT, PLAN, "scenario.yaml", "mail")  # of a patrol that went as it should

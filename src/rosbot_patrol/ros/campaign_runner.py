@@ -13,6 +13,9 @@ from pathlib import Path
 
 GRACE = 30.0  # beyond a program's own limit [s]
 
+_LIMIT = ("timeout", "--foreground", "-s", "KILL")  # inside of a wrapping lock, which may be waited for without end
+_KILLED = (137, -signal.SIGKILL)
+
 
 @dataclass(frozen=True)
 class Job:
@@ -79,7 +82,7 @@ class Runner:
         try:
             with job.log.open("ab") as out:
                 process = subprocess.Popen(
-                    [*self._wrap, *self._prefix, *job.command],
+                    [*self._wrap, *_LIMIT, f"{job.limit + GRACE:.0f}", *self._prefix, *job.command],
                     stdin=subprocess.DEVNULL,
                     stdout=out,
                     stderr=subprocess.STDOUT,
@@ -89,15 +92,11 @@ class Runner:
             return f"could not be started: {err}"
         with self._lock:
             self._running.add(process)
-        try:
-            # a wrapping lock may be waited for without end; the program keeps its own limit once it runs
-            status = process.wait(None if self._wrap else job.limit + GRACE)
-        except subprocess.TimeoutExpired:
-            _end(process)
+        status = process.wait()
+        with self._lock:
+            self._running.discard(process)
+        if status in _KILLED:
             return f"did not end within {job.limit + GRACE:.0f} s"
-        finally:
-            with self._lock:
-                self._running.discard(process)
         return "" if status == 0 else f"ended with status {status}, see {job.log}"
 
 

@@ -1,4 +1,4 @@
-"""Rooms of one's own for houses that run side by side: a network and process space each, where the system gives them.
+"""A network and process space of its own for each of the houses that run side by side, where the system gives them.
 
 In such a space every house has the same ports, and all that was started in it ends with it.
 """
