@@ -182,7 +182,7 @@ class House:
 
     def mails(self):
         folder = self.folder / "mail"
-        return list(mailbox.Maildir(folder, create=False)) if folder.exists() else []
+        return list(mailbox.Maildir(folder, create=False)) if (folder / "cur").exists() else []  # made last
 
     def close(self):
         for process in reversed(self.processes):

@@ -66,7 +66,7 @@ class Watch:
 
     def mails(self):
         place = self.folder / "mail"
-        box = mailbox.Maildir(place, create=False) if (place / "new").exists() else []
+        box = mailbox.Maildir(place, create=False) if (place / "cur").exists() else []
         return sorted(box, key=lambda mail: mail["Message-ID"])
 
     def mail(self, subject):
