@@ -44,7 +44,8 @@ log = logging.getLogger(__name__)
 
 _SAME = 0.06  # a depth picture of that time is of the same moment [s]
 _HELD = 0.25  # so long a picture waits for its depth, wall time [s]
-_STARTING = 1.0  # so long after it was asked for depth may need to come, wall time [s]
+_STARTING = 3.0  # so long after it was asked for depth may need to come from whoever publishes it, wall time [s]
+_NOBODY = 1.0  # so long until it is clear that nobody does, wall time [s]
 _KEEP = 8.0  # so long after the last box depth is listened to, wall time [s]
 _BEFORE = 0.2  # so far before a wall is what hangs on it, or sits behind what the lidar hits [m]
 _GIVE_UP = 60.0  # so long a depth camera that is silent is not asked again, wall time [s]
@@ -121,7 +122,8 @@ class DepthRing:
         """Stop listening where nobody needs it any more or nothing comes."""
         if self._subscriber is None:
             return
-        silent = not self._ring and wall - self._asked > _STARTING
+        connected = self._subscriber.get_num_connections() > 0
+        silent = not self._ring and wall - self._asked > (_STARTING if connected else _NOBODY)
         if silent:
             self._silent_since = wall
             log.warning(
@@ -147,7 +149,7 @@ class DepthRing:
     def is_flowing(self, stamp: float) -> bool:
         """Whether depth comes, or is about to, so that a picture of a moment [s] without it proves nothing."""
         newest = self._newest()
-        return self._subscriber is not None and (newest is None or stamp - newest < 1.0)
+        return self._subscriber is not None and (newest is None or stamp - newest < _STARTING)
 
     def _newest(self) -> float | None:
         with self._lock:
@@ -247,7 +249,8 @@ class PatrolEyes:
         frame, stamp, lens = pending.frame, pending.stamp, self._lenses.lens
         pose = self._camera(stamp) if lens is not None and stamp > 0.0 else None
         if pose is None or lens is None:
-            return frame
+            is_known = lens is not None and stamp > 0.0  # where the robot was then may be told in a moment
+            return None if is_known and wall - pending.came < _HELD else frame
         view = View(lens, pose)
         place = Pose2D(float(pose[0, 3]), float(pose[1, 3]), view.yaw)
         frame = replace(frame, eye=Eye(pose=place, width=lens.view_width, columns=lens.width))
