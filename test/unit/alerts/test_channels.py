@@ -139,8 +139,9 @@ def test_every_mistake_is_named_with_file_and_key(tmp_path, channels, said):
 
 
 def test_a_password_comes_from_a_private_file_or_the_environment(tmp_path):
-    with pytest.raises(ParamError, match="can be read by others, expected mode 600"):
-        read_secret("~x", private(tmp_path, mode=0o644), "", {})
+    for mode in (0o644, 0o640, 0o604, 0o620):
+        with pytest.raises(ParamError, match="can be read by others, expected mode 600"):
+            read_secret("~x", private(tmp_path, mode=mode), "", {})
     assert read_secret("~x", private(tmp_path), "", {}) == "geheim"
     assert read_secret("~x", "", "V", {"V": "other"}) == "other"
     for text, said in (("", "is empty"), ("a\tb\n", "holds a line break or control character")):

@@ -317,3 +317,24 @@ def test_a_crash_between_taking_and_crossing_out_sends_again_with_the_same_id(tm
     assert mail.ids == ["a", "a", "a"]
     assert len(list((folder / "new").iterdir())) == 1
     assert post.outbox.waiting() == []
+
+
+def test_what_was_taken_long_ago_and_waits_for_another_channel_is_not_forgotten(tmp_path):
+    mail, phone = Box(), Box()
+    phone.down = "no network"
+    channels = channel("mail", mail), channel("phone", phone)
+    post = postman(tmp_path, *channels)
+    post.outbox.put(notice("old"))
+    post.take_over()
+    deliver_all(post)
+    post.hand_over()
+    line = {"channel": "mail", "transport": "box", "wall": 1.0, "where": "there"}
+    with (tmp_path / "taken.jsonl").open("a") as file:
+        file.writelines(json.dumps({**line, "ids": [f"n{i}"]}) + "\n" for i in range(600))
+    for _ in range(2):
+        again = postman(tmp_path, *channels)
+        again.take_over()
+        deliver_all(again)
+        again.hand_over()
+    assert len((tmp_path / "taken.jsonl").read_text().splitlines()) == 501
+    assert mail.ids == ["old"]
