@@ -3,7 +3,8 @@
 
     benchmarks/alerts.py [--only PART ...] [--json FILE]
 
-Parts: search (100,000 incidents: lists, searches, one record, verification), chain (sensor to goal, person to disk
+Parts: search (100,000 incidents: lists, searches, one record, verification), keeping (what it costs the patrol),
+chain (sensor to goal, person to disk
 and mail server, with the real nodes).
 """
 
@@ -16,9 +17,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import alerts_chain
+import alerts_keeping
 import alerts_search
 
-PARTS: dict[str, Callable[[], dict[str, float]]] = {"search": alerts_search.measure, "chain": alerts_chain.measure}
+PARTS: dict[str, Callable[[], dict[str, float]]] = {
+    "search": alerts_search.measure,
+    "keeping": alerts_keeping.measure,
+    "chain": alerts_chain.measure,
+}
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ td.time { white-space: nowrap; font-variant-numeric: tabular-nums; }
 figure { margin: 0 0 .8rem; }
 figcaption, footer, .faint { color: var(--faint); font-size: .85rem; }
 figure img { display: block; width: 100%; height: auto; border-radius: .4rem; background: #fff; }
-.best { display: grid; gap: .8rem; grid-template-columns: repeat(auto-fit, minmax(min(18rem, 100%), 1fr)); }
+.best { display: grid; gap: .8rem; grid-template-columns: repeat(auto-fit, minmax(min(20rem, 100%), 1fr)); }
 .strip { display: grid; gap: .3rem; grid-template-columns: repeat(auto-fill, minmax(6.5rem, 1fr)); }
 .strip figure { margin: 0; } .strip figcaption { font-size: .7rem; text-align: center; }
 .strip .after img { outline: 2px solid var(--confirmed); outline-offset: -2px; }

@@ -40,6 +40,7 @@ DISK_RETRY = 5.0  # [s] between attempts where the disk does not take something
 _BUSY, _IDLE = 0.5, 5.0  # [s] between two looks at the pictures, in a mission and without one
 _TIDY = 600.0  # [s] between two looks at age and size
 _MOST = 5000  # entries in memory while the disk takes nothing; 2 kB each at most
+_SAME_AGAIN = 60.0  # [s] until the same complaint is logged again
 _PATIENCE = 3.0  # [s] more than a clip should take
 
 
@@ -98,6 +99,7 @@ class IncidentKeeper:
         self._looking = ""
         self._is_ending = False
         self._lost = 0
+        self._complaint = ("", 0.0)
         self._tidy_at = 0.0
         self._map: MapView | None = None
         self._wake = threading.Event()
@@ -304,7 +306,7 @@ class IncidentKeeper:
         self._health.set("incidents", WARN if "disk" in more else OK, more or "incidents are kept")
 
     def _trouble(self, err: StoreError) -> float:
-        log.error("incidents cannot be written: %s; trying on", err)
+        self._complain(err)
         if err.is_full and self._store is not None:
             try:
                 done = make_room(self._store, wall=time.time())
@@ -318,6 +320,14 @@ class IncidentKeeper:
         self._health.set("incidents", ERROR, f"incidents cannot be written: {err}")
         self._forget_store()
         return DISK_RETRY
+
+    def _complain(self, err: StoreError) -> None:
+        """Log what is wrong, the same again once a minute only."""
+        text, at = self._complaint
+        if str(err) == text and time.monotonic() - at < _SAME_AGAIN:
+            return
+        self._complaint = (str(err), time.monotonic())
+        log.error("incidents cannot be written: %s; trying on every %.0f s", err, DISK_RETRY)
 
     def _forget_store(self) -> None:
         if self._store is not None:

@@ -145,7 +145,8 @@ class AlertDesk:
         log.warning("ALERT: %s; the notice is on disk", incident.sentence)
         self._jobs.popleft()
         if picture is not None:
-            file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=notice.seen.stamp, caption=note)
+            caption = "sent with the notice"
+            file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=notice.seen.stamp, caption=caption)
             self._keeper.put_picture(incident.id, file)
         return True
 
