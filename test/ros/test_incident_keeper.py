@@ -93,6 +93,9 @@ def test_a_mission_becomes_a_closed_record_with_a_map_and_a_report(house):
     assert [file.role for file in kept.files] == ["map"]
     assert (house.folder / "incidents" / "a" / "report.html").exists()
     assert [(i.id, i.verdict) for i in house.verdicts] == [("a", "unverified")]
+    (house.folder / "incidents" / "a" / "report.html").unlink()  # as if the program had ended before it
+    house.make().step()
+    assert (house.folder / "incidents" / "a" / "report.html").exists()
     assert house.health.told[-1] == (OK, "incidents are kept")
 
 

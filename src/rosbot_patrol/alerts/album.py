@@ -130,7 +130,11 @@ class Album:
         whole = picture.width * picture.height if isinstance(picture, RawPicture) else 640 * 480
         name = f"{picture.stamp:.3f}"
         candidate = Candidate(
-            name=name, probability=seen.probability, share=area / max(whole, 1), sharpness=sharpness(plain)
+            name=name,
+            stamp=picture.stamp,
+            probability=seen.probability,
+            share=area / max(whole, 1),
+            sharpness=sharpness(plain),
         )
         boxed = self._jpeg(picture, seen.boxes)
         if boxed is None:

@@ -140,16 +140,25 @@ class Clip:
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A picture that shows somebody: its file, how sure the detector was, the box's share of the picture, sharpness."""
+    """A picture that shows somebody.
+
+    Attributes:
+        name: of its file.
+        stamp: when it was taken [s].
+        probability: how sure the detector was.
+        share: of the picture that the box takes.
+        sharpness: see `sharpness`.
+    """
 
     name: str
+    stamp: float
     probability: float
     share: float
     sharpness: float
 
 
-def best_pictures(candidates: Iterable[Candidate], count: int = 3) -> list[str]:
-    """The names of the pictures that show best who it was: sure, large, sharp."""
+def best_pictures(candidates: Iterable[Candidate], count: int = 3, apart: float = 1.0) -> list[str]:
+    """The names of the pictures that show best who it was (sure, large, sharp), each some time [s] from the others."""
     known = list(candidates)
     sharpest = max((c.sharpness for c in known), default=0.0) or 1.0
 
@@ -157,7 +166,11 @@ def best_pictures(candidates: Iterable[Candidate], count: int = 3) -> list[str]:
         size = min(candidate.share / 0.1, 1.0) ** 0.5
         return candidate.probability * (0.3 + 0.7 * size) * (0.5 + 0.5 * candidate.sharpness / sharpest)
 
-    return [c.name for c in sorted(known, key=score, reverse=True)[:count]]
+    taken: list[Candidate] = []
+    for candidate in sorted(known, key=score, reverse=True):
+        if len(taken) < count and all(abs(candidate.stamp - other.stamp) >= apart for other in taken):
+            taken.append(candidate)
+    return [candidate.name for candidate in taken]
 
 
 def sharpness(jpeg: bytes) -> float:

@@ -89,7 +89,7 @@ def _facts(incident: Incident) -> str:
         rows.append(
             (
                 "First seen",
-                f"{clock_text(incident.confirmed)}, {incident.confirmed - incident.wall:.1f} s after the call",
+                f"{clock_text(incident.confirmed)}, {incident.confirmed - incident.wall:.1f} s after the mission began",
             )
         )
     if incident.person is not None:

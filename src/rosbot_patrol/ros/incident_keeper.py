@@ -19,7 +19,8 @@ import rospy
 from rosbot_patrol.alerts.album import Album, Sighting
 from rosbot_patrol.alerts.evidence import EvidenceParams
 from rosbot_patrol.alerts.incident import Event, Incident
-from rosbot_patrol.alerts.incident_files import NewFile
+from rosbot_patrol.alerts.incident_files import REPORT, NewFile
+from rosbot_patrol.alerts.incident_query import Query, find_incidents
 from rosbot_patrol.alerts.incident_repair import close_abandoned, repair
 from rosbot_patrol.alerts.incident_report import write_report
 from rosbot_patrol.alerts.incident_salvage import open_store
@@ -40,6 +41,7 @@ DISK_RETRY = 5.0  # [s] between attempts where the disk does not take something
 _BUSY, _IDLE = 0.5, 5.0  # [s] between two looks at the pictures, in a mission and without one
 _TIDY = 600.0  # [s] between two looks at age and size
 _MOST = 5000  # entries in memory while the disk takes nothing; 2 kB each at most
+_RECENT = 5  # records that are looked at for a missing report
 _SAME_AGAIN = 60.0  # [s] until the same complaint is logged again
 _PATIENCE = 3.0  # [s] more than a clip should take
 
@@ -202,8 +204,18 @@ class IncidentKeeper:
             log.warning("incidents: %s", sentence)
         self._store = store
         keep_reserve(self.state_dir)
+        self._catch_up(store)
         self._tell_well()
         return store
+
+    def _catch_up(self, store: IncidentStore) -> None:
+        """Write the reports that the end of the program came before."""
+        for row in find_incidents(store.connection, store.path, Query(limit=_RECENT)):
+            is_wanted = row.closed is not None and row.verdict in self._records.report_verdicts
+            if is_wanted and not store.folder.path(row.id, REPORT).exists():
+                incident = store.get(row.id)
+                if incident is not None:
+                    write_report(store, incident)
 
     def _write(self, store: IncidentStore, entry: Entry | tuple[str, NewFile]) -> None:
         if isinstance(entry, tuple):
