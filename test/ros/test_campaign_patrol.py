@@ -12,8 +12,9 @@ pytest.importorskip("rosbot_patrol.msg", reason="the workspace is not on the pat
 import rospy
 from rosbot_patrol.msg import Alert, PatrolState
 
+from rosbot_patrol.campaign.cast import Person
 from rosbot_patrol.campaign.houses import load_house
-from rosbot_patrol.campaign.plan import Patrol, Person
+from rosbot_patrol.campaign.plan import Patrol
 from rosbot_patrol.campaign.record import Result
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.ros.campaign_patrol import evaluate

@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rosbot_patrol.campaign.cast import Person
 from rosbot_patrol.campaign.floor import RECOGNISED, Floor
-from rosbot_patrol.campaign.plan import Person
 from rosbot_patrol.geometry import Pose2D
 
 ENOUGH = 1.5  # in view for so long, somebody has to be found [s]

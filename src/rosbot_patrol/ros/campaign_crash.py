@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import rospy
 
+from rosbot_patrol.campaign.cast import plain_place
 from rosbot_patrol.campaign.crash_ledger import Journal, next_patrol, open_call
 from rosbot_patrol.campaign.crash_plan import ALL, Kill, plan_crashes
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses import load_house
-from rosbot_patrol.campaign.plan import CONFIRMED, plain_place
+from rosbot_patrol.campaign.plan import CONFIRMED
 from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.ros.campaign_mail import MailSink
 from rosbot_patrol.ros.house import House, HouseError, Master, child_pids

@@ -63,6 +63,7 @@ class CrashCampaign:
         books = self.books()
         text = books.text()
         write_atomic(self.folder / "books.txt", f"{text}\n".encode())
+        write_atomic(self.folder / "books.json", summary_json(books).encode())
         print(f"\n{text}")
         return 0 if books.is_clean else 1
 

@@ -20,6 +20,8 @@ import sys
 import time
 from pathlib import Path
 
+import rospkg
+
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses import HOUSES, HouseFiles, load_house
 from rosbot_patrol.campaign.page import page
@@ -41,8 +43,6 @@ KEPT_FOR_GOOD = (RESULT, PLAN, "scenario.yaml", "mail")  # of a patrol that went
 
 def package_root() -> Path:
     """The folder with worlds and maps: the package's, wherever it is installed."""
-    import rospkg
-
     return Path(rospkg.RosPack().get_path("rosbot_patrol"))
 
 

@@ -10,12 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from rosbot_patrol.campaign.cast import HIDDEN, PLAIN
 from rosbot_patrol.campaign.floor import EYE_LEVEL, Floor
 from rosbot_patrol.campaign.houses import HOUSES, House, house_files
 from rosbot_patrol.campaign.plan import (
-    HIDDEN,
     KINDS,
-    PLAIN,
     Patrol,
     house_of,
     kind_of,

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from rosbot_patrol.campaign.cast import Person
 from rosbot_patrol.campaign.floor import Floor
-from rosbot_patrol.campaign.plan import Person
 from rosbot_patrol.campaign.share import true_share
 from rosbot_patrol.campaign.truth import Track, place_error, presence
 from rosbot_patrol.geometry import Pose2D
