@@ -1,10 +1,12 @@
 """The books of a crash campaign: what was called for and what was killed, written before it is done, and whether every
-call got its verdict and every confirmed incident its one mail.
+call got its verdict and every confirmed incident its one mail. Calls come one at a time, so that each has the records
+between it and the next; what the patrol keeps counts, not what it says.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -53,12 +55,12 @@ class Journal:
 
 @dataclass(frozen=True, kw_only=True)
 class KeptRecord:
-    """What of an incident's record is asked for here."""
+    """What of an incident's record is asked for here; `wall` is when its mission began, seconds since 1970."""
 
     id: str
     room: int
     verdict: str
-    closed: float | None
+    wall: float
     is_confirmed: bool
 
 
@@ -143,11 +145,10 @@ def balance(
     lines = list(journal)
     kills = [line for line in lines if line["kind"] == "kill"]
     calls = [line for line in lines if line["kind"] == "call"]
-    seen = {line["call"]: line["verdict"] for line in lines if line["kind"] == "verdict"}
     answered: Counter[str] = Counter()
     lost = []
-    for call in calls:
-        verdict = seen.get(call["call"]) or _verdict_of(call, records)
+    for call, after in zip(calls, [*calls[1:], None], strict=True):
+        verdict = _verdict_of(call, after, records)
         if verdict:
             answered[verdict] += 1
         else:
@@ -184,17 +185,11 @@ def balance(
     )
 
 
-def _verdict_of(call: Mapping[str, Any], records: Sequence[KeptRecord]) -> str:
-    """The verdict that the guard kept for a call: of the first record of its room that was completed after it."""
-    later = [
-        record
-        for record in records
-        if record.room == call["room"]
-        and record.verdict
-        and record.closed is not None
-        and record.closed >= call["wall"] - CLOCK_SLACK
-    ]
-    return min(later, key=lambda record: record.closed or 0.0).verdict if later else ""
+def _verdict_of(call: Mapping[str, Any], after: Mapping[str, Any] | None, records: Sequence[KeptRecord]) -> str:
+    """The verdict of the first mission to a call's room that began after it and before the next call."""
+    until = math.inf if after is None else after["wall"]
+    own = [r for r in records if r.room == call["room"] and call["wall"] - CLOCK_SLACK <= r.wall < until and r.verdict]
+    return min(own, key=lambda record: record.wall).verdict if own else ""
 
 
 def next_patrol(journal: Iterable[Mapping[str, Any]]) -> int:

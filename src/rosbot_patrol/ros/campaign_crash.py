@@ -26,6 +26,7 @@ from rosbot_patrol.ros.house import House, HouseError, Master, child_pids
 HOUSE = "flat"  # its rooms are near: short patrols
 PATROLS = 4  # in one life
 READY, ENDS, MOMENT, DELIVERED = 120.0, 240.0, 60.0, 40.0  # longest waits [s]
+FORGOTTEN = 20.0  # a patrol that rests for so long has forgotten a call [s]
 JOURNAL = "journal.jsonl"
 
 
@@ -100,24 +101,29 @@ class CrashLife:
 
     def _finish(self, call: Mapping[str, Any], since: int) -> None:
         """Wait for the verdict of a call, and write it down."""
-        try:
-            self._house.wait(lambda: bool(self._verdict(call["room"], since)), ENDS, f"a verdict for {call['call']}")
-        except HouseError as err:
-            if not self._house.is_running:
-                raise
-            self._journal.add("given_up", call=call["call"], why=str(err).splitlines()[0])
-            return
+        until, rested = time.monotonic() + ENDS, time.monotonic()
+        while not self._verdict(call["room"], since):
+            self._house.wait(lambda: True, 1.0, "a verdict")  # says so where the launch has ended
+            if not self._is_at_rest():
+                rested = time.monotonic()
+            if time.monotonic() > until or time.monotonic() - rested > FORGOTTEN:
+                state = self._house.state
+                self._journal.add("given_up", call=call["call"], why=state.why if state else "no state")
+                return
+            time.sleep(0.05)
         verdict = self._verdict(call["room"], since)
         self._journal.add("verdict", call=call["call"], verdict=verdict, wall=time.time())
 
     def _verdict(self, room: int, since: int) -> str:
-        """The verdict of a mission to a room that has ended since a state, "" before that."""
+        """The verdict of a mission to a room that has ended since a state, "" before that.
+
+        That the patrol rests after it is not enough: a mission that it forgot in a restart has ended without one.
+        """
         states = self._states[since:]
-        begun = next((i for i, s in enumerate(states) if s.mission and s.room_id == room), None)
-        if begun is None:
-            return ""
-        rest = next((s for s in states[begun:] if not s.mission and s.state == PatrolState.IDLE), None)
-        return str(rest.last_verdict) if rest is not None else ""
+        own = [i for i, s in enumerate(states) if s.mission and s.room_id == room]
+        told = [states[i].verdict for i in own if states[i].verdict]
+        ended = bool(own) and any(s.state == PatrolState.IDLE for s in states[own[-1] :])
+        return str(told[-1]) if told and ended else ""
 
     def _kill(self, kill: Kill, call: Mapping[str, Any], since: int) -> None:
         with suppress(HouseError):

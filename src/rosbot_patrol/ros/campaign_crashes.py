@@ -121,7 +121,7 @@ def kept_records(state_dir: Path) -> list[KeptRecord]:
             id=found.id,
             room=found.room_id,
             verdict=found.verdict,
-            closed=found.closed,
+            wall=found.wall,
             is_confirmed=found.verdict == CONFIRMED,
         )
         for found in incidents

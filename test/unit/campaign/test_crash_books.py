@@ -28,8 +28,8 @@ def kill(of: str, victim: str = "amcl") -> dict[str, Any]:
     return {"kind": "kill", "call": of, "victim": victim, "moment": "driving", "delay": 1.0}
 
 
-def record(name: str, closed: float | None, verdict: str = "confirmed", room: int = 1) -> KeptRecord:
-    return KeptRecord(id=name, room=room, verdict=verdict, closed=closed, is_confirmed=verdict == "confirmed")
+def record(name: str, wall: float, verdict: str = "confirmed", room: int = 1) -> KeptRecord:
+    return KeptRecord(id=name, room=room, verdict=verdict, wall=wall, is_confirmed=verdict == "confirmed")
 
 
 VERDICT = {"kind": "verdict", "call": "p0", "verdict": "confirmed"}
@@ -56,7 +56,7 @@ def test_kills_of_a_patrol_come_in_the_order_of_its_moments_and_all_comes_last()
 
 
 def test_a_clean_campaign() -> None:
-    books = balance([call("p0", 10.0), kill("p0"), VERDICT], [record("a", 30.0)], [MAIL], verified="", waiting=0)
+    books = balance([call("p0", 10.0), kill("p0"), VERDICT], [record("a", 10.4)], [MAIL], verified="", waiting=0)
     assert books.is_clean
     assert "calls with a verdict: 1 of 1 (20.7% to 100.0%); confirmed 1" in books.text()
     assert "database: verifies" in books.text()
@@ -72,25 +72,25 @@ def test_a_clean_campaign() -> None:
     ],
 )
 def test_mails_that_do_not_add_up(mails: list[KeptMail], told: str) -> None:
-    books = balance([call("p0", 10.0), VERDICT], [record("a", 30.0)], mails, verified="", waiting=0)
+    books = balance([call("p0", 10.0), VERDICT], [record("a", 10.4)], mails, verified="", waiting=0)
     assert not books.is_clean
     assert told in books.text()
 
 
-def test_a_verdict_that_nobody_saw_counts_by_the_record() -> None:
-    journal = [call("p0", 100.0), kill("p0", ALL)]
-    late = balance(journal, [record("a", 130.0, "unverified")], [], verified=None, waiting=0)
-    assert dict(late.answered) == {"unverified": 1}
-    for other in (record("a", 50.0, "clear"), record("a", 130.0, "clear", room=2), record("a", None, "")):
-        lost = balance(journal, [other], [], verified=None, waiting=0)
+def test_a_call_is_answered_by_what_the_patrol_kept_of_it_alone() -> None:
+    journal = [call("p0", 100.0), kill("p0", ALL), {**VERDICT, "verdict": "clear"}, call("p1", 200.0, 1)]
+    answers = [record("a", 100.3, "unverified"), record("b", 201.0, "clear")]
+    assert dict(balance(journal, answers, [], verified=None, waiting=0).answered) == {"unverified": 1, "clear": 1}
+    for other in (record("a", 50.0, "clear"), record("a", 130.0, "clear", room=2), record("a", 100.3, "")):
+        lost = balance(journal, [other, answers[1]], [], verified=None, waiting=0)
         assert lost.lost == ["call p0 of room 1 has no verdict (killed: all driving+1.00 s)"]
         assert not lost.is_clean
 
 
 def test_what_is_left_over_is_not_clean() -> None:
     journal = [call("p0", 10.0), VERDICT]
-    assert not balance(journal, [record("a", 30.0)], [MAIL], verified="", waiting=1).is_clean
-    assert not balance(journal, [record("a", 30.0)], [MAIL], verified="link 3 is broken", waiting=0).is_clean
+    assert not balance(journal, [record("a", 10.4)], [MAIL], verified="", waiting=1).is_clean
+    assert not balance(journal, [record("a", 10.4)], [MAIL], verified="link 3 is broken", waiting=0).is_clean
 
 
 def test_the_journal_goes_on_where_a_kill_cut_it(tmp_path: Path) -> None:
