@@ -77,17 +77,21 @@ class Watch:
         self.refusals: Counter[str] = Counter()
         self._classes = frozenset(alarm_classes)
         self._views: deque[_View] = deque(maxlen=self.params.window)
+        self._glimpses: deque[float] = deque(maxlen=3)  # when pictures came that do not count, but show somebody
         self._newest = -math.inf
 
     def start(self, now: float) -> None:
         """Forget everything; pictures taken before `now` do not count from here on."""
         self._views.clear()
+        self._glimpses.clear()
         self.refusals.clear()
         self._newest = now
 
     def add(self, now: float, frame: Frame) -> tuple[Confirmation, ...]:
         """Take one picture's boxes; a confirmation for each intruder that they make."""
         if not frame.counts:
+            if self.plausible(frame):
+                self._glimpses.append(now)
             return ()
         stamp = now if frame.stamp is None else frame.stamp
         if frame.stamp is not None:
@@ -109,7 +113,8 @@ class Watch:
 
     def candidate(self, now: float, recent: float = 0.6) -> bool:
         """Whether a picture that came lately shows something that may become an intruder."""
-        return any(view.boxes and abs(now - view.arrived) <= recent for view in self._views)
+        seen = [view.arrived for view in self._views if view.boxes]
+        return any(abs(now - at) <= recent for at in (*seen, *self._glimpses))
 
     def plausible(self, frame: Frame) -> list[Box]:
         """Boxes of a picture that may show an intruder, the surest first."""
@@ -118,7 +123,8 @@ class Watch:
 
     def lately(self, now: float, recent: float = 3.0) -> int:
         """How many of the last three pictures, if they came lately, show something that may become an intruder."""
-        return sum(bool(view.boxes) and abs(now - view.arrived) <= recent for view in list(self._views)[-3:])
+        seen = [view.arrived for view in list(self._views)[-3:] if view.boxes]
+        return sum(abs(now - at) <= recent for at in (*seen, *self._glimpses))
 
     def _is_likely(self, box: Box) -> bool:
         if box.label not in self._classes or not 0.0 < box.probability <= 1.0:

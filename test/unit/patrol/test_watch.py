@@ -164,3 +164,11 @@ def test_what_the_judge_refuses_counts_as_nothing_seen_and_is_told():
     assert feed(watch, frames(*[[placed(1.1, 1.0)]] * 4)) == []
     assert not watch.candidate(1.3)
     assert watch.refusals == {"it is the coat stand at (1.0, 1.0)": 4}
+
+
+def test_a_picture_that_does_not_count_proves_nothing_but_is_worth_stopping_for(watch):
+    for i in range(6):
+        assert watch.add(1.0 + i / 10, Frame(stamp=1.0 + i / 10, boxes=(box(),), counts=False)) == ()
+    assert watch.candidate(1.6)
+    assert watch.lately(1.6) >= 2
+    assert not watch.candidate(3.0)
