@@ -18,14 +18,16 @@ from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
+from rosbot_patrol.patrol.arming import load_rules
 from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.schedule import load_schedule
 from rosbot_patrol.patrol.watch import WatchParams
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.ros import sensor_watch_node
 from rosbot_patrol.ros.demo_intruder_node import read_walk
 from rosbot_patrol.ros.parameter_tables import document
-from rosbot_patrol.ros.patrol_node import NodeParams, load_flat
+from rosbot_patrol.ros.patrol_settings import NodeParams, load_flat
 from rosbot_patrol.ros.simulator_node import SimulatorParams
 from rosbot_patrol.ros.twist_mux_node import TwistMuxParams
 from rosbot_patrol.simulation.scenario import read_scenario
@@ -158,3 +160,12 @@ def test_every_scenario_can_be_played_where_it_says(scenario: str) -> None:
     sensors = {place.id for place in read_sensors(play.setting.motion_sensors)}
     assert {t.sensor for t in play.triggers} <= sensors
     assert set(play.expect.verdicts if play.expect else ()) <= sensors
+
+
+@pytest.mark.parametrize("points", ["room_points.yaml", "flat_room_points.yaml", "office_room_points.yaml"])
+def test_modes_and_rounds_that_we_ship(points):
+    rooms = load_rooms(ROOT / "params" / points)
+    rules = load_rules(str(ROOT / "config" / "arming.yaml"), rooms)
+    assert rules.first_mode == "armed_away"
+    assert all(mode.rooms is None for name, mode in rules.modes.items() if name != "disarmed")
+    assert load_schedule(str(ROOT / "config" / "patrol_schedule.yaml"), rooms) == ((), None)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 from ros_processes import Ros
@@ -35,3 +37,21 @@ def sim_ros(sim_master: Ros) -> Iterator[Ros]:
     yield sim_master
     sim_master.stop_nodes()
     subprocess.run(["rosparam", "delete", "/simulator"], env=sim_master.env, stderr=subprocess.DEVNULL)
+
+
+@pytest.fixture(scope="module")
+def patrol_master() -> Iterator[int]:
+    import patrol_house  # needs rospy
+
+    with patrol_house.patrol_master() as port:
+        yield port
+
+
+@pytest.fixture
+def house(patrol_master: int, tmp_path: Path) -> Iterator[Any]:
+    """What surrounds patrol_robot: see patrol_house."""
+    import patrol_house
+
+    house = patrol_house.House(tmp_path)
+    yield house
+    house.close()

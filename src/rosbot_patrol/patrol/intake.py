@@ -67,6 +67,8 @@ class Intake:
             if inputs.guarded.is_quiet and request.origin is Origin.SCHEDULE:
                 log.info("the round is left out: quiet hours; room %d", request.room_id)
                 continue
+            if request.origin is Origin.TRIGGER and not inputs.guarded.counts(request.room_id):
+                continue  # one that was kept over a restart, and is not armed any more
             taken.changed |= bool(self.ask([request], inputs.wall, mission)[request.room_id])
         return taken
 

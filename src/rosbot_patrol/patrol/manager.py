@@ -20,76 +20,34 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
-from rosbot_patrol.geometry import Pose2D, distance
-from rosbot_patrol.params import param
-from rosbot_patrol.patrol import recall, saying
-from rosbot_patrol.patrol.battery import BatteryParams, BatteryWatch
-from rosbot_patrol.patrol.commands import Commands, Notice, Release, Report, Word
-from rosbot_patrol.patrol.drive import Drive, DriveParams
-from rosbot_patrol.patrol.inputs import Frame, Inputs
-from rosbot_patrol.patrol.intake import Intake
+from rosbot_patrol.patrol import recall
+from rosbot_patrol.patrol.battery import BatteryWatch
+from rosbot_patrol.patrol.commands import Commands, Word
+from rosbot_patrol.patrol.conduct import Viewpoints
+from rosbot_patrol.patrol.inputs import Inputs
 from rosbot_patrol.patrol.judge import Judge
-from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.mission import Mission, Phase, Verdict
-from rosbot_patrol.patrol.own_motion import OwnMotion
-from rosbot_patrol.patrol.people import People, PeopleParams, Person
-from rosbot_patrol.patrol.phases import LookAround, LookParts, OneTurn, Trip, Views
-from rosbot_patrol.patrol.queueing import MissionQueue, PriorityParams
-from rosbot_patrol.patrol.readiness import Readiness
+from rosbot_patrol.patrol.orders import Ordered
+from rosbot_patrol.patrol.phases import Views
 from rosbot_patrol.patrol.request import Origin, Request
-from rosbot_patrol.patrol.rooms import Room, Rooms
-from rosbot_patrol.patrol.spin import SpinParams
-from rosbot_patrol.patrol.steady import Heard, SteadyClock
-from rosbot_patrol.patrol.track import Track, TrackParams
-from rosbot_patrol.patrol.watch import Confirmation, Watch, WatchParams
+from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.patrol.settings import ManagerParams
+from rosbot_patrol.patrol.steady import Heard
 
 log = logging.getLogger(__name__)
 
-ALARM_CLASSES = ["person", "fire hydrant"]
-AT_HOME = 0.5  # [m] from room 0's point
 
-Viewpoints = Callable[[Room, Inputs], Sequence[Pose2D]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ManagerParams:
-    """The patrol's behaviour."""
-
-    alarm_classes: tuple[str, ...] = param(tuple(ALARM_CLASSES), doc="classes of objects that alarm")
-    own_motion_radius: float = param(
-        2.0, unit="m", lo=0.0, doc="so near to a room's point the moving robot is what its sensor sees"
-    )
-    own_motion_memory: float = param(
-        2.0, unit="s", lo=0.0, hi=60.0, doc="so long after it was near the robot is still what the sensor saw"
-    )
-    resume_max_age: float = param(
-        43200.0, unit="s", lo=0.0, doc="a call that is older than this after a restart is reported, not followed"
-    )
-    drive: DriveParams = DriveParams()
-    look: LookParams = LookParams()
-    spin: SpinParams = SpinParams()
-    watch: WatchParams = WatchParams()
-    people: PeopleParams = PeopleParams()
-    track: TrackParams = TrackParams()
-    priorities: PriorityParams = PriorityParams()
-    battery: BatteryParams = BatteryParams()
-
-
-class PatrolManager:
-    """The patrol as a function of time and inputs.
+class PatrolManager(Ordered):
+    """The patrol as a function of time and inputs: which mission runs when.
 
     Args:
         rooms: of the points file.
         params: behaviour.
         memory: what `snapshot` gave before the program ended, to go on from there.
-        needs_camera: pictures come in, so that a silent camera can be told.
-        views: what was seen of a room, and from where to see the rest.
-        viewpoints: further poses from which a room is seen, where its own cannot be reached.
-        judge: who refuses what cannot be an intruder.
+        needs_camera, views, viewpoints, judge: see `Conduct`.
     """
 
     def __init__(
@@ -103,38 +61,13 @@ class PatrolManager:
         viewpoints: Viewpoints | None = None,
         judge: Judge | None = None,
     ) -> None:
-        self.rooms = rooms
-        self.params = params or ManagerParams()
-        self.mission: Mission | None = None
-        self.queue = MissionQueue()
-        self.last_verdict = ""
-        self.held: dict[str, float] = {}  # notices of missions that wait for an entry delay, until [s since 1970]
-        self._judge = judge or Judge()
-        self._watch = Watch(tuple(self.params.alarm_classes), self.params.watch, self._judge)
-        self._people = People(self.params.people)
-        self._track = Track(self.params.track)
-        self._is_tracking = False
-        self._parts = LookParts(
-            look=self.params.look, spin=self.params.spin, drive=self.params.drive, needs_camera=needs_camera
+        super().__init__(
+            rooms, params or ManagerParams(), needs_camera=needs_camera, views=views, viewpoints=viewpoints, judge=judge
         )
-        self._views: Views = views or OneTurn()
-        self._viewpoints = viewpoints
-        self._clock = SteadyClock()
         self._heard = {name: Heard() for name in ("detector_at", "camera_at", "camera_changed_at")}
-        self._own_motion = OwnMotion(self.params.own_motion_radius, self.params.own_motion_memory)
-        self._intake = Intake(rooms, self.queue, self.params.priorities, self._own_motion)
-        self._ready = Readiness(self.params.look)
         self._battery = BatteryWatch(self.params.battery)
-        self._trip: Trip | None = None
-        self._look: LookAround | None = None
-        self._home: Drive | None = None  # the way home without a mission
-        self._homes = 0
-        self._report: Report | None = None
-        self._pending = Commands()  # of what people ordered between two steps
         self._homes_tried = 0
         self._is_first = True
-        self._inputs = Inputs()
-        self._now = 0.0
         if memory:
             recall.recall(self, self._intake, memory)
 
@@ -156,11 +89,11 @@ class PatrolManager:
         inputs = self._inputs = self._in_steady_time(now, inputs)
         time = self._clock.time
         self._own_motion.see(time, inputs.pose, awake=not self._is_blind(inputs))
+        self._release(inputs, out)
+        self._take(inputs, out)
         if self._is_first:
             self._is_first = False
             self._drop_the_old(inputs, out)
-        self._release(inputs, out)
-        self._take(inputs, out)
         self._mind_the_battery(inputs, out)
         if inputs.stop:
             self._hold_still(inputs, out)
@@ -266,139 +199,6 @@ class PatrolManager:
         out.changed = True
         self._start(inputs, Phase.DRIVING)
 
-    def _start(self, inputs: Inputs, phase: Phase) -> None:
-        assert self.mission is not None
-        self.mission.started = self._now
-        self._watch.start(self._now)
-        self._track.reset()
-        self._is_tracking = False
-        self._people = People(self.params.people)
-        self._people.recall(self.mission.people, self._clock.time)
-        self._views.start(self.mission)
-        self._enter(phase, inputs)
-
-    def _go_on(self, inputs: Inputs) -> None:
-        """Go on with a mission after a restart: where a first full turn was made the look goes on, else it begins."""
-        mission = self.mission
-        assert mission is not None
-        phase = mission.phase
-        self._start(inputs, Phase.DRIVING if phase is Phase.LOOKING and not mission.views_done else phase)
-
-    def _enter(self, phase: Phase, inputs: Inputs) -> None:
-        mission = self.mission
-        assert mission is not None
-        mission.phase = phase
-        self._trip = self._look = None
-        if phase is Phase.LOOKING:
-            self._look = LookAround(mission, self._views, self._parts, inputs.pose)
-        elif phase is Phase.DRIVING:
-            name = f"{mission.id}/{phase.value}"
-            self._trip = Trip(name, mission.room.pose, self.params.drive, self._others(mission.room))
-        else:
-            self._trip = Trip(f"{mission.id}/{phase.value}", self.rooms.base.pose, self.params.drive)
-
-    def _others(self, room: Room) -> Callable[[], Sequence[Pose2D]] | None:
-        viewpoints = self._viewpoints
-        return (lambda: viewpoints(room, self._inputs)) if viewpoints else None
-
-    # -- phases
-
-    def _count(self, passed: float, inputs: Inputs) -> None:
-        mission = self.mission
-        assert mission is not None
-        name = mission.phase.value
-        mission.began.setdefault(name, inputs.wall)
-        mission.times[name] = mission.times.get(name, 0.0) + passed
-
-    def _step_drive(self, inputs: Inputs, out: Commands) -> None:
-        mission, trip = self.mission, self._trip
-        assert mission is not None
-        assert trip is not None
-        there = mission.phase is Phase.DRIVING
-        step = trip.step(self._clock.time, inputs.link, inputs.pose)
-        out.goal = step.goal
-        out.cancel |= step.cancel
-        where = mission.room.title if there else f"home, {saying.verdict(mission)}"
-        if step.waiting:
-            self._say(out, Phase.STARTING if there else Phase.RETURNING, f"waiting for move_base to drive to {where}")
-        elif step.reached and there:
-            mission.arrived = self._now
-            out.changed = True
-            self._enter(Phase.LOOKING, inputs)
-            self._say(out, Phase.LOOKING, f"arrived in {mission.room.title}")
-        elif step.problem and there:
-            self._decide(Verdict.UNREACHABLE, f"{mission.room.title} cannot be reached: {step.problem}")
-            self._turn_home(inputs, out)
-        elif step.reached or step.problem:
-            self._end(out, f"not at home ({step.problem})" if step.problem else "at home again")
-        else:
-            also = "" if trip.is_at_first else ", to another viewpoint in it"
-            self._say(out, mission.phase, f"driving to {where}{also}")
-
-    def _step_look(self, inputs: Inputs, out: Commands) -> None:
-        mission, look = self.mission, self._look
-        assert mission is not None
-        assert look is not None
-        candidate = mission.sightings == 0 and self._watch.candidate(self._now)
-        step = look.step(self._clock.time, inputs, candidate=candidate)
-        out.speed, out.goal = step.speed, step.goal
-        out.cancel |= step.cancel
-        out.changed |= step.progress
-        if not step.done:
-            self._say(out, Phase.LOOKING, f"{step.why}, in {mission.room.title}")
-            return
-        mission.looked = self._now
-        problem = step.problem or self._views.blind()
-        if problem:
-            moved = self._views.moved()
-            also = f"; {moved}" if moved else ""
-            self._decide(Verdict.UNVERIFIED, f"{mission.room.title} could not be verified: {problem}{also}")
-        else:
-            self._decide(Verdict.CLEAR, saying.clear(mission, look.turned_deg, self._watch.refusals))
-        self._turn_home(inputs, out)
-
-    def _decide(self, verdict: Verdict, reason: str) -> None:
-        mission = self.mission
-        assert mission is not None
-        if mission.verdict is Verdict.CONFIRMED:  # nothing that comes later takes that back
-            is_clear = verdict is Verdict.CLEAR
-            log.info("%s", f"the look around in {mission.room.title} is over" if is_clear else reason)
-            return
-        mission.verdict, mission.reason = verdict, reason
-        (log.info if verdict is Verdict.CLEAR else log.warning)("%s", reason)
-
-    def _turn_home(self, inputs: Inputs, out: Commands) -> None:
-        assert self.mission is not None
-        out.changed = True
-        self._enter(Phase.RETURNING, inputs)
-        self._say(out, Phase.RETURNING, f"driving home, {saying.verdict(self.mission)}")
-
-    def _end(self, out: Commands, place: str) -> None:
-        """The mission is over; `place` says where the robot is or goes."""
-        mission = self.mission
-        assert mission is not None
-        if mission.verdict is None:
-            self._decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at")
-        (log.info if place == "at home again" else log.warning)(
-            "the mission to %s is over, %s", mission.room.title, place
-        )
-        self._close(mission, out)
-        self._leave(out)
-        self._ready.at_rest = f"on guard, {place}; {saying.verdict(mission)}"
-        self._say(out, Phase.IDLE, self._ready.at_rest)
-
-    def _leave(self, out: Commands) -> None:
-        self.mission = self._trip = self._look = None
-        out.changed = True
-
-    def _close(self, mission: Mission, out: Commands) -> None:
-        assert mission.verdict is not None
-        self.last_verdict = mission.verdict.value
-        out.ended += (mission,)
-        out.changed = True
-
-    # -- without a mission
-
     def _rest(self, time: float, inputs: Inputs, out: Commands) -> None:
         low = self._battery.is_low
         if low and self._home is None and self._homes_tried == 0 and not self._is_home(inputs):
@@ -411,26 +211,6 @@ class PatrolManager:
         self._say(
             out, phase, f"waiting for the battery, which is low ({self._battery.text})" if low else self._ready.text
         )
-
-    def _is_home(self, inputs: Inputs) -> bool:
-        return inputs.pose is None or distance(inputs.pose, self.rooms.base.pose) < AT_HOME
-
-    def _drive_home(self) -> None:
-        self._homes += 1
-        self._home = Drive(f"home/{self._homes}", self.rooms.base.pose, self.params.drive)
-
-    def _step_home(self, time: float, inputs: Inputs, out: Commands) -> None:
-        assert self._home is not None
-        step = self._home.step(time, inputs.link, inputs.pose)
-        out.goal = step.goal
-        out.cancel |= step.cancel
-        if step.reached or step.problem:
-            self._home = None
-            place = f"not at home ({step.problem})" if step.problem else "at home again"
-            self._ready.at_rest = f"on guard, {place}"
-            self._say(out, Phase.IDLE, self._ready.at_rest)
-        else:
-            self._say(out, Phase.RETURNING, "waiting for move_base to drive home" if step.waiting else "driving home")
 
     # -- what ends a mission early
 
@@ -484,155 +264,3 @@ class PatrolManager:
             self._decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at to the end: {inputs.guarded.why}")
             self._enter(Phase.RETURNING, inputs)
             out.cancel = out.changed = True
-
-    def _give_up(self, requests: Iterable[Request], why: str, out: Commands) -> None:
-        """Requests that will not be followed get their verdict, too."""
-        for request in requests:
-            mission = recall.begin(request, self.rooms, self._inputs.wall)
-            mission.verdict, mission.reason = Verdict.UNVERIFIED, f"{mission.room.title} was not looked at: {why}"
-            log.warning("%s", mission.reason)
-            self._close(mission, out)
-
-    # -- people's orders, between two steps; each says what was done
-
-    def cancel(self, why: str = "cancelled by a person") -> str:
-        """Give up the mission that runs and all that wait; the robot stays where it is."""
-        rooms = saying.rooms_open(self.mission, self.queue)
-        was_home = self._home is not None
-        self._give_up(self.queue.drop(), why, self._pending)
-        self._home = None
-        if self.mission:
-            self._decide(Verdict.UNVERIFIED, f"{self.mission.room.title} was not looked at to the end: {why}")
-            self._end(self._pending, f"where it is, as the mission was {why}")
-        self._pending.cancel |= bool(rooms) or was_home
-        self._ready.at_rest = f"on guard, {why}" if rooms or was_home else self._ready.at_rest
-        if rooms:
-            return f"given up: {rooms}; the robot stays where it is"
-        return "the way home is given up" if was_home else "there is nothing to give up"
-
-    def go_home(self) -> str:
-        """Give up everything and drive home."""
-        rooms = saying.rooms_open(self.mission, self.queue)
-        if self._inputs.stop:
-            return f"the robot stays where it is: {self._inputs.stop}"
-        self.cancel("called home by a person")
-        self._drive_home()
-        return f"given up: {rooms}; the robot drives home" if rooms else "the robot drives home"
-
-    def abandon(self, why: str) -> Commands:
-        """Give up mission and queue, for an orderly end of the program; the answer holds their records."""
-        rooms = saying.rooms_open(self.mission, self.queue)
-        if rooms:
-            log.warning("the patrol ends: %s; given up: %s", why, rooms)
-            self.cancel(why)
-        out, self._pending = self._pending, Commands()
-        return out
-
-    def ask(self, requests: Sequence[Request]) -> dict[int, str]:
-        """Queue requests; the id of the mission that will answer each room, "" where the room is refused."""
-        taken = self._intake.ask(requests, self._inputs.wall, self.mission)
-        self._pending.changed = True
-        return taken
-
-    # -- detections
-
-    def _watch_frames(self, inputs: Inputs, out: Commands) -> None:
-        mission = self.mission
-        assert mission is not None
-        if inputs.house is not None:
-            self._judge.floor = inputs.house.floor
-        for frame in inputs.frames:
-            for seen in self._watch.add(self._now, frame):
-                self._note(mission, seen, inputs, out)
-            self._point_at(frame, inputs)
-
-    def _note(self, mission: Mission, seen: Confirmation, inputs: Inputs, out: Commands) -> None:
-        """Somebody was confirmed."""
-        mission.sightings += 1
-        if mission.best is None or seen.probability > mission.best.probability:
-            mission.best = seen
-        person, is_new = self._people.note(self._clock.time, seen.measured)
-        person.label, person.room = seen.label, self._room_at(person, inputs)
-        mission.people = self._people.places
-        mission.place = mission.people[0]
-        out.people = tuple(self._people.met)
-        if mission.verdict is not Verdict.CONFIRMED:
-            self._decide(Verdict.CONFIRMED, saying.sighting(mission, seen, person.room))
-        if is_new:
-            if person.number > 1:
-                log.warning(
-                    "a second incident, %s: %s", f"{mission.id}-{person.number}", saying.sighting(mission, seen)
-                )
-            mission.notified = out.changed = True
-            out.notices += (self._notice(mission, inputs, seen, person.number),)
-
-    def _room_at(self, person: Person, inputs: Inputs) -> str:
-        """The room in which a person is, "" where that is not known."""
-        if inputs.house is None or person.x is None or person.y is None:
-            return ""
-        room = self.rooms.find(inputs.house.room_at(person.x, person.y))
-        return room.title if room else ""
-
-    def _notice(self, mission: Mission, inputs: Inputs, seen: Confirmation, number: int) -> Notice:
-        copy = dataclasses.replace(mission, people=list(mission.people))
-        if number > 1:
-            copy.id, copy.place = f"{mission.id}-{number}", mission.people[number - 1]
-        until = inputs.guarded.holds_until
-        if until is not None:
-            self.held[copy.id] = until
-        return Notice(mission=copy, seen=seen, phase=mission.phase, pose=inputs.pose, is_held=until is not None)
-
-    # -- the camera is kept on a person
-
-    def _point_at(self, frame: Frame, inputs: Inputs) -> None:
-        boxes = self._watch.plausible(frame)
-        if not boxes or (self._watch.lately(self._now) < 2 and not self._track.is_on):
-            return  # a single picture stops no drive
-        if frame.eye is None:
-            return
-        column = (boxes[0].xmin + boxes[0].xmax) / 2.0
-        self._track.see(self._clock.time, frame.eye.bearing(column), frame.eye.pose.yaw)
-
-    def _keep_in_view(self, inputs: Inputs, out: Commands) -> bool:
-        """Turn towards whom the camera has in view; what the robot was about waits."""
-        speed = self._track.step(self._clock.time, inputs.pose.yaw if inputs.pose else None)
-        mission, was_tracking = self.mission, self._is_tracking
-        assert mission is not None
-        self._is_tracking = speed is not None
-        if speed is None:
-            return False
-        if not was_tracking:
-            out.cancel |= self._interrupt()
-        if self._look is not None and not self._look.drives:
-            self._look.step(self._clock.time, inputs, candidate=False, held=True)
-        near = inputs.clearance is not None and inputs.clearance < self.params.spin.spin_clearance
-        out.speed = 0.0 if near else speed
-        self._say(out, mission.phase, f"keeping the camera on somebody, {saying.phase_text(mission)}")
-        return True
-
-    def _interrupt(self) -> bool:
-        """Leave off driving; whether there is a goal to give up."""
-        if self._look is not None:
-            self._look.pause()
-            return self._look.drives
-        if self._trip is not None:
-            self._trip.pause()
-        return self._trip is not None
-
-    def _release(self, inputs: Inputs, out: Commands) -> None:
-        """Notices whose entry delay is over, or that were disarmed in time."""
-        for mission, until in list(self.held.items()):
-            disarmed = inputs.guarded.mode == "disarmed"
-            if disarmed or inputs.wall >= until or inputs.guarded.holds_until is None:
-                del self.held[mission]
-                why = "disarmed within the entry delay" if disarmed else "the entry delay is over"
-                out.releases += (Release(mission=mission, is_dropped=disarmed, why=why),)
-                out.changed = True
-
-    # -- what people are told
-
-    def _say(self, out: Commands, phase: Phase, why: str) -> None:
-        report = saying.report(phase, why, self.mission, self.queue, self.last_verdict, self._inputs.guarded.mode)
-        if report != self._report:
-            self._report = report
-            out.report = report

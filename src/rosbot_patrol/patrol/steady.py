@@ -25,8 +25,8 @@ class SteadyClock:
         """Go on to `now` [s]; returns how much time has passed."""
         gap = 0.0 if self._last is None else now - self._last
         self._last = now
-        passed = min(max(gap, 0.0), LONGEST_STEP)
         self.jump = gap if not -BACKWARDS <= gap <= LONGEST_STEP else 0.0
+        passed = 0.0 if self.jump else max(gap, 0.0)
         self.time += passed
         return passed
 

@@ -1,7 +1,8 @@
-"""What of the patrol outlives the program: one JSON file, valid for one run of the launch only.
+"""What of the patrol outlives the program: one JSON file.
 
-A node that respawns goes on where it stopped; a house launched anew (another run id) starts with an empty queue, as
-nobody waits for yesterday's trigger.
+A program that was killed, alone or with the whole launch, goes on where it stopped: every call gets its verdict. One
+that was ended in order has nothing left to go on with. Latched triggers that were handled are known within one run of
+the launch only, as in another one they are new. A file of another house (another points file) is none.
 """
 
 from __future__ import annotations
@@ -20,24 +21,26 @@ VERSION = 2
 
 
 class PatrolStore:
-    """Keeps the manager's memory and the latched triggers that were handled.
+    """Keeps the manager's memory, the schedule's, and the latched triggers that were handled.
 
     Args:
         path: of the file.
         run_id: of the launch.
+        house: which house it is of, such as its points file.
+
+    Attributes:
+        memory: what the manager kept, empty if nothing; schedule: what the schedule did.
+        taken: number of the last line of the journal that the memory knows.
     """
 
-    def __init__(self, path: Path, run_id: str) -> None:
+    def __init__(self, path: Path, run_id: str, house: str = "") -> None:
         self.path = path
-        self._run_id = run_id
+        self._run_id, self._house = run_id, house
         self._latched: dict[str, int] = {}
-        self._memory: dict[str, Any] = {}
+        self.memory: Mapping[str, Any] = {}
+        self.schedule: Mapping[str, float] = {}
+        self.taken = 0
         self._read()
-
-    @property
-    def memory(self) -> Mapping[str, Any]:
-        """What the manager kept in this run of the launch, empty if nothing."""
-        return self._memory
 
     def is_handled(self, sender: str, room_id: int) -> bool:
         """Whether a latched trigger of this sender was taken before the program ended."""
@@ -50,9 +53,17 @@ class PatrolStore:
         while len(self._latched) > 100:
             self._latched.pop(next(iter(self._latched)))
 
-    def save(self, memory: Mapping[str, Any]) -> None:
-        """Write memory and latched triggers. Raises OSError."""
-        tree = {"version": VERSION, "run_id": self._run_id, "latched": dict(self._latched), "memory": dict(memory)}
+    def save(self, memory: Mapping[str, Any], *, taken: int = 0, schedule: Mapping[str, float] | None = None) -> None:
+        """Write it all. Raises OSError."""
+        tree = {
+            "version": VERSION,
+            "run_id": self._run_id,
+            "house": self._house,
+            "taken": taken,
+            "latched": dict(self._latched),
+            "schedule": dict(schedule or {}),
+            "memory": dict(memory),
+        }
         write_atomic(self.path, json.dumps(tree, indent=1).encode())
 
     def _read(self) -> None:
@@ -60,12 +71,18 @@ class PatrolStore:
             tree = json.loads(self.path.read_text(encoding="utf-8"))
             if tree["version"] != VERSION:
                 raise ValueError(f"version {tree['version']}, expected {VERSION}")
-            if tree["run_id"] != self._run_id:
-                return
-            self._latched = {str(k): int(v) for k, v in tree["latched"].items()}
-            self._memory = dict(tree["memory"])
+            latched = {str(k): int(v) for k, v in tree["latched"].items()}
+            memory, taken, schedule = dict(tree["memory"]), int(tree["taken"]), dict(tree["schedule"])
+            is_same = str(tree["house"]) == self._house
         except FileNotFoundError:
             return
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as err:
             log.warning("%s cannot be used (%s), starting afresh", self.path, err)
-            self._latched, self._memory = {}, {}
+            return
+        self.taken = taken  # the journal goes on counting in any case
+        if not is_same:
+            log.warning("%s is of the house of %s, starting afresh", self.path, tree["house"])
+            return
+        self.memory, self.schedule = memory, schedule
+        if tree["run_id"] == self._run_id:
+            self._latched = latched

@@ -40,7 +40,8 @@ from rosbot_patrol.ros.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.incident_keeper import RecordParams
 from rosbot_patrol.ros.map_server_node import MapServerParams
 from rosbot_patrol.ros.narrator_node import NarratorParams
-from rosbot_patrol.ros.patrol_node import NodeParams
+from rosbot_patrol.ros.patrol_inputs import InputParams
+from rosbot_patrol.ros.patrol_settings import NodeParams
 from rosbot_patrol.ros.republish_node import RepublishParams
 from rosbot_patrol.ros.sensor_watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator_node import SimulatorParams
@@ -57,6 +58,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
         "patrol_robot",
         [
             ("", NodeParams),
+            ("", InputParams),
             ("", MailParams),
             ("", DriveParams),
             ("", LookParams),

@@ -75,6 +75,10 @@ class MoveBase:
             if self._tag:
                 self._client.cancel_goal()
 
+    def cancel_all(self) -> None:
+        """Give up every goal that the server has, whoever sent it."""
+        self._client.cancel_all_goals()
+
 
 def _state(status: int) -> GoalState:
     if status in _ACTIVE:

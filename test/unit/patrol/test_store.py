@@ -18,9 +18,20 @@ def test_the_same_run_goes_on(tmp_path):
     assert not again.is_handled("/rostopic_2", 4)
 
 
-def test_another_run_starts_empty(tmp_path):
-    PatrolStore(tmp_path / "p.json", "one").save(MEMORY)
-    assert PatrolStore(tmp_path / "p.json", "two").memory == {}
+def test_another_run_goes_on_too_but_its_latched_triggers_are_new(tmp_path):
+    store = PatrolStore(tmp_path / "p.json", "one")
+    store.note_latched("/rostopic_1", 4)
+    store.save(MEMORY, taken=7, schedule={"night": 5.0})
+    again = PatrolStore(tmp_path / "p.json", "two")
+    assert (again.memory, again.taken, again.schedule) == (MEMORY, 7, {"night": 5.0})
+    assert not again.is_handled("/rostopic_1", 4)
+
+
+def test_another_house_starts_empty(tmp_path, caplog):
+    PatrolStore(tmp_path / "p.json", "run", "flat.yaml").save(MEMORY, taken=7)
+    again = PatrolStore(tmp_path / "p.json", "run", "house.yaml")
+    assert (again.memory, again.taken) == ({}, 7)
+    assert "is of the house of flat.yaml" in caplog.text
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff", b"{}", json.dumps({"version": 99}).encode()])

@@ -1,0 +1,76 @@
+"""The emergency stop: held by each that pressed it, until released, over restarts.
+
+Two can hold it: the service (a person or a program that means this robot) and the topic (a button on the robot, or
+whatever else feeds the base's lock). A button that says "not pressed" ten times a second releases only what it held
+itself; the service releases both, as whoever calls it means just that: a button that is still pressed says so again.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from pathlib import Path
+
+from rosbot_patrol.files import write_atomic
+
+log = logging.getLogger(__name__)
+
+SERVICE, TOPIC = "service", "topic"
+_WORDS = {
+    SERVICE: "the emergency stop was pressed (service /patrol/emergency_stop)",
+    TOPIC: "the emergency stop was pressed (topic /e_stop)",
+    "file": "the emergency stop holds, as what was kept of it cannot be read",
+}
+
+
+class EmergencyStop:
+    """Whether the robot has to stand still.
+
+    Args:
+        path: where that is kept; a file that cannot be read holds the robot.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._held: set[str] = self._read()
+        self._unsaved = False
+        if self._held:
+            log.warning("%s, before the program ended", self.why)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether anybody holds it."""
+        return bool(self._held)
+
+    @property
+    def why(self) -> str:
+        """Who holds it, "" where nobody does."""
+        return _WORDS[min(self._held, key=list(_WORDS).index)] if self._held else ""
+
+    def press(self, pressed: bool, source: str) -> bool:
+        """Press (or release); whether `is_held` has changed. It holds at once, `save` makes it last."""
+        was, before = self.is_held, set(self._held)
+        if pressed:
+            self._held.add(source)
+        elif source == SERVICE:
+            self._held.clear()
+        else:
+            self._held.discard(source)
+        self._unsaved |= self._held != before
+        return self.is_held != was
+
+    def save(self) -> None:
+        """Bring it to the disk where it changed. Raises OSError."""
+        if self._unsaved:
+            write_atomic(self._path, json.dumps({"held_by": sorted(self._held)}).encode())
+            self._unsaved = False
+
+    def _read(self) -> set[str]:
+        try:
+            held = json.loads(self._path.read_text(encoding="utf-8"))["held_by"]
+            return {name for name in held if name in _WORDS}
+        except FileNotFoundError:
+            return set()
+        except (OSError, ValueError, KeyError, TypeError) as err:
+            log.error("%s cannot be read (%s): the robot stands still until the stop is released", self._path, err)
+            return {"file"}

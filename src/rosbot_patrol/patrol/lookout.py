@@ -1,0 +1,115 @@
+"""What the camera sees on a mission: who is confirmed, told and kept in view."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+
+from rosbot_patrol.patrol import saying
+from rosbot_patrol.patrol.commands import Commands, Notice, Release
+from rosbot_patrol.patrol.conduct import Conduct
+from rosbot_patrol.patrol.inputs import Frame, Inputs
+from rosbot_patrol.patrol.mission import Mission, Verdict
+from rosbot_patrol.patrol.people import Person
+from rosbot_patrol.patrol.watch import Confirmation
+
+log = logging.getLogger(__name__)
+
+
+class Lookout(Conduct):
+    """A `Conduct` that minds what the detector sees. Arguments as of Conduct."""
+
+    def _watch_frames(self, inputs: Inputs, out: Commands) -> None:
+        mission = self.mission
+        assert mission is not None
+        if inputs.house is not None:
+            self._judge.floor = inputs.house.floor
+        for frame in inputs.frames:
+            for seen in self._watch.add(self._now, frame):
+                self._note(mission, seen, inputs, out)
+            self._point_at(frame, inputs)
+
+    def _note(self, mission: Mission, seen: Confirmation, inputs: Inputs, out: Commands) -> None:
+        """Somebody was confirmed."""
+        mission.sightings += 1
+        if mission.best is None or seen.probability > mission.best.probability:
+            mission.best = seen
+        person, is_new = self._people.note(self._clock.time, seen.measured)
+        person.label, person.room = seen.label, self._room_at(person, inputs)
+        mission.people = self._people.places
+        mission.place = mission.people[0]
+        out.people = tuple(self._people.met)
+        if mission.verdict is not Verdict.CONFIRMED:
+            self._decide(Verdict.CONFIRMED, saying.sighting(mission, seen, person.room))
+        if is_new:
+            if person.number > 1:
+                log.warning(
+                    "a second incident, %s: %s", f"{mission.id}-{person.number}", saying.sighting(mission, seen)
+                )
+            mission.notified = out.changed = True
+            out.notices += (self._notice(mission, inputs, seen, person.number),)
+
+    def _room_at(self, person: Person, inputs: Inputs) -> str:
+        """The room in which a person is, "" where that is not known."""
+        if inputs.house is None or person.x is None or person.y is None:
+            return ""
+        room = self.rooms.find(inputs.house.room_at(person.x, person.y))
+        return room.title if room else ""
+
+    def _notice(self, mission: Mission, inputs: Inputs, seen: Confirmation, number: int) -> Notice:
+        copy = dataclasses.replace(mission, people=list(mission.people))
+        if number > 1:
+            copy.id, copy.place = f"{mission.id}-{number}", mission.people[number - 1]
+        until = inputs.guarded.holds_until
+        if until is not None:
+            self.held[copy.id] = until
+        return Notice(mission=copy, seen=seen, phase=mission.phase, pose=inputs.pose, is_held=until is not None)
+
+    # -- the camera is kept on a person
+
+    def _point_at(self, frame: Frame, inputs: Inputs) -> None:
+        boxes = self._watch.plausible(frame)
+        if not boxes or (self._watch.lately(self._now) < 2 and not self._track.is_on):
+            return  # a single picture stops no drive
+        if frame.eye is None:
+            return
+        column = (boxes[0].xmin + boxes[0].xmax) / 2.0
+        self._track.see(self._clock.time, frame.eye.bearing(column), frame.eye.pose.yaw)
+
+    def _keep_in_view(self, inputs: Inputs, out: Commands) -> bool:
+        """Turn towards whom the camera has in view; what the robot was about waits."""
+        speed = self._track.step(self._clock.time, inputs.pose.yaw if inputs.pose else None)
+        mission, was_tracking = self.mission, self._is_tracking
+        assert mission is not None
+        self._is_tracking = speed is not None
+        if speed is None:
+            return False
+        if not was_tracking:
+            out.cancel |= self._interrupt()
+        if self._look is not None and not self._look.drives:
+            self._look.step(self._clock.time, inputs, candidate=False, held=True)
+        near = inputs.clearance is not None and inputs.clearance < self.params.spin.spin_clearance
+        out.speed = 0.0 if near else speed
+        self._say(out, mission.phase, f"keeping the camera on somebody, {saying.phase_text(mission)}")
+        return True
+
+    def _interrupt(self) -> bool:
+        """Leave off driving; whether there is a goal to give up."""
+        if self._look is not None:
+            self._look.pause()
+            return self._look.drives
+        if self._trip is not None:
+            self._trip.pause()
+        return self._trip is not None
+
+    # -- notices that waited
+
+    def _release(self, inputs: Inputs, out: Commands) -> None:
+        """Notices whose entry delay is over, or that were disarmed in time."""
+        for mission, until in list(self.held.items()):
+            disarmed = inputs.guarded.mode == "disarmed"
+            if disarmed or inputs.wall >= until or inputs.guarded.holds_until is None:
+                del self.held[mission]
+                why = "disarmed within the entry delay" if disarmed else "the entry delay is over"
+                out.releases += (Release(mission=mission, is_dropped=disarmed, why=why),)
+                out.changed = True

@@ -1,0 +1,127 @@
+"""What people and programs order: action, services, arming, emergency stop; and a kill right after a call."""
+
+import json
+import os
+import signal
+import time
+
+import pytest
+from patrol_house import ROOT, wait_until
+
+rospy = pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+
+def call(name, kind, *values):
+    rospy.wait_for_service(name, 10)
+    return rospy.ServiceProxy(name, kind)(*values)
+
+
+def test_action_services_and_arming(house):
+    import actionlib
+    from rosbot_patrol.msg import Arming, PatrolAction, PatrolGoal
+    from rosbot_patrol.srv import Arm
+    from std_srvs.srv import Trigger
+
+    (house.folder / "schedule.yaml").write_text("rounds: [{name: night, at: [25:00]}]")
+    modes = []
+    subscriber = rospy.Subscriber("/patrol/arming", Arming, modes.append)
+    house.start_move_base()
+    house.start_patrol(
+        schedule=str(house.folder / "schedule.yaml"), arming=str(ROOT / "config" / "arming.yaml"), spin_speed=5.0
+    )
+    said = f"{house.folder}/schedule.yaml: rounds[0]/at[0]: is 1500, expected a time of day"
+    assert said in house.log(house.patrol)
+
+    client = actionlib.SimpleActionClient("patrol", PatrolAction)
+    assert client.wait_for_server(rospy.Duration(10))
+    client.send_goal_and_wait(PatrolGoal(rooms=[1, 99]))
+    assert "there is no room 99" in client.get_goal_status_text()
+    feedback = []
+    client.send_goal(PatrolGoal(rooms=[2, 1]), feedback_cb=feedback.append)
+    assert client.wait_for_result(rospy.Duration(60))
+    result = client.get_result()
+    assert (list(result.rooms), result.verdicts) == ([2, 1], ["clear", "clear"])
+    assert result.text == "2 of 2 rooms have a verdict: nobody was confirmed"
+    assert len(set(result.missions)) == 2
+    assert {"driving", "looking"} <= {f.phase for f in feedback}
+    assert house.states[-1].origin in ("action", "")
+
+    client.send_goal(PatrolGoal())
+    wait_until(lambda: house.states[-1].origin == "action", 10, "the round")
+    client.cancel_goal()
+    assert client.wait_for_result(rospy.Duration(10))
+    assert "cancelled by the program" in client.get_goal_status_text()
+    wait_until(lambda: house.states[-1].state == "idle", 20, "the rest")
+
+    refused = call("/patrol/arm", Arm, "party")
+    assert not refused.accepted
+    assert "the mode 'party' is not known here" in refused.message
+    assert call("/patrol/arm", Arm, "disarmed").accepted
+    wait_until(lambda: modes and modes[-1].mode == "disarmed", 5, "the mode")
+    house.send(1)
+    wait_until(lambda: "the house is disarmed" in house.log(house.patrol), 5, "the word")
+    assert house.states[-1].state == "idle"
+    assert "the robot looks at the rooms 1, 2" in call("/patrol/all", Trigger).message
+    wait_until(lambda: house.states[-1].origin == "all", 5, "the round")
+    assert call("/patrol/home", Trigger).message.startswith("given up: room")
+    wait_until(lambda: house.states[-1].why == "on guard, at home again", 20, "home")
+    assert call("/patrol/cancel", Trigger).message == "there is nothing to give up"
+    assert json.loads((house.folder / "state" / "arming.json").read_text())["mode"] == "disarmed"
+    subscriber.unregister()
+
+
+def test_the_emergency_stop_holds_over_a_kill(house):
+    from std_msgs.msg import Bool
+    from std_srvs.srv import SetBool
+
+    locks = []
+    subscriber = rospy.Subscriber("/e_stop", Bool, lambda message: locks.append(message.data))
+    house.start_move_base(speed=0.5)
+    house.start_patrol()
+    house.send(7)
+    wait_until(lambda: house.states[-1].state == "driving", 10, "the drive")
+    house.twists.clear()
+    assert call("/patrol/emergency_stop", SetBool, True).success
+    wait_until(lambda: house.states[-1].state == "stopped", 5, "the stop")
+    assert house.states[-1].last_verdict == "unverified"
+    wait_until(lambda: locks and locks[-1], 5, "the base's lock")
+    wait_until(lambda: len(house.twists) > 5, 5, "the zeros")
+    assert not any(house.twists)
+    house.send(1)
+    wait_until(lambda: list(house.states[-1].queue) == [1], 5, "the queue")
+
+    os.killpg(house.patrol.pid, signal.SIGKILL)
+    house.patrol.wait()
+    house.start_patrol(wait=False)
+    wait_until(lambda: house.states and house.states[-1].state == "stopped", 20, "the stop, again")
+    assert list(house.states[-1].queue) == [1]
+    button = rospy.Publisher("/e_stop", Bool, queue_size=5)
+    wait_until(lambda: button.get_num_connections() > 1, 10, "the subscription")
+    locks.clear()
+    button.publish(Bool(data=False))  # a button that nobody presses
+    wait_until(lambda: len(locks) > 1 and locks[-1], 5, "the lock, closed again")
+    assert house.states[-1].state == "stopped"
+
+    assert call("/patrol/emergency_stop", SetBool, False).message == "released"
+    wait_until(lambda: not locks[-1], 5, "the lock, open")
+    assert house.wait_for_mission().last_verdict == "clear"
+    button.unregister()
+    subscriber.unregister()
+
+
+def test_a_kill_right_after_a_call_loses_nothing(house):
+    rospy.set_param("/run_id", "one")
+    house.start_move_base()
+    house.start_patrol()
+    calls = house.folder / "state" / "calls.jsonl"
+    house.send(3)
+    deadline = time.monotonic() + 10.0
+    while not calls.stat().st_size and time.monotonic() < deadline:
+        pass
+    os.killpg(house.patrol.pid, signal.SIGKILL)
+    house.patrol.wait()
+    rospy.set_param("/run_id", "two")  # the whole house was killed, and launched anew
+    house.start_patrol(wait=False)
+    last = house.wait_for_mission()
+    assert {s.room_id for s in house.states if s.mission} == {3}
+    assert last.last_verdict == "clear"
