@@ -68,6 +68,7 @@ class PatrolManager(Ordered):
         self._battery = BatteryWatch(self.params.battery)
         self._homes_tried = 0
         self._is_first = True
+        self._is_stopped = False
         if memory:
             recall.recall(self, self._intake, memory)
 
@@ -98,6 +99,9 @@ class PatrolManager(Ordered):
         if inputs.stop:
             self._hold_still(inputs, out)
             return out
+        if self._is_stopped:
+            self._is_stopped = False
+            out.words += (Word(kind="emergency stop", text="the emergency stop is released", is_over=True),)
         self._choose(time, inputs, out)
         if self.mission is None:
             self._rest(time, inputs, out)
@@ -230,8 +234,10 @@ class PatrolManager(Ordered):
 
     def _hold_still(self, inputs: Inputs, out: Commands) -> None:
         """The emergency stop is pressed."""
-        if self._report is None or self._report.phase is not Phase.STOPPED:
+        if not self._is_stopped:
+            self._is_stopped = True
             out.cancel = out.cancel_all = True
+            out.words += (Word(kind="emergency stop", text=f"{inputs.stop}: nobody looks until it is released"),)
         self._home = None
         out.goal, out.speed = None, 0.0
         if self.mission:

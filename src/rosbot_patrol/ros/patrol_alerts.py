@@ -7,20 +7,25 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 import rospy
 
-from rosbot_patrol.alerts.incident import Incident
+from rosbot_patrol.alerts.held import HeldNotices
+from rosbot_patrol.alerts.incident import Event, Incident
 from rosbot_patrol.alerts.incident_database import FOLDER
 from rosbot_patrol.alerts.incident_files import NewFile
 from rosbot_patrol.alerts.incident_store import recall_incident
-from rosbot_patrol.alerts.mail import one_line
+from rosbot_patrol.alerts.mail import one_line, token
+from rosbot_patrol.alerts.notice import Notice as PostNotice
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
 from rosbot_patrol.alerts.postman import Delivery
 from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
-from rosbot_patrol.patrol.commands import Notice
+from rosbot_patrol.patrol.chronicle import Entry
+from rosbot_patrol.patrol.commands import Commands, Ignored, Notice, Release, Word
+from rosbot_patrol.patrol.ignored_log import IgnoredLog
 from rosbot_patrol.ros.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.owner_mail import OwnerPost
 from rosbot_patrol.ros.patrol_images import PictureRing
@@ -47,7 +52,9 @@ class AlertDesk:
         keeper: IncidentKeeper,
     ) -> None:
         self._post, self._pictures, self._keeper = post, pictures, keeper
-        self._jobs: deque[tuple[Incident, Notice]] = deque()
+        self._held = HeldNotices(keeper.state_dir / "held")
+        self._ignored = IgnoredLog(keeper.state_dir / "ignored.jsonl")
+        self._jobs: deque[Callable[[], bool]] = deque()
         self._memory: Callable[[], None] | None = None
         self._memory_due = 0.0
         self._to_record = threading.Event()
@@ -83,9 +90,18 @@ class AlertDesk:
             reason=mission.reason,
             pose=(pose.x, pose.y, pose.yaw) if pose else None,
         )
-        self._jobs.append((incident, notice))
+        self._jobs.append(lambda: self._record(incident, notice))
         self._keeper.see(incident.id, seen.stamp)
         self._to_record.set()
+
+    def follow(self, commands: Commands) -> None:
+        """Take what else a step has for the owner: notices that waited, words, calls that start nothing."""
+        jobs = [partial(self._release, release) for release in commands.releases]
+        jobs += [partial(self._tell, word, time.time()) for word in commands.words]
+        jobs += [partial(self._note_ignored, commands.ignored)] * bool(commands.ignored)
+        if jobs:
+            self._jobs.extend(jobs)
+            self._to_record.set()
 
     def remember(self, save: Callable[[], None]) -> None:
         """Save the patrol's memory once every notice taken so far is on disk; returns at once.
@@ -103,7 +119,10 @@ class AlertDesk:
     def _record_next(self) -> float:
         """Write one thing; returns how long to wait for the next [s]."""
         if self._jobs:
-            return 0.0 if self._record(*self._jobs[0]) else DISK_RETRY
+            if not self._jobs[0]():
+                return DISK_RETRY
+            self._jobs.popleft()
+            return 0.0
         save = self._memory
         if save is None:
             return 60.0
@@ -129,25 +148,65 @@ class AlertDesk:
                     self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
     def _record(self, incident: Incident, notice: Notice) -> bool:
-        if self._post.has(incident.id):  # the program was killed after it was written
-            self._jobs.popleft()
+        """Bring a notice to the disk; whether that is done."""
+        if self._post.has(incident.id) or self._held.has(incident.id):  # the program was killed after it was written
             return True
         picture, note = self._picture(notice)
-        place = self._post.place
+        place = str(self._held.folder) if notice.is_held else self._post.place
+        put = self._held.put if notice.is_held else self._post.put
         with self._telling:
             try:
-                self._post.put(incident_notice(incident, picture, picture_note=note))
+                put(incident_notice(incident, picture, picture_note=note))
             except OSError as err:
                 log.error("the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, place, err)
                 return False
             self._told[incident.id] = incident
             self._publish(incident, transport="", location=place, text=incident.sentence)
-        log.warning("ALERT: %s; the notice is on disk", incident.sentence)
-        self._jobs.popleft()
+        waits = ", where it waits for the entry delay" if notice.is_held else ""
+        log.warning("ALERT: %s; the notice is on disk%s", incident.sentence, waits)
         if picture is not None:
             caption = "sent with the notice"
             file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=notice.seen.stamp, caption=caption)
             self._keeper.put_picture(incident.id, file)
+        return True
+
+    def _release(self, release: Release) -> bool:
+        """Send a notice that waited, or drop it; whether that is done."""
+        try:
+            notice = self._held.get(token(release.mission))
+            if notice is not None and not release.is_dropped:
+                self._post.put(notice)
+            self._held.remove(token(release.mission))
+        except (OSError, ValueError) as err:
+            log.error("the notice about %s that waited cannot be used: %s; trying on", release.mission, err)
+            return False
+        text = f"the notice is {'dropped' if release.is_dropped else 'sent'}: {release.why}"
+        log.warning("%s (%s)", text, release.mission)
+        event = Event(wall=time.time(), kind="notice", text=text)
+        self._keeper.put([Entry(incident=release.mission, events=(event,))])
+        return True
+
+    def _tell(self, word: Word, wall: float) -> bool:
+        """Tell the owner something that is no intruder; whether that is done."""
+        notice = PostNotice(
+            id=token(f"{word.kind}-{wall:.3f}"),
+            wall=wall,
+            kind="fault",
+            subject=f"rosbot patrol: {word.kind}{' again well' if word.is_over else ''}",
+            text=f"{word.text[:1].upper()}{word.text[1:]}.",
+        )
+        try:
+            self._post.put(notice)
+        except OSError as err:
+            log.error("'%s' cannot be written to %s: %s; trying on", word.text, self._post.place, err)
+            return False
+        return True
+
+    def _note_ignored(self, calls: tuple[Ignored, ...]) -> bool:
+        try:
+            self._ignored.add(calls)
+        except OSError as err:
+            log.error("calls that start no mission cannot be written down: %s", err)
         return True
 
     def _picture(self, notice: Notice) -> tuple[bytes | None, str]:

@@ -227,6 +227,7 @@ class PatrolNode:
             self._publish_state(time_now, commands.report)
         for notice in commands.notices:
             self.desk.take(notice, time_now)
+        self.desk.follow(commands)
         self._record(time_now, commands, inputs.pose)
         self._show_people(time_now, commands)
         if self.manager.mission is not None or self.keeper.needs_pictures:
