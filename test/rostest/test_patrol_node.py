@@ -330,6 +330,7 @@ def test_the_narrator_tells_and_ends_with_the_mission(house, person, verdict, st
     )
     house.start_patrol()
     wait_until(lambda: "On guard." in house.log(narrator), 10, "the word")
+    wait_until(lambda: house.trigger.get_num_connections() > 1, 10, "the narrator's subscription")
     house.person = person
     house.send(3)
     assert narrator.wait(60) == status
