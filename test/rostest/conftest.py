@@ -39,8 +39,9 @@ def sim_ros(sim_master: Ros) -> Iterator[Ros]:
     subprocess.run(["rosparam", "delete", "/simulator"], env=sim_master.env, stderr=subprocess.DEVNULL)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def patrol_master() -> Iterator[int]:
+    """The master of the patrol's tests: rospy knows one in a process."""
     import patrol_house  # needs rospy
 
     with patrol_house.patrol_master() as port:
