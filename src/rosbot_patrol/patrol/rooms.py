@@ -6,6 +6,7 @@ Differs:
 - `angle_unit: deg|rad` names the unit of `angle`; without it the file is read in radians as the original reads it,
   with a warning for each angle beyond a full turn.
 - `rooms_num` has to agree with the rooms listed; each fault is one sentence that names file and key.
+- Two rooms of one name are warned of.
 - A key that stands twice is a fault, where yaml itself keeps the last.
 """
 
@@ -115,7 +116,24 @@ def load_rooms(path: str | Path) -> Rooms:
     file = params.load(_File, read_mapping(path, keys="rooms_num and rooms"), name=prefix)
     expected = [f"room{i}" for i in range(file.rooms_num)]
     _check_listed(file, expected, prefix)
-    return Rooms(tuple(_room(file, i, key, prefix) for i, key in enumerate(expected)), str(path))
+    rooms = tuple(_room(file, i, key, prefix) for i, key in enumerate(expected))
+    _warn_of_namesakes(rooms, prefix)
+    return Rooms(rooms, str(path))
+
+
+def _warn_of_namesakes(rooms: tuple[Room, ...], prefix: str) -> None:
+    seen: dict[str, int] = {}
+    for room in rooms:
+        first = seen.setdefault(room.name.casefold(), room.id)
+        if first != room.id:
+            log.warning(
+                "%srooms/room%d/name is '%s', as room %d's: both are patrolled, but notices and people tell them apart"
+                " by number only, and files that mean one of them have to give the number",
+                prefix,
+                room.id,
+                room.name,
+                first,
+            )
 
 
 def _check_listed(file: _File, expected: list[str], prefix: str) -> None:
