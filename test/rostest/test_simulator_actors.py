@@ -38,10 +38,10 @@ def wait(wanted):
 
 said = {}
 said["empty"] = hits()
-said["spawned"] = call("spawn_door", SpawnDoor, name="gate", hinge=Pose2D(1.0, -0.45, math.pi / 2))
+said["spawned"] = call("spawn_door", SpawnDoor, name="gate", hinge=Pose2D(1.0, 0.45, -math.pi / 2))  # opens away
 said["closed"] = wait(lambda n: n > 0)
 said["opened"] = call("set_door", SetDoor, name="gate", opening=1.0, speed=3.0)
-said["open"] = wait(lambda n: n < said["closed"] / 2)
+said["open"] = wait(lambda n: n < 40)
 said["shut"] = call("set_door", SetDoor, name="gate", opening=0.0, at_once=True)
 said["wrong"] = call("set_door", SetDoor, name="gate", opening=2.0)
 said["narrow"] = call("spawn_door", SpawnDoor, name="slit", width=-1.0)
