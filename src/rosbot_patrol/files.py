@@ -15,6 +15,12 @@ def write_atomic(path: Path, data: bytes) -> None:
         OSError: the disk does not take it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, data)
+    sync_folder(path.parent)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """As `write_atomic`, into a folder that is there and that the caller syncs, once for many files. Raises OSError."""
     scratch = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with scratch.open("wb") as file:
@@ -25,7 +31,6 @@ def write_atomic(path: Path, data: bytes) -> None:
     except OSError:
         scratch.unlink(missing_ok=True)
         raise
-    sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.incident import StoredFile, is_name
 from rosbot_patrol.alerts.incident_database import errors_of
-from rosbot_patrol.files import sync_folder
+from rosbot_patrol.files import sync_folder, write_whole
 
 REPORT = "report.html"  # made of the record, not part of it
 
@@ -66,7 +66,7 @@ class IncidentFolder:
             is_new = not folder.exists()
             folder.mkdir(parents=True, exist_ok=True)
             for path, data in paths:
-                _write(path, data)
+                write_whole(path, data)
             sync_folder(folder)
             if is_new:
                 sync_folder(self.root)
@@ -113,16 +113,3 @@ class IncidentFolder:
         if hashlib.sha256(data).hexdigest() != file.sha256:
             return f"the file {file.name} is not the one that was kept: it was changed"
         return ""
-
-
-def _write(path: Path, data: bytes) -> None:
-    scratch = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with scratch.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        scratch.replace(path)
-    except OSError:
-        scratch.unlink(missing_ok=True)
-        raise

@@ -18,10 +18,10 @@ ALARM_CLASSES = ["person", "fire hydrant"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ManagerParams:
-    """The patrol's behaviour."""
+class BehaviourParams:
+    """What the node and its manager share."""
 
-    alarm_classes: tuple[str, ...] = param(tuple(ALARM_CLASSES), doc="classes of objects that alarm")
+    alarm_classes: list[str] = param(ALARM_CLASSES, doc="classes of objects that alarm")
     own_motion_radius: float = param(
         2.0, unit="m", lo=0.0, doc="so near to a room's point the moving robot is what its sensor sees"
     )
@@ -31,6 +31,12 @@ class ManagerParams:
     resume_max_age: float = param(
         43200.0, unit="s", lo=0.0, doc="a call that is older than this after a restart is reported, not followed"
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManagerParams(BehaviourParams):
+    """The patrol's behaviour."""
+
     drive: DriveParams = DriveParams()
     look: LookParams = LookParams()
     spin: SpinParams = SpinParams()

@@ -23,7 +23,7 @@ from rosbot_patrol.patrol.people import PeopleParams
 from rosbot_patrol.patrol.queueing import PriorityParams
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.schedule import Round
-from rosbot_patrol.patrol.settings import ManagerParams
+from rosbot_patrol.patrol.settings import BehaviourParams, ManagerParams
 from rosbot_patrol.patrol.spin import SpinParams
 from rosbot_patrol.patrol.track import TrackParams
 from rosbot_patrol.patrol.viewpoints import ViewpointParams
@@ -43,23 +43,13 @@ NO_ROUNDS: tuple[tuple[Round, ...], tzinfo | None] = ((), None)
 
 
 @dataclass(frozen=True, kw_only=True)
-class NodeParams:
+class NodeParams(BehaviourParams):
     """The node's own parameters; those of mail, drive, look, turn and watch come beside them."""
 
     path_to_params: str = param(doc="points file (the tutorial's name)")
     sensors: str = param("", doc="file of the sensors; empty or none: a sensor's id is the number of its room")
     state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
     image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
-    alarm_classes: list[str] = param(["person", "fire hydrant"], doc="classes of objects that alarm")
-    own_motion_radius: float = param(
-        2.0, unit="m", lo=0.0, doc="so near to a room's point the moving robot is what its sensor sees"
-    )
-    own_motion_memory: float = param(
-        2.0, unit="s", lo=0.0, hi=60.0, doc="so long after it was near the robot is still what the sensor saw"
-    )
-    resume_max_age: float = param(
-        43200.0, unit="s", lo=0.0, doc="a call that is older than this after a restart is reported, not followed"
-    )
     rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
     schedule: str = param("", doc="file of the rounds; empty: none")
     arming: str = param("", doc="file of the modes; empty: all rooms in each mode, without delays")
@@ -105,7 +95,7 @@ def load_manager_params(node: NodeParams, tree: dict[str, Any], prefix: str) -> 
     battery = load_flat(BatteryParams, tree)
     check_battery(battery, prefix)
     return ManagerParams(
-        alarm_classes=tuple(node.alarm_classes),
+        alarm_classes=node.alarm_classes,
         own_motion_radius=node.own_motion_radius,
         own_motion_memory=node.own_motion_memory,
         resume_max_age=node.resume_max_age,

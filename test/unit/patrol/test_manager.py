@@ -308,7 +308,7 @@ def test_it_stands_still_to_confirm_what_may_be_an_intruder():
 
 
 def test_alarm_classes_are_a_parameter():
-    manager = PatrolManager(ROOMS, ManagerParams(alarm_classes=("cat",)))
+    manager = PatrolManager(ROOMS, ManagerParams(alarm_classes=["cat"]))
     assert World(manager, person_when=looking).mission(1).verdict.value == "clear"
 
 
