@@ -140,7 +140,11 @@ class House:
         command = [*inside, "rosrun", "rosbot_patrol", "patrol_robot", "__name:=patrolling_node"]
         self.patrol = self._start(command, values)
         if wait:
-            wait_until(lambda: self.states and self.states[-1].state == "idle", 25, "on guard")
+            try:
+                wait_until(lambda: self.states and self.states[-1].state == "idle", 60, "on guard")
+            except AssertionError as err:
+                said = [s.why for s in self.states]
+                raise AssertionError(f"{err}; it said {said}; its log: {self.log(self.patrol)[-3000:]}") from err
 
     def _start(self, command, params):
         log = (self.folder / f"log{len(self.processes)}").open("wb")
