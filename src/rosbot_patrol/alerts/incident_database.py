@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from rosbot_patrol.errors import StoreError
@@ -130,14 +130,12 @@ def open_for_writing(path: Path) -> sqlite3.Connection:
     Raises:
         StoreError: `is_corrupt` where the file is no such database or a damaged one.
     """
-    with errors_of(path):
+    with errors_of(path), ExitStack() as undo:
         path.parent.mkdir(parents=True, exist_ok=True)
         connection = _connect(path, "mode=rwc")
-        try:
-            _prepare(connection, path)
-        except BaseException:
-            connection.close()
-            raise
+        undo.callback(connection.close)
+        _prepare(connection, path)
+        undo.pop_all()
     return connection
 
 
@@ -200,12 +198,6 @@ def errors_of(path: Path) -> Iterator[None]:
 @contextmanager
 def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.Connection]:
     """All or nothing, on the disk when it ends. Raises StoreError."""
-    with errors_of(path):
+    with errors_of(path), connection:  # which commits, or rolls back
         connection.execute("BEGIN IMMEDIATE")
-        try:
-            yield connection
-            connection.execute("COMMIT")
-        except BaseException:
-            with suppress(sqlite3.Error):  # what went wrong is said by the error that is under way
-                connection.execute("ROLLBACK")
-            raise
+        yield connection

@@ -8,6 +8,7 @@ import email.policy
 import itertools
 import socketserver
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -49,9 +50,10 @@ class MailSink:
         self._server.server_close()
 
 
-class _Session(socketserver.StreamRequestHandler):
+class _Session(socketserver.StreamRequestHandler, ABC):
+    @abstractmethod
     def keep(self, mail: bytes) -> None:
-        raise NotImplementedError
+        """Take a mail; when it returns the mail is on the disk."""
 
     def handle(self) -> None:
         with contextlib.suppress(ConnectionError):
