@@ -9,17 +9,19 @@ from html import escape
 from rosbot_patrol.campaign.table import Share
 
 _LEFT, _WIDTH, _ROW = 250.0, 420.0, 30.0  # of a chart: room for the names, length of an axis, height of a line [px]
-_RIGHT = 150.0
+_RIGHT = 190.0
 
 
 def share_chart(shares: Sequence[Share], *, good: float | None = 1.0) -> str:
     """A line for each share: the interval as a bar, the share as a dot.
 
     Args:
-        shares: those of no trials are left out.
+        shares: those of no trials are left out, and without any there is no chart.
         good: what the share should be; another is drawn as a fault. None where neither is.
     """
     shown = [share for share in shares if share.trials]
+    if not shown:
+        return ""
     height = _ROW * len(shown) + 30.0
     parts = [_axis([0.0, 0.25, 0.5, 0.75, 1.0], 1.0, height, [f"{v:.0%}" for v in (0, 0.25, 0.5, 0.75, 1)])]
     for i, share in enumerate(shown):
@@ -41,11 +43,14 @@ def spread_chart(rows: Sequence[tuple[str, Sequence[float], float | None]], unit
     """A line for each measure: every value as a dot, the median as a stroke, the bound as a dashed one.
 
     Args:
-        rows: name, values, and the bound that they should keep or None; rows without values are left out.
+        rows: name, values, and the bound that they should keep or None; rows without values are left
+            out, and without any there is no chart.
         unit: of all of them.
     """
     shown = [row for row in rows if row[1]]
-    most = max((max(values) for _, values, _ in shown), default=1.0)
+    if not shown:
+        return ""
+    most = max(max(values) for _, values, _ in shown)
     most = _round_up(max([most, *(bound for *_, bound in shown if bound is not None)]))
     height = _ROW * len(shown) + 30.0
     ticks = [most * k / 4 for k in range(5)]
