@@ -22,7 +22,7 @@ class Event:
 
     Attributes:
         wall: when, seconds since 1970.
-        kind: sensor (what one said), state (what the robot does), seen, notice, verdict, fault, note.
+        kind: sensor (what one said), state (what the robot does), seen, suspect, notice, verdict, fault, note.
         text: one sentence.
         data: further plain values, such as the sensor's id.
     """

@@ -31,6 +31,7 @@ class Result:
         localisation: mean and largest error of the pose [m].
         home_error: from where the robot began, at the end [m].
         home: whether it came back; None where it went on to another room, or nobody knows.
+        suspects: what looked like somebody to the guard, as it says.
         mails: that were delivered; missions: that ended.
         sim_s, wall_s: how long it took.
     """
@@ -56,6 +57,7 @@ class Result:
     localisation: tuple[float, float] | None = None
     home_error: float | None = None
     home: bool | None = None
+    suspects: list[str] = field(default_factory=list)
     mails: int = 0
     missions: int = 0
     sim_s: float = 0.0

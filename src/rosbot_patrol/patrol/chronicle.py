@@ -154,7 +154,9 @@ class Chronicle:
         path = tuple(self._path) if is_own else ()
         why = commands.report.why if commands.report is not None else mission.reason
         event = Event(wall=wall, kind="state", text=why, data={"spent": dict(mission.times)})
-        entries.append(Entry(incident=mission.id, changes=_state(mission), path=path, events=(event,), closed=wall))
+        looked_like = commands.suspects if is_own else ()
+        events = (*(Event(wall=wall, kind="suspect", text=text) for text in looked_like), event)
+        entries.append(Entry(incident=mission.id, changes=_state(mission), path=path, events=events, closed=wall))
         for number in range(2, len(mission.people) + 1):
             other = replace(mission, id=f"{mission.id}-{number}", place=mission.people[number - 1])
             entries.append(Entry(incident=other.id, changes=_state(other), events=(event,), closed=wall))

@@ -97,6 +97,7 @@ class Commands:
         releases: what becomes of notices that were held.
         ended: missions that are over, with their verdicts; the robot may not be at home yet.
         ignored: calls that start no mission.
+        suspects: what looked like somebody on the mission that ended, one sentence each.
         words: for the owner.
         people: those met on the mission, where one of them was seen in this step.
         changed: what has to outlive the program has changed.
@@ -111,6 +112,7 @@ class Commands:
     releases: tuple[Release, ...] = ()
     ended: tuple[Mission, ...] = ()
     ignored: tuple[Ignored, ...] = ()
+    suspects: tuple[str, ...] = ()
     words: tuple[Word, ...] = ()
     people: tuple[Person, ...] = ()
     changed: bool = False

@@ -19,6 +19,7 @@ from rosbot_patrol.patrol.readiness import Readiness
 from rosbot_patrol.patrol.rooms import Room, Rooms
 from rosbot_patrol.patrol.settings import ManagerParams
 from rosbot_patrol.patrol.steady import SteadyClock
+from rosbot_patrol.patrol.suspects import Suspects
 from rosbot_patrol.patrol.track import Track
 from rosbot_patrol.patrol.watch import Watch
 
@@ -63,6 +64,7 @@ class Conduct:
         self.held: dict[str, float] = {}
         self._judge = judge or Judge()
         self._watch = Watch(tuple(params.alarm_classes), params.watch, self._judge)
+        self._suspects = Suspects(params.suspects)
         self._people = People(params.people)
         self._track = Track(params.track)
         self._is_tracking = False
@@ -85,6 +87,7 @@ class Conduct:
         assert self.mission is not None
         self.mission.started = self._now
         self._watch.start(self._now)
+        self._suspects.start(self._now)
         self._track.reset()
         self._is_tracking = False
         self._people = People(self.params.people)
@@ -207,6 +210,7 @@ class Conduct:
     def _close(self, mission: Mission, out: Commands) -> None:
         assert mission.verdict is not None
         self.last_verdict = mission.verdict.value
+        out.suspects += saying.suspects(self._suspects.all)
         out.ended += (mission,)
         out.changed = True
 

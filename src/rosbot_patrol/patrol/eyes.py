@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from rosbot_patrol.patrol.inputs import Eye, Inputs
 from rosbot_patrol.patrol.mission import Mission
 from rosbot_patrol.patrol.room_regions import RoomRegions
 from rosbot_patrol.patrol.rooms import Room
+from rosbot_patrol.patrol.suspects import Suspect
 from rosbot_patrol.patrol.viewpoints import Viewpoint, ViewpointParams, ViewpointPlanner
 from rosbot_patrol.patrol.witness import Witness, WitnessParams, off_the_map
 from rosbot_patrol.scan import scan_points
@@ -25,6 +27,7 @@ log = logging.getLogger(__name__)
 VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
 _SAME_DOUBT = 1.5  # boxes too far off to be measured that are nearer are of one thing [m]
+_SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -48,7 +51,13 @@ class _Doubt:
     x: float
     y: float
     pictures: int = 1
+    seen_from: tuple[Pose2D, ...] = ()  # where a second side is wanted
     is_visited: bool = False
+
+    @property
+    def text(self) -> str:
+        looked = "was seen from one side only" if self.seen_from else "was not seen from near"
+        return f"something like a person at about ({self.x:.1f}, {self.y:.1f}) {looked}"
 
 
 class Eyes:
@@ -100,6 +109,18 @@ class Eyes:
             for box in frame.boxes:
                 if box.doubt is not None:
                     self._doubt(*box.doubt)
+
+    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+        """Look at what seems to be a person from another side."""
+        for suspect in doubtful:
+            known = next((d for d in self._doubts if d.seen_from and suspect.apart(d.x, d.y) < _SAME_SUSPECT), None)
+            if known is None:
+                known = _Doubt(suspect.x, suspect.y, pictures=self.params.coverage.seen_in)
+                self._doubts.append(known)
+            known.seen_from = tuple(side.eye for side in suspect.sides)
+        gone = [d for d in self._doubts if d.seen_from and not any(s.apart(d.x, d.y) < _SAME_SUSPECT for s in doubtful)]
+        for doubt in gone:  # told, or no longer like one
+            doubt.is_visited = True
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """The best further viewpoint within the bounds."""
@@ -162,7 +183,7 @@ class Eyes:
         """Why what was seen is too little."""
         doubts = self._open_doubts()
         if doubts:
-            return f"something like a person at about ({doubts[0].x:.1f}, {doubts[0].y:.1f}) was not seen from near"
+            return doubts[0].text
         share = self.share()
         if share is None or share >= self.params.clear_share:
             return ""
@@ -194,7 +215,7 @@ class Eyes:
     def _doubt(self, x: float, y: float) -> None:
         """Something like a person was seen at about a place, too far off to be measured."""
         for doubt in self._doubts:
-            if math.hypot(doubt.x - x, doubt.y - y) < _SAME_DOUBT:
+            if not doubt.seen_from and math.hypot(doubt.x - x, doubt.y - y) < _SAME_DOUBT:
                 doubt.pictures += 1
                 return
         self._doubts.append(_Doubt(x, y))
@@ -217,7 +238,9 @@ class Eyes:
         assert self._planner is not None
         assert inputs.pose is not None
         for doubt in self._open_doubts():
-            found = self._planner.near(inputs.pose, doubt.x, doubt.y, stands=self._stands(inputs))
+            found = self._planner.near(
+                inputs.pose, doubt.x, doubt.y, stands=self._stands(inputs), seen_from=doubt.seen_from
+            )
             if found is not None:
                 doubt.is_visited = True
                 return found

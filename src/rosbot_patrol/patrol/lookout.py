@@ -26,8 +26,18 @@ class Lookout(Conduct):
             self._judge.floor = inputs.house.floor
         for frame in inputs.frames:
             for seen in self._watch.add(self._now, frame):
+                self._suspects.told(seen.measured)
+                self._note(mission, seen, inputs, out)
+            for seen in self._weigh(frame):
                 self._note(mission, seen, inputs, out)
             self._point_at(frame, inputs)
+        self._views.suspect(self._suspects.doubtful())
+
+    def _weigh(self, frame: Frame) -> tuple[Confirmation, ...]:
+        """Weak sights are gathered by place."""
+        if not frame.counts or frame.stamp is None or frame.eye is None:
+            return ()
+        return self._suspects.add(frame.stamp, frame.eye.pose, self._watch.plausible(frame))
 
     def _note(self, mission: Mission, seen: Confirmation, inputs: Inputs, out: Commands) -> None:
         """Somebody was confirmed."""

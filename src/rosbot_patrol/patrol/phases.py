@@ -13,6 +13,7 @@ from rosbot_patrol.patrol.inputs import GoalLink, Inputs
 from rosbot_patrol.patrol.look import Look, LookParams, LookStep
 from rosbot_patrol.patrol.mission import Mission
 from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.suspects import Suspect
 from rosbot_patrol.patrol.viewpoints import Viewpoint
 
 Choose = Callable[[], Sequence[Pose2D]]
@@ -72,6 +73,9 @@ class Views(Protocol):
     def see(self, now: float, inputs: Inputs) -> None:
         """One step of the drive to the room or of the look."""
 
+    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+        """What looks like a person from too few sides, all of it."""
+
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """Where to look from next, None where the room is seen well enough or there is nowhere."""
 
@@ -96,6 +100,9 @@ class OneTurn:
 
     def see(self, now: float, inputs: Inputs) -> None:
         """Nothing to see."""
+
+    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+        """There is no other side."""
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """One turn is enough."""

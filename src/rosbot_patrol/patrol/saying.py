@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from rosbot_patrol.patrol.commands import Report
 from rosbot_patrol.patrol.mission import Mission, Phase
 from rosbot_patrol.patrol.queueing import MissionQueue
+from rosbot_patrol.patrol.suspects import Suspect
 from rosbot_patrol.patrol.watch import Confirmation
 
 _WHERE = {Phase.DRIVING: "on the way to", Phase.LOOKING: "in"}
@@ -37,6 +38,19 @@ def clear(mission: Mission, turned_deg: float, refusals: Mapping[str, int]) -> s
     if refusals:
         parts.append(f"something like a person was no person: {max(refusals, key=lambda why: refusals[why])}")
     return ", ".join(parts)
+
+
+def suspects(found: Iterable[Suspect]) -> tuple[str, ...]:
+    """What looked like somebody, for the record: where, how surely, from which sides."""
+    texts = []
+    for suspect in found:
+        sides = [
+            f"{len(side.scores)} pictures at {side.score:.2f} from ({side.eye.x:.1f}, {side.eye.y:.1f})"
+            for side in suspect.sides
+        ]
+        about = f"{suspect.label} at ({suspect.x:.2f}, {suspect.y:.2f})"
+        texts.append(f"{about}{', told' * suspect.is_told}: {'; '.join(sides)}")
+    return tuple(texts)
 
 
 def phase_text(mission: Mission) -> str:

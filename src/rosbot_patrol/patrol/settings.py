@@ -11,6 +11,7 @@ from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.people import PeopleParams
 from rosbot_patrol.patrol.queueing import PriorityParams
 from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.suspects import SuspectParams
 from rosbot_patrol.patrol.track import TrackParams
 from rosbot_patrol.patrol.watch import WatchParams
 
@@ -41,6 +42,7 @@ class ManagerParams(BehaviourParams):
     look: LookParams = LookParams()
     spin: SpinParams = SpinParams()
     watch: WatchParams = WatchParams()
+    suspects: SuspectParams = SuspectParams()
     people: PeopleParams = PeopleParams()
     track: TrackParams = TrackParams()
     priorities: PriorityParams = PriorityParams()

@@ -7,12 +7,13 @@ robot can reach in the room and at its doors, the one that shows most unseen flo
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, wrap_angles
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.coverage import CoverageParams, sight_on_map, visible
 from rosbot_patrol.patrol.floor import Array, Floor, Mask
@@ -35,6 +36,9 @@ class ViewpointParams:
         0.22, unit="m", lo=0.05, doc="half the narrowest gap that a viewpoint is reached through"
     )
     viewpoint_spacing: float = param(0.4, unit="m", lo=0.1, doc="between the places that are compared")
+    other_side: float = param(
+        0.8, unit="rad", lo=0.0, hi=3.1, doc="so far aside a second look at something like a person is from"
+    )
     doorway_depth: float = param(1.0, unit="m", lo=0.0, doc="so far outside of the room a viewpoint may lie")
 
 
@@ -113,7 +117,15 @@ class ViewpointPlanner:
         return self.next(start, room, room, width=width, tried=tried)
 
     def near(
-        self, start: Pose2D, x: float, y: float, *, stands: Mask | None = None, nearest: float = 1.5, most: float = 3.5
+        self,
+        start: Pose2D,
+        x: float,
+        y: float,
+        *,
+        stands: Mask | None = None,
+        seen_from: Sequence[Pose2D] = (),
+        nearest: float = 1.5,
+        most: float = 3.5,
     ) -> Viewpoint | None:
         """A place from which another one is looked at from near, on a free line; None where there is none.
 
@@ -122,6 +134,7 @@ class ViewpointPlanner:
             x: of what is to be looked at [m].
             y: of what is to be looked at [m].
             stands: as for `next`.
+            seen_from: from there it was seen: the place is to show another side.
             nearest: no place nearer than that [m].
             most: none farther [m].
         """
@@ -133,12 +146,21 @@ class ViewpointPlanner:
         good = open_ & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
         if stands is not None:
             good &= ~stands
+        for eye in seen_from:
+            good &= self._is_aside(math.atan2(eye.y - y, eye.x - x), x, y)
         if not good.any():
             return None
         iy, ix = np.unravel_index(int(np.where(good, ways, _FAR).argmin()), good.shape)
         at = floor.info.centre_of(int(ix), int(iy))
         yaw = math.atan2(y - at[1], x - at[0])
         return Viewpoint(pose=Pose2D(*at, yaw), turn=0.0, gain=0.0, way=float(ways[iy, ix]))
+
+    def _is_aside(self, bearing: float, x: float, y: float) -> Mask:
+        """The floor that lies in another direction from a place than a bearing in map [rad]."""
+        ix, iy = np.meshgrid(np.arange(self.floor.info.shape[1]), np.arange(self.floor.info.shape[0]))
+        xs, ys = self.floor.centres(ix, iy)
+        mask: Mask = np.abs(wrap_angles(np.arctan2(ys - y, xs - x) - bearing)) > self.params.other_side
+        return mask
 
     def _before(self, x: float, y: float) -> tuple[float, float]:
         """The floor before a wall on which something hangs."""

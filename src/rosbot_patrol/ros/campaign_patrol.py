@@ -153,6 +153,7 @@ def evaluate(
         localisation=heard.localisation(),
         home_error=home,
         home=None if home is None or went_on else home < HOME,
+        suspects=[event.text for event in kept.events if event.kind == "suspect"] if kept is not None else [],
         mails=mails,
         missions=len({s.message.mission for s in heard.states if s.message.mission}),
         sim_s=round(robot.times[-1], 1) if robot.times else 0.0,

@@ -25,6 +25,7 @@ from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.schedule import Round
 from rosbot_patrol.patrol.settings import BehaviourParams, ManagerParams
 from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.suspects import SuspectParams
 from rosbot_patrol.patrol.track import TrackParams
 from rosbot_patrol.patrol.viewpoints import ViewpointParams
 from rosbot_patrol.patrol.watch import WatchParams
@@ -61,6 +62,7 @@ class NodeParams(BehaviourParams):
     )
     known_objects: str = param("", doc="file of things that look like somebody (patrol/known_objects); empty: none")
     watch: WatchParams = WatchParams()
+    suspects: SuspectParams = SuspectParams()
     judge: JudgeParams = JudgeParams()
     coverage: CoverageParams = CoverageParams()
     viewpoints: ViewpointParams = ViewpointParams()
@@ -105,6 +107,7 @@ def load_manager_params(node: NodeParams, tree: dict[str, Any], prefix: str) -> 
         look=load_flat(LookParams, tree),
         spin=load_flat(SpinParams, tree),
         watch=node.watch,
+        suspects=node.suspects,
         people=node.people,
         track=node.track,
     )

@@ -37,7 +37,8 @@ HOUSE = (
     "########################",
 )  # the room at the bottom has a corner on the left that its point does not see
 FLOOR = drawn_floor(*HOUSE)
-ROOMS = points((2.0, 4.7), (9.5, 2.0))
+POINT = Pose2D(9.5, 2.0, 0.0)
+ROOMS = points((2.0, 4.7), POINT[:2])
 REGIONS = part_rooms(FLOOR, ROOMS)
 
 Place = tuple[float, float]
@@ -74,6 +75,7 @@ class World:
         self.triggers: tuple[int, ...] = ()
         self.goals, self.notices, self.ended, self.reports, self.tracked = [], [], [], [], []
         self.cancels, self.flat, self.count, self.measures_to = 0, False, 0, 99.0
+        self.score: Callable[[Pose2D], float] = lambda pose: 0.9
 
     def frame(self) -> Frame:
         sight = sight_on_map(FLOOR, self.pose.x, self.pose.y, 8.0)
@@ -94,7 +96,7 @@ class World:
         left, right = round(max(middle - 40, 0)), round(min(middle + 40, 640))
         return Box(
             label="person",
-            probability=0.9,
+            probability=self.score(self.pose),
             xmin=left,
             xmax=right,
             ymin=20,
@@ -334,3 +336,36 @@ def test_what_nobody_could_look_at_from_near_is_unverified() -> None:
     mission = world.mission()
     assert mission.verdict.value == "unverified"
     assert "something like a person at about (3.2, 0.8)" in mission.reason
+
+
+def side(pose: Pose2D) -> float:
+    """Where the eye is from (7, 1)."""
+    return math.atan2(pose.y - 1.0, pose.x - 7.0)
+
+
+def test_one_who_is_half_hidden_is_looked_at_from_another_side_and_confirmed() -> None:
+    world = World(lambda now: [(7.0, 1.0)])
+    world.score = lambda pose: 0.55
+    mission = world.mission()
+    assert mission.verdict.value == "confirmed"
+    assert "probability 0.55" in mission.reason
+    first, *others = mission.views_done
+    assert max(abs(wrap_angle(side(Pose2D(*view)) - side(Pose2D(*first)))) for view in others) > 0.6
+    assert len(world.notices) == 1
+
+
+def test_what_looks_like_somebody_from_one_side_only_is_nobody() -> None:
+    world = World(lambda now: [(7.0, 1.0)])
+    world.score = lambda pose: 0.55 if abs(side(pose) - side(POINT)) < 0.6 else 0.0
+    mission = world.mission()
+    assert mission.verdict.value == "clear"
+    assert any(abs(wrap_angle(side(Pose2D(*view)) - side(POINT))) > 0.6 for view in mission.views_done)
+    assert world.notices == []
+
+
+def test_what_could_be_looked_at_from_one_side_only_is_unverified() -> None:
+    world = World(lambda now: [(7.0, 1.0)], eyes=EyesParams(look_around="spin"))
+    world.score = lambda pose: 0.55 if math.dist(pose[:2], POINT[:2]) < 0.3 else 0.0
+    mission = world.mission()
+    assert mission.verdict.value == "unverified"
+    assert "was seen from one side only" in mission.reason

@@ -286,6 +286,9 @@ class TwoViews:
     def see(self, now, inputs):
         pass
 
+    def suspect(self, doubtful):
+        pass
+
     def next(self, inputs):
         done = len(self.mission.views_done)
         pose = Pose2D(self.mission.room.pose.x + 2.0, 0.0, 0.0)

@@ -1,0 +1,175 @@
+"""Weak sights gathered by place: what looks a little like a person, and stays so from another side, is one.
+
+Somebody half hidden behind furniture is seen for long, but never surely: the watch, which wants a few sure pictures in
+a row, lets them pass. Here boxes are gathered by the place of what they show. Something with a person's face from one
+side only (a coat on a stand, a shadow) is doubtful, and worth a look from elsewhere; something that is taken for a
+person from two sides, at one place, is confirmed. Each side's pictures count as one witness, however many there are:
+pictures from one place err alike.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from rosbot_patrol.geometry import Pose2D, angle_difference
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.inputs import Box, Measured
+from rosbot_patrol.patrol.watch import Confirmation
+
+_PICTURES = 100  # of a side that are kept
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuspectParams:
+    """What weak sights make of a place."""
+
+    weak_score: float = param(0.5, lo=0.0, hi=1.0, doc="least median of a side's probabilities")
+    weak_pictures: int = param(5, lo=1, hi=100, doc="pictures from one side that have to show it")
+    weak_sides: int = param(2, lo=1, hi=10, doc="sides from which it has to look like a person")
+    side_angle: float = param(0.6, unit="rad", lo=0.05, hi=3.1, doc="seen from so far aside is another side")
+    weak_error: float = param(0.6, unit="m", lo=0.05, doc="what is not known better than that has no place")
+    weak_apart: float = param(0.7, unit="m", lo=0.1, doc="farther apart are two things")
+
+
+@dataclass
+class Side:
+    """What was seen of a thing from one side.
+
+    Attributes:
+        bearing: from the thing to where it was first seen from, in map [rad].
+        scores: probabilities of the last pictures.
+        eye: the camera at the last of them.
+    """
+
+    bearing: float
+    eye: Pose2D
+    scores: deque[float] = field(default_factory=lambda: deque(maxlen=_PICTURES))
+
+    @property
+    def score(self) -> float:
+        """Median of the probabilities."""
+        return statistics.median_low(self.scores)
+
+
+@dataclass
+class Suspect:
+    """Something that looks like a person.
+
+    Attributes:
+        label: class of object; x, y: place in map [m]; weight: of all that told it.
+        sides: from where it was seen.
+        best: the surest box; stamp: of its picture [s]; boxes: all of that picture.
+        is_told: it was confirmed.
+    """
+
+    label: str
+    x: float
+    y: float
+    weight: float
+    best: Box
+    stamp: float
+    boxes: tuple[Box, ...]
+    sides: list[Side] = field(default_factory=list)
+    is_told: bool = False
+
+    @property
+    def pictures(self) -> int:
+        """In which it was seen, of all sides."""
+        return sum(len(side.scores) for side in self.sides)
+
+    def apart(self, x: float, y: float) -> float:
+        """From a place [m]."""
+        return math.hypot(self.x - x, self.y - y)
+
+
+class Suspects:
+    """Those of one mission.
+
+    Args:
+        params: what makes one a person.
+    """
+
+    def __init__(self, params: SuspectParams | None = None) -> None:
+        self.params = params or SuspectParams()
+        self.all: list[Suspect] = []
+        self._newest = -math.inf
+
+    def start(self, now: float) -> None:
+        """Forget all, for a new mission; pictures taken before `now` do not count from here on."""
+        self.all, self._newest = [], now
+
+    def add(self, stamp: float, eye: Pose2D, boxes: Iterable[Box]) -> tuple[Confirmation, ...]:
+        """Take the boxes of one picture that may show an intruder; a confirmation for each that has become one.
+
+        Args:
+            stamp: of the picture [s].
+            eye: the camera in map.
+            boxes: of the classes that alarm, none of them refused.
+        """
+        if stamp <= self._newest:
+            return ()
+        self._newest = stamp
+        found, boxes = [], tuple(boxes)
+        for box in boxes:
+            m = box.measured
+            if m is None or m.error > self.params.weak_error:
+                continue
+            suspect = self._take(box, m, stamp, boxes)
+            self._side(suspect, eye).scores.append(box.probability)
+            if not suspect.is_told and len(self._witnesses(suspect)) >= self.params.weak_sides:
+                suspect.is_told = True
+                found.append(self._confirmation(suspect))
+        return tuple(found)
+
+    def told(self, measured: Measured | None) -> None:
+        """Somebody was confirmed otherwise: what was gathered there is of them."""
+        for suspect in self.all:
+            if measured is None or suspect.apart(measured.x, measured.y) <= self.params.weak_apart + measured.error:
+                suspect.is_told = True
+
+    def doubtful(self) -> list[Suspect]:
+        """Those that look like a person from too few sides."""
+        return [s for s in self.all if not s.is_told and self._witnesses(s)]
+
+    def _take(self, box: Box, m: Measured, stamp: float, boxes: tuple[Box, ...]) -> Suspect:
+        near = [s for s in self.all if s.label == box.label and s.apart(m.x, m.y) <= self.params.weak_apart]
+        weight = 1.0 / max(m.error, 0.05) ** 2
+        if not near:
+            self.all.append(Suspect(box.label, m.x, m.y, weight, box, stamp, boxes))
+            return self.all[-1]
+        suspect = min(near, key=lambda s: s.apart(m.x, m.y))
+        suspect.weight += weight
+        suspect.x += (m.x - suspect.x) * weight / suspect.weight
+        suspect.y += (m.y - suspect.y) * weight / suspect.weight
+        if box.probability > suspect.best.probability:
+            suspect.best, suspect.stamp, suspect.boxes = box, stamp, boxes
+        return suspect
+
+    def _side(self, suspect: Suspect, eye: Pose2D) -> Side:
+        bearing = math.atan2(eye.y - suspect.y, eye.x - suspect.x)
+        nearest = min(suspect.sides, key=lambda s: abs(angle_difference(s.bearing, bearing)), default=None)
+        if nearest is None or abs(angle_difference(nearest.bearing, bearing)) > self.params.side_angle:
+            nearest = Side(bearing, eye)
+            suspect.sides.append(nearest)
+        nearest.eye = eye
+        return nearest
+
+    def _witnesses(self, suspect: Suspect) -> list[Side]:
+        p = self.params
+        return [s for s in suspect.sides if len(s.scores) >= p.weak_pictures and s.score >= p.weak_score]
+
+    def _confirmation(self, suspect: Suspect) -> Confirmation:
+        others = tuple(box for box in suspect.boxes if box is not suspect.best)
+        scores = [score for side in self._witnesses(suspect) for score in side.scores]
+        return Confirmation(
+            label=suspect.label,
+            probability=statistics.median_low(scores),
+            stamp=suspect.stamp,
+            boxes=(suspect.best, *others),
+            pictures=len(scores),
+            measured=suspect.best.measured,
+        )
