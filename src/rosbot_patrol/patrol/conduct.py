@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 from rosbot_patrol.geometry import Pose2D, distance
 from rosbot_patrol.patrol import saying
+from rosbot_patrol.patrol.close_ups import CloseUps
 from rosbot_patrol.patrol.commands import Commands, Report
 from rosbot_patrol.patrol.drive import Drive
 from rosbot_patrol.patrol.inputs import Inputs
@@ -65,6 +66,7 @@ class Conduct:
         self._judge = judge or Judge()
         self._watch = Watch(tuple(params.alarm_classes), params.watch, self._judge)
         self._suspects = Suspects(params.suspects)
+        self._close_ups = CloseUps(self._judge)
         self._people = People(params.people)
         self._track = Track(params.track)
         self._is_tracking = False
@@ -88,6 +90,7 @@ class Conduct:
         self.mission.started = self._now
         self._watch.start(self._now)
         self._suspects.start(self._now)
+        self._close_ups.start()
         self._track.reset()
         self._is_tracking = False
         self._people = People(self.params.people)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rosbot_patrol.geometry import Pose2D, angle_difference, transform_points
 from rosbot_patrol.params import param
+from rosbot_patrol.patrol.close_ups import Sighting
 from rosbot_patrol.patrol.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
 from rosbot_patrol.patrol.floor import Mask
 from rosbot_patrol.patrol.inputs import Eye, Inputs
@@ -28,6 +29,7 @@ VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
 _SAME_DOUBT = 1.5  # boxes too far off to be measured that are nearer are of one thing [m]
 _SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
+_BACK = 2.0, 4.5  # from there a person shows whole [m]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -52,11 +54,14 @@ class _Doubt:
     y: float
     pictures: int = 1
     seen_from: tuple[Pose2D, ...] = ()  # where a second side is wanted
+    is_near: bool = False  # too near to be told from a pet
     is_visited: bool = False
 
     @property
     def text(self) -> str:
         looked = "was seen from one side only" if self.seen_from else "was not seen from near"
+        if self.is_near:
+            looked = "was too near to be told from a pet"
         return f"something like a person at about ({self.x:.1f}, {self.y:.1f}) {looked}"
 
 
@@ -121,6 +126,19 @@ class Eyes:
         gone = [d for d in self._doubts if d.seen_from and not any(s.apart(d.x, d.y) < _SAME_SUSPECT for s in doubtful)]
         for doubt in gone:  # told, or no longer like one
             doubt.is_visited = True
+
+    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+        """Look from farther off at what is too near to be told from a pet."""
+        for thing in doubtful:
+            known = next((d for d in self._doubts if d.is_near and _apart(d, thing) < _SAME_DOUBT), None)
+            if known is None:
+                seen_in = self.params.coverage.seen_in
+                self._doubts.append(_Doubt(thing.x, thing.y, pictures=seen_in, is_near=True))
+            elif not known.is_visited:
+                known.x, known.y = thing.x, thing.y
+        for doubt in self._doubts:
+            if doubt.is_near and not any(_apart(doubt, thing) < _SAME_DOUBT for thing in doubtful):
+                doubt.is_visited = True
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """The best further viewpoint within the bounds."""
@@ -215,7 +233,7 @@ class Eyes:
     def _doubt(self, x: float, y: float) -> None:
         """Something like a person was seen at about a place, too far off to be measured."""
         for doubt in self._doubts:
-            if not doubt.seen_from and math.hypot(doubt.x - x, doubt.y - y) < _SAME_DOUBT:
+            if not doubt.seen_from and not doubt.is_near and math.hypot(doubt.x - x, doubt.y - y) < _SAME_DOUBT:
                 doubt.pictures += 1
                 return
         self._doubts.append(_Doubt(x, y))
@@ -238,8 +256,9 @@ class Eyes:
         assert self._planner is not None
         assert inputs.pose is not None
         for doubt in self._open_doubts():
+            span = {"nearest": _BACK[0], "most": _BACK[1]} if doubt.is_near else {}
             found = self._planner.near(
-                inputs.pose, doubt.x, doubt.y, stands=self._stands(inputs), seen_from=doubt.seen_from
+                inputs.pose, doubt.x, doubt.y, stands=self._stands(inputs), seen_from=doubt.seen_from, **span
             )
             if found is not None:
                 doubt.is_visited = True
@@ -284,3 +303,7 @@ class Eyes:
         points = transform_points(inputs.scan.map_from_laser, scan_points(inputs.scan.scan))
         off = off_the_map(self._house.floor, points, self.params.witness.off_map)
         return self._house.floor.mark_near(off, _ROBOT) if len(off) else np.zeros(self._house.floor.info.shape, bool)
+
+
+def _apart(doubt: _Doubt, thing: Sighting) -> float:
+    return math.hypot(doubt.x - thing.x, doubt.y - thing.y)

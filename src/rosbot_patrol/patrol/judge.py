@@ -42,6 +42,10 @@ class Known:
         return math.hypot(measured.x - self.x, measured.y - self.y) <= self.radius + min(measured.error, 0.5)
 
 
+PET = "it is as low as a pet"
+_TOP_ROW = 3  # a box that begins so near to the picture's upper edge may go on above it [px]
+
+
 class Judge:
     """Refuses what cannot be an intruder.
 
@@ -62,6 +66,13 @@ class Judge:
         if m is None:
             return "it is too far off to be measured" if box.doubt else ""
         return self._known(box, m) or self._outside(m) or self._picture(m) or self._size(box, m)
+
+    def is_too_near(self, box: Box) -> bool:
+        """Whether the picture ends so low above the floor that a person and a pet look alike in it."""
+        m = box.measured
+        if m is None or box.label != "person" or m.source == "floor" or box.ymin > _TOP_ROW:
+            return False
+        return m.top < self.params.person_top_min and m.width < self.params.lying_length
 
     def _known(self, box: Box, m: Measured) -> str:
         found = next((k for k in self.known if k.is_at(m) and k.label in ("", box.label)), None)
@@ -87,8 +98,8 @@ class Judge:
             return "it is too large for a person"
         if m.width >= p.lying_length * sure:
             return ""
-        if m.is_cut and box.ymin <= 3:  # the picture ends before it does
+        if m.is_cut and box.ymin <= _TOP_ROW:  # the picture ends before it does
             return ""
         if m.top < p.person_top_min * sure:
-            return "it is as low as a pet"
+            return PET
         return "it is too small for a person" if m.height < p.person_height_min * sure else ""

@@ -24,7 +24,8 @@ class Lookout(Conduct):
         assert mission is not None
         if inputs.house is not None:
             self._judge.floor = inputs.house.floor
-        for frame in inputs.frames:
+        for given in inputs.frames:
+            frame = self._leave_out_close_ups(given)
             for seen in self._watch.add(self._now, frame):
                 self._suspects.told(seen.measured)
                 self._note(mission, seen, inputs, out)
@@ -32,6 +33,16 @@ class Lookout(Conduct):
                 self._note(mission, seen, inputs, out)
             self._point_at(frame, inputs)
         self._views.suspect(self._suspects.doubtful())
+        self._views.step_back(self._close_ups.doubtful)
+
+    def _leave_out_close_ups(self, frame: Frame) -> Frame:
+        """What is too near to be told from a pet proves nothing, but the robot stops for it."""
+        if not frame.counts or frame.stamp is None:
+            return frame
+        boxes, is_left = self._close_ups.sort(frame.stamp, frame.boxes)
+        if is_left:
+            self._watch.glimpse(self._now)
+        return dataclasses.replace(frame, boxes=boxes)
 
     def _weigh(self, frame: Frame) -> tuple[Confirmation, ...]:
         """Weak sights are gathered by place."""

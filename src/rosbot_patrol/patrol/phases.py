@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.close_ups import Sighting
 from rosbot_patrol.patrol.drive import Drive, DriveParams, DriveStep
 from rosbot_patrol.patrol.inputs import GoalLink, Inputs
 from rosbot_patrol.patrol.look import Look, LookParams, LookStep
@@ -76,6 +77,9 @@ class Views(Protocol):
     def suspect(self, doubtful: Sequence[Suspect]) -> None:
         """What looks like a person from too few sides, all of it."""
 
+    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+        """What is too near to be told from a pet, all of it."""
+
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """Where to look from next, None where the room is seen well enough or there is nowhere."""
 
@@ -103,6 +107,9 @@ class OneTurn:
 
     def suspect(self, doubtful: Sequence[Suspect]) -> None:
         """There is no other side."""
+
+    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+        """There is no other place."""
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """One turn is enough."""

@@ -91,7 +91,7 @@ class Watch:
         """Take one picture's boxes; a confirmation for each intruder that they make."""
         if not frame.counts:
             if self.plausible(frame):
-                self._glimpses.append(now)
+                self.glimpse(now)
             return ()
         stamp = now if frame.stamp is None else frame.stamp
         if frame.stamp is not None:
@@ -110,6 +110,10 @@ class Watch:
             if not any(self._is_same(box, other.label, other.measured) for other in found):
                 found += self._confirm(box)
         return tuple(found)
+
+    def glimpse(self, now: float) -> None:
+        """Something was in view that cannot be judged yet."""
+        self._glimpses.append(now)
 
     def candidate(self, now: float, recent: float = 0.6) -> bool:
         """Whether a picture that came lately shows something that may become an intruder."""

@@ -75,6 +75,7 @@ class World:
         self.triggers: tuple[int, ...] = ()
         self.goals, self.notices, self.ended, self.reports, self.tracked = [], [], [], [], []
         self.cancels, self.flat, self.count, self.measures_to = 0, False, 0, 99.0
+        self.top = 1.7  # height of people
         self.score: Callable[[Pose2D], float] = lambda pose: 0.9
 
     def frame(self) -> Frame:
@@ -91,7 +92,11 @@ class World:
 
     def box(self, x: float, y: float, away: float, bearing: float) -> Box:
         middle = 320 - 554 * math.tan(bearing)
-        measured = Measured(x=x, y=y, error=0.15, away=away, top=1.7, height=1.6, width=0.5, is_flat=self.flat)
+        most = 0.2 + 0.43 * away  # the picture ends there
+        top, is_cut = min(self.top, most), most < self.top
+        measured = Measured(
+            x=x, y=y, error=0.15, away=away, top=top, height=top, width=0.5, is_cut=is_cut, is_flat=self.flat
+        )
         is_far = away > self.measures_to
         left, right = round(max(middle - 40, 0)), round(min(middle + 40, 640))
         return Box(
@@ -99,7 +104,7 @@ class World:
             probability=self.score(self.pose),
             xmin=left,
             xmax=right,
-            ymin=20,
+            ymin=0 if is_cut else 20,
             ymax=300,
             measured=None if is_far else measured,
             doubt=(x, y) if is_far else None,
@@ -369,3 +374,25 @@ def test_what_could_be_looked_at_from_one_side_only_is_unverified() -> None:
     mission = world.mission()
     assert mission.verdict.value == "unverified"
     assert "was seen from one side only" in mission.reason
+
+
+@pytest.mark.parametrize(("top", "verdict"), [(1.7, "confirmed"), (0.7, "clear")])
+def test_what_is_too_near_to_be_told_from_a_pet_is_looked_at_from_farther_off(top: float, verdict: str) -> None:
+    world = World()
+    world.top = top
+    world.triggers = (1,)
+    world.until(lambda w: w.phase is Phase.LOOKING)
+    world.people = lambda now: [(10.5, 2.2)]  # a metre from where the robot turns
+    mission = world.until(lambda w: bool(w.ended)).ended[-1]
+    assert mission.verdict.value == verdict
+    assert any(math.dist(view[:2], (10.5, 2.2)) > 1.9 for view in mission.views_done)
+
+
+def test_what_is_too_near_and_seen_from_nowhere_else_is_unverified() -> None:
+    world = World(eyes=EyesParams(look_around="spin"))
+    world.triggers = (1,)
+    world.until(lambda w: w.phase is Phase.LOOKING)
+    world.people = lambda now: [(10.5, 2.2)] if world.phase is Phase.LOOKING else []
+    mission = world.until(lambda w: bool(w.ended)).ended[-1]
+    assert mission.verdict.value == "unverified"
+    assert "was too near to be told from a pet" in mission.reason

@@ -289,6 +289,9 @@ class TwoViews:
     def suspect(self, doubtful):
         pass
 
+    def step_back(self, doubtful):
+        pass
+
     def next(self, inputs):
         done = len(self.mission.views_done)
         pose = Pose2D(self.mission.room.pose.x + 2.0, 0.0, 0.0)

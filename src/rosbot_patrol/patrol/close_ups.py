@@ -1,0 +1,92 @@
+"""What is so near that the picture shows its legs only: a pet and a person look alike there.
+
+A low camera sees up to 0.9 m at a metre and a half. What is nearer than that, and goes on above the picture, counts as
+a person only where somebody of a person's height was seen about there shortly before or after; where a pet was, it is
+the pet; else it is a doubt, and worth a look from farther off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from rosbot_patrol.patrol.inputs import Box
+from rosbot_patrol.patrol.judge import PET, Judge
+
+_SAME = 1.0  # so near to each other two sightings are of one [m]
+_SPEED = 1.0  # it may have walked so fast since [m/s]
+_WALKED = 4.0  # but no farther [m]
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """Where something was, in map [m], and when [s]."""
+
+    x: float
+    y: float
+    at: float
+
+    def may_be(self, other: Sighting) -> bool:
+        """Whether both may be of one."""
+        walked = min(_SPEED * abs(self.at - other.at), _WALKED)
+        return math.hypot(self.x - other.x, self.y - other.y) <= _SAME + walked
+
+
+class CloseUps:
+    """Those of one mission.
+
+    Args:
+        judge: who tells pets, and what is too near to be told.
+    """
+
+    def __init__(self, judge: Judge) -> None:
+        self._judge = judge
+        self._pets: deque[Sighting] = deque(maxlen=20)
+        self._people: deque[Sighting] = deque(maxlen=20)
+        self._open: list[Sighting] = []
+
+    def start(self) -> None:
+        """Forget all, for a new mission."""
+        self._pets.clear()
+        self._people.clear()
+        self._open = []
+
+    @property
+    def doubtful(self) -> Sequence[Sighting]:
+        """What was too near to be told, and was not told otherwise."""
+        return self._open
+
+    def sort(self, stamp: float, boxes: Iterable[Box]) -> tuple[tuple[Box, ...], bool]:
+        """The boxes of a picture that can be judged, and whether one was left out that may be a person.
+
+        Args:
+            stamp: of the picture [s].
+            boxes: all of them.
+        """
+        kept, near = [], []
+        for box in boxes:
+            m = box.measured
+            if m is None or box.label != "person":
+                kept.append(box)
+                continue
+            place = Sighting(m.x, m.y, stamp)
+            if self._judge.is_too_near(box):
+                near.append((box, place))
+                continue
+            kept.append(box)
+            refusal = self._judge.refusal(box)
+            if refusal == PET:
+                self._pets.append(place)
+            elif not refusal:
+                self._people.append(place)
+        self._open = [s for s in self._open if not any(s.may_be(o) for o in (*self._pets, *self._people))]
+        is_left = False
+        for box, place in near:
+            if any(place.may_be(person) for person in self._people):
+                kept.append(box)
+            elif not self._judge.refusal(box) and not any(place.may_be(pet) for pet in self._pets):
+                is_left = True
+                self._open = [s for s in self._open if not s.may_be(place)] + [place]
+        return tuple(kept), is_left

@@ -1,0 +1,64 @@
+"""What is too near to be told from a pet."""
+
+from __future__ import annotations
+
+import pytest
+
+from rosbot_patrol.patrol.close_ups import CloseUps
+from rosbot_patrol.patrol.inputs import Box, Measured
+from rosbot_patrol.patrol.judge import Judge
+
+
+def box(x: float = 0.0, *, top: float = 0.7, cut: bool = True, label: str = "person", **fields) -> Box:
+    defaults = {"x": x, "y": 0.0, "error": 0.1, "away": 1.2, "top": top, "height": top, "width": 0.4, "is_cut": cut}
+    measured = Measured(**{**defaults, **fields})
+    return Box(label=label, probability=0.9, xmin=100, ymin=0 if cut else 90, xmax=200, ymax=300, measured=measured)
+
+
+PERSON, PET = {"top": 1.6, "cut": False}, {"top": 0.6, "cut": False}
+
+
+@pytest.fixture
+def close_ups() -> CloseUps:
+    return CloseUps(Judge())
+
+
+def test_legs_alone_are_a_doubt(close_ups: CloseUps) -> None:
+    assert close_ups.sort(1.0, (box(),)) == ((), True)
+    assert [(s.x, s.y) for s in close_ups.doubtful] == [(0.0, 0.0)]
+    close_ups.sort(1.1, (box(0.1),))
+    assert len(close_ups.doubtful) == 1
+    close_ups.start()
+    assert not close_ups.doubtful
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        box(**PERSON),
+        box(top=1.1),  # the picture ends above a pet
+        box(width=1.4),  # as wide as one who lies
+        box(label="fire hydrant"),
+        box(source="floor"),
+        Box(label="person", probability=0.9, xmin=0, ymin=0, xmax=50, ymax=90),
+    ],
+)
+def test_what_can_be_judged_is_left_to_the_judge(close_ups: CloseUps, given: Box) -> None:
+    assert close_ups.sort(1.0, (given,)) == ((given,), False)
+    assert not close_ups.doubtful
+
+
+def test_legs_of_somebody_who_was_seen_whole_are_theirs(close_ups: CloseUps) -> None:
+    close_ups.sort(1.0, (box(2.0, **PERSON),))
+    legs = box(0.0)
+    assert close_ups.sort(3.0, (legs,)) == ((legs,), False)
+    assert close_ups.sort(3.1, (box(-9.0),)) == ((), True)  # nobody walks that fast
+
+
+def test_legs_of_a_pet_are_the_pets_whenever_it_is_seen_whole(close_ups: CloseUps) -> None:
+    close_ups.sort(1.0, (box(),))
+    assert close_ups.doubtful
+    close_ups.sort(3.0, (box(1.5, **PET),))
+    assert not close_ups.doubtful
+    assert close_ups.sort(4.0, (box(1.0),)) == ((), False)
+    assert not close_ups.doubtful
