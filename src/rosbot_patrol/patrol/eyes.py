@@ -29,6 +29,7 @@ VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
 _SAME_DOUBT = 1.5  # boxes too far off to be measured that are nearer are of one thing [m]
 _SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
+_CLOSE = 1.0  # so near one may come to what is half hidden [m]
 _BACK = 2.0, 4.5  # from there a person shows whole [m]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
@@ -54,6 +55,7 @@ class _Doubt:
     y: float
     pictures: int = 1
     seen_from: tuple[Pose2D, ...] = ()  # where a second side is wanted
+    is_grave: bool = True  # without a second look nobody can say that nobody is there
     is_near: bool = False  # too near to be told from a pet
     is_visited: bool = False
 
@@ -122,6 +124,7 @@ class Eyes:
             if known is None:
                 known = _Doubt(suspect.x, suspect.y, pictures=self.params.coverage.seen_in)
                 self._doubts.append(known)
+            known.is_grave = suspect.is_grave
             known.seen_from = tuple(side.eye for side in suspect.sides)
         gone = [d for d in self._doubts if d.seen_from and not any(s.apart(d.x, d.y) < _SAME_SUSPECT for s in doubtful)]
         for doubt in gone:  # told, or no longer like one
@@ -199,7 +202,7 @@ class Eyes:
 
     def blind(self) -> str:
         """Why what was seen is too little."""
-        doubts = self._open_doubts()
+        doubts = [doubt for doubt in self._open_doubts() if doubt.is_grave]
         if doubts:
             return doubts[0].text
         share = self.share()
@@ -257,6 +260,8 @@ class Eyes:
         assert inputs.pose is not None
         for doubt in self._open_doubts():
             span = {"nearest": _BACK[0], "most": _BACK[1]} if doubt.is_near else {}
+            if doubt.seen_from:
+                span = {"nearest": _CLOSE}
             found = self._planner.near(
                 inputs.pose, doubt.x, doubt.y, stands=self._stands(inputs), seen_from=doubt.seen_from, **span
             )

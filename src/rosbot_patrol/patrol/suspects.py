@@ -29,6 +29,9 @@ class SuspectParams:
 
     weak_score: float = param(0.5, lo=0.0, hi=1.0, doc="least median of a side's probabilities")
     weak_pictures: int = param(5, lo=1, hi=100, doc="pictures from one side that have to show it")
+    doubt_pictures: int = param(
+        2, lo=1, hi=100, doc="pictures from one side, however unsure, that make a place worth a look from elsewhere"
+    )
     weak_sides: int = param(2, lo=1, hi=10, doc="sides from which it has to look like a person")
     side_angle: float = param(0.6, unit="rad", lo=0.05, hi=3.1, doc="seen from so far aside is another side")
     weak_error: float = param(0.6, unit="m", lo=0.05, doc="what is not known better than that has no place")
@@ -63,7 +66,7 @@ class Suspect:
         label: class of object; x, y: place in map [m]; weight: of all that told it.
         sides: from where it was seen.
         best: the surest box; stamp: of its picture [s]; boxes: all of that picture.
-        is_told: it was confirmed.
+        is_told: it was confirmed; is_grave: from one side it looks like a person for long.
     """
 
     label: str
@@ -75,6 +78,7 @@ class Suspect:
     boxes: tuple[Box, ...]
     sides: list[Side] = field(default_factory=list)
     is_told: bool = False
+    is_grave: bool = False
 
     @property
     def pictures(self) -> int:
@@ -120,7 +124,9 @@ class Suspects:
                 continue
             suspect = self._take(box, m, stamp, boxes)
             self._side(suspect, eye).scores.append(box.probability)
-            if not suspect.is_told and len(self._witnesses(suspect)) >= self.params.weak_sides:
+            witnesses = self._witnesses(suspect)
+            suspect.is_grave = bool(witnesses)
+            if not suspect.is_told and len(witnesses) >= self.params.weak_sides:
                 suspect.is_told = True
                 found.append(self._confirmation(suspect))
         return tuple(found)
@@ -132,8 +138,9 @@ class Suspects:
                 suspect.is_told = True
 
     def doubtful(self) -> list[Suspect]:
-        """Those that look like a person from too few sides."""
-        return [s for s in self.all if not s.is_told and self._witnesses(s)]
+        """Those that looked like a person in some pictures, and are not confirmed."""
+        least = self.params.doubt_pictures
+        return [s for s in self.all if not s.is_told and any(len(side.scores) >= least for side in s.sides)]
 
     def _take(self, box: Box, m: Measured, stamp: float, boxes: tuple[Box, ...]) -> Suspect:
         near = [s for s in self.all if s.label == box.label and s.apart(m.x, m.y) <= self.params.weak_apart]

@@ -19,6 +19,7 @@ from rosbot_patrol.patrol.coverage import CoverageParams, sight_on_map, visible
 from rosbot_patrol.patrol.floor import Array, Floor, Mask
 
 _FAR = 1e9
+_NEARER = 0.7  # where there is no other side, so much nearer than before is a second look
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +135,7 @@ class ViewpointPlanner:
             x: of what is to be looked at [m].
             y: of what is to be looked at [m].
             stands: as for `next`.
-            seen_from: from there it was seen: the place is to show another side.
+            seen_from: from there it was seen: the place is to show another side, or at least more of it.
             nearest: no place nearer than that [m].
             most: none farther [m].
         """
@@ -146,8 +147,12 @@ class ViewpointPlanner:
         good = open_ & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
         if stands is not None:
             good &= ~stands
-        for eye in seen_from:
-            good &= self._is_aside(math.atan2(eye.y - y, eye.x - x), x, y)
+        if seen_from:
+            aside = good.copy()
+            for eye in seen_from:
+                aside &= self._is_aside(math.atan2(eye.y - y, eye.x - x), x, y)
+            before = min(math.hypot(eye.x - x, eye.y - y) for eye in seen_from)
+            good = aside if aside.any() else good & (distances.reshape(good.shape) <= _NEARER * before)
         if not good.any():
             return None
         iy, ix = np.unravel_index(int(np.where(good, ways, _FAR).argmin()), good.shape)

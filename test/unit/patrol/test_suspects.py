@@ -57,10 +57,12 @@ def test_another_place_a_weaker_sight_and_a_place_not_known_are_no_second_side(o
     assert seen.see(SOUTH, other, pictures=50) == []
 
 
-def test_few_pictures_are_no_side() -> None:
+def test_two_pictures_are_a_doubt_and_few_are_no_side() -> None:
     seen = Seen()
-    seen.see(WEST, box(), pictures=4)
+    seen.see(WEST, box(), pictures=1)
     assert seen.suspects.doubtful() == []
+    seen.see(WEST, box(score=0.4), pictures=3)
+    assert len(seen.suspects.doubtful()) == 1
     assert seen.see(SOUTH, box(), pictures=9) == []
 
 
