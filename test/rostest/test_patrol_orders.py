@@ -109,6 +109,36 @@ def test_the_emergency_stop_holds_over_a_kill(house):
     subscriber.unregister()
 
 
+def test_what_was_called_while_the_patrol_was_down_is_looked_at(house):
+    """The sensors' watch heard it."""
+    from rosbot_patrol.msg import SensorStates
+
+    heard = []
+    house.ends.append(rospy.Subscriber("/sensors/states", SensorStates, heard.append))
+    house.start_move_base()
+    watch = house._start(
+        ["rosrun", "rosbot_patrol", "sensor_watch", "__name:=sensor_watch"],
+        {
+            "path_to_params": str(ROOT / "params" / "room_points.yaml"),
+            "state_dir": str(house.folder / "state"),
+            "transport": "maildir",
+            "maildir": str(house.folder / "mail"),
+        },
+    )
+    house.start_patrol()
+    wait_until(lambda: heard, 20, "the sensors' watch")
+    os.killpg(house.patrol.pid, signal.SIGKILL)
+    house.patrol.wait()
+    house.send(4)
+    wait_until(lambda: any(s.id == 4 and s.motion >= 0.0 for s in heard[-1].sensors), 10, "that the watch has heard it")
+    house.start_patrol(wait=False)
+    last = house.wait_for_mission()
+    assert {s.room_id for s in house.states if s.mission} == {4}
+    assert last.last_verdict == "clear"
+    assert "while the patrol was down" in house.log(house.patrol)
+    assert watch.poll() is None
+
+
 def test_a_kill_right_after_a_call_loses_nothing(house):
     rospy.set_param("/run_id", "one")
     house.start_move_base()

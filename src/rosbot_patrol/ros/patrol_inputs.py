@@ -113,6 +113,11 @@ class PatrolInputs:
         self._refused = Repeats()
         self._has_latched = False
 
+    def ask(self, request: Request) -> None:
+        """Take a request from elsewhere."""
+        self._requests.append(request)
+        self._wake()
+
     def start(self) -> None:
         """Begin to listen."""
         rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100, tcp_nodelay=True)
@@ -133,7 +138,7 @@ class PatrolInputs:
         is_first = sender not in self._first_heard
         self._first_heard.add(sender)
         is_early = time.monotonic() - self._started < self.params.latched_window
-        room = self._room_of(message.id)
+        room = self.room_of(message.id)
         if room is None:
             return
         self._hear(f"motion sensor {message.id} sees motion", sensor=message.id, room=room)
@@ -142,7 +147,7 @@ class PatrolInputs:
             return
         self._call(room, sender if is_latched else "")
 
-    def _room_of(self, sensor_id: int) -> int | None:
+    def room_of(self, sensor_id: int) -> int | None:
         """The room that a sensor calls to; without a file its id, which the manager knows or refuses."""
         if not self._sensors.has_file:
             return sensor_id

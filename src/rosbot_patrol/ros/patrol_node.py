@@ -51,6 +51,7 @@ from rosbot_patrol.patrol.store import PatrolStore
 from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.incident_keeper import IncidentKeeper, RecordParams
+from rosbot_patrol.ros.missed_calls import MissedCalls
 from rosbot_patrol.ros.node import Loop, now, ros_home, run_node
 from rosbot_patrol.ros.owner_mail import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.patrol_actions import PatrolActions
@@ -137,6 +138,7 @@ class PatrolNode:
             inputs, rooms, self.sensors, self.store, journal, eyes=eyes, transforms=transforms, wake=self._loop.hurry
         )
         self.inputs.on_boxes = self._note_sighting
+        self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of)
         self.markers = PeopleMarkers(inputs.map_frame)
         self._shown = ""
         self._is_over = False
@@ -163,6 +165,7 @@ class PatrolNode:
         self.keeper.start([*mission, *(request.id for request in self.manager.queue)])
         self.desk.start()
         self.inputs.start()
+        self.missed.start()
         self._actions.start()
         self._loop.start()
         rospy.spin()
@@ -172,6 +175,7 @@ class PatrolNode:
     def _step(self, time_now: float) -> None:
         with self._stepping:
             if not self._is_over:
+                self.missed.step()
                 self._actions.begin()
                 self._stop_switch.step()
                 inputs = self._inputs(time_now)
