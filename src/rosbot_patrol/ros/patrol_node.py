@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import rospy
-from geometry_msgs.msg import Twist
 
 from rosbot_patrol.alerts.album import Sighting
 from rosbot_patrol.alerts.channels import MailParams
@@ -31,11 +30,10 @@ from rosbot_patrol.alerts.evidence import EvidenceParams
 from rosbot_patrol.alerts.mail import one_line
 from rosbot_patrol.alerts.picture import LabelledBox
 from rosbot_patrol.alerts.retention import RetentionParams
-from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
-from rosbot_patrol.msg import PatrolState
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.arming import Arming, ArmingRules, load_rules, read_memory
 from rosbot_patrol.patrol.chronicle import Chronicle
-from rosbot_patrol.patrol.commands import Commands, Report
+from rosbot_patrol.patrol.commands import Commands
 from rosbot_patrol.patrol.emergency import EmergencyStop
 from rosbot_patrol.patrol.eyes import Eyes
 from rosbot_patrol.patrol.inputs import Box, Inputs
@@ -48,8 +46,7 @@ from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.schedule import Schedule, load_schedule
 from rosbot_patrol.patrol.store import PatrolStore
-from rosbot_patrol.ros import convert
-from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+from rosbot_patrol.ros.diagnostics import Health
 from rosbot_patrol.ros.incident_keeper import IncidentKeeper, RecordParams
 from rosbot_patrol.ros.missed_calls import MissedCalls
 from rosbot_patrol.ros.node import Loop, now, ros_home, run_node
@@ -61,6 +58,7 @@ from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.ros.patrol_images import PictureRing
 from rosbot_patrol.ros.patrol_inputs import InputParams, PatrolInputs
 from rosbot_patrol.ros.patrol_orders import ArmingDesk, Orders, StopSwitch
+from rosbot_patrol.ros.patrol_outputs import StatePublisher, Wheels
 from rosbot_patrol.ros.patrol_settings import (
     NO_ROUNDS,
     NodeParams,
@@ -143,14 +141,11 @@ class PatrolNode:
         self._shown = ""
         self._is_over = False
         self._is_signalled = False
-        self._turning = False
-        self._report: Report | None = None
         self._round_at = -math.inf
         self._schedule_changed = False
         self.move_base = MoveBase(inputs.map_frame)
-        self._cmd_vel = rospy.Publisher("/cmd_vel", Twist, queue_size=1)
-        self._state = rospy.Publisher("/patrol/state", PatrolState, queue_size=10, latch=True)
-        self._stop_switch = StopSwitch(EmergencyStop(folder / "stop.json"), self.move_base, self._cmd_vel)
+        self._wheels, self._state = Wheels(), StatePublisher(self.health)
+        self._stop_switch = StopSwitch(EmergencyStop(folder / "stop.json"), self.move_base, self._wheels.publisher)
         kept = folder / "arming.json"
         self._arming = ArmingDesk(Arming(self.rules, read_memory(kept)), kept)
         self._orders = Orders(self.manager, rooms, self._stepping)
@@ -226,9 +221,9 @@ class PatrolNode:
             self.move_base.cancel()
         if commands.goal is not None:
             self.move_base.send(commands.goal)
-        self._turn(commands.speed)
+        self._wheels.turn(commands.speed)
         if commands.report is not None:
-            self._publish_state(time_now, commands.report)
+            self._state.publish(time_now, commands.report, self.manager.mission)
         for notice in commands.notices:
             self.desk.take(notice, time_now)
         self.desk.follow(commands)
@@ -264,40 +259,6 @@ class PatrolNode:
         if commands.people:
             self.markers.show(commands.people, time_now, mission.room.title if mission else "")
 
-    def _turn(self, speed: float | None) -> None:
-        if speed is None:
-            if self._turning:
-                self._cmd_vel.publish(convert.twist_to_msg(STOP))
-            self._turning = False
-            return
-        self._turning = True
-        self._cmd_vel.publish(convert.twist_to_msg(Twist2D(wz=speed)))
-
-    def _publish_state(self, time_now: float, report: Report) -> None:
-        if self._report is None or (report.phase, report.why) != (self._report.phase, self._report.why):
-            log.info("%s: %s", report.phase.value, report.why)
-        self._report = report
-        message = PatrolState(
-            state=report.phase.value,
-            mission=report.mission,
-            room_id=report.room_id,
-            room_name=report.room_name,
-            origin=report.origin,
-            why=report.why,
-            queue=bytes(report.queue),
-            verdict=report.verdict,
-            last_verdict=report.last_verdict,
-            share_seen=-1.0,
-            mode=report.mode,
-        )
-        mission = self.manager.mission
-        if mission is not None:
-            message.share_seen = -1.0 if mission.share_seen is None else mission.share_seen
-            message.phases, message.seconds = list(mission.times), list(mission.times.values())
-        message.header.stamp = convert.time_to_msg(time_now)
-        self._state.publish(message)
-        self.health.set("", OK if report.phase is not Phase.STARTING else WARN, f"{report.phase.value}: {report.why}")
-
     def _save(self, changed: bool) -> None:
         if not changed:
             return
@@ -331,8 +292,7 @@ class PatrolNode:
             if self._is_signalled:
                 self._record(now(), self.manager.abandon("the patrol was ended"))
             self.move_base.cancel()
-            if self._turning:
-                self._cmd_vel.publish(convert.twist_to_msg(STOP))
+            self._wheels.stop()
             self._save(changed=True)
         self.keeper.finish()
         deadline = time.monotonic() + 2.0

@@ -1,0 +1,84 @@
+"""What the patrol says and commands on topics: its state, and the wheels while it turns."""
+
+from __future__ import annotations
+
+import logging
+
+import rospy
+from geometry_msgs.msg import Twist
+
+from rosbot_patrol.geometry import STOP, Twist2D
+from rosbot_patrol.msg import PatrolState
+from rosbot_patrol.patrol.commands import Report
+from rosbot_patrol.patrol.mission import Mission, Phase
+from rosbot_patrol.ros import convert
+from rosbot_patrol.ros.diagnostics import OK, WARN, Health
+
+log = logging.getLogger(__name__)
+
+
+class Wheels:
+    """/cmd_vel while the patrol turns; another's, else."""
+
+    def __init__(self) -> None:
+        self.publisher = rospy.Publisher("/cmd_vel", Twist, queue_size=1)
+        self._turning = False
+
+    def turn(self, speed: float | None) -> None:
+        """Turn [rad/s]; None: no longer, and stand still at the end of a turn."""
+        if speed is None:
+            self.stop()
+            return
+        self._turning = True
+        self.publisher.publish(convert.twist_to_msg(Twist2D(wz=speed)))
+
+    def stop(self) -> None:
+        """Stand still, where it turns."""
+        if self._turning:
+            self.publisher.publish(convert.twist_to_msg(STOP))
+        self._turning = False
+
+
+class StatePublisher:
+    """/patrol/state, the log and /diagnostics.
+
+    Args:
+        health: of the node.
+    """
+
+    def __init__(self, health: Health) -> None:
+        self._health = health
+        self._report: Report | None = None
+        self._publisher = rospy.Publisher("/patrol/state", PatrolState, queue_size=10, latch=True)
+
+    def publish(self, time_now: float, report: Report, mission: Mission | None) -> None:
+        """Tell a state that is new.
+
+        Args:
+            time_now: ROS time [s].
+            report: the state.
+            mission: that runs.
+        """
+        if self._report is None or (report.phase, report.why) != (self._report.phase, self._report.why):
+            log.info("%s: %s", report.phase.value, report.why)
+        self._report = report
+        message = PatrolState(
+            state=report.phase.value,
+            mission=report.mission,
+            room_id=report.room_id,
+            room_name=report.room_name,
+            origin=report.origin,
+            why=report.why,
+            queue=bytes(report.queue),
+            verdict=report.verdict,
+            last_verdict=report.last_verdict,
+            share_seen=-1.0,
+            mode=report.mode,
+        )
+        if mission is not None:
+            message.share_seen = -1.0 if mission.share_seen is None else mission.share_seen
+            message.phases, message.seconds = list(mission.times), list(mission.times.values())
+        message.header.stamp = convert.time_to_msg(time_now)
+        self._publisher.publish(message)
+        level = OK if report.phase is not Phase.STARTING else WARN
+        self._health.set("", level, f"{report.phase.value}: {report.why}")
