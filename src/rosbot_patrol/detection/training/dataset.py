@@ -15,6 +15,7 @@ from rosbot_patrol.detection.training.overlay import lay_patterns
 MARGIN = 8
 OVERLAY = 0.5
 FAINT = 5.0
+JPEGS = ".jpegs"
 NET_HEIGHT = HEIGHT + 2 * MARGIN
 
 
@@ -22,11 +23,27 @@ class Packed:
     """A shard in memory as jpegs of high quality: a seventh of its size, and no disk between the network and it.
 
     Args:
-        pictures: RGB, uint8, shape (N, 240, 320, 3).
+        files: a jpeg each, uint8.
     """
 
-    def __init__(self, pictures: np.ndarray) -> None:
-        self._files = [_packed(picture) for picture in pictures]
+    def __init__(self, files: list[np.ndarray]) -> None:
+        self._files = files
+
+    @classmethod
+    def of(cls, pictures: np.ndarray) -> Packed:
+        """Of pictures, RGB, uint8, shape (N, 240, 320, 3)."""
+        return cls([_packed(picture) for picture in pictures])
+
+    @classmethod
+    def load(cls, path: Path) -> Packed:
+        """What `save` wrote."""
+        with np.load(path) as file:
+            return cls(np.split(file["bytes"], file["ends"][:-1]))
+
+    def save(self, path: Path) -> None:
+        """Write a shard."""
+        with path.open("wb") as file:
+            np.savez(file, bytes=np.concatenate(self._files), ends=np.cumsum([len(f) for f in self._files]))
 
     def __len__(self) -> int:
         return len(self._files)
@@ -46,11 +63,16 @@ class Pictures:
     def open(cls, folder: Path, name: str) -> Pictures:
         """All finished shards of that name, or of several names with commas between them."""
         files = [
-            f for one in name.split(",") for f in sorted(folder.glob(f"{one}-[0-9]*.npy")) if ".part" not in f.name
+            f
+            for one in name.split(",")
+            for kind in (".npy", JPEGS)
+            for f in sorted(folder.glob(f"{one}-[0-9]*{kind}"))
+            if ".part" not in f.name
         ]
         if not files:
             raise FileNotFoundError(f"{folder} holds no pictures named {name}-*.npy; make them with render.py")
-        shards = [np.load(f, mmap_mode="r") for f in files]
+        packed = {f: Packed.load(f) for f in files if f.suffix == JPEGS}  # a shard that is listed twice is kept once
+        shards = [packed[f] if f in packed else np.load(f, mmap_mode="r") for f in files]
         labels = []
         for file, shard in zip(files, shards, strict=True):
             rows = np.load(file.with_suffix(".npz"))["boxes"]
@@ -64,7 +86,7 @@ class Pictures:
         packed: dict[str, Packed] = {}
         for shard in self.shards:
             if isinstance(shard, np.memmap) and str(shard.filename) not in packed:
-                packed[str(shard.filename)] = Packed(shard)
+                packed[str(shard.filename)] = Packed.of(shard)
         shards = [packed[str(s.filename)] if isinstance(s, np.memmap) else s for s in self.shards]
         return Pictures(shards, self.labels)
 

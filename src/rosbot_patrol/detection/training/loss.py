@@ -32,12 +32,12 @@ class Truth:
 
 def yolo_loss(heads: list[Yolo], values: list[torch.Tensor], truth: Truth, width: int) -> dict[str, torch.Tensor]:
     """Parts of the loss: box, objectness, kind; each already weighted."""
-    sizes = torch.tensor([a for head in heads for a in head.anchors])
+    sizes = torch.tensor([a for head in heads for a in head.anchors], device=truth.boxes.device)
     overlap = _shape_iou(truth.boxes[:, 2:], sizes)
     take = (overlap > MATCH) | (overlap == overlap.max(dim=1, keepdim=True).values)
     take &= truth.asked[:, None]
     parts = {name: values[0].new_zeros(()) for name in ("box", "object", "kind")}
-    matched = torch.zeros(())
+    matched = values[0].new_zeros((), dtype=torch.float32)
     first = 0
     for head, raw in zip(heads, values, strict=True):
         count = len(head.anchors)
@@ -63,12 +63,12 @@ def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, 
     place = truth.batch[which]
     column = (truth.boxes[which, 0] / stride).long().clamp(0, columns - 1)
     row = (truth.boxes[which, 1] / stride).long().clamp(0, rows - 1)
-    target = torch.zeros(batch, len(head.anchors), rows, columns)
+    target = grid.new_zeros(batch, len(head.anchors), rows, columns)
     weight = _weight(head, grid, truth, stride)
-    result = {"box": raw.new_zeros(()), "kind": raw.new_zeros(()), "matched": torch.tensor(float(len(which)))}
+    result = {"box": raw.new_zeros(()), "kind": raw.new_zeros(()), "matched": raw.new_tensor(float(len(which)))}
     if len(which):
         mine = grid[place, anchor, :, row, column]
-        sizes = torch.tensor(head.anchors)[anchor]
+        sizes = torch.tensor(head.anchors, device=raw.device)[anchor]
         centre = (torch.sigmoid(mine[:, :2]) + torch.stack([column, row], 1)) * stride
         predicted = torch.cat([centre, torch.exp(mine[:, 2:4].clamp(max=6)) * sizes], 1)
         result["box"] = (1 - _generalised_iou(predicted, truth.boxes[which])).sum()
@@ -87,26 +87,27 @@ def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, 
 def _weight(head: Yolo, grid: torch.Tensor, truth: Truth, stride: float) -> torch.Tensor:
     """0 where a prediction is left alone, else 1."""
     batch, anchors, _, rows, columns = grid.shape
-    weight = torch.ones(batch, anchors, rows, columns)
+    left = grid.new_zeros(batch, anchors, rows, columns)
+    if not len(truth.boxes):
+        return left + 1.0
     with torch.no_grad():
-        y, x = torch.meshgrid(torch.arange(rows), torch.arange(columns), indexing="ij")
+        device = grid.device
+        y, x = torch.meshgrid(torch.arange(rows, device=device), torch.arange(columns, device=device), indexing="ij")
+        shapes = torch.tensor(head.anchors, device=device)[None, :, :, None, None]
         centre = (torch.sigmoid(grid[:, :, :2]) + torch.stack([x, y])) * stride
-        size = torch.exp(grid[:, :, 2:4].clamp(max=6)) * torch.tensor(head.anchors)[None, :, :, None, None]
-        for i in range(len(truth.boxes)):
-            b, box = truth.batch[i], truth.boxes[i]
-            low = torch.maximum(centre[b] - size[b] / 2, (box[:2] - box[2:] / 2)[None, :, None, None])
-            high = torch.minimum(centre[b] + size[b] / 2, (box[:2] + box[2:] / 2)[None, :, None, None])
-            shared = (high - low).clamp(min=0).prod(dim=1)
-            if bool(truth.asked[i]):
-                union = size[b].prod(dim=1) + box[2] * box[3] - shared
-                weight[b][shared / union > IGNORE_IOU] = 0.0
-            else:
-                weight[b][shared / size[b].prod(dim=1).clamp(min=1.0) > 0.3] = 0.0
-                middle = (((x + 0.5) * stride - box[0]).abs() < box[2] / 2 + stride) & (
-                    ((y + 0.5) * stride - box[1]).abs() < box[3] / 2 + stride
-                )
-                weight[b][middle.expand(anchors, -1, -1)] = 0.0
-    return weight
+        size = torch.exp(grid[:, :, 2:4].clamp(max=6)) * shapes
+        centre, size = centre[truth.batch], size[truth.batch]  # (N, anchors, 2, rows, columns)
+        box = truth.boxes[:, None, :, None, None]
+        low = torch.maximum(centre - size / 2, box[:, :, :2] - box[:, :, 2:] / 2)
+        high = torch.minimum(centre + size / 2, box[:, :, :2] + box[:, :, 2:] / 2)
+        shared, own = (high - low).clamp(min=0).prod(dim=2), size.prod(dim=2)
+        good = shared / (own + box[:, :, 2:].prod(dim=2) - shared) > IGNORE_IOU
+        away = (torch.stack([x, y])[None, None] + 0.5) * stride - box[:, :, :2]
+        middle = (away.abs() < box[:, :, 2:] / 2 + stride).all(dim=2)
+        doubtful = (shared / own.clamp(min=1.0) > 0.3) | middle
+        alone = torch.where(truth.asked[:, None, None, None], good, doubtful)
+        left.index_add_(0, truth.batch, alone.float())
+    return (left == 0.0).float()
 
 
 def _shape_iou(sizes: torch.Tensor, anchors: torch.Tensor) -> torch.Tensor:

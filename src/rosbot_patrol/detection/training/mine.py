@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.detection.training.dataset import Pictures
+from rosbot_patrol.detection.training.dataset import JPEGS, Packed, Pictures
 from rosbot_patrol.detection.training.render import PER_SHARD
 from rosbot_patrol.detection.training.report import find_all, load_forward
 from rosbot_patrol.detection.training.scoring import Found
@@ -44,10 +44,10 @@ def write_set(pictures: Pictures, chosen: np.ndarray, folder: Path, name: str) -
             shots.append(pictures.picture(shard, i))
             rows.append(pictures.labels[shard][i].copy())
             rows[-1][:, 0] = k
-        target = folder / f"{name}-{number:04d}.npy"
+        target = folder / f"{name}-{number:04d}{JPEGS}"
         np.savez_compressed(target.with_suffix(".npz"), boxes=np.concatenate(rows))
-        half = target.with_suffix(".part.npy")
-        np.save(half, np.array(shots))
+        half = target.with_suffix(".part" + JPEGS)
+        Packed.of(np.array(shots)).save(half)
         half.rename(target)
 
 

@@ -1,7 +1,7 @@
 """Write a set of labelled pictures as shards on disk: seeded, by several processes, going on where it was left.
 
 A shard NAME-0007.npz holds `boxes`, one row per visible actor (see `labels.py`), and NAME-0007.npy the pictures as
-the network gets them without its grey margins, uint8, shape (count, 240, 320, 3).
+the network gets them without its grey margins, uint8, shape (count, 240, 320, 3); with --jpeg NAME-0007.jpegs.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training import scenes
+from rosbot_patrol.detection.training.dataset import JPEGS, Packed
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 from rosbot_patrol.detection.training.patterns import draw_textures
 from rosbot_patrol.detection.training.test_set import SETS, WORLD, unseen_textures
@@ -64,6 +65,7 @@ class Studio:
         house_share: float = 0.3,
         plain: bool = False,
         pets: float = 0.0,
+        hard: float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
         """`count` pictures and the rows of their labels; a share of them is taken in the house, if there is one.
 
@@ -74,6 +76,7 @@ class Studio:
             house_share: share of scenes in the house.
             plain: leave the house's colours, light and furniture as they are.
             pets: share of the pictures with cats or dogs.
+            hard: share of what is hard to tell (`scenes.draw_actors`).
         """
         rng = np.random.default_rng(seed)
         self.furnish(np.random.default_rng([*seed, 1]))
@@ -89,7 +92,7 @@ class Studio:
                 camera = scenes.draw_camera(scene, rng)
                 if camera is None or len(pictures) == count:
                     break
-                picture, labels = self._view(scene, camera, rng, test, pets)
+                picture, labels = self._view(scene, camera, rng, test, pets, hard)
                 rows += [[len(pictures), *label] for label in labels]
                 pictures.append(picture)
         return np.array(pictures), np.array(rows, np.float32).reshape(-1, len(COLUMNS))
@@ -106,9 +109,10 @@ class Studio:
         rng: np.random.Generator,
         test: bool,
         pets: float = 0.0,
+        hard: float = 0.0,
     ):
         assert self.renderer is not None
-        actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets)
+        actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets, hard=hard)
         for i, actor in enumerate(actors):
             self.renderer.add(actor.body, label=i + 1)
             self.renderer.move(actor.body.name, actor.pose)
@@ -210,7 +214,7 @@ def _poster(painter: EglRenderer, look, rng: np.random.Generator) -> Texture:
 
 def _work(job: tuple[argparse.Namespace, int]) -> str:
     options, index = job
-    target = options.folder / f"{options.name}-{index:04d}.npy"
+    target = options.folder / f"{options.name}-{index:04d}{JPEGS if options.jpeg else '.npy'}"
     if target.exists():
         return target.name
     if os.nice(0) < 5:
@@ -226,10 +230,14 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
         house_share=options.house_share,
         plain=options.plain,
         pets=options.pets,
+        hard=options.hard,
     )
     np.savez_compressed(target.with_suffix(".npz"), boxes=boxes)
-    part = target.with_suffix(".part.npy")
-    np.save(part, pictures)
+    part = target.with_suffix(".part" + target.suffix)
+    if options.jpeg:
+        Packed.of(pictures).save(part)
+    else:
+        np.save(part, pictures)
     part.rename(target)
     return target.name
 
@@ -248,6 +256,8 @@ def main() -> None:
     parser.add_argument("--house-share", type=float, default=0.3)
     parser.add_argument("--plain", action="store_true", help="leave the house as it is")
     parser.add_argument("--pets", type=float, default=0.0, help="share of the pictures with cats or dogs")
+    parser.add_argument("--hard", type=float, default=0.0, help="share of people behind things, of pets nearby")
+    parser.add_argument("--jpeg", action="store_true", help="keep the pictures as jpegs, a seventh as large")
     parser.add_argument("--set", choices=SETS, help="draw these pictures of the tests, which test_set.py lays down")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
@@ -256,6 +266,7 @@ def main() -> None:
         chosen = SETS[options.set]
         options.name, options.pictures, options.seed = options.set, chosen.pictures, chosen.seed
         options.house, options.house_share, options.pets, options.plain = WORLD, chosen.house_share, chosen.pets, False
+        options.hard, options.jpeg = 0.0, False
     options.folder.mkdir(parents=True, exist_ok=True)
     shards = -(-options.pictures // PER_SHARD)
     jobs = [(options, i) for i in range(shards)]

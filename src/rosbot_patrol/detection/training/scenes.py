@@ -138,7 +138,13 @@ def draw_camera(scene: Scene, rng: Rng) -> tuple[float, float, float] | None:
 
 
 def draw_actors(
-    scene: Scene, camera: tuple[float, float, float], rng: Rng, *, reserved: bool = False, pets: float = 0.0
+    scene: Scene,
+    camera: tuple[float, float, float],
+    rng: Rng,
+    *,
+    reserved: bool = False,
+    pets: float = 0.0,
+    hard: float = 0.0,
 ) -> list[Actor]:
     """People and hydrants before a camera, where there is room for them; often none at all.
 
@@ -148,17 +154,21 @@ def draw_actors(
         rng: chance.
         reserved: draw people that training never sees.
         pets: share of the views with a cat or a dog, or two, as well; they come last and are nothing to be found.
+        hard: that share of people stands behind furniture, sits or crouches, and of pets right before the camera.
     """
     people = int(rng.choice([0, 1, 2, 3, 4], p=[0.30, 0.47, 0.14, 0.06, 0.03]))
     hydrants = int(rng.choice([0, 1, 2], p=[0.76, 0.20, 0.04]))
     actors: list[Actor] = []
     for i in range(people + hydrants):
-        spot = _spot(scene, camera, rng)
+        is_hard = bool(hard) and i < people and bool(rng.random() < hard)
+        spot = _hidden_spot(scene, camera, rng) if is_hard else _spot(scene, camera, rng)
         if spot is None:
             continue
         pose = placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi)))
-        make = draw_person if i < people else _draw_hydrant
-        actors.append(make(rng, f"actor{i}", pose, reserved))
+        if i < people:
+            actors.append(draw_person(rng, f"actor{i}", pose, reserved, low=is_hard))
+        else:
+            actors.append(_draw_hydrant(rng, f"actor{i}", pose, reserved))
         if not (i < people and rng.random() < 0.25):
             scene_margin = Place(spot[0], spot[1], 0.15, 0.15, 0.0)
             scene.places.append(scene_margin)
@@ -166,15 +176,24 @@ def draw_actors(
         if scene.places and scene.places[-1].half_x == 0.15:
             scene.places.pop()
     if pets and rng.random() < pets:
-        spots = [_spot(scene, camera, rng) for _ in range(int(rng.integers(1, 3)))]
+        near = 2.5 if hard and rng.random() < hard else 0.0
+        spots = [_spot(scene, camera, rng, most=near) for _ in range(int(rng.integers(1, 3)))]
         actors += [_draw_pet(rng, f"pet{i}", spot) for i, spot in enumerate(spots) if spot is not None]
     return actors
 
 
-def draw_person(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
-    """A person by chance; a reserved one has a height, colour, mask or posture that training never draws."""
+def draw_person(rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool = False) -> Actor:
+    """A person by chance; a reserved one has a height, colour, mask or posture that training never draws.
+
+    Args:
+        rng: chance.
+        name: of the body.
+        pose: on the floor, in the world.
+        reserved: such a one.
+        low: sits or crouches more often.
+    """
     look = draw_look(rng) if rng.random() < 0.9 else _named(rng)
-    posture = str(rng.choice(POSTURES, p=[0.80, 0.12, 0.08]))
+    posture = str(rng.choice(POSTURES, p=[0.45, 0.30, 0.25] if low else [0.80, 0.12, 0.08]))
     if reserved:
         look = draw_reserved(rng)
         posture = str(rng.choice(["standing", "creeping", "sitting", "crouching"], p=[0.55, 0.25, 0.1, 0.1]))
@@ -226,10 +245,34 @@ def _draw_pet(rng: Rng, name: str, spot: tuple[float, float]) -> Actor:
     return Actor(pet_body(name, look), placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi))), parts, [])
 
 
-def _spot(scene: Scene, camera: tuple[float, float, float], rng: Rng) -> tuple[float, float] | None:
+def _hidden_spot(scene: Scene, camera: tuple[float, float, float], rng: Rng) -> tuple[float, float] | None:
+    """A free spot behind something that is in view, as near to it as somebody hides; else any."""
+    x, y, yaw = camera
+    x0, x1, y0, y1 = scene.extent
+    for k in rng.permutation(len(scene.places)):
+        place = scene.places[int(k)]
+        away, bearing = np.hypot(place.x - x, place.y - y), np.arctan2(place.y - y, place.x - x)
+        aside = abs(np.remainder(bearing - yaw + np.pi, 2 * np.pi) - np.pi)
+        if max(place.half_x, place.half_y) > 1.3 or not 0.7 < away < 6.0 or aside > 0.5:
+            continue
+        bearing += float(rng.normal(0.0, 0.5 * max(place.half_x, place.half_y) / away))
+        for behind in np.arange(0.25, 1.6, 0.15):
+            px, py = x + (away + behind) * np.cos(bearing), y + (away + behind) * np.sin(bearing)
+            if x0 < px < x1 and y0 < py < y1 and scene.is_free(px, py, 0.22):
+                if _sees(scene, (x, y), (px, py)):
+                    return float(px), float(py)
+                break
+    return _spot(scene, camera, rng)
+
+
+def _spot(
+    scene: Scene, camera: tuple[float, float, float], rng: Rng, *, most: float = 0.0
+) -> tuple[float, float] | None:
     x, y, yaw = camera
     near = float(np.exp(rng.uniform(np.log(0.7), np.log(8.5))))
     distance = near if rng.random() < 0.35 else float(rng.uniform(1.2, 8.5))
+    if most:
+        distance = float(rng.uniform(0.6, most))
     for attempt in range(30):
         if attempt >= 12:
             distance = max(0.7, distance * 0.93)

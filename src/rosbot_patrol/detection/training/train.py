@@ -14,6 +14,7 @@ import queue
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -64,13 +65,14 @@ class Trainer:
             self._save()
 
     def _epoch(self) -> None:
-        rng = np.random.default_rng([self.options.seed, self.epoch])
         index = self._share(self.pictures.index())
-        batches = _ahead(self.pictures, index, self.options.batch, rng)
+        epoch = Batches(self.pictures, index, self.options.batch, (self.options.seed, self.epoch))
         self.network.train()
         self._freeze()
         sums: dict[str, float] = {}
-        bar = tqdm(batches, total=self.steps_each, desc=f"epoch {self.epoch + 1}/{self.options.epochs}", mininterval=5)
+        batches = epoch.ahead(self.options.loaders)
+        title = f"epoch {self.epoch + 1}/{self.options.epochs}"
+        bar = tqdm(batches, total=self.steps_each, desc=title, mininterval=5)
         for done, (images, rows) in enumerate(bar, 1):
             parts = self._step(images, rows)
             for name, value in parts.items():
@@ -107,10 +109,10 @@ class Trainer:
         inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
         inputs = inputs.contiguous(memory_format=torch.channels_last)
-        boxes = torch.from_numpy(rows)
+        boxes = torch.from_numpy(rows).to(self.device)
         truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.options.bf16):
-            values = [value.float().cpu() for value in self.run_network(inputs)]
+            values = [value.float() for value in self.run_network(inputs)]
         parts = yolo_loss(self.spec.heads, values, truth, self.spec.width)  # type: ignore[arg-type]
         self.optimiser.zero_grad(set_to_none=True)
         sum(parts.values()).backward()  # type: ignore[union-attr]
@@ -176,18 +178,42 @@ def _schedule(done: float, step: int, cool: float) -> float:
     return warm * (0.02 + 0.98 * 0.5 * (1 - math.cos(math.pi * left)))
 
 
-def _ahead(pictures: Pictures, index: np.ndarray, batch: int, rng: np.random.Generator):
-    """Batches, made by a thread two ahead."""
-    ready: queue.Queue = queue.Queue(2)
+class Batches(torch.utils.data.Dataset):
+    """The batches of an epoch; each is the same whoever makes it.
 
-    def fill() -> None:
-        for start in range(0, len(index), batch):
-            ready.put(batch_of(pictures, index[start : start + batch], rng))
-        ready.put(None)
+    Args:
+        pictures: the set.
+        index: (shard, picture) of each of the epoch, shape (N, 2).
+        batch: pictures of one.
+        seed: of the epoch's chance.
+    """
 
-    threading.Thread(target=fill, daemon=True).start()
-    while (item := ready.get()) is not None:
-        yield item
+    def __init__(self, pictures: Pictures, index: np.ndarray, batch: int, seed: tuple[int, int]) -> None:
+        self._pictures, self._index, self._batch, self._seed = pictures, index, batch, seed
+
+    def __len__(self) -> int:
+        return -(-len(self._index) // self._batch)
+
+    def __getitem__(self, k: int) -> tuple[np.ndarray, np.ndarray]:
+        chosen = self._index[k * self._batch : (k + 1) * self._batch]
+        return batch_of(self._pictures, chosen, np.random.default_rng([*self._seed, k]))
+
+    def ahead(self, loaders: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """All of them, made by so many processes, or by one thread where that is 0: enough beside two cores."""
+        if loaders:
+            for images, rows in torch.utils.data.DataLoader(self, batch_size=None, num_workers=loaders):
+                yield images.numpy(), rows.numpy()
+            return
+        ready: queue.Queue = queue.Queue(2)
+
+        def fill() -> None:
+            for k in range(len(self)):
+                ready.put(self[k])
+            ready.put(None)
+
+        threading.Thread(target=fill, daemon=True).start()
+        while (item := ready.get()) is not None:
+            yield item
 
 
 def main() -> None:
@@ -207,6 +233,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, help="end after so long, with the rate fallen, whatever the epochs")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--loaders", type=int, default=0, help="processes that make batches; 0: a thread")
     parser.add_argument("--bf16", action="store_true")
     parser.add_argument("--freeze", type=int, default=0, help="so many of the first layers keep their numbers")
     parser.add_argument("--pack", action="store_true", help="read all pictures once and keep them in memory as jpegs")

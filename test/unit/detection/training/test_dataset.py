@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rosbot_patrol.detection.training.dataset import Pictures, batch_of
+from rosbot_patrol.detection.training.dataset import JPEGS, Pictures, batch_of
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 
 
@@ -34,6 +34,21 @@ def test_pictures_in_memory_are_those_on_disk(folder: Path) -> None:
         assert off.mean() < 2.0
     _, rows = batch_of(memory, memory.index()[:2], None)
     assert rows[0, 2:6].tolist() == [120.0, 188.0, 80.0, 120.0]
+
+
+def test_shards_of_jpegs_are_read_like_the_others(folder: Path) -> None:
+    disk = Pictures.open(folder, "room")
+    memory = disk.pack()
+    for shard in range(2):
+        memory.shards[shard].save(folder / f"small-{shard:04d}{JPEGS}")
+        labels = np.load(folder / f"room-{shard:04d}.npz")["boxes"]
+        np.savez(folder / f"small-{shard:04d}.npz", boxes=labels)
+    small = Pictures.open(folder, "small,small")
+    assert len(small) == 8
+    assert small.shards[0] is small.shards[2]
+    for shard, i in disk.index():
+        assert (small.picture(shard, i) == memory.picture(shard, i)).all()
+    assert small.pack().shards[1] is small.shards[1]
 
 
 def test_no_pictures_of_a_name(folder: Path) -> None:

@@ -47,6 +47,31 @@ def test_actors_stand_free_and_before_the_camera() -> None:
     assert kinds.count("fire_hydrant") > 2
 
 
+def test_hard_ones_hide_behind_things_and_pets_come_near() -> None:
+    def draw(hard: float) -> tuple[list[float], list[float]]:
+        rng, pets, free = np.random.default_rng(4), [], []
+        for _ in range(60):
+            room = scenes.draw_room(rng)
+            scenes.furnish(room, rng, 12)
+            camera = scenes.draw_camera(room, rng)
+            if camera is None:
+                continue
+            for actor in scenes.draw_actors(room, camera, rng, pets=0.5, hard=hard):
+                x, y = actor.pose[:2, 3]
+                if actor.body.kind == "pet":
+                    pets.append(float(np.hypot(x - camera[0], y - camera[1])))
+                elif actor.body.kind == "person":
+                    way = [
+                        (camera[0] + t * (x - camera[0]), camera[1] + t * (y - camera[1])) for t in (0.6, 0.7, 0.8, 0.9)
+                    ]
+                    free.append(all(room.is_free(*point, 0.0) for point in way))
+        return pets, free
+
+    (far, open_), (near, hidden) = draw(0.0), draw(1.0)
+    assert np.median(near) < 2.0 < np.median(far)
+    assert np.mean(hidden) < np.mean(open_) - 0.2
+
+
 def test_the_house_keeps_its_walls_where_they_are() -> None:
     world = load_world(HOUSE)
     house = scenes.draw_house(np.random.default_rng(3), world)
