@@ -46,7 +46,7 @@ def find_all(pictures: Pictures, cfg: Path, forward: Forward, *, batch: int = 16
     """Run a network over a set."""
     spec = read_cfg(str(cfg))
     index = pictures.index()
-    boxes, labels, hits = [], [], []
+    boxes, labels, hits, first = [], [], [], 0
     place = Letterbox(WIDTH, HEIGHT, spec.width, spec.height)
     for start in range(0, len(index), batch):
         chosen = index[start : start + batch]
@@ -56,7 +56,8 @@ def find_all(pictures: Pictures, cfg: Path, forward: Forward, *, batch: int = 16
             rows[:, 0] = start + b
             mine = [value[b] for value in values]
             found = decode.decode(spec.heads, mine, place, threshold=FLOOR, iou_threshold=0.4)
-            got, hit = match(start + b, found, rows, sum(len(h) for h in hits))
+            got, hit = match(start + b, found, rows, first)
+            first += len(hit)
             boxes.append(got)
             labels.append(rows)
             hits.append(hit)
