@@ -41,6 +41,10 @@ class Vigil:
             self._touched = wall
             os.utime(self._path, (wall, wall))
 
+    def end(self) -> None:
+        """It was ended in order: what is called from now on is not missed."""
+        self._path.unlink(missing_ok=True)
+
     def missed(self, wall: float) -> bool:
         """Whether a call at a time (seconds since 1970) came when nobody listened."""
         return self._gone is not None and self._gone - _SLACK <= wall <= self._began + _SLACK

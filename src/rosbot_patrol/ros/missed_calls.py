@@ -53,6 +53,13 @@ class MissedCalls:
             self._subscriber.unregister()
             self._subscriber = None
 
+    def end(self) -> None:
+        """The patrol was ended in order, and is not waited for."""
+        try:
+            self._vigil.end()
+        except OSError as err:
+            log.error("the sign of life cannot be taken away: %s", err)
+
     def _on_states(self, message: SensorStates) -> None:
         self._heard += 1
         if self._heard != 2:  # the first is latched, nobody knows how old; those after the second tell nothing new

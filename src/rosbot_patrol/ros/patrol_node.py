@@ -291,6 +291,7 @@ class PatrolNode:
             self._is_over = True
             if self._is_signalled:
                 self._record(now(), self.manager.abandon("the patrol was ended"))
+                self.missed.end()
             self.move_base.cancel()
             self._wheels.stop()
             self._save(changed=True)

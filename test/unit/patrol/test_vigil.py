@@ -24,6 +24,13 @@ def test_what_was_called_between_the_last_sign_and_the_start_was_missed(tmp_path
     assert [again.missed(t) for t in (1008.0, 1009.9, 1020.0, 1030.1, 1031.0)] == [False, True, True, True, False]
 
 
+def test_after_an_orderly_end_nothing_was_missed(tmp_path: Path) -> None:
+    first = Vigil(tmp_path / "alive", 1000.0)
+    first.end()
+    first.end()
+    assert not Vigil(tmp_path / "alive", 1030.0).has_gap
+
+
 @pytest.mark.parametrize("wall", [900.0, 9000.0])
 def test_a_clock_that_was_set_and_a_long_night_are_no_gap(tmp_path: Path, wall: float) -> None:
     Vigil(tmp_path / "alive", 1000.0)
