@@ -28,6 +28,19 @@ def test_round_trip():
             np.testing.assert_array_equal(getattr(before, name), getattr(after, name))
 
 
+def test_numbers_rounded_to_half_precision_are_as_half_precision_has_them():
+    written = random_weights(SPEC, np.random.default_rng(3))
+    written[1].biases[:4] = 0.0, -1.5, 1.99999, -3e4
+    read = parse_weights(format_weights(SPEC, written, bits=10), SPEC)
+    for before, after in zip(written, read, strict=True):
+        for name in ("weights", "biases"):
+            half = getattr(before, name).astype(np.float16).astype(np.float32)
+            np.testing.assert_allclose(getattr(after, name), half, rtol=2**-11, atol=1e-4)
+            kept = getattr(after, name).view(np.uint32) & 0x1FFF
+            assert not kept.any()
+    assert read[1].biases[:4].tolist() == [0.0, -1.5, 2.0, -30000.0]
+
+
 def test_order_in_the_file_is_biases_scales_means_variances_weights():
     numbers = np.frombuffer(make_bytes(), dtype="<f4", offset=20)
     first = parse_weights(make_bytes(), SPEC)[0]

@@ -142,7 +142,7 @@ class Trainer:
         part = self.options.checkpoint.with_suffix(".part")
         torch.save(state, part)
         os.replace(part, self.options.checkpoint)
-        weights = format_weights(self.spec, self.mean.to_weights(), seen=self.step * self.options.batch)
+        weights = format_weights(self.spec, self.mean.to_weights(), seen=self.step * self.options.batch, bits=10)
         self.options.weights.write_bytes(weights)
 
     def _resume(self) -> None:
