@@ -18,6 +18,9 @@ from rosbot_patrol.patrol.judge import PET, Judge
 _SAME = 1.0  # so near to each other two sightings are of one [m]
 _SPEED = 1.0  # it may have walked so fast since [m/s]
 _WALKED = 4.0  # but no farther [m]
+_SURE = 0.7  # probability of a sighting that speaks for a person: a dog far off is taken for one now and then
+_TALL = 1.1  # and its top above the floor [m]
+_OFTEN = 3  # such sightings, at least
 
 
 @dataclass(frozen=True)
@@ -79,14 +82,20 @@ class CloseUps:
             refusal = self._judge.refusal(box)
             if refusal == PET:
                 self._pets.append(place)
-            elif not refusal:
+            elif not refusal and box.probability >= _SURE and m.top >= _TALL:
                 self._people.append(place)
-        self._open = [s for s in self._open if not any(s.may_be(o) for o in (*self._pets, *self._people))]
+        self._open = [s for s in self._open if not self._is_told(s)]
         is_left = False
         for box, place in near:
-            if any(place.may_be(person) for person in self._people):
+            if self._is_person(place):
                 kept.append(box)
             elif not self._judge.refusal(box) and not any(place.may_be(pet) for pet in self._pets):
                 is_left = True
                 self._open = [s for s in self._open if not s.may_be(place)] + [place]
         return tuple(kept), is_left
+
+    def _is_person(self, place: Sighting) -> bool:
+        return sum(place.may_be(person) for person in self._people) >= _OFTEN
+
+    def _is_told(self, place: Sighting) -> bool:
+        return self._is_person(place) or any(place.may_be(pet) for pet in self._pets)

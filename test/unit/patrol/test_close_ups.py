@@ -9,10 +9,12 @@ from rosbot_patrol.patrol.inputs import Box, Measured
 from rosbot_patrol.patrol.judge import Judge
 
 
-def box(x: float = 0.0, *, top: float = 0.7, cut: bool = True, label: str = "person", **fields) -> Box:
+def box(
+    x: float = 0.0, *, top: float = 0.7, cut: bool = True, label: str = "person", score: float = 0.9, **fields
+) -> Box:
     defaults = {"x": x, "y": 0.0, "error": 0.1, "away": 1.2, "top": top, "height": top, "width": 0.4, "is_cut": cut}
     measured = Measured(**{**defaults, **fields})
-    return Box(label=label, probability=0.9, xmin=100, ymin=0 if cut else 90, xmax=200, ymax=300, measured=measured)
+    return Box(label=label, probability=score, xmin=100, ymin=0 if cut else 90, xmax=200, ymax=300, measured=measured)
 
 
 PERSON, PET = {"top": 1.6, "cut": False}, {"top": 0.6, "cut": False}
@@ -49,10 +51,20 @@ def test_what_can_be_judged_is_left_to_the_judge(close_ups: CloseUps, given: Box
 
 
 def test_legs_of_somebody_who_was_seen_whole_are_theirs(close_ups: CloseUps) -> None:
-    close_ups.sort(1.0, (box(2.0, **PERSON),))
     legs = box(0.0)
+    for k in range(2):
+        close_ups.sort(1.0 + 0.1 * k, (box(2.0, **PERSON),))
+    assert close_ups.sort(1.3, (legs,)) == ((), True)  # not often enough
+    close_ups.sort(1.4, (box(2.0, **PERSON),))
     assert close_ups.sort(3.0, (legs,)) == ((legs,), False)
     assert close_ups.sort(3.1, (box(-9.0),)) == ((), True)  # nobody walks that fast
+
+
+@pytest.mark.parametrize("given", [box(2.0, top=1.6, cut=False, score=0.5), box(2.0, top=0.95, cut=False)])
+def test_a_dog_far_off_that_passes_for_a_person_does_not_speak_for_its_legs(close_ups: CloseUps, given: Box) -> None:
+    for k in range(20):
+        close_ups.sort(1.0 + 0.1 * k, (given,))
+    assert close_ups.sort(3.0, (box(),)) == ((), True)
 
 
 def test_legs_of_a_pet_are_the_pets_whenever_it_is_seen_whole(close_ups: CloseUps) -> None:
