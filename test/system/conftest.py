@@ -17,5 +17,12 @@ def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[object]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(master: object, tmp_path: Path) -> Path:
+    """A folder of its own, and a parameter server that knows nothing of the house before."""
+    import rospy
+
+    kept = ("/rosdistro", "/rosversion", "/run_id", "/roslaunch", "/use_sim_time")
+    for name in rospy.get_param_names():
+        if not name.startswith(kept):
+            rospy.delete_param(name)
     return tmp_path
