@@ -43,6 +43,7 @@ class Known:
 
 
 PET = "it is as low as a pet"
+_NEAR_ERROR = 0.35  # of a place by the floor that is good enough to tell the size: right before the camera [m]
 _TOP_ROW = 3  # a box that begins so near to the picture's upper edge may go on above it [px]
 
 
@@ -70,7 +71,7 @@ class Judge:
     def is_too_near(self, box: Box) -> bool:
         """Whether the picture ends so low above the floor that a person and a pet look alike in it."""
         m = box.measured
-        if m is None or box.label != "person" or m.source == "floor" or box.ymin > _TOP_ROW:
+        if m is None or box.label != "person" or not _has_size(m) or box.ymin > _TOP_ROW:
             return False
         return m.top < self.params.person_top_min and m.width < self.params.lying_length
 
@@ -91,7 +92,7 @@ class Judge:
 
     def _size(self, box: Box, m: Measured) -> str:
         p = self.params
-        if box.label != "person" or m.source == "floor":
+        if box.label != "person" or not _has_size(m):
             return ""
         sure = max(1.0 - 0.5 * m.error, 0.6)  # of the bounds, as far as the distance is
         if m.top > p.person_top_max / sure or m.width > p.person_width_max / sure:
@@ -103,3 +104,8 @@ class Judge:
         if m.top < p.person_top_min * sure:
             return PET
         return "it is too small for a person" if m.height < p.person_height_min * sure else ""
+
+
+def _has_size(m: Measured) -> bool:
+    """Whether its distance is known so well that its size is."""
+    return m.source != "floor" or m.error <= _NEAR_ERROR

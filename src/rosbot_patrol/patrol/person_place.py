@@ -2,8 +2,12 @@
 
 Distances are taken in this order. Depth tells the nearest thing in the middle of the box, and whether all of it lies
 in one plane, as a picture on a wall does. The lidar tells what stands in the box's bearings that the map does not show:
-legs. Where neither tells, the lower edge of the box is taken for the feet, which is good to some tens of per cent at a
-camera this low; a box that ends at the picture's lower edge has no feet.
+legs. Where neither tells, the lower edge of the box is taken for the feet, which is good to a few per cent right before
+the camera and to some tens of per cent farther off, as low as the camera is; a box that ends at the picture's lower
+edge has no feet.
+
+Nothing in a box is farther off than the floor beneath its lower edge. Depth that says so is of what shows between the
+legs or beside them, as of dark clothes or of one nearer than a depth camera can measure, and is not taken.
 """
 
 from __future__ import annotations
@@ -26,6 +30,8 @@ _FEW = 40  # depths, at least, to say anything
 _LEGS = 2  # beams, at least
 _GRID = 48  # samples along each side of a box, at most
 _FLAT_SHARE = 0.92  # of the samples lie in a picture's plane
+_EDGE_ERROR = 3.0, 0.04  # of a box's lower edge [px], and the share of its height that comes to it
+_BELIEVED = 0.05  # of a box's samples speak for the nearer thing
 _NOISE = 0.003  # of a depth camera, at 1 m; it grows with the square [m]
 
 
@@ -96,19 +102,25 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
     if box.width <= 0 or box.height <= 0:
         return box
     flat: bool | None = None
+    most, is_behind = _farthest(box, view), False
     if depth is not None:
         samples = _samples(box, view.lens, depth)
         along = _nearest(samples)
-        flat = _is_flat(samples)
+        is_behind = along is not None and along > most
+        if is_behind:
+            along = _nearer(samples, most)
+        else:
+            flat = _is_flat(samples)
         if along is not None:
             return replace(box, measured=_at(box, view, along, source="depth", error=0.1 + 0.02 * along, flat=flat))
     found = _by_lidar(box, view, unmapped) if unmapped is not None else None
-    if found is not None:
+    if found is not None and found <= most:
         return replace(box, measured=_at(box, view, found, source="lidar", error=0.15 + 0.02 * found, flat=flat))
-    found = _by_floor(box, view)
-    if found is None:
+    told = _by_floor(box, view, is_behind=is_behind)
+    if told is None:
         return box
-    return replace(box, measured=_at(box, view, found, source="floor", error=0.3 + 0.25 * found, flat=flat))
+    found, error = told
+    return replace(box, measured=_at(box, view, found, source="floor", error=error, flat=flat))
 
 
 def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: bool | None) -> Measured:
@@ -154,6 +166,12 @@ def _nearest(samples: NDArray[np.float64]) -> float | None:
         return None
     near = np.quantile(known, 0.2)
     return float(np.median(known[known < near + _DEEP]))
+
+
+def _nearer(samples: NDArray[np.float64], most: float) -> float | None:
+    """How far the thing is that is no farther than `most` [m], None where next to nothing is."""
+    near = samples[samples <= most]  # NaN is not
+    return float(np.median(near)) if near.size >= max(_BELIEVED * samples.size, _FEW) else None
 
 
 def _is_flat(samples: NDArray[np.float64]) -> bool | None:
@@ -202,12 +220,35 @@ def _by_lidar(box: Box, view: View, unmapped: Array) -> float | None:
     return float(np.median(legs)) * ahead if ahead > 0.1 else None
 
 
-def _by_floor(box: Box, view: View) -> float | None:
-    """Distance along the optical axis at which the lower edge of a box meets the floor [m]."""
-    if box.ymax >= view.lens.height - _EDGE:
+def _by_floor(box: Box, view: View, *, is_behind: bool) -> tuple[float, float] | None:
+    """Distance along the optical axis at which the lower edge of a box meets the floor, and about its error [m].
+
+    Args:
+        box: in the colour picture.
+        view: of it.
+        is_behind: depth says that it is right before the camera: so it is where the box goes on beneath the picture.
+    """
+    if box.ymax >= view.lens.height - _EDGE and not is_behind:
         return None
-    ray = view.ray((box.xmin + box.xmax) / 2.0, box.ymax)
-    if ray[2] > -0.005:
+    found = _floor_at(box, view, float(box.ymax))
+    if not 0.2 < found < 15.0:
         return None
-    along = float(view.eye[2] / -ray[2])
-    return along if 0.2 < along < 15.0 else None
+    off = _edge_error(box)
+    spread = _floor_at(box, view, box.ymax - off) - _floor_at(box, view, box.ymax + off)
+    return found, min(0.3 + 0.25 * found, 0.1 + 0.25 * spread)
+
+
+def _farthest(box: Box, view: View) -> float:
+    """How far what a box shows can be at most, along the optical axis [m]: the floor ends its lower edge."""
+    return _floor_at(box, view, box.ymax - _edge_error(box))
+
+
+def _edge_error(box: Box) -> float:
+    """By how much the lower edge of a box may be wrong [px]."""
+    return _EDGE_ERROR[0] + _EDGE_ERROR[1] * box.height
+
+
+def _floor_at(box: Box, view: View, row: float) -> float:
+    """Where the floor is in a row of the picture below the middle of a box, along the optical axis [m]."""
+    down = -float(view.ray((box.xmin + box.xmax) / 2.0, row)[2])
+    return float(view.eye[2]) / down if down > 0.005 else math.inf

@@ -41,7 +41,7 @@ def test_legs_alone_are_a_doubt(close_ups: CloseUps) -> None:
         box(top=1.1),  # the picture ends above a pet
         box(width=1.4),  # as wide as one who lies
         box(label="fire hydrant"),
-        box(source="floor"),
+        box(source="floor", error=0.5),
         Box(label="person", probability=0.9, xmin=0, ymin=0, xmax=50, ymax=90),
     ],
 )

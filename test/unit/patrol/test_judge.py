@@ -29,6 +29,7 @@ def test_what_was_not_measured_is_not_refused() -> None:
     ("fields", "why"),
     [
         ({"top": 0.55, "height": 0.5, "width": 0.7}, "as low as a pet"),
+        ({"top": 0.55, "height": 0.5, "width": 0.7, "source": "floor", "error": 0.25}, "as low as a pet"),
         ({"top": 2.8, "height": 2.7}, "too large"),
         ({"width": 2.9}, "too large"),
         ({"top": 1.2, "height": 0.2}, "too small"),
