@@ -129,7 +129,7 @@ def evaluate(
     kept = _kept(state_dir, None if begin is None else heard.states[begin].message.mission)
     person = kept.person if kept is not None else None
     looked = times.get("looked")
-    went_on = end is None or bool(heard.states[end].message.mission)
+    went_on = end is None or any(s.message.mission for s in heard.states[end:])  # called again before it was home
     home = math.dist(robot.poses[-1][:2], robot.poses[0][:2]) if robot.times else None
     return Result(
         number=patrol.number,
