@@ -16,6 +16,7 @@ from typing import Any
 
 from rosbot_patrol.campaign.crash_plan import ALL
 from rosbot_patrol.campaign.intervals import wilson
+from rosbot_patrol.campaign.plan import CLEAR
 
 CLOCK_SLACK = 1.0  # between the clocks of two programs [s]
 
@@ -81,6 +82,8 @@ class Books:
         moments: by moment.
         calls: triggers that were raised; answered: those that got a verdict, by verdict.
         lost: sentences on those that got none.
+        watched: calls whose mission ended in the life in which somebody stood in the room.
+        overlooked: sentences on those of them that ended in `clear`, whatever was killed.
         confirmed: incidents; mails: how many of them have so many mails.
         strangers: sentences on mails without an incident, incidents without a mail or with several.
         repeated: mails that came more than once under one Message-ID.
@@ -93,6 +96,8 @@ class Books:
     calls: int
     answered: Mapping[str, int]
     lost: Sequence[str]
+    watched: int
+    overlooked: Sequence[str]
     confirmed: int
     mails: Mapping[int, int]
     strangers: Sequence[str]
@@ -102,8 +107,9 @@ class Books:
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing was lost, doubled or broken."""
-        return not (self.lost or self.strangers or self.repeated or self.verified or self.waiting)
+        """Whether nothing was lost, overlooked, doubled or broken."""
+        found = self.lost or self.overlooked or self.strangers or self.repeated
+        return not (found or self.verified or self.waiting)
 
     def text(self) -> str:
         """For people."""
@@ -117,12 +123,13 @@ class Books:
             f"{kills} kills: {', '.join(f'{name} {count}' for name, count in sorted(self.kills.items()))}",
             f"at these moments: {', '.join(f'{name} {count}' for name, count in sorted(self.moments.items()))}",
             f"calls with a verdict: {answered} of {self.calls} ({low:.1%} to {high:.1%}); {verdicts}",
+            f"somebody in the room, and yet clear: {len(self.overlooked)} of {self.watched}",
             f"confirmed incidents with one mail: {one} of {self.confirmed} ({mail_low:.1%} to {mail_high:.1%})",
             f"mails that came twice under one Message-ID: {self.repeated}",
             f"notices left in the outbox: {self.waiting}",
             "database: " + ("not checked" if self.verified is None else self.verified or "verifies"),
         ]
-        return "\n".join([*lines, *self.lost, *self.strangers])
+        return "\n".join([*lines, *self.lost, *self.overlooked, *self.strangers])
 
 
 def balance(
@@ -146,16 +153,18 @@ def balance(
     kills = [line for line in lines if line["kind"] == "kill"]
     calls = [line for line in lines if line["kind"] == "call"]
     answered: Counter[str] = Counter()
-    lost = []
+    lost, overlooked = [], []
+    watched = {line["call"] for line in lines if line["kind"] == "verdict" and line.get("there")}
     for call, after in zip(calls, [*calls[1:], None], strict=True):
         verdict = _verdict_of(call, after, records)
+        hit = [f"{k['victim']} {k['moment']}+{k['delay']:.2f} s" for k in kills if k["call"] == call["call"]]
+        told = f"call {call['call']} of room {call['room']}, killed: {', '.join(hit) or 'none'}:"
         if verdict:
             answered[verdict] += 1
         else:
-            hit = [f"{k['victim']} {k['moment']}+{k['delay']:.2f} s" for k in kills if k["call"] == call["call"]]
-            lost.append(
-                f"call {call['call']} of room {call['room']} has no verdict (killed: {', '.join(hit) or 'none'})"
-            )
+            lost.append(f"{told} no verdict")
+        if verdict == CLEAR and call["call"] in watched:
+            overlooked.append(f"{told} clear, and somebody stood there")
     confirmed = [record for record in records if record.is_confirmed]
     by_incident: dict[str, set[str]] = {}
     for mail in mails:
@@ -176,6 +185,8 @@ def balance(
         calls=len(calls),
         answered=answered,
         lost=lost,
+        watched=len(watched),
+        overlooked=overlooked,
         confirmed=len(confirmed),
         mails=Counter(len(by_incident.get(record.id, ())) for record in confirmed),
         strangers=strangers,

@@ -11,6 +11,8 @@ from rosbot_patrol.patrol.request import Request
 from rosbot_patrol.patrol.room_regions import RoomRegions
 from rosbot_patrol.scan import LaserScan
 
+_SLACK = 3.0, 0.04  # of a detector's boxes: pixels, and share of the height
+
 
 class GoalState(Enum):
     """How far the goal given last has come."""
@@ -55,7 +57,7 @@ class Measured:
         error: of the place, about [m].
         away: distance from the camera over the floor [m].
         top: of the object over the floor [m]; height, width: of what shows of it [m].
-        is_cut: the box ends at the picture's upper or lower edge: there may be more of it.
+        is_cut: the box ends about the picture's upper edge, or at its lower one: there may be more of it.
         is_flat: all of it lies in one plane, None where no depth tells.
         source: what told the distance: "depth", "lidar", "floor" (the box's lower edge).
     """
@@ -99,6 +101,11 @@ class Box:
     def height(self) -> int:
         """Height [px]."""
         return self.ymax - self.ymin
+
+    @property
+    def slack(self) -> float:
+        """By how much its upper and lower edges may be off [px]."""
+        return _SLACK[0] + _SLACK[1] * self.height
 
 
 @dataclass(frozen=True, kw_only=True)

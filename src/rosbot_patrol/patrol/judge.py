@@ -44,7 +44,6 @@ class Known:
 
 PET = "it is as low as a pet"
 _NEAR_ERROR = 0.35  # of a place by the floor that is good enough to tell the size: right before the camera [m]
-_TOP_ROW = 3  # a box that begins so near to the picture's upper edge may go on above it [px]
 
 
 class Judge:
@@ -71,7 +70,7 @@ class Judge:
     def is_too_near(self, box: Box) -> bool:
         """Whether the picture ends so low above the floor that a person and a pet look alike in it."""
         m = box.measured
-        if m is None or box.label != "person" or not _has_size(m) or box.ymin > _TOP_ROW:
+        if m is None or box.label != "person" or not _has_size(m) or box.ymin > box.slack:
             return False
         return m.top < self.params.person_top_min and m.width < self.params.lying_length
 
@@ -99,7 +98,7 @@ class Judge:
             return "it is too large for a person"
         if m.width >= p.lying_length * sure:
             return ""
-        if m.is_cut and box.ymin <= _TOP_ROW:  # the picture ends before it does
+        if m.is_cut and box.ymin <= box.slack:  # the picture ends before it does
             return ""
         if m.top < p.person_top_min * sure:
             return PET

@@ -23,14 +23,13 @@ from rosbot_patrol.patrol.inputs import Box, Measured
 
 Array = NDArray[np.float64]
 
-_EDGE = 3  # a box that ends so near to the picture's edge may go on beyond it [px]
+_EDGE = 3  # a box that ends so near to the picture's lower edge may go on beyond it [px]
 _THICK = 0.12  # from the front of a person to the middle [m]
 _DEEP = 0.35  # what is so much farther than the nearest part is not of the person [m]
 _FEW = 40  # depths, at least, to say anything
 _LEGS = 2  # beams, at least
 _GRID = 48  # samples along each side of a box, at most
 _FLAT_SHARE = 0.92  # of the samples lie in a picture's plane
-_EDGE_ERROR = 3.0, 0.04  # of a box's lower edge [px], and the share of its height that comes to it
 _BELIEVED = 0.05  # of a box's samples speak for the nearer thing
 _NOISE = 0.003  # of a depth camera, at 1 m; it grows with the square [m]
 
@@ -129,7 +128,7 @@ def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: 
     place = view.eye + view.ray(middle, lens.cy) * (along + _THICK)
     top = view.eye + view.ray(middle, box.ymin) * along
     away = math.hypot(*(place - view.eye)[:2])
-    is_cut = box.ymin <= _EDGE or box.ymax >= lens.height - _EDGE
+    is_cut = box.ymin <= box.slack or box.ymax >= lens.height - _EDGE
     return Measured(
         x=float(place[0]),
         y=float(place[1]),
@@ -233,19 +232,13 @@ def _by_floor(box: Box, view: View, *, is_behind: bool) -> tuple[float, float] |
     found = _floor_at(box, view, float(box.ymax))
     if not 0.2 < found < 15.0:
         return None
-    off = _edge_error(box)
-    spread = _floor_at(box, view, box.ymax - off) - _floor_at(box, view, box.ymax + off)
+    spread = _floor_at(box, view, box.ymax - box.slack) - _floor_at(box, view, box.ymax + box.slack)
     return found, min(0.3 + 0.25 * found, 0.1 + 0.25 * spread)
 
 
 def _farthest(box: Box, view: View) -> float:
     """How far what a box shows can be at most, along the optical axis [m]: the floor ends its lower edge."""
-    return _floor_at(box, view, box.ymax - _edge_error(box))
-
-
-def _edge_error(box: Box) -> float:
-    """By how much the lower edge of a box may be wrong [px]."""
-    return _EDGE_ERROR[0] + _EDGE_ERROR[1] * box.height
+    return _floor_at(box, view, box.ymax - box.slack)
 
 
 def _floor_at(box: Box, view: View, row: float) -> float:

@@ -112,7 +112,8 @@ class CrashLife:
                 return
             time.sleep(0.05)
         verdict = self._verdict(call["room"], since)
-        self._journal.add("verdict", call=call["call"], verdict=verdict, wall=time.time())
+        there = self._place is not None and call["room"] == self._room
+        self._journal.add("verdict", call=call["call"], verdict=verdict, there=there, wall=time.time())
 
     def _verdict(self, room: int, since: int) -> str:
         """The verdict of a mission to a room that has ended since a state, "" before that.

@@ -146,6 +146,8 @@ def summary_json(books: Books) -> str:
             "calls": books.calls,
             "answered": dict(books.answered),
             "lost": list(books.lost),
+            "watched": books.watched,
+            "overlooked": list(books.overlooked),
             "confirmed": books.confirmed,
             "mails": {str(count): number for count, number in books.mails.items()},
             "repeated": books.repeated,

@@ -83,8 +83,21 @@ def test_a_call_is_answered_by_what_the_patrol_kept_of_it_alone() -> None:
     assert dict(balance(journal, answers, [], verified=None, waiting=0).answered) == {"unverified": 1, "clear": 1}
     for other in (record("a", 50.0, "clear"), record("a", 130.0, "clear", room=2), record("a", 100.3, "")):
         lost = balance(journal, [other, answers[1]], [], verified=None, waiting=0)
-        assert lost.lost == ["call p0 of room 1 has no verdict (killed: all driving+1.00 s)"]
+        assert lost.lost == ["call p0 of room 1, killed: all driving+1.00 s: no verdict"]
         assert not lost.is_clean
+
+
+@pytest.mark.parametrize(("verdict", "is_clean"), [("clear", False), ("unverified", True), ("confirmed", True)])
+def test_a_room_that_is_clear_with_somebody_in_it_is_not_clean(verdict: str, is_clean: bool) -> None:
+    said = {**VERDICT, "verdict": verdict, "there": True}
+    mails = [MAIL] if verdict == "confirmed" else []
+    books = balance([call("p0", 10.0), kill("p0"), said], [record("a", 10.4, verdict)], mails, verified="", waiting=0)
+    assert books.is_clean == is_clean
+    assert f"somebody in the room, and yet clear: {int(not is_clean)} of 1" in books.text()
+    gone = balance(
+        [call("p0", 10.0), {**said, "there": False}], [record("a", 10.4, "clear")], [], verified="", waiting=0
+    )
+    assert gone.is_clean  # all was killed, and in the next life somebody stands elsewhere
 
 
 def test_what_is_left_over_is_not_clean() -> None:

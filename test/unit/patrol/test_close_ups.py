@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from rosbot_patrol.patrol.close_ups import CloseUps
@@ -32,6 +34,12 @@ def test_legs_alone_are_a_doubt(close_ups: CloseUps) -> None:
     assert len(close_ups.doubtful) == 1
     close_ups.start()
     assert not close_ups.doubtful
+
+
+def test_a_box_that_begins_a_little_below_the_pictures_edge_is_of_legs_too(close_ups: CloseUps) -> None:
+    begun = dataclasses.replace(box(), ymin=14)
+    assert close_ups.sort(1.0, (begun,)) == ((), True)
+    assert not close_ups.sort(1.1, (dataclasses.replace(begun, ymin=16),))[1]  # a pet's back
 
 
 @pytest.mark.parametrize(

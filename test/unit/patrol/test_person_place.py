@@ -146,6 +146,14 @@ def test_the_wall_that_shows_beside_a_leg_is_not_the_leg(leg: float) -> None:
     assert m.is_flat is not True
 
 
+def test_a_box_that_begins_about_the_upper_edge_may_go_on_above_it() -> None:
+    for ymin, is_cut in ((14, True), (40, False)):
+        box = Box(label="person", probability=0.9, xmin=100, ymin=ymin, xmax=200, ymax=350)
+        m = measure(box, view_from(), depth_of(box, 1.2)).measured
+        assert m is not None
+        assert m.is_cut == is_cut
+
+
 def test_a_leg_too_near_to_be_measured_stands_beneath_the_picture() -> None:
     view = view_from()
     box = Box(label="person", probability=0.9, xmin=100, ymin=0, xmax=400, ymax=479)
