@@ -1,12 +1,12 @@
 """amcl without ROS: fed with odometry and scans, it says where on the map the robot is.
 
 The decisions are upstream's: an update once the odometry moved by `update_min_d` in x or in y or turned by
-`update_min_a`; every `resample_interval`-th update resamples, and only then (and after a start) is a pose given out.
+`update_min_a`, once for each laser; every `resample_interval`-th update resamples, and only then (and after a start) is
+a pose given out. Beyond upstream it says whether the estimate is to be believed, and searches where it is not.
 """
 
 from __future__ import annotations
 
-import logging
 import math
 from dataclasses import dataclass
 
@@ -14,21 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.amcl.kld import KldRule
+from rosbot_patrol.amcl.known_map import KnownMap
 from rosbot_patrol.amcl.motion_model import OdometryNoise, move_particles
+from rosbot_patrol.amcl.odometry_track import OdometryTrack, Reading
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.particle_filter import Estimate, ParticleFilter
-from rosbot_patrol.amcl.sensor_model import MODELS, Mount, SensorModel, pick_beams
-from rosbot_patrol.errors import MapError
+from rosbot_patrol.amcl.seeker import Seeker
+from rosbot_patrol.amcl.sensor_model import Beams, Mount, pick_beams
+from rosbot_patrol.amcl.trust import State, Trust, Witness, agreement
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.maps.occupancy import FREE
 from rosbot_patrol.scan import LaserScan
-
-log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 
-JUMP_M, JUMP_SPEED = 1.0, 5.0  # odometry that moves farther than this and faster is a restart, not a motion
+WATCH_S = 0.2  # how often the estimate is compared with a scan
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,16 @@ class Outcome:
         resampled: they were drawn anew.
         estimate: the pose to give out, or None where there is no news.
         is_blind: the particles were moved, but no beam of the scan could weigh them.
+        is_late: a newer scan came before; this one was left out.
+        is_found: the search has found the robot, and the estimate has moved there.
     """
 
     updated: bool = False
     resampled: bool = False
     estimate: Estimate | None = None
     is_blind: bool = False
+    is_late: bool = False
+    is_found: bool = False
 
 
 class Localizer:
@@ -57,8 +61,26 @@ class Localizer:
     """
 
     def __init__(self, params: AmclParams, rng: np.random.Generator) -> None:
-        self._params = params
         self._rng = rng
+        self._map: KnownMap | None = None
+        self._track = OdometryTrack()
+        self._odometry: Pose2D | None = None  # at the last update
+        self._is_start = True
+        self._frames: set[str] = set()  # of the lasers
+        self._due: set[str] = set()  # of those that have not weighed the last motion
+        self._updates = 0
+        self._forced = False
+        self._seeker: Seeker | None = None
+        self._was_asked = False  # to search, whatever the estimate is worth
+        self._watched = -math.inf
+        self.estimate: Estimate | None = None
+        self.map_from_odom: Pose2D | None = None
+        self._take(params)
+        self.filter = ParticleFilter(self._rule, alpha_slow=self._slow, alpha_fast=self._fast, rng=rng)
+        self.set_pose(*start_of(params))
+
+    def _take(self, params: AmclParams) -> None:
+        self._params = params
         self._alphas = OdometryNoise(
             alpha1=params.odom_alpha1,
             alpha2=params.odom_alpha2,
@@ -66,30 +88,40 @@ class Localizer:
             alpha4=params.odom_alpha4,
             alpha5=params.odom_alpha5,
         )
-        rule = KldRule(
+        self._rule = KldRule(
             least=min(params.min_particles, params.max_particles),
             most=params.max_particles,
             error=params.kld_err,
             z=params.kld_z,
         )
-        self.filter = ParticleFilter(
-            rule, alpha_slow=params.recovery_alpha_slow, alpha_fast=params.recovery_alpha_fast, rng=rng
-        )
-        self._grid: Grid | None = None
-        self._model: SensorModel | None = None
-        self._free: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-        self._odometry: Pose2D | None = None  # at the last update; None: start at the next scan
-        self._stamp = -math.inf
-        self._updates = 0
-        self._forced = False
-        self.estimate: Estimate | None = None
-        self.map_from_odom: Pose2D | None = None
-        self.set_pose(*start_of(params))
+        self._slow, self._fast = params.recovery_alpha_slow, params.recovery_alpha_fast
+        self._witness = Witness(lost_below=params.trust_lost_below, sure_above=params.trust_sure_above)
 
     @property
     def has_map(self) -> bool:
         """Whether there is a map to localise on."""
-        return self._model is not None
+        return self._map is not None
+
+    @property
+    def trust(self) -> Trust:
+        """Whether the estimate is to be believed."""
+        return self._witness.trust
+
+    @property
+    def is_seeking(self) -> bool:
+        """Whether the whole map is searched for the robot."""
+        return self._seeker is not None
+
+    def reconfigure(self, params: AmclParams) -> None:
+        """Other parameters from now on; the particles stay where they are, and so does where the robot started.
+
+        Raises:
+            MapError: the map cannot be used with them.
+        """
+        known = None if self._map is None else KnownMap(self._map.grid, params, self._rng)
+        self._take(params)
+        self._map, self._seeker = known, None
+        self.filter.configure(self._rule, alpha_slow=self._slow, alpha_fast=self._fast)
 
     def set_map(self, grid: Grid) -> None:
         """Take a map; the particles stay where they are.
@@ -97,41 +129,52 @@ class Localizer:
         Raises:
             MapError: the map is turned, empty, or its place makes no sense.
         """
-        grid.info.require_aligned("amcl")
-        info = grid.info
-        if not (0.0 < info.resolution < math.inf and math.isfinite(info.origin_x + info.origin_y) and grid.cells.size):
-            raise MapError("amcl", f"a map of {info.width} x {info.height} cells of {info.resolution} m makes no sense")
-        self._model = MODELS[self._params.laser_model_type](grid, self._params)
-        self._grid = grid
-        self._free = np.flatnonzero(grid.cells == FREE)
+        self._map, self._seeker = KnownMap(grid, self._params, self._rng), None
+        self._witness.forget()
 
-    def set_pose(self, pose: Pose2D, covariance: Array) -> None:
-        """Start anew about a pose; covariance of x, y, yaw, shape (3, 3)."""
+    def set_pose(self, pose: Pose2D, covariance: Array, odom_from_base: Pose2D | None = None) -> None:
+        """Start anew about a pose.
+
+        Args:
+            pose: map_from_base.
+            covariance: of x, y, yaw, shape (3, 3).
+            odom_from_base: the odometry at which the robot was there; None: it is there at the next scan.
+        """
         self.filter.spread_about(pose, covariance)
-        self._odometry = None
+        self._start_from(odom_from_base)
+        self._seeker, self._was_asked = None, False
+
+    def _start_from(self, odom_from_base: Pose2D | None) -> None:
+        self._odometry, self._is_start = odom_from_base, True
+        self._witness.forget()
 
     def localize_globally(self) -> bool:
         """Start anew from anywhere on the free floor; False where the map has none."""
-        if not len(self._free):
+        if self._map is None or not self._map.floor.area:
             return False
-        self.filter.spread_over(self._random_poses)
-        self._odometry = None
+        self.filter.spread_over(self._map.floor.random_poses)
+        self._start_from(None)
+        self.seek()
         return True
+
+    def seek(self) -> bool:
+        """Search the whole map, whatever the estimate is worth; False where that cannot be.
+
+        The estimate in use stays until the search has found a place that the scans of several updates speak for.
+        """
+        if self._map is None or not self._map.floor.area or self._params.seek == "never":
+            return False
+        self._begin_search(self._map)
+        self._was_asked = True
+        return True
+
+    def _begin_search(self, known: KnownMap) -> None:
+        self._seeker = Seeker(known.model, known.wide, known.obstacles, known.floor, self._rng)
+        self._was_asked = False
 
     def request_update(self) -> None:
         """Update at the next scan even without motion."""
         self._forced = True
-
-    def _random_poses(self, count: int) -> Array:
-        """Poses on free cells, shape (count, 3)."""
-        assert self._grid is not None
-        info = self._grid.info
-        iy, ix = np.divmod(self._rng.choice(self._free, count), info.width)
-        poses = self._rng.random((count, 3))
-        poses[:, 0] = info.origin_x + (ix + poses[:, 0]) * info.resolution
-        poses[:, 1] = info.origin_y + (iy + poses[:, 1]) * info.resolution
-        poses[:, 2] = (2.0 * poses[:, 2] - 1.0) * math.pi
-        return poses
 
     def update(self, scan: LaserScan, odom_from_base: Pose2D, mount: Mount) -> Outcome:
         """Take in a scan and the odometry at its time.
@@ -141,44 +184,68 @@ class Localizer:
             odom_from_base: the robot in the odometry's frame at the scan's stamp.
             mount: how the laser sits on the robot.
         """
-        if self._model is None:
+        known = self._map
+        if known is None:
             return Outcome()
-        self._check_restart(scan.stamp, odom_from_base)
-        is_start = self._odometry is None
-        if not (is_start or self._forced or self._has_moved(odom_from_base)):
-            return Outcome()
+        reading = self._track.judge(scan.stamp, odom_from_base)
+        if reading is Reading.LATE:
+            return Outcome(is_late=True)
+        if reading is Reading.RESTART:
+            self._restart(odom_from_base)
+        self._track.follow(scan.stamp, odom_from_base)
+        beams = pick_beams(scan, mount, self._params)
+        outcome = Outcome()
+        if self._is_due(scan.frame_id, odom_from_base):
+            outcome = self._update(known, beams, odom_from_base)
+        self._watch(known, beams, scan.stamp, odom_from_base)
+        return self._search(known, beams, odom_from_base) or outcome
+
+    def _is_due(self, frame: str, odometry: Pose2D) -> bool:
+        """Whether this laser has to weigh a motion; each does once."""
+        self._frames.add(frame)
+        if self._is_start or self._forced or self._has_moved(odometry):
+            self._due = set(self._frames)
+        self._forced = False
+        return frame in self._due
+
+    def _update(self, known: KnownMap, beams: Beams, odometry: Pose2D) -> Outcome:
+        is_start = self._is_start
         if is_start:
             self._updates = 0
-        else:
-            assert self._odometry is not None
-            self._move(self._odometry, odom_from_base)
-        self._odometry, self._forced = odom_from_base, False
-        weighing = self._model.weigh(self.filter.poses, pick_beams(scan, mount, self._params))
+        if self._odometry is not None:
+            self._move(self.filter.poses, self._odometry, odometry)
+        self._odometry, self._is_start = odometry, False
+        self._due.discard(beams.frame)
+        weighing = known.model.weigh(self.filter.poses, beams)
         is_blind = weighing is None
         if weighing is not None:
             self.filter.weigh(weighing)
         estimate = self.filter.estimate()  # before the draw, which forgets how well each particle fits
-        resampled = self._resample_when_due()
+        resampled = self._resample_when_due(known)
         if not (resampled or is_start):
             return Outcome(updated=True, is_blind=is_blind)
+        self._give_out(estimate, odometry)
+        return Outcome(updated=True, resampled=resampled, estimate=estimate, is_blind=is_blind)
+
+    def _give_out(self, estimate: Estimate, odometry: Pose2D) -> None:
         self.estimate = estimate
-        self.map_from_odom = compose(self.estimate.pose, invert(odom_from_base))
-        return Outcome(updated=True, resampled=resampled, estimate=self.estimate, is_blind=is_blind)
+        self.map_from_odom = compose(estimate.pose, invert(odometry))
 
-    def _move(self, start: Pose2D, end: Pose2D) -> None:
-        move_particles(self.filter.poses, start, end, self._params.odom_model_type, self._alphas, self._rng)
+    def _move(self, poses: Array, start: Pose2D, end: Pose2D) -> None:
+        move_particles(poses, start, end, self._params.odom_model_type, self._alphas, self._rng)
 
-    def _resample_when_due(self) -> bool:
+    def _resample_when_due(self, known: KnownMap) -> bool:
         self._updates += 1
         if self._updates % self._params.resample_interval:
             return False
         if self._params.selective_resampling and self.filter.effective_share > 0.5:
             return False
-        self.filter.resample(self._random_poses)
+        self.filter.resample(known.floor.random_poses)
         return True
 
     def _has_moved(self, odometry: Pose2D) -> bool:
-        assert self._odometry is not None
+        if self._odometry is None:
+            return True
         p = self._params
         return (
             abs(odometry.x - self._odometry.x) > p.update_min_d
@@ -186,22 +253,50 @@ class Localizer:
             or abs(angle_difference(odometry.yaw, self._odometry.yaw)) > p.update_min_a
         )
 
-    def _check_restart(self, stamp: float, odometry: Pose2D) -> None:
-        """Where time or odometry jumped, go on from here without believing the jump."""
-        elapsed = stamp - self._stamp
-        self._stamp = stamp
-        if self._odometry is None:
+    def _restart(self, odometry: Pose2D) -> None:
+        """Go on from here with an odometry that began anew: the jump is not believed, the way until then is."""
+        last = self._track.last
+        if last is None:
             return
-        way = math.hypot(odometry.x - self._odometry.x, odometry.y - self._odometry.y)
-        if elapsed < 0.0:
-            log.warning("time went back by %.3f s: going on from the last pose", -elapsed)
-        elif way > JUMP_M + self._params.update_min_d + JUMP_SPEED * elapsed:
-            log.warning("the odometry jumped by %.2f m in %.2f s: taken as its restart, not as a motion", way, elapsed)
-        else:
+        if self._odometry is not None:
+            if last != self._odometry:
+                self._move(self.filter.poses, self._odometry, last)
+            self._odometry = odometry
+        if self._seeker is not None:
+            self._seeker.restart(last, odometry, self._move)
+        if self.map_from_odom is not None:
+            self.map_from_odom = compose(compose(self.map_from_odom, last), invert(odometry))
+
+    # Trust and search
+
+    def _watch(self, known: KnownMap, beams: Beams, stamp: float, odometry: Pose2D) -> None:
+        """Compare the estimate with the scan."""
+        if self.map_from_odom is None or self.estimate is None or 0.0 <= stamp - self._watched < WATCH_S:
             return
-        self._odometry = odometry
-        if self.estimate is not None:
-            self.map_from_odom = compose(self.estimate.pose, invert(odometry))
+        self._watched = stamp
+        pose = compose(self.map_from_odom, odometry)
+        trust = self._witness.hear(stamp, agreement(pose, beams, known.obstacles), self.estimate)
+        if trust.state is State.LOST and self._seeker is None and self._params.seek == "lost" and known.floor.area:
+            self._begin_search(known)
+        elif trust.state is State.LOCALISED and self._seeker is not None and not self._was_asked:
+            self._seeker = None
+
+    def _search(self, known: KnownMap, beams: Beams, odometry: Pose2D) -> Outcome | None:
+        """Go on with a search; what it has found is the estimate from then on."""
+        seeker = self._seeker
+        if seeker is None or not seeker.update(beams, odometry, self._move):
+            return None
+        found = seeker.found(math.nan if self._was_asked else self.trust.agreement)
+        if found is None:
+            return None
+        self._seeker, self._was_asked = None, False
+        self.filter.set_particles(seeker.near(found.pose))
+        self._odometry, self._is_start, self._updates = odometry, False, 0
+        estimate = self.filter.estimate()
+        self._give_out(estimate, odometry)
+        self._witness.forget()
+        self._witness.hear(self._watched, agreement(estimate.pose, beams, known.obstacles), estimate)
+        return Outcome(updated=True, estimate=estimate, is_found=True)
 
 
 def start_of(params: AmclParams) -> tuple[Pose2D, Array]:

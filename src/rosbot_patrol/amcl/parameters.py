@@ -9,6 +9,7 @@ from rosbot_patrol.amcl.motion_model import MOTION_MODELS
 from rosbot_patrol.params import param
 
 SENSOR_MODELS = ("beam", "likelihood_field", "likelihood_field_prob")
+SEEK = ("never", "asked", "lost")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,4 +72,9 @@ class AmclParams:
     std_warn_level_x: float = param(0.2, unit="m", lo=0.0, doc="spread from which /diagnostics warns")
     std_warn_level_y: float = param(0.2, unit="m", lo=0.0, doc="spread from which /diagnostics warns")
     std_warn_level_yaw: float = param(0.1, unit="rad", lo=0.0, doc="spread from which /diagnostics warns")
+    trust_lost_below: float = param(0.45, lo=0.0, hi=1.0, doc="lost where scans and map agree by less (ours)")
+    trust_sure_above: float = param(0.6, lo=0.0, hi=1.0, doc="sure again where they agree by more (ours)")
+    seek: str = param(
+        "lost", choices=SEEK, doc="when to search the whole map beside the filter: when asked, when lost too (ours)"
+    )
     bag_scan_period: float = param(-1.0, unit="s", doc="accepted for upstream's sake (used when playing a bag)")

@@ -17,6 +17,8 @@ from rosbot_patrol.geometry import Pose2D, wrap_angles
 Array = NDArray[np.float64]
 RandomPoses = Callable[[int], Array]
 
+CORE_SHARE = 0.1  # of the heaviest bin's weight: lighter bins do not chain clusters together
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -53,6 +55,11 @@ class ParticleFilter:
         self.poses: Array = np.zeros((1, 3))
         self.weights: Array = np.ones(1)
         self._evidence: Array = np.zeros(1)
+
+    def configure(self, rule: KldRule, *, alpha_slow: float, alpha_fast: float) -> None:
+        """Other rules from now on; the particles stay."""
+        self._rule = rule
+        self._alpha_slow, self._alpha_fast = alpha_slow, alpha_fast
 
     def spread_about(self, pose: Pose2D, covariance: Array) -> None:
         """Start anew from a Gaussian about a pose; covariance of x, y, yaw, shape (3, 3), symmetrised and clipped."""
@@ -137,7 +144,7 @@ class ParticleFilter:
         model are so soft that their plain mean is half a metre off where updates are few.
         """
         labels = np.empty(len(self.poses), dtype=np.int64)
-        numbers = kernels.label_clusters(self.poses, labels)
+        numbers = kernels.label_clusters(self.poses, self.weights, CORE_SHARE, labels)
         weight_of = np.bincount(labels, weights=self.weights, minlength=numbers)
         chosen = int(weight_of.argmax())
         top = self._evidence[labels == chosen].max()

@@ -154,12 +154,46 @@ def root_of(parents: Wholes, i: int) -> int:
     return i
 
 
-@kernel("int64(float64[:, ::1], int64[::1])")
-def label_clusters(poses: Array, labels: Wholes) -> int:
+@kernel("void(int64[::1], int64[::1], int64[::1], int64[::1], float64[::1], float64)")
+def join_bins(keys: Wholes, slots: Wholes, index: Wholes, parents: Wholes, mass: Array, least: float) -> None:
+    """Join each bin that holds `least` of the weight with the bins about it.
+
+    Args:
+        keys: of the bins, shape (B,).
+        slots: hash table of the keys.
+        index: the bin in each slot.
+        parents: disjoint sets of bins, changed in place, shape (B,).
+        mass: weight in each bin, shape (B,).
+        least: a bin with less joins with nothing by itself.
+    """
+    for b in range(keys.shape[0]):
+        if mass[b] < least:
+            continue
+        turn = keys[b] % 64
+        place = keys[b] // 64
+        for dx in range(-1, 2):
+            for dy in range(-1, 2):
+                for dt in range(-1, 2):
+                    near = (place + dx * (1 << 25) + dy) * 64 + (turn + dt) % TURNS
+                    slot = find_slot(slots, near)
+                    if slots[slot] != near:
+                        continue
+                    other = index[slot]
+                    if mass[other] >= least or parents[other] == other:
+                        parents[root_of(parents, other)] = root_of(parents, b)
+
+
+@kernel("int64(float64[:, ::1], float64[::1], float64, int64[::1])")
+def label_clusters(poses: Array, weights: Array, share: float, labels: Wholes) -> int:
     """Number the clusters of particles whose bins touch; returns how many numbers are in use.
+
+    Only bins with at least `share` of the heaviest bin's weight link others (as the core points of DBSCAN, Ester et al.
+    1996): random poses that recovery strews over the map would otherwise chain the whole house to one cluster.
 
     Args:
         poses: x, y, yaw, shape (N, 3).
+        weights: of each, shape (N,).
+        share: 0 to 1; 0: every bin links.
         labels: the cluster of each, shape (N,); numbers need not be consecutive.
     """
     n = poses.shape[0]
@@ -169,6 +203,7 @@ def label_clusters(poses: Array, labels: Wholes) -> int:
     slots = np.full(size, EMPTY, dtype=np.int64)
     index = np.zeros(size, dtype=np.int64)
     keys = np.empty(n, dtype=np.int64)
+    mass = np.zeros(n)
     bins = 0
     for i in range(n):
         key = bin_key(poses[i, 0], poses[i, 1], poses[i, 2])
@@ -179,17 +214,9 @@ def label_clusters(poses: Array, labels: Wholes) -> int:
             keys[bins] = key
             bins += 1
         labels[i] = index[slot]
+        mass[labels[i]] += weights[i]
     parents = np.arange(bins)
-    for b in range(bins):
-        turn = keys[b] % 64
-        place = keys[b] // 64
-        for dx in range(-1, 2):
-            for dy in range(-1, 2):
-                for dt in range(-1, 2):
-                    near = (place + dx * (1 << 25) + dy) * 64 + (turn + dt) % TURNS
-                    slot = find_slot(slots, near)
-                    if slots[slot] == near:
-                        parents[root_of(parents, b)] = root_of(parents, index[slot])
+    join_bins(keys[:bins], slots, index, parents, mass[:bins], share * mass[:bins].max())
     for i in range(n):
         labels[i] = root_of(parents, labels[i])
     return bins

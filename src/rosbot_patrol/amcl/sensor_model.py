@@ -21,6 +21,8 @@ from rosbot_patrol.scan import LaserScan
 
 Array = NDArray[np.float64]
 
+CONVERGED_M = 0.5  # upstream's
+
 
 @dataclass(frozen=True)
 class Mount:
@@ -40,6 +42,7 @@ class Beams:
         angles, ranges: all beams in the sensor's frame turned upright [rad, m], `reach` where nothing was hit,
             shapes (L,).
         reach: largest range [m].
+        frame: of the laser.
     """
 
     xs: Array
@@ -48,6 +51,7 @@ class Beams:
     angles: Array
     ranges: Array
     reach: float
+    frame: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,7 @@ def pick_beams(scan: LaserScan, mount: Mount, params: AmclParams) -> Beams:
         angles=angles[known],
         ranges=np.where(is_hit, ranges, reach)[known],
         reach=reach,
+        frame=scan.frame_id,
     )
 
 
@@ -145,7 +150,7 @@ class LikelihoodFieldProbModel:
 
     def _agreed(self, poses: Array, beams: Beams) -> tuple[Array, Array]:
         p = self._params
-        if not p.do_beamskip or not len(beams.xs):
+        if not p.do_beamskip or not len(beams.xs) or not _is_converged(poses):
             return beams.xs, beams.ys
         counts = np.empty(len(beams.xs), dtype=np.int64)
         field = self.distances
@@ -207,6 +212,12 @@ class BeamModel:
             sums,
         )
         return Weighing(1.0 + sums, sums / len(beams.ranges), sums)
+
+
+def _is_converged(poses: Array) -> bool:
+    """Whether all particles are at one place, as upstream asks before it skips beams."""
+    off = np.abs(poses[:, :2] - poses[:, :2].mean(axis=0))
+    return bool(off.max() <= CONVERGED_M)
 
 
 MODELS: dict[str, type[LikelihoodFieldModel] | type[LikelihoodFieldProbModel] | type[BeamModel]] = {

@@ -81,18 +81,36 @@ class ScanQueue:
         if not self._waiting:
             self._arrived.wait(IDLE_S)
         self._arrived.clear()
-        for entry in list(self._waiting):
-            try:
-                placed = self._place(entry[0])
-            except (TransformError, ValueError) as err:
-                self._drop_when_old(entry, str(err))
-                continue
-            self._forget(entry)
-            self.problem = ""
-            return placed
+        found = self._first_placed()
+        if found is not None:
+            return found
         if self._waiting:
             time.sleep(POLL_S)
         return None
+
+    def _first_placed(self) -> PlacedScan | None:
+        entries = list(self._waiting)
+        for i, entry in enumerate(entries):
+            placed = self._try(entry)
+            if placed is None:
+                continue
+            # tf may have come since the older ones were tried, and they go first: a scan that is late is lost
+            for older in entries[:i]:
+                earlier = self._try(older)
+                if earlier is not None:
+                    entry, placed = older, earlier
+                    break
+            self._forget(entry)
+            self.problem = ""
+            return placed
+        return None
+
+    def _try(self, entry: tuple[LaserScan, float]) -> PlacedScan | None:
+        try:
+            return self._place(entry[0])
+        except (TransformError, ValueError) as err:
+            self._drop_when_old(entry, str(err))
+            return None
 
     def _place(self, scan: LaserScan) -> PlacedScan:
         mount = self._mount(scan.frame_id)

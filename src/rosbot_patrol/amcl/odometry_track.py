@@ -1,0 +1,64 @@
+"""Whether what scan and odometry say follows from what they said before.
+
+A scan that comes after a newer one (threads and networks under load do that) is late and says nothing new. Taken for a
+clock set back, it would cost the motion since the last update: with the tutorial's 0.5 m and 1 rad between updates that
+is enough to lose the robot.
+"""
+
+from __future__ import annotations
+
+import enum
+import logging
+import math
+
+from rosbot_patrol.geometry import Pose2D
+
+log = logging.getLogger(__name__)
+
+LATE_S = 1.0  # older than the newest by more than this is no late scan: the clock was set back
+JUMP_M, JUMP_SPEED = 1.0, 5.0  # odometry that moves farther than this and faster is a restart, not a motion
+
+
+class Reading(enum.Enum):
+    """What a scan's stamp and odometry are against the last ones."""
+
+    USUAL = enum.auto()
+    LATE = enum.auto()
+    RESTART = enum.auto()
+
+
+class OdometryTrack:
+    """Remembers the newest scan's stamp and odometry.
+
+    Attributes:
+        last: odom_from_base at the newest scan, None before the first.
+    """
+
+    def __init__(self) -> None:
+        self.last: Pose2D | None = None
+        self._stamp = -math.inf
+
+    def judge(self, stamp: float, odometry: Pose2D) -> Reading:
+        """What a scan is; `follow` it unless it is late.
+
+        Args:
+            stamp: of the scan [s].
+            odometry: odom_from_base at that time.
+        """
+        elapsed = stamp - self._stamp
+        if -LATE_S <= elapsed < 0.0:
+            return Reading.LATE
+        if elapsed < 0.0:
+            log.warning("time went back by %.3f s: going on from the last pose", -elapsed)
+            return Reading.RESTART
+        if self.last is None:
+            return Reading.USUAL
+        way = math.hypot(odometry.x - self.last.x, odometry.y - self.last.y)
+        if way <= JUMP_M + JUMP_SPEED * elapsed:
+            return Reading.USUAL
+        log.warning("the odometry jumped by %.2f m in %.2f s: taken as its restart, not as a motion", way, elapsed)
+        return Reading.RESTART
+
+    def follow(self, stamp: float, odometry: Pose2D) -> None:
+        """This is the newest scan now."""
+        self._stamp, self.last = stamp, odometry

@@ -1,0 +1,136 @@
+"""Finds a robot that is lost: a second filter over the whole map, beside the one that is believed.
+
+The filter in use is left alone while this one searches, so that nothing jumps about the house meanwhile; what was found
+is handed over once. The seeker begins with the poses that one scan speaks for, weighs them more sharply than amcl does,
+and mixes in fresh ones from every scan, in case the right one was not among them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.amcl.floor import Floor
+from rosbot_patrol.amcl.kld import KldRule
+from rosbot_patrol.amcl.likelihood_field import Field
+from rosbot_patrol.amcl.particle_filter import Estimate, ParticleFilter
+from rosbot_patrol.amcl.sensor_model import Beams, SensorModel, Weighing
+from rosbot_patrol.amcl.trust import agreement
+from rosbot_patrol.geometry import Pose2D, angle_difference, wrap_angles
+
+Array = NDArray[np.float64]
+Move = Callable[[Array, Pose2D, Pose2D], None]
+
+LEAST, MOST = 500, 3000  # particles
+TRIED_PER_M2, MOST_TRIED = 600.0, 400_000  # random poses of which the first ones are picked
+FRESH_TRIED, FRESH_SHARE = 5000, 0.1  # likewise, and their share of each draw
+SHARPNESS = 10.0  # how much a better fit counts
+STEP_M, STEP_RAD = 0.1, 0.15  # of motion between updates, however seldom amcl updates
+FOUND_AGREEMENT, FOUND_CLUSTER = 0.7, 0.8
+FOUND_UPDATES = 6  # in a row that a place must hold
+KEEPS = 0.5  # share of the old average of the agreement, an update
+NEAR_M, NEAR_RAD = 0.5, 0.4  # what belongs to the place that was found
+
+
+class Seeker:
+    """One search.
+
+    Args:
+        model: weighs poses.
+        wide: one of a wide spread, for the random poses.
+        obstacles: distance to the nearest obstacle [m], for the verdict.
+        floor: where the robot may be.
+        rng: source of all chance.
+    """
+
+    def __init__(
+        self, model: SensorModel, wide: SensorModel, obstacles: Field, floor: Floor, rng: np.random.Generator
+    ) -> None:
+        self._model, self._wide = model, wide
+        self._obstacles, self._floor = obstacles, floor
+        self.filter = ParticleFilter(KldRule(least=LEAST, most=MOST), alpha_slow=0.0, alpha_fast=0.0, rng=rng)
+        self._rng = rng
+        self._odometry: Pose2D | None = None  # at the last update
+        self._held = 0
+        self._agreement = math.nan
+        self.estimate: Estimate | None = None
+
+    def update(self, beams: Beams, odometry: Pose2D, move: Move) -> bool:
+        """Take in a scan, where the robot has moved enough; whether it has.
+
+        Args:
+            beams: of the scan.
+            odometry: odom_from_base at its time.
+            move: moves particles as the odometry moved between two poses.
+        """
+        if self._odometry is None:
+            tried = int(min(max(TRIED_PER_M2 * self._floor.area, MOST), MOST_TRIED))
+            self.filter.set_particles(self._floor.likely_poses(self._wide, beams, tried=tried, count=MOST))
+        elif not _has_moved(self._odometry, odometry):
+            return False
+        else:
+            move(self.filter.poses, self._odometry, odometry)
+        self._odometry = odometry
+        self._weigh(beams)
+        return True
+
+    def restart(self, last: Pose2D, odometry: Pose2D, move: Move) -> None:
+        """The odometry began anew at a pose, after a last one."""
+        if self._odometry is not None:
+            move(self.filter.poses, self._odometry, last)
+            self._odometry = odometry
+
+    def _weigh(self, beams: Beams) -> None:
+        weighing = self._model.weigh(self.filter.poses, beams)
+        if weighing is None:
+            return
+        sharp = np.exp(SHARPNESS * (weighing.fit - weighing.fit.max()))
+        self.filter.weigh(Weighing(sharp, weighing.fit, weighing.evidence))
+        self.estimate = self.filter.estimate()
+        self._judge(self.estimate, beams)
+        self.filter.resample(self._floor.random_poses)
+        self._freshen(beams)
+
+    def _judge(self, estimate: Estimate, beams: Beams) -> None:
+        found = agreement(estimate.pose, beams, self._obstacles)
+        if found is None:
+            return
+        is_first = math.isnan(self._agreement)
+        self._agreement = found if is_first else KEEPS * self._agreement + (1.0 - KEEPS) * found
+        is_good = self._agreement >= FOUND_AGREEMENT and estimate.cluster_weight >= FOUND_CLUSTER
+        self._held = self._held + 1 if is_good else 0
+
+    def _freshen(self, beams: Beams) -> None:
+        """Put fresh poses in place of some particles."""
+        poses = self.filter.poses
+        count = int(FRESH_SHARE * len(poses))
+        if count:
+            places = self._rng.choice(len(poses), count, replace=False)
+            poses[places] = self._floor.likely_poses(self._wide, beams, tried=FRESH_TRIED, count=count)
+
+    def found(self, believed: float) -> Estimate | None:
+        """Where the robot is, once that is clear.
+
+        Args:
+            believed: agreement at the estimate in use, 0 to 1, nan where there is none; the new one must beat it.
+        """
+        if self.estimate is None or self._held < FOUND_UPDATES:
+            return None
+        if not math.isnan(believed) and self._agreement < believed + 0.1:
+            return None
+        return self.estimate
+
+    def near(self, pose: Pose2D) -> Array:
+        """The particles about a pose, shape (N, 3); those of other places are left out."""
+        poses = self.filter.poses
+        off = np.hypot(poses[:, 0] - pose.x, poses[:, 1] - pose.y)
+        turn = np.abs(wrap_angles(poses[:, 2] - pose.yaw))
+        chosen = poses[(off < NEAR_M) & (turn < NEAR_RAD)]
+        return chosen.copy() if len(chosen) else np.array([pose], dtype=np.float64)
+
+
+def _has_moved(start: Pose2D, end: Pose2D) -> bool:
+    return math.hypot(end.x - start.x, end.y - start.y) > STEP_M or abs(angle_difference(end.yaw, start.yaw)) > STEP_RAD
