@@ -2,8 +2,8 @@
 
 A beam that ends where the map has an obstacle is explained. One that ends early may have met a chair or somebody, which
 the map does not know: it counts little. One that went through a wall of the map counts twice, for walls stay. The share
-of what is explained, averaged over a few seconds, is the agreement. At the right poses in our three houses it is 0.93 to
-1, a metre off mostly below 0.3; with half of the beams cut short at the right pose it would be 0.67.
+of what is explained, averaged over a few seconds, is the agreement. In our three houses it is 0.93 to 1 at the right
+pose and mostly below 0.3 a metre off; with half of the beams cut short at the right pose it would be 0.67.
 """
 
 from __future__ import annotations
