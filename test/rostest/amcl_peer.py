@@ -11,9 +11,11 @@ import time
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, TransformStamped
+from dynamic_reconfigure.client import Client
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, TransformStamped, Twist
+from rosbot_patrol.msg import LocalizationHealth
 from sensor_msgs.msg import LaserScan
-from std_srvs.srv import Empty
+from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
 HALF = 2.0  # of the room's edge [m]
@@ -49,6 +51,9 @@ class Peer:
         rospy.Subscriber("amcl_pose", PoseWithCovarianceStamped, self.poses.append)
         rospy.Subscriber("particlecloud", PoseArray, self.clouds.append)
         rospy.Subscriber("tf", TFMessage, self.hear_tf)
+        self.turns, self.health, self.said = [], None, {}
+        rospy.Subscriber("amcl/cmd_vel", Twist, lambda twist: self.turns.append(twist.angular.z))
+        rospy.Subscriber("amcl/health", LocalizationHealth, self.hear_health)
 
     def hear_tf(self, message):
         self.corrections += [t for t in message.transforms if t.child_frame_id == "odom"]
@@ -66,6 +71,33 @@ class Peer:
             time.sleep(0.05)
             self.x += step
 
+    def hear_health(self, message):
+        self.health = message
+
+    def late_scan(self, ago):
+        """One that was taken before those that came."""
+        stamp = rospy.Time.now() - rospy.Duration.from_sec(ago)
+        message = LaserScan(angle_min=-math.pi, angle_max=math.pi, range_min=0.1, range_max=8.0)
+        message.header.frame_id, message.header.stamp = "laser", stamp
+        message.ranges, message.angle_increment = ranges_at(self.x, 0.0), 2 * math.pi / 179
+        self.scan.publish(message)
+
+    def relocalize(self):
+        answer = rospy.ServiceProxy("amcl/relocalize", Trigger)()
+        self.said = {"success": answer.success, "message": answer.message}
+        end = time.time() + 10.0
+        while time.time() < end and not any(self.turns):
+            time.sleep(0.05)
+
+    def reconfigure(self, **changes):
+        self.said = dict(Client("amcl", timeout=10.0).update_configuration(changes))
+        self.said.pop("groups", None)
+
+    def wait_for_health(self, state):
+        end = time.time() + 15.0
+        while time.time() < end and (self.health is None or self.health.state != state):
+            time.sleep(0.05)
+
     def initialpose(self, x, frame="map"):
         message = PoseWithCovarianceStamped()
         message.header.frame_id, message.pose.pose.position.x = frame, x
@@ -79,6 +111,9 @@ class Peer:
     def report(self):
         time.sleep(0.3)
         said = {"poses": len(self.poses), "tf": len(self.corrections), "x": self.x}
+        if self.health is not None:
+            said |= {"state": self.health.state, "belief": self.health.belief, "seeking": self.health.seeking}
+        said |= {"turned": any(self.turns), "answer": self.said}
         if self.poses:
             last = self.poses[-1]
             said |= {"pose": last.pose.pose.position.x, "frame": last.header.frame_id, "var": last.pose.covariance[0]}
@@ -87,7 +122,7 @@ class Peer:
         if self.corrections:
             last = self.corrections[-1]
             said |= {"odom": last.transform.translation.x, "parent": last.header.frame_id}
-        for heard in (self.poses, self.clouds, self.corrections):
+        for heard in (self.poses, self.clouds, self.corrections, self.turns):
             heard.clear()
         return said
 

@@ -98,6 +98,32 @@ def test_services_and_initial_poses(ros, room):
     assert peer.do("drive", scans=1)["var"] > 0.3
 
 
+def test_health_a_late_scan_and_parameters_that_change(ros, room):
+    _, peer = started(ros, room)
+    peer.do("initialpose", x=0.0)  # an amcl before this one saved another
+    peer.do("drive", scans=20, step=0.03)
+    well = peer.do("wait_for_health", state="localised")
+    assert well["state"] == "localised"
+    assert well["belief"] > 0.8
+    assert not well["turned"]
+    assert peer.do("late_scan", ago=0.5)["tf"] == 0
+    changed = peer.do("reconfigure", update_min_d=0.02, tf_broadcast=False, max_particles=300)
+    assert changed["answer"]["update_min_d"] == 0.02
+    driven = peer.do("drive", scans=8, step=0.03)
+    assert driven["tf"] == 0
+    assert driven["poses"] >= 3  # each second of the updates at each 0.03 m
+    assert driven["particles"] <= 300
+
+
+def test_a_search_by_hand_turns_the_robot(ros, room):
+    node, peer = started(ros, room)
+    peer.do("drive", scans=5)
+    asked = peer.do("relocalize")
+    assert asked["answer"]["success"]
+    assert asked["turned"]
+    node.says("searching the whole map")
+
+
 def test_a_respawned_node_goes_on_where_it_was(ros, room):
     node, peer = started(ros, room, "_save_pose_rate:=5.0")
     peer.do("initialpose", x=0.5)

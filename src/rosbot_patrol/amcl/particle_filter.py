@@ -28,12 +28,14 @@ class Estimate:
         pose: mean of the heaviest cluster of particles.
         covariance: of all particles, x, y, yaw, shape (3, 3).
         cluster_weight: share of the weight in that cluster, 0 to 1.
+        cluster_spread: standard deviation of the place within it [m].
         particles: how many there are.
     """
 
     pose: Pose2D
     covariance: Array
     cluster_weight: float
+    cluster_spread: float
     particles: int
 
 
@@ -151,4 +153,11 @@ class ParticleFilter:
         sharp = self.weights * np.exp(np.minimum(self._evidence - top, 0.0))
         best = kernels.moments(self.poses, sharp, labels, chosen)
         whole = kernels.moments(self.poses, self.weights, labels, -1)
-        return Estimate(Pose2D(*best[0].tolist()), whole[1:4].copy(), float(weight_of[chosen]), len(self.poses))
+        cluster = kernels.moments(self.poses, self.weights, labels, chosen)
+        return Estimate(
+            pose=Pose2D(*best[0].tolist()),
+            covariance=whole[1:4].copy(),
+            cluster_weight=float(weight_of[chosen]),
+            cluster_spread=math.sqrt(max(float(cluster[1, 0] + cluster[2, 1]), 0.0)),
+            particles=len(self.poses),
+        )

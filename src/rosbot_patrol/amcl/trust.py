@@ -24,7 +24,8 @@ NEAR_M = 0.2  # from an obstacle: a beam that ends there is explained
 FEWEST = 8  # beams that say something, or the scan is no witness
 SHORT_COUNTS, THROUGH_COUNTS, UNRETURNED_COUNTS = 0.5, 2.0, 0.5
 MEMORY_S = 2.0  # of the average
-WIDE_M = 0.5  # a spread from which on the estimate is unsure
+WIDE_M = 1.0  # spread of the best cluster from which on the estimate is unsure
+FEW = 0.5  # share of the weight below which a cluster is one guess among others
 
 
 class State(enum.Enum):
@@ -121,13 +122,16 @@ class Witness:
         if math.isnan(average):
             return Trust(reason="too few beams of the scans measured anything")
         belief = average * estimate.cluster_weight
-        spread = math.sqrt(max(estimate.covariance[0, 0] + estimate.covariance[1, 1], 0.0))
         limit = self._sure_above if self.trust.state is State.LOST else self._lost_below
         if average < limit:
             reason = f"the scans contradict the map at the estimate (they agree by {100.0 * average:.0f} %)"
             return Trust(State.LOST, belief, average, reason)
-        if spread > WIDE_M:
-            return Trust(State.UNSURE, belief, average, f"the particles are spread by {spread:.2f} m")
+        if estimate.cluster_spread > WIDE_M:
+            reason = f"the particles are spread by {estimate.cluster_spread:.2f} m"
+            return Trust(State.UNSURE, belief, average, reason)
+        if estimate.cluster_weight < FEW:
+            reason = f"no more than {100.0 * estimate.cluster_weight:.0f} % of the particles' weight stand behind it"
+            return Trust(State.UNSURE, belief, average, reason)
         if average < self._sure_above:
             reason = f"the scans agree with the map by no more than {100.0 * average:.0f} %"
             return Trust(State.UNSURE, belief, average, reason)

@@ -3,15 +3,20 @@
 Matches amcl of ROS Noetic's navigation 1.17: topics `scan`, `initialpose`, `map` (with `~use_map_topic`) in,
 `amcl_pose` and `particlecloud` (latched), `/diagnostics` and tf map -> odom out; services `global_localization`,
 `request_nomotion_update`, `set_map`; the map from the service `static_map`; parameters in `AmclParams`, with the pose
-saved to them for a respawn. Written from Probabilistic Robotics and upstream's documentation.
+saved to them for a respawn, and dynamic_reconfigure. Written from Probabilistic Robotics and upstream's documentation.
+
+Beyond upstream: `~health` says whether the estimate is to be believed, by how well the scans agree with the map there.
+Where they contradict it, a second filter searches the whole map (`~seek`), and hands over what it finds. The service
+`~relocalize` starts that search by hand, with one turn of the robot on the spot, driven on `~cmd_vel`.
 
 Differs: within the best cluster particles that fit the newest scan count for more, where upstream takes the plain
 mean: with the tutorial's few updates that is 5 cm off instead of 25. All particles in one bin ask for the fewest
 particles, upstream's rule then asks for the most. The averages behind the recovery are of a beam's fit, so that more
 or fewer beams are no cause for random poses. Draws follow an even sequence instead of independent numbers. A new map
-keeps the pose that the filter has. A pose that was saved in another run of a simulation is not taken. An odometry that
-jumps or a clock that goes back is a restart, not a motion. A turned map is refused with a sentence. No
-dynamic_reconfigure.
+keeps the pose that the filter has. A pose that was saved in another run of a simulation is not taken, to one of this
+run the way since is added. An odometry that jumps or a clock that goes back is a restart, not a motion; a scan that is
+older than one taken in is left out. Only bins of some weight link clusters, so that random poses do not chain the house
+together. A turned map is refused with a sentence. dynamic_reconfigure: see `amcl_tuning`.
 """
 
 from __future__ import annotations
@@ -19,34 +24,29 @@ from __future__ import annotations
 import logging
 import math
 import threading
-import time
 
 import numpy as np
 import rospy
-import tf2_ros
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
-from nav_msgs.msg import OccupancyGrid
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.srv import SetMapRequest, SetMapResponse
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan as LaserScanMsg
-from std_srvs.srv import Empty, EmptyResponse
+from std_srvs.srv import Empty, EmptyResponse, Trigger, TriggerResponse
 
 from rosbot_patrol.amcl.localizer import Localizer, Outcome, scan_problem, start_of
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.errors import MapError, TransformError
+from rosbot_patrol.amcl.trust import State
+from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, compose, invert
-from rosbot_patrol.ros.convert import (
-    grid_from_msg,
-    pose2d_from_pose,
-    pose2d_to_pose,
-    scan_from_msg,
-    time_to_msg,
-    transform_to_msg,
-)
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.ros.amcl_look_around import LookAround
+from rosbot_patrol.ros.amcl_maps import MapSource
+from rosbot_patrol.ros.amcl_outputs import AmclOutputs, spread_of, verdict
+from rosbot_patrol.ros.amcl_tuning import AmclTuning
+from rosbot_patrol.ros.convert import pose2d_from_pose, scan_from_msg
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
-from rosbot_patrol.ros.grids import GetMapFast, GridMsg, SetMapFast
-from rosbot_patrol.ros.node import Loop, Worker, load_params, now, run_node
-from rosbot_patrol.ros.pose_arrays import pose_array_to_msg
+from rosbot_patrol.ros.grids import SetMapFast
+from rosbot_patrol.ros.node import Loop, load_params, now, run_node
 from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.saved_pose import SavedPose
 from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
@@ -55,7 +55,6 @@ from rosbot_patrol.ros.transforms import Transforms
 log = logging.getLogger(__name__)
 
 SILENT_S = 15.0  # as upstream: a lidar that says nothing for so long is warned of
-ASK_AGAIN_S = 0.5
 
 
 class AmclNode:
@@ -76,22 +75,23 @@ class AmclNode:
         self._scans = ScanQueue(self._transforms, self._odom, self._base)
         self._last_scan = now()
         self._last_time = now()
-        self._last_cloud = -math.inf
         self._odom_from_base: Pose2D | None = None
         self._stamp = -math.inf  # of the newest scan taken in
         self._was_placed = False  # by initialpose, set_map or global_localization
         self._saved = SavedPose()
         self._is_first = True
         self._health = Health()
-        self._broadcaster = tf2_ros.TransformBroadcaster()
-        self._pose = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=2, latch=True)
-        self._cloud = rospy.Publisher("particlecloud", PoseArray, queue_size=2, latch=True)
+        self._maps = MapSource(params, self._take_map)
+        self._outputs = AmclOutputs(params)
+        self._look_around = LookAround(self._transforms, self._odom, self._base, self._is_found)
+        self._late = 0  # scans
+        self._was_seeking = False
         self._services = [
             rospy.Service("global_localization", Empty, self._localize_globally),
             rospy.Service("request_nomotion_update", Empty, self._request_update),
             rospy.Service("set_map", SetMapFast, self._set_map),
+            rospy.Service("~relocalize", Trigger, self._relocalize),
         ]
-        self._map_subscriber: rospy.Subscriber | None = None
         self._subscribers = [
             rospy.Subscriber("initialpose", PoseWithCovarianceStamped, self._initial_pose, queue_size=2),
             rospy.Subscriber("scan", numpy_msg(LaserScanMsg), self._scan, queue_size=100, buff_size=1 << 20),
@@ -100,13 +100,12 @@ class AmclNode:
     def run(self) -> None:
         """Work until shutdown."""
         rospy.on_shutdown(self._save_pose)
-        if self._params.use_map_topic:
-            self._map_subscriber = rospy.Subscriber("map", GridMsg, self._map_message, queue_size=1)
-        else:
-            Worker(self._ask_for_map, name="map").start()
+        self._maps.start()
         Loop(1.0, self._tell_health, name="health").start()
-        if self._params.save_pose_rate > 0.0:
-            Loop(self._params.save_pose_rate, lambda _: self._save_pose(), name="save").start()
+        self._look_around.watch()
+        self._saving = Loop(max(self._params.save_pose_rate, 0.1), self._save_when_wanted, name="save")
+        self._saving.start()
+        self._tuning = AmclTuning(self._params, rospy.get_name() + "/", self._take_params)
         while not rospy.is_shutdown():
             placed = self._scans.take()
             if placed is not None:
@@ -123,46 +122,12 @@ class AmclNode:
             return
         self._scans.put(scan)
 
-    def _ask_for_map(self) -> None:
-        name = rospy.resolve_name("static_map")
-        log.info("Requesting the map from %s", name)
-        ask = rospy.ServiceProxy(name, GetMapFast)
-        while not rospy.is_shutdown():
-            try:
-                if self._take_map(ask().map, name):
-                    return
-            except rospy.ServiceException as err:
-                rospy.logwarn_throttle(10.0, f"no map from {name} yet ({err}), trying again")
-            time.sleep(ASK_AGAIN_S)
-
-    def _map_message(self, message: OccupancyGrid) -> None:
-        if self._take_map(message, rospy.resolve_name("map")) and self._params.first_map_only:
-            assert self._map_subscriber is not None
-            self._map_subscriber.unregister()
-
-    def _take_map(self, message: OccupancyGrid, source: str) -> bool:
-        if message.header.frame_id.lstrip("/") != self._global:
-            log.warning(
-                "the map of %s is in frame '%s', expected '%s': it is taken for that",
-                source,
-                message.header.frame_id,
-                self._global,
-            )
-        try:
-            grid = grid_from_msg(message)
-            with self._lock:
-                self._localizer.set_map(grid)
-        except (MapError, ValueError) as err:
-            log.error("the map of %s cannot be used: %s", source, err)
-            return False
-        info = grid.info
-        log.info("Received a %d X %d map @ %.3f m/pix", info.width, info.height, info.resolution)
-        if not (grid.cells == 0).any():
-            log.warning("the map of %s has no free cell: the robot cannot be anywhere on it", source)
-        return True
+    def _take_map(self, grid: Grid) -> None:
+        with self._lock:
+            self._localizer.set_map(grid)
 
     def _set_map(self, request: SetMapRequest) -> SetMapResponse:
-        taken = self._take_map(request.map, "set_map")
+        taken = self._maps.take(request.map, "set_map")
         if taken:
             self._initial_pose(request.initial_pose)
             if self._params.force_update_after_set_map:
@@ -184,25 +149,26 @@ class AmclNode:
         except ValueError as err:
             log.warning("initial pose is ignored: %s", err)
             return
-        pose = compose(pose, self._motion_since(message.header.stamp.to_sec()))
+        motion, newest = self._motion_since(message.header.stamp.to_sec())
+        pose = compose(pose, motion)
         log.info("Setting pose (%.6f): %.3f %.3f %.3f", now(), pose.x, pose.y, pose.yaw)
         covariance[2, :2] = covariance[:2, 2] = 0.0  # as upstream
         with self._lock:
             self._was_placed = True
-            self._localizer.set_pose(pose, covariance)
+            self._localizer.set_pose(pose, covariance, newest)
             if self._params.force_update_after_initialpose:
                 self._localizer.request_update()
 
-    def _motion_since(self, stamp: float) -> Pose2D:
-        """How the robot moved since a pose was clicked."""
+    def _motion_since(self, stamp: float) -> tuple[Pose2D, Pose2D | None]:
+        """How the robot moved since a pose was clicked, and the odometry now, None where it is not known."""
         try:
             then = self._transforms.lookup(self._odom, self._base, stamp if stamp > 0.0 else None)
             newest = self._transforms.lookup(self._odom, self._base)
         except TransformError as err:
             if stamp > 0.0:
                 log.warning("the motion since the initial pose's stamp is not known, taken as none: %s", err)
-            return Pose2D()
-        return compose(invert(then), newest)
+            return Pose2D(), None
+        return compose(invert(then), newest), newest
 
     def _localize_globally(self, _request: object) -> EmptyResponse:
         with self._lock:
@@ -212,6 +178,24 @@ class AmclNode:
         else:
             log.error("global_localization: there is no map with free floor yet")
         return EmptyResponse()
+
+    def _relocalize(self, _request: object) -> TriggerResponse:
+        with self._lock:
+            started = self._localizer.seek()
+        if not started:
+            return TriggerResponse(False, "there is no map with free floor yet, or the parameter seek is 'never'")
+        self._look_around.start()
+        log.info("searching the whole map for the robot, and looking around once")
+        return TriggerResponse(True, "searching the whole map, and looking around once: see ~health")
+
+    def _is_found(self) -> bool:
+        return self._localizer.trust.state is State.LOCALISED and not self._localizer.is_seeking
+
+    def _take_params(self, params: AmclParams) -> None:
+        with self._lock:
+            self._localizer.reconfigure(params)
+            self._params = self._outputs.params = params
+        self._saving.set_rate(max(params.save_pose_rate, 0.1))
 
     def _request_update(self, _request: object) -> EmptyResponse:
         with self._lock:
@@ -224,42 +208,48 @@ class AmclNode:
         scan = placed.scan
         if self._is_first:
             self._is_first = False
-            self._forget_other_runs(scan.stamp)
+            self._resume(placed)
         with self._lock:
             outcome = self._localizer.update(scan, placed.odom_from_base, placed.mount)
             correction = self._localizer.map_from_odom
             poses = self._localizer.filter.poses
-            self._odom_from_base, self._stamp = placed.odom_from_base, scan.stamp
-        if correction is not None and self._params.tf_broadcast:
-            stamp = scan.stamp + self._params.transform_tolerance
-            self._broadcaster.sendTransform(transform_to_msg(correction, self._global, self._odom, stamp))
+            if not outcome.is_late:
+                self._odom_from_base, self._stamp = placed.odom_from_base, scan.stamp
+        self._late += outcome.is_late
+        if correction is not None and not outcome.is_late:
+            self._outputs.send_correction(correction, scan.stamp)
         if outcome.is_blind:
             rospy.logwarn_throttle(
                 10.0, f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
             )
-        self._publish(outcome, poses, scan.stamp)
-
-    def _forget_other_runs(self, stamp: float) -> None:
-        own = self._saved.own(self._params, stamp)
-        if own is not None and not self._was_placed:
-            with self._lock:
-                self._localizer.set_pose(*start_of(own))
-
-    def _publish(self, outcome: Outcome, poses: np.ndarray, stamp: float) -> None:
         if outcome.estimate is not None:
-            message = PoseWithCovarianceStamped()
-            message.header.frame_id, message.header.stamp = self._global, time_to_msg(stamp)
-            message.pose.pose = pose2d_to_pose(outcome.estimate.pose)
-            covariance = np.zeros((6, 6))
-            covariance[np.ix_([0, 1], [0, 1])] = outcome.estimate.covariance[:2, :2]
-            covariance[5, 5] = outcome.estimate.covariance[2, 2]
-            message.pose.covariance = covariance.ravel().tolist()
-            self._pose.publish(message)
-        rate = self._params.gui_publish_rate
-        due = rate <= 0.0 or not 0.0 <= stamp - self._last_cloud < 1.0 / rate
-        if outcome.updated and due:
-            self._last_cloud = stamp
-            self._cloud.publish(pose_array_to_msg(poses, self._global, stamp))
+            self._outputs.send_pose(outcome.estimate, scan.stamp)
+        if outcome.updated:
+            self._outputs.send_cloud(poses, scan.stamp)
+        self._tell_of_search(outcome)
+
+    def _tell_of_search(self, outcome: Outcome) -> None:
+        if outcome.is_found and outcome.estimate is not None:
+            x, y, yaw = outcome.estimate.pose
+            log.warning("found the robot at %.2f %.2f %.2f, the estimate has moved there", x, y, yaw)
+        was, self._was_seeking = self._was_seeking, self._localizer.is_seeking
+        if self._was_seeking and not was:
+            log.warning("searching the whole map for the robot: %s", self._localizer.trust.reason or "asked to")
+        elif was and not self._was_seeking and not outcome.is_found:
+            log.info("the search is over: the estimate came right by itself, or a pose was set")
+
+    def _resume(self, placed: PlacedScan) -> None:
+        """Start from what an amcl before this one saved, where that is of this run."""
+        own = self._saved.own(self._params, placed.scan.stamp)
+        then = None if own is not None else self._saved.odometry(self._params, placed.odom_from_base)
+        if self._was_placed or (own is None and then is None):
+            return
+        with self._lock:
+            self._localizer.set_pose(*start_of(own or self._params), then)
+
+    def _save_when_wanted(self, _now: float) -> None:
+        if self._params.save_pose_rate > 0.0:
+            self._save_pose()
 
     def _save_pose(self) -> None:
         with self._lock:
@@ -270,7 +260,7 @@ class AmclNode:
         pose = compose(correction, odometry)
         values = (*pose, *(float(v) for v in np.diag(estimate.covariance)))
         try:
-            self._saved.save(values, stamp)
+            self._saved.save(values, stamp, odometry)
         except (OSError, rospy.ROSException) as err:
             rospy.logwarn_throttle(30.0, f"the pose cannot be saved on the parameter server: {err}")
 
@@ -282,21 +272,17 @@ class AmclNode:
             self._last_scan = current
         self._last_time = current
         level, message = self._state(current)
-        values: dict[str, object] = {"scans dropped": self._scans.dropped}
-        estimate = self._localizer.estimate
+        trust, estimate, seeking = self._localizer.trust, self._localizer.estimate, self._localizer.is_seeking
+        values: dict[str, object] = {"scans dropped": self._scans.dropped, "scans late": self._late}
         if estimate is not None:
-            std = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
-            values |= {
-                "std_x": f"{std[0]:.3f}",
-                "std_y": f"{std[1]:.3f}",
-                "std_yaw": f"{std[2]:.3f}",
-                "particles": estimate.particles,
-                "best cluster": f"{estimate.cluster_weight:.2f}",
-            }
-            p = self._params
-            if level == OK and (std > [p.std_warn_level_x, p.std_warn_level_y, p.std_warn_level_yaw]).any():
-                level, message = WARN, "the pose is not sure: the particles are spread widely"
+            spread = spread_of(estimate)
+            values |= {f"std_{key}": f"{value:.3f}" for key, value in zip(("x", "y", "yaw"), spread, strict=True)}
+            values |= {"particles": estimate.particles, "best cluster": f"{estimate.cluster_weight:.2f}"}
+        values |= {"belief": f"{trust.belief:.2f}", "scans agree": f"{trust.agreement:.2f}", "searching": seeking}
+        if level == OK:
+            level, message = verdict(trust, estimate, self._params, seeking=seeking)
         self._health.set("Standard deviation", level, message, values)
+        self._outputs.send_health(trust, estimate, max(self._stamp, 0.0), seeking=seeking)
 
     def _state(self, current: float) -> tuple[int, str]:
         silent = current - self._last_scan

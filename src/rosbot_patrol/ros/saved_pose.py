@@ -2,7 +2,8 @@
 
 As upstream: a node that is started again goes on from there. But a master may outlive a simulation, and in the next one
 the robot stands at its start again, with a clock that begins anew. So the time is saved too; where the first scan is
-older than it, what was saved belongs to another run and is given up for the defaults.
+older than it, what was saved belongs to another run and is given up for the defaults. And so is the odometry, by which
+the way is known that the robot went since.
 """
 
 from __future__ import annotations
@@ -15,19 +16,22 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.geometry import Pose2D
 
 log = logging.getLogger(__name__)
 
 NAMES = tuple(f"initial_{key}" for key in ("pose_x", "pose_y", "pose_a", "cov_xx", "cov_yy", "cov_aa"))
 SAVED = "~saved_pose"
+ODOMETRY = ("odom_x", "odom_y", "odom_a")
 SLACK_S = 1.0
+FAR_M = 3.0  # a robot whose amcl is gone stops; odometry that is farther off began anew
 
 
 class SavedPose:
     """What a node before this one saved, and what this one saves."""
 
     def __init__(self) -> None:
-        self._before = _read(rospy.get_param(SAVED, None))
+        self._before = self._found = _read(rospy.get_param(SAVED, None))
         self._last: tuple[float, ...] = ()
 
     def own(self, params: AmclParams, stamp: float) -> AmclParams | None:
@@ -54,21 +58,35 @@ class SavedPose:
         defaults: dict[str, Any] = {f.name: f.default for f in fields(params) if f.name in saved}
         return replace(params, **defaults)
 
-    def save(self, values: tuple[float, ...], stamp: float) -> None:
+    def odometry(self, params: AmclParams, now: Pose2D) -> Pose2D | None:
+        """odom_from_base at the saved pose, None where it is not known or was set anew since.
+
+        Args:
+            params: as read at the start; a pose in them that is not the saved one has no odometry.
+            now: odom_from_base at the first scan.
+        """
+        found = self._found
+        if not found or any(getattr(params, name) != found[name] for name in NAMES):
+            return None
+        then = Pose2D(*(found[name] for name in ODOMETRY))
+        return then if math.dist(then[:2], now[:2]) < FAR_M else None
+
+    def save(self, values: tuple[float, ...], stamp: float, odometry: Pose2D) -> None:
         """Set the parameters `NAMES`; raises what rospy.set_param raises."""
         if values == self._last:
             return
         pose = dict(zip(NAMES, values, strict=True))
         for name, value in pose.items():
             rospy.set_param(f"~{name}", value)
-        rospy.set_param(SAVED, {**pose, "stamp": stamp})
+        rospy.set_param(SAVED, {**pose, **dict(zip(ODOMETRY, odometry, strict=True)), "stamp": stamp})
         self._last = values
 
 
 def _read(tree: object) -> dict[str, float]:
     if tree is None:
         return {}
-    if isinstance(tree, dict) and all(isinstance(tree.get(name), int | float) for name in (*NAMES, "stamp")):
-        return {name: float(tree[name]) for name in (*NAMES, "stamp")}
+    wanted = (*NAMES, *ODOMETRY, "stamp")
+    if isinstance(tree, dict) and all(isinstance(tree.get(name), int | float) for name in wanted):
+        return {name: float(tree[name]) for name in wanted}
     log.warning("%s is not as amcl writes it, it is left out", rospy.resolve_name(SAVED))
     return {}
