@@ -80,7 +80,7 @@ def test_amcl(profile: str) -> None:
 
 def test_twist_mux() -> None:
     mux = load(TwistMuxParams, given("command_mux.launch", "twist_mux"), name="/twist_mux/")
-    assert [s.name for s in sorted(mux.topics, key=lambda s: -s.priority)] == ["teleop", "patrol", "move_base"]
+    assert [s.name for s in sorted(mux.topics, key=lambda s: -s.priority)] == ["teleop", "patrol", "amcl", "move_base"]
 
 
 def test_simulator() -> None:

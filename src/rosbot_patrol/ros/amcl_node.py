@@ -303,7 +303,7 @@ class AmclNode:
 
 def body() -> None:
     """Load, build, run."""
-    AmclNode(load_params(AmclParams)).run()
+    AmclNode(load_params(AmclParams, ignore=["saved_pose"])).run()
 
 
 def main() -> None:
