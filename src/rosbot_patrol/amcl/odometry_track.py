@@ -15,7 +15,7 @@ from rosbot_patrol.geometry import Pose2D
 
 log = logging.getLogger(__name__)
 
-LATE_S = 1.0  # older than the newest by more than this is no late scan: the clock was set back
+LATE_S = 1.0  # older than the newest by more than this is no late scan: the clock was set back, or a bag began anew
 JUMP_M, JUMP_SPEED = 1.0, 5.0  # odometry that moves farther than this and faster is a restart, not a motion
 
 
@@ -48,14 +48,12 @@ class OdometryTrack:
         elapsed = stamp - self._stamp
         if -LATE_S <= elapsed < 0.0:
             return Reading.LATE
+        way = 0.0 if self.last is None else math.hypot(odometry.x - self.last.x, odometry.y - self.last.y)
+        if way <= JUMP_M + JUMP_SPEED * max(elapsed, 0.0):  # a clock that was set does not move the robot
+            return Reading.USUAL
         if elapsed < 0.0:
-            log.warning("time went back by %.3f s: going on from the last pose", -elapsed)
+            log.warning("time went back by %.3f s, and the odometry with it: going on from the last pose", -elapsed)
             return Reading.RESTART
-        if self.last is None:
-            return Reading.USUAL
-        way = math.hypot(odometry.x - self.last.x, odometry.y - self.last.y)
-        if way <= JUMP_M + JUMP_SPEED * elapsed:
-            return Reading.USUAL
         log.warning("the odometry jumped by %.2f m in %.2f s: taken as its restart, not as a motion", way, elapsed)
         return Reading.RESTART
 

@@ -146,6 +146,16 @@ def test_a_kidnapped_robot_is_found(parameters: AmclParams) -> None:
     assert made.trust.state is State.LOCALISED
 
 
+def test_a_search_repeats_bit_for_bit() -> None:
+    ways = []
+    for _ in range(2):
+        made = localizer()
+        for moment in kidnapped():
+            made.update(moment.scan, moment.odometry, MOUNT)
+        ways.append(made.filter.poses)
+    np.testing.assert_array_equal(*ways)
+
+
 def test_global_localisation_is_quick_with_few_particles() -> None:
     made = localizer(tuned(max_particles=500, min_particles=100))
     assert made.localize_globally()
