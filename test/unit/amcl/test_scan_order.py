@@ -50,6 +50,20 @@ def test_scans_out_of_order_do_not_lead_astray(seed: int) -> None:
     assert math.degrees(worst[1]) < 15.0
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_somebody_beside_the_robot_does_not_lead_the_tutorials_parameters_astray(seed: int) -> None:
+    made, rng = localizer(replace(TUTORIAL, seek="never"), seed), np.random.default_rng(seed)
+    first, worst = 0.0, 0.0
+    for moment in drive([*ALLEY, (-2.5, 6.5), (-4.0, 4.0)]):
+        first += rng.normal(0.0, 6.0)
+        seen, ranges = (int(first) + np.arange(36)) % 120, moment.scan.ranges.copy()
+        ranges[seen] = np.minimum(ranges[seen], 0.7)
+        made.update(replace(moment.scan, ranges=ranges), moment.odometry, MOUNT)
+        assert made.map_from_odom is not None
+        worst = max(worst, error(compose(made.map_from_odom, moment.odometry), moment.truth)[0])
+    assert worst < 0.3
+
+
 def test_a_late_scan_changes_nothing() -> None:
     made = localizer()
     moments = list(drive(ALLEY[:1]))[:6]
