@@ -2,8 +2,8 @@
 
 `likelihood_field` and `beam` add the cubed probabilities of the beams, as upstream does: that is softer than their
 product, and forgives what is not on the map. But it is too soft where updates are few: with the tutorial's parameters
-somebody who took 30 % of the view led it astray by metres, in each of four drives. So the sum counts to the third power,
-which is still far softer than a product, and with which none of the four was off by more than 0.2 m.
+somebody who took 30 % of the view led it astray by metres, in each of four drives. So the sum counts to the third
+power, which is still far softer than a product, and with which none of the four was off by more than 0.2 m.
 `likelihood_field_prob` multiplies the probabilities.
 """
 

@@ -15,9 +15,9 @@ particles, upstream's rule then asks for the most. The weights of `likelihood_fi
 power, or somebody beside the robot leads it astray where updates are few. The averages behind the recovery are of a
 beam's fit, so that more or fewer beams are no cause for random poses. Draws follow an even sequence instead of
 independent numbers. A new map keeps the pose that the filter has. A pose that was saved in another run of a
-simulation is not taken, to one of this run the way since is added. An odometry that jumps or a clock that goes back
-is a restart, not a motion; a scan that is older than one taken in is left out. Only bins of some weight link
-clusters, so that random poses do not chain the house together. A turned map is refused with a sentence.
+simulation is not taken, to one of this run the way since is added. An odometry that jumps, with the clock or
+without, began anew and is no motion; a scan that is older than one taken in is left out. Only bins of some weight
+link clusters, so that random poses do not chain the house together. A turned map is refused with a sentence.
 dynamic_reconfigure: see `amcl_tuning`.
 """
 
