@@ -43,6 +43,7 @@ class Peer:
     def __init__(self):
         self.poses, self.clouds, self.corrections = [], [], []
         self.x = 0.0
+        self.sent = 0  # scans
         self.tf = tf2_ros.TransformBroadcaster()
         self.static = tf2_ros.StaticTransformBroadcaster()
         self.static.sendTransform(transform("base_link", "laser", 0.0, 0.0, 0.0, rospy.Time()))
@@ -58,13 +59,21 @@ class Peer:
     def hear_tf(self, message):
         self.corrections += [t for t in message.transforms if t.child_frame_id == "odom"]
 
+    def wait_for_ears(self):
+        """Until amcl hears scans and tf (this program hears its own tf, too)."""
+        end = time.time() + 10.0
+        while time.time() < end and not (self.scan.get_num_connections() and self.tf.pub_tf.get_num_connections() > 1):
+            time.sleep(0.05)
+
     def drive(self, scans, step=0.0, broken="", frame="laser"):
+        self.wait_for_ears()
         for _ in range(scans):
             stamp = rospy.Time.now()
             self.tf.sendTransform(transform("odom", "base_link", 5.0 + self.x, 0.0, 0.0, stamp))
             message = LaserScan(angle_min=-math.pi, angle_max=math.pi, range_min=0.1, range_max=8.0)
             message.header.frame_id, message.header.stamp = frame, stamp
             ranges = ranges_at(self.x, 0.0)
+            self.sent += 1
             ranges = {"nan": [math.nan] * 180, "none": [], "few": ranges[:20]}.get(broken, ranges)
             message.ranges, message.angle_increment = ranges, 2 * math.pi / 179
             self.scan.publish(message)
@@ -108,8 +117,16 @@ class Peer:
     def call(self, service):
         rospy.ServiceProxy(service, Empty)()
 
+    def settle(self):
+        """Wait until what was sent has been answered, or for as long as a busy machine may take."""
+        end, heard = time.time() + 2.0, -1
+        while time.time() < end and (len(self.corrections) < self.sent or heard != len(self.corrections)):
+            heard = len(self.corrections)
+            time.sleep(0.3)
+        self.sent = 0
+
     def report(self):
-        time.sleep(0.3)
+        self.settle()
         said = {"poses": len(self.poses), "tf": len(self.corrections), "x": self.x}
         if self.health is not None:
             said |= {"state": self.health.state, "belief": self.health.belief, "seeking": self.health.seeking}
