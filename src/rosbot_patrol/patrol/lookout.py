@@ -58,7 +58,8 @@ class Lookout(Conduct):
         person, is_new = self._people.note(self._clock.time, seen.measured)
         person.label, person.room = seen.label, self._room_at(person, inputs)
         mission.people = self._people.places
-        mission.place = mission.people[0]
+        if mission.place is None:  # it stays what the sentence and the mail say
+            mission.place = mission.people[0]
         out.people = tuple(self._people.met)
         if mission.verdict is not Verdict.CONFIRMED:
             self._decide(Verdict.CONFIRMED, saying.sighting(mission, seen, person.room))

@@ -55,7 +55,7 @@ class Mission:
         began: when each of these began first, in seconds since 1970.
         views_done: poses from which the room was looked at in a full turn.
         share_seen: of the room's floor, 0 to 1, None where nobody measures.
-        place: x, y of the person in map [m], None where it is not known.
+        place: x, y in map [m] of the person who was confirmed first, then; None where it is not known.
         people: where each of those met was last, likewise; each of them gets a notice.
         own_motion: rooms whose sensor called while the robot passed them, with seconds since 1970: not followed.
     """

@@ -18,6 +18,8 @@ from rosbot_patrol.params import param
 from rosbot_patrol.patrol.inputs import Box, Frame, Measured
 from rosbot_patrol.patrol.judge import Judge
 
+_AS_GOOD = 1.3  # so much larger may an error be in a newer picture
+
 
 @dataclass(frozen=True, kw_only=True)
 class WatchParams:
@@ -46,7 +48,7 @@ class Confirmation:
         stamp: of the picture that shows it best [s].
         boxes: alarm boxes in that picture, the best first.
         pictures: how many showed it.
-        measured: its place and size as they were last measured, None where nothing tells.
+        measured: its place and size as they were last measured well, None where nothing tells.
     """
 
     label: str
@@ -157,7 +159,7 @@ class Watch:
             return []
         best, view = max(shown, key=lambda pair: (pair[0].probability, pair[0].height))
         others = sorted((b for b in view.boxes if b is not best), key=lambda b: (b.label != best.label, -b.probability))
-        measured = min((b.measured for b, _ in shown[-3:] if b.measured), key=lambda m: m.error, default=None)
+        measured = _newest([b.measured for b, _ in shown[-3:] if b.measured])
         return [
             Confirmation(
                 label=best.label,
@@ -179,3 +181,11 @@ class _View:
 
 def _score(box: Box) -> float:
     return box.probability
+
+
+def _newest(measured: list[Measured]) -> Measured | None:
+    """The last of those that are about as exact as the best: who walks is no longer where they were."""
+    if not measured:
+        return None
+    best = min(m.error for m in measured)
+    return [m for m in measured if m.error <= _AS_GOOD * best][-1]

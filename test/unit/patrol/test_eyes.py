@@ -306,7 +306,9 @@ def test_one_who_walks_in_the_room_is_kept_in_view() -> None:
         x, y = world.people(world.now)[0]
         kept.append(abs(wrap_angle(math.atan2(y - world.pose.y, x - world.pose.x) - world.pose.yaw)))
     assert max(kept) < WIDTH / 2
+    (told,) = [notice.mission.place for notice in world.notices]
     world.until(lambda w: bool(w.ended))
+    assert world.ended[0].place == told  # the record says what the mail says, however far they walk
 
 
 def test_a_poster_and_a_known_object_are_told_and_do_not_alarm() -> None:

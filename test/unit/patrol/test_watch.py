@@ -158,6 +158,12 @@ def test_the_surest_place_of_the_last_pictures_is_told(watch):
     assert found[0].measured.x == 1.0
 
 
+def test_of_places_about_as_sure_the_newest_is_told(watch):
+    errors = (0.10, 0.11, 0.12)
+    found = feed(watch, frames(*[[placed(1.0 + 0.2 * i, 1.0, error=e)] for i, e in enumerate(errors)]))
+    assert found[0].measured.x == pytest.approx(1.4)
+
+
 def test_what_the_judge_refuses_counts_as_nothing_seen_and_is_told():
     watch = Watch(("person",), judge=Judge(known=(Known(x=1.0, y=1.0, name="the coat stand"),)))
     watch.start(0.0)
