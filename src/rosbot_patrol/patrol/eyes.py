@@ -41,6 +41,9 @@ class EyesParams:
     look_around: str = param(
         "full", choices=("full", "spin"), doc="full: from further viewpoints, too; spin: one turn at the room's point"
     )
+    person_distance: float = param(
+        1.0, unit="m", lo=0.0, doc="no viewpoint lies nearer to whom it has met, and no way to one passes nearer"
+    )
     clear_share: float = param(
         0.5, lo=0.0, hi=1.0, doc="with less of the floor seen a room is not clear but unverified"
     )
@@ -303,11 +306,20 @@ class Eyes:
         return sight_of_scan(inputs.scan.scan, inputs.scan.map_from_laser, floor, reach)
 
     def _stands(self, inputs: Inputs) -> Mask | None:
-        if inputs.scan is None or self._house is None:
+        """Where no way leads: what the lidar sees and the map does not know, and whoever was met; None: no idea."""
+        if self._house is None or self._mission is None:
             return None
-        points = transform_points(inputs.scan.map_from_laser, scan_points(inputs.scan.scan))
-        off = off_the_map(self._house.floor, points, self.params.witness.off_map)
-        return self._house.floor.mark_near(off, _ROBOT) if len(off) else np.zeros(self._house.floor.info.shape, bool)
+        floor, met = self._house.floor, [place for place in self._mission.people if place is not None]
+        if inputs.scan is None and not met:
+            return None
+        mask = np.zeros(floor.info.shape, bool)
+        if inputs.scan is not None:
+            points = transform_points(inputs.scan.map_from_laser, scan_points(inputs.scan.scan))
+            off = off_the_map(floor, points, self.params.witness.off_map)
+            mask |= floor.mark_near(off, _ROBOT)
+        if met:
+            mask |= floor.mark_near(np.array(met), self.params.person_distance)
+        return mask
 
 
 def _apart(doubt: _Doubt, thing: Sighting) -> float:

@@ -311,6 +311,15 @@ def test_one_who_walks_in_the_room_is_kept_in_view() -> None:
     assert world.ended[0].place == told  # the record says what the mail says, however far they walk
 
 
+@pytest.mark.parametrize("distance", [2.0, 0.0])
+def test_no_viewpoint_and_no_way_to_one_leads_close_by_whom_it_has_met(distance: float) -> None:
+    world = World(lambda now: [(3.4, 1.0)], eyes=EyesParams(person_distance=distance))  # before the corner
+    mission = world.mission()
+    assert mission.verdict.value == "confirmed"
+    nearest = min(math.dist(goal[:2], (3.4, 1.0)) for goal in world.goals)
+    assert (nearest >= 2.0 - 0.1) == (distance > 0.0)  # a cell of the floor is 0.1 m wide
+
+
 def test_a_poster_and_a_known_object_are_told_and_do_not_alarm() -> None:
     world = World(lambda now: [(7.0, 1.0)])
     world.flat = True
