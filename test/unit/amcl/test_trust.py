@@ -146,6 +146,33 @@ def test_a_kidnapped_robot_is_found(parameters: AmclParams) -> None:
     assert made.trust.state is State.LOCALISED
 
 
+def slipping(start: Pose2D, rate: tuple[float, float]) -> list[Moment]:
+    """Wheels that turn for six seconds while the robot stands, jammed [m/s, rad/s], and then a drive."""
+    rng, found, odometry = np.random.default_rng(5), [], Pose2D()
+    for i in range(30):
+        found.append(Moment(start, odometry, scan_at(start, rng, stamp=0.2 * i)))
+        odometry = compose(odometry, Pose2D(0.2 * rate[0], 0.0, 0.2 * rate[1]))
+    after = list(drive(AWAY, start=start, seed=3))
+    shift = compose(odometry, invert(after[0].odometry))
+    return found + [
+        Moment(m.truth, compose(shift, m.odometry), replace(m.scan, stamp=m.scan.stamp + 6.0)) for m in after
+    ]
+
+
+@pytest.mark.parametrize("rate", [(0.0, 1.0), (0.2, 0.0), (0.1, 0.6)])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_wheels_that_slip_do_not_make_the_estimate_jump_about(rate: tuple[float, float], seed: int) -> None:
+    made = localizer(seed=seed)
+    made.set_pose(Pose2D(), np.diag([0.001, 0.001, 0.001]))
+    worst = 0.0
+    for moment in slipping(Pose2D(), rate):
+        made.update(moment.scan, moment.odometry, MOUNT)
+        worst = max(worst, off(made, moment))
+    assert worst < 0.6 + 6.0 * rate[0]  # as far as the wheels went, at most
+    assert off(made, moment) < 0.1
+    assert made.trust.state is State.LOCALISED
+
+
 def test_a_search_repeats_bit_for_bit() -> None:
     ways = []
     for _ in range(2):
