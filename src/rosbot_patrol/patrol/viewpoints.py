@@ -18,7 +18,7 @@ from rosbot_patrol.params import param
 from rosbot_patrol.patrol.coverage import CoverageParams, sight_on_map, visible
 from rosbot_patrol.patrol.floor import Array, Floor, Mask
 
-_FAR = 1e9
+_FAR = math.inf
 _NEARER = 0.7  # where there is no other side, so much nearer than before is a second look
 
 
@@ -202,6 +202,11 @@ class ViewpointPlanner:
         if cell is None:
             return np.full(self.floor.info.shape, _FAR)
         return _ways(wide, cell) * self.floor.info.resolution
+
+    def reached(self, start: Pose2D) -> Mask:
+        """Cells of the floor that the robot gets to from a pose."""
+        mask: Mask = self.ways(start) < _FAR
+        return mask
 
     def _places(
         self, room: Mask, ways: Array, stands: Mask | None, tried: tuple[tuple[float, float], ...]

@@ -133,3 +133,15 @@ def test_a_room_whose_point_is_out_of_reach_is_looked_into_from_elsewhere() -> N
 
 def test_a_robot_off_the_map_plans_nothing() -> None:
     assert PLANNER.next(Pose2D(40.0, 40.0, 0.0), ROOM, ROOM, width=WIDTH) is None
+
+
+def test_what_no_way_leads_to_is_not_reached() -> None:
+    floor = drawn_floor("#######", "#..#..#", "#..#..#", "#..#..#", "#..#..#", "#######")
+    planner = ViewpointPlanner(floor, ViewpointParams(viewpoint_clearance=0.3))
+    start = Pose2D(1.0, 1.5, 0.0)
+    reached = planner.reached(start)
+    xs = floor.info.origin_x + (np.nonzero(reached)[1] + 0.5) * floor.info.resolution
+    assert reached.any()
+    assert xs.max() < 1.5
+    assert np.isinf(planner.ways(start)[~reached]).all()
+    assert planner.near(start, 2.5, 1.5, nearest=0.1, most=1.0) is None  # floor there is, but no way to it
