@@ -97,3 +97,13 @@ def test_a_house_that_never_came_up_is_a_problem_and_nothing_else(patrol: Patrol
     assert result.failures == ("roslaunch ended",)
     assert result.verdict == ""
     assert result.share_true is None
+
+
+def test_a_touch_is_told_with_who_moved(patrol: Patrol, tmp_path: Path) -> None:
+    heard = recording(seen_at=24.0, verdict="confirmed")
+    heard.contacts = [(35.0, "bob"), (35.1, "bob"), (40.0, "bob")]
+    result = judged(patrol, heard, tmp_path, contacts=["bob", "bob", "bob"])
+    first, second = result.touches
+    assert first == "bob at 35.0 s, the robot at (3.10, 3.15) and 0.00 m/s, bob at 0.00 m/s"
+    assert second.startswith("bob at 40.0 s")
+    assert result.failures == (f"touched {first}; {second}",)

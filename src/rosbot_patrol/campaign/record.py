@@ -27,7 +27,7 @@ class Result:
         place_error: of the person, as told and as true [m].
         share_told, share_true: of the room's floor that was seen.
         times: seconds of simulated time between two events, by name.
-        contacts: what the robot touched.
+        contacts: what the robot touched; touches: each touch in words, with when and who moved.
         localisation: mean and largest error of the pose [m].
         home_error: from where the robot began, at the end [m].
         home: whether it came back; None where it went on to another room, or nobody knows.
@@ -54,6 +54,7 @@ class Result:
     share_true: float | None = None
     times: dict[str, float] = field(default_factory=dict)
     contacts: list[str] = field(default_factory=list)
+    touches: list[str] = field(default_factory=list)
     localisation: tuple[float, float] | None = None
     home_error: float | None = None
     home: bool | None = None
@@ -88,7 +89,8 @@ class Result:
             found.append(f"{self.verdict or 'no verdict'} in a room without anybody")
         if self.verdict == CONFIRMED and self.mails != 1:
             found.append(f"{self.mails} mails")
-        found += [f"touched {', '.join(sorted(set(self.contacts)))}"] if self.contacts else []
+        touched = self.touches or sorted(set(self.contacts))
+        found += [f"touched {'; '.join(touched)}"] if self.contacts else []
         found += ["not home"] if self.home is False else []
         return tuple(found)
 

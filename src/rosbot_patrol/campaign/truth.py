@@ -12,6 +12,7 @@ from rosbot_patrol.campaign.floor import RECOGNISED, Floor
 from rosbot_patrol.geometry import Pose2D
 
 ENOUGH = 1.5  # in view for so long, somebody has to be found [s]
+_ONE_TOUCH = 1.0  # a pause in a touch that makes it two [s]
 _LONGEST = 0.5  # between two poses of the same one; more is a gap [s]
 
 
@@ -26,6 +27,11 @@ class Track:
         """The pose at a time, the last one before it; None before the first."""
         i = bisect.bisect_right(self.times, time) - 1
         return self.poses[i] if i >= 0 else None
+
+    def speed(self, time: float, span: float = 0.4) -> float | None:
+        """How fast it moved over a span up to a time [m/s], None before the first pose."""
+        before, after = self.at(time - span), self.at(time)
+        return None if before is None or after is None else math.dist(before[:2], after[:2]) / span
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,3 +107,25 @@ def place_error(tracks: dict[str, Track], people: Sequence[Person], time: float,
     """How far a place that was told is from the nearest of the people at that time [m]; None where nobody is known."""
     there = [pose for p in people if p.name in tracks and (pose := tracks[p.name].at(time)) is not None]
     return min((math.dist(pose[:2], (x, y)) for pose in there), default=None)
+
+
+def touches(contacts: Sequence[tuple[float, str]], robot: Track, tracks: dict[str, Track]) -> list[str]:
+    """Each touch in words: what, when, where, and who moved.
+
+    Args:
+        contacts: simulated time and name of what the robot touched, for each moment of a touch.
+        robot: its way.
+        tracks: of those who move.
+    """
+    told: list[str] = []
+    last: dict[str, float] = {}
+    for time, name in contacts:
+        is_new = time - last.get(name, -math.inf) > _ONE_TOUCH
+        last[name] = time
+        pose = robot.at(time)
+        if not is_new or pose is None:
+            continue
+        own, other = robot.speed(time) or 0.0, tracks[name].speed(time) if name in tracks else None
+        whose = f", {name} at {other:.2f} m/s" if other is not None else ""
+        told.append(f"{name} at {time:.1f} s, the robot at ({pose.x:.2f}, {pose.y:.2f}) and {own:.2f} m/s{whose}")
+    return told

@@ -18,7 +18,7 @@ from rosbot_patrol.campaign.houses import load_house
 from rosbot_patrol.campaign.plan import CONFIRMED, WITHIN, Patrol, patrol_from_plain, scenario_text
 from rosbot_patrol.campaign.record import PLAN, RESULT, Result
 from rosbot_patrol.campaign.share import true_share
-from rosbot_patrol.campaign.truth import Presence, place_error, presence
+from rosbot_patrol.campaign.truth import Presence, place_error, presence, touches
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import Alert, PatrolState
@@ -150,6 +150,7 @@ def evaluate(
         share_true=true_share(floor, patrol.room, robot, triggered, triggered + looked) if looked else None,
         times={name: round(value, 2) for name, value in times.items()},
         contacts=contacts,
+        touches=touches(heard.contacts, robot, tracks),
         localisation=heard.localisation(),
         home_error=home,
         home=None if home is None or went_on else home < HOME,

@@ -15,7 +15,7 @@ from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.campaign.truth import Track
 from rosbot_patrol.geometry import Pose2D, distance
-from rosbot_patrol.msg import Alert, EspTrigger, PatrolState
+from rosbot_patrol.msg import Alert, Contacts, EspTrigger, PatrolState
 from rosbot_patrol.ros.convert import pose2d_from_pose
 from rosbot_patrol.ros.simulator_scenario import PLAYED
 
@@ -39,6 +39,7 @@ class Recording:
     triggers: list[tuple[float, int]] = field(default_factory=list)
     goals: list[float] = field(default_factory=list)
     estimates: list[tuple[float, Pose2D]] = field(default_factory=list)
+    contacts: list[tuple[float, str]] = field(default_factory=list)
     is_played: bool = False
 
     def robot_track(self) -> Track:
@@ -78,6 +79,7 @@ class CampaignWatch:
             rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100),
             rospy.Subscriber("/move_base/goal", MoveBaseActionGoal, self._on_goal, queue_size=100),
             rospy.Subscriber("/amcl_pose", PoseWithCovarianceStamped, self._on_estimate, queue_size=100),
+            rospy.Subscriber("/ground_truth/contacts", Contacts, self._on_contacts, queue_size=100),
             rospy.Subscriber("/simulator/scenario", String, self._on_act, queue_size=100),
         ]
 
@@ -122,6 +124,11 @@ class CampaignWatch:
     def _on_estimate(self, message: PoseWithCovarianceStamped) -> None:
         with self._lock:
             self.heard.estimates.append((message.header.stamp.to_sec(), pose2d_from_pose(message.pose.pose)))
+
+    def _on_contacts(self, message: Contacts) -> None:
+        with self._lock:
+            stamp = message.header.stamp.to_sec()
+            self.heard.contacts += [(stamp, c.other) for c in message.contacts if c.kind != "floor"]
 
     def _on_act(self, message: String) -> None:
         if message.data == PLAYED:
