@@ -32,7 +32,7 @@ class Result:
         home_error: from where the robot began, at the end [m].
         home: whether it came back; None where it went on to another room, or nobody knows.
         suspects: what looked like somebody to the guard, as it says.
-        mails: that were delivered; missions: that ended.
+        people: who were to be found; mails: that were delivered; missions: that ended.
         sim_s, wall_s: how long it took.
     """
 
@@ -59,6 +59,7 @@ class Result:
     home_error: float | None = None
     home: bool | None = None
     suspects: list[str] = field(default_factory=list)
+    people: int = 1
     mails: int = 0
     missions: int = 0
     sim_s: float = 0.0
@@ -80,6 +81,11 @@ class Result:
         return self.verdict == CONFIRMED and not self.was_there
 
     @property
+    def has_its_mails(self) -> bool:
+        """Whether there came one, or one for each of several people."""
+        return 1 <= self.mails <= max(self.people, 1)
+
+    @property
     def failures(self) -> tuple[str, ...]:
         """What did not go as it should have, each in a few words."""
         found = [self.problem] if self.problem else []
@@ -87,7 +93,7 @@ class Result:
         found += ["false alarm"] if self.false_alarm else []
         if not (self.missed or self.false_alarm or self.problem) and not self.was_there and self.verdict != "clear":
             found.append(f"{self.verdict or 'no verdict'} in a room without anybody")
-        if self.verdict == CONFIRMED and self.mails != 1:
+        if self.verdict == CONFIRMED and not self.has_its_mails:
             found.append(f"{self.mails} mails")
         touched = self.touches or sorted(set(self.contacts))
         found += [f"touched {'; '.join(touched)}"] if self.contacts else []

@@ -47,7 +47,7 @@ def shares(results: Sequence[Result]) -> list[Share]:
         Share("without touching anything", sum(not r.contacts for r in played), len(played)),
         Share(
             "one mail for each confirmed",
-            sum(r.mails == 1 for r in played if r.verdict == CONFIRMED),
+            sum(r.has_its_mails for r in played if r.verdict == CONFIRMED),
             sum(r.verdict == CONFIRMED for r in played),
         ),
     ]

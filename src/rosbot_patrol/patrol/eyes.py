@@ -154,8 +154,10 @@ class Eyes:
             return None
         if not self._has_eye:
             return None
-        is_enough = self.coverage.share >= p.viewpoints.coverage_goal and not self._open_doubts()
-        if is_enough:
+        wanted, least = self.coverage.unseen(), None
+        if self.coverage.share >= p.viewpoints.coverage_goal:
+            wanted, least = self._hideouts(wanted), math.pi * p.viewpoints.hideout**2
+        if not wanted.any() and not self._open_doubts():
             return None
         late = self._now - self._began > p.viewpoints.viewpoints_time
         if late or self._views >= p.viewpoints.viewpoints_most:
@@ -167,15 +169,16 @@ class Eyes:
             self._views += 1
             log.info("%s: something like a person is to be looked at from near", mission.room.title)
             return nearer
-        if self.coverage.share >= p.viewpoints.coverage_goal:
+        if not wanted.any():
             return None
         found = self._planner.next(
             inputs.pose,
             self._room(mission.room),
-            self.coverage.unseen(),
+            wanted,
             width=self._width,
             stands=self._stands(inputs),
             tried=tuple(self._tried),
+            least=least,
         )
         if found is not None:
             self._views += 1
@@ -212,6 +215,11 @@ class Eyes:
         if share is None or share >= self.params.clear_share:
             return ""
         return f"only {share:.0%} of its floor could be seen"
+
+    def is_seen(self) -> bool:
+        """Whether as much of the floor was seen as is wanted."""
+        share = self.share()
+        return share is not None and share >= self.params.viewpoints.coverage_goal
 
     def moved(self) -> str:
         """What the lidar saw move."""
@@ -304,6 +312,13 @@ class Eyes:
         if inputs.scan is None:
             return sight_on_map(floor, eye.pose.x, eye.pose.y, reach)
         return sight_of_scan(inputs.scan.scan, inputs.scan.map_from_laser, floor, reach)
+
+    def _hideouts(self, unseen: Mask) -> Mask:
+        """Unseen floor that is large enough to hide somebody."""
+        radius = self.params.viewpoints.hideout
+        if self._house is None or radius <= 0.0:
+            return np.zeros(unseen.shape, bool)
+        return self._house.floor.open_to(unseen, radius)
 
     def _stands(self, inputs: Inputs) -> Mask | None:
         """Where no way leads: what the lidar sees and the map does not know, and whoever was met; None: no idea."""

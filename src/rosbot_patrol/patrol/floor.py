@@ -86,6 +86,11 @@ class Floor:
         hit[iy[inside], ix[inside]] = True
         return _grown(hit, math.ceil(radius / self.info.resolution - 0.5))
 
+    def open_to(self, mask: Mask, radius: float) -> Mask:
+        """The part of a mask that discs of a radius [m] fit into: specks and slits are left out."""
+        cells = max(round(radius / self.info.resolution), 0)
+        return mask & _grown(~_grown(~mask, cells), cells)
+
 
 def floor_of(grid: Grid, *, free_below: int = 25) -> Floor:
     """The floor of a map.

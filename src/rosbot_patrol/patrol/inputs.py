@@ -58,6 +58,7 @@ class Measured:
         away: distance from the camera over the floor [m].
         top: of the object over the floor [m]; height, width: of what shows of it [m].
         is_cut: the box ends about the picture's upper edge, or at its lower one: there may be more of it.
+        is_cut_above: there may be more of it above the picture.
         is_flat: all of it lies in one plane, None where no depth tells.
         source: what told the distance: "depth", "lidar", "floor" (the box's lower edge).
     """
@@ -70,6 +71,7 @@ class Measured:
     height: float
     width: float
     is_cut: bool = False
+    is_cut_above: bool = False
     is_flat: bool | None = None
     source: str = "depth"
 

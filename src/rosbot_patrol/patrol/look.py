@@ -42,6 +42,7 @@ class LookStep:
         progress: a viewpoint is done, which has to outlive the program.
         done: the look is over.
         problem: why it does not count as a look at the whole room, "" where it does.
+        is_stuck: that is because the robot could not turn so far; what it saw, it saw.
         why: what it does, for people.
     """
 
@@ -51,6 +52,7 @@ class LookStep:
     progress: bool = False
     done: bool = False
     problem: str = ""
+    is_stuck: bool = False
     why: str = ""
 
 
@@ -76,7 +78,7 @@ class Look:
         self._map_yaw: float | None = None
         self._map_turned = 0.0
         self._turned_at: float | None = None
-        self._problem = ""
+        self._problem = self._stuck = ""
         self._held_since: float | None = None
         self._held_out_until = -math.inf
 
@@ -107,7 +109,7 @@ class Look:
             self._correction = Spin(abs(self._left()), clockwise=self._left() < 0.0, params=self._spin_params)
         elif step.done:
             if spin is self.spin:  # a correction that fails takes nothing from the turn
-                self._problem = step.problem or self._problem
+                self._stuck = step.problem
             self._turned_at = now
         return LookStep(speed=step.speed, why=f"turning to look around, {self._progress()}")
 
@@ -139,7 +141,9 @@ class Look:
         self._note_blindness(now, inputs)
         waited = now - self._turned_at
         done = waited >= self.params.linger or waited < 0.0
-        return LookStep(done=done, problem=self._problem, why="waiting for the detector's last pictures")
+        problem = self._problem or self._stuck
+        is_stuck = bool(self._stuck) and not self._problem
+        return LookStep(done=done, problem=problem, is_stuck=is_stuck, why="waiting for the detector's last pictures")
 
     def _note_blindness(self, now: float, inputs: Inputs) -> None:
         if not self._problem:

@@ -24,6 +24,7 @@ from rosbot_patrol.patrol.inputs import Box, Measured
 Array = NDArray[np.float64]
 
 _EDGE = 3  # a box that ends so near to the picture's lower edge may go on beyond it [px]
+_HEADROOM = 0.06  # with less between a box and the picture's upper edge there may be more above it [m]
 _THICK = 0.12  # from the front of a person to the middle [m]
 _DEEP = 0.35  # what is so much farther than the nearest part is not of the person [m]
 _FEW = 40  # depths, at least, to say anything
@@ -31,6 +32,8 @@ _LEGS = 2  # beams, at least
 _GRID = 48  # samples along each side of a box, at most
 _FLAT_SHARE = 0.92  # of the samples lie in a picture's plane
 _BELIEVED = 0.05  # of a box's samples speak for the nearer thing
+_UPRIGHT_ROWS = 0.5  # of the rows show one who stands
+_BEFORE_SHARE = 0.35  # of a picture on the wall may be hidden
 _NOISE = 0.003  # of a depth camera, at 1 m; it grows with the square [m]
 
 
@@ -106,7 +109,10 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
         samples = _samples(box, view.lens, depth)
         along = _nearest(samples)
         is_behind = along is not None and along > most
-        if is_behind:
+        leg = _upright(samples, *_about_floor(box, view)) if along is not None else None
+        if leg is not None and along is not None and leg < along - _DEEP:
+            along = leg
+        elif is_behind:
             along = _nearer(samples, most)
         else:
             flat = _is_flat(samples)
@@ -128,7 +134,7 @@ def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: 
     place = view.eye + view.ray(middle, lens.cy) * (along + _THICK)
     top = view.eye + view.ray(middle, box.ymin) * along
     away = math.hypot(*(place - view.eye)[:2])
-    is_cut = box.ymin <= box.slack or box.ymax >= lens.height - _EDGE
+    is_cut_above = box.ymin <= box.slack or box.ymin / lens.fy * along < _HEADROOM
     return Measured(
         x=float(place[0]),
         y=float(place[1]),
@@ -137,7 +143,8 @@ def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: 
         top=float(top[2]),
         height=box.height / lens.fy * along,
         width=box.width / lens.fx * along,
-        is_cut=is_cut,
+        is_cut=is_cut_above or box.ymax >= lens.height - _EDGE,
+        is_cut_above=is_cut_above,
         is_flat=flat,
         source=source,
     )
@@ -173,11 +180,23 @@ def _nearer(samples: NDArray[np.float64], most: float) -> float | None:
     return float(np.median(near)) if near.size >= max(_BELIEVED * samples.size, _FEW) else None
 
 
-def _is_flat(samples: NDArray[np.float64]) -> bool | None:
-    """Whether all of a box lies in one plane, None where too little of it is known.
+def _upright(samples: NDArray[np.float64], least: float, most: float) -> float | None:
+    """How far the upright thing is that lies between two distances [m], None where there is none.
 
-    In a pinhole's picture the inverse of the depth of a plane is linear in row and column; the plane is fitted by
-    least squares, twice: the second time to what lies near the first.
+    A leg at the edge of a box, before a wall that fills it: little of the box, but most of its rows.
+    """
+    is_between = (samples >= least) & (samples <= most)
+    if is_between.mean() < _BELIEVED or is_between.any(axis=1).mean() < _UPRIGHT_ROWS:
+        return None
+    return float(np.median(samples[is_between]))
+
+
+def _is_flat(samples: NDArray[np.float64]) -> bool | None:
+    """Whether what a box shows lies in one plane, None where too little of it is known.
+
+    In a pinhole's picture the inverse of the depth of a plane is linear in row and column. The plane is that of the
+    upper middle, where a person's chest is, by least squares, again of what lies near the first. All of the box has to
+    lie in it but for what stands before it at the edges, as a sofa before a picture on the wall.
     """
     is_known = np.isfinite(samples) & (samples > 0.0)
     high, wide = samples.shape
@@ -186,17 +205,23 @@ def _is_flat(samples: NDArray[np.float64]) -> bool | None:
         return None
     rows, columns = np.nonzero(is_known)
     metres = samples[rows, columns]
-    terms = np.column_stack((rows, columns, np.ones(len(rows))))
-    kept = np.ones(len(rows), bool)
+    terms = np.column_stack((rows, columns, np.ones(len(rows)))).astype(np.float64)
+    is_chest = (rows < 0.6 * high) & (columns >= wide // 8) & (columns < wide - wide // 8)
+    kept: NDArray[np.bool_] = is_chest
+    fitted: Array = metres
     bound = np.maximum(0.03, 3.0 * _NOISE * metres**2)
     for _ in range(3):
-        if kept.sum() < len(rows) // 3:
+        if kept.sum() < max(is_chest.sum() // 3, 3):
             return False
         plane, *_ = np.linalg.lstsq(terms[kept], 1.0 / metres[kept], rcond=None)
         inverse = terms @ plane
         fitted = np.where(inverse > 1e-3, 1.0 / np.maximum(inverse, 1e-3), np.inf)
-        kept = np.abs(fitted - metres) < bound
-    return bool(kept.mean() >= _FLAT_SHARE)
+        kept = is_chest & (np.abs(fitted - metres) < bound)
+    is_in = np.abs(fitted - metres) < bound
+    is_before = (metres < fitted - bound) & ~is_chest
+    if is_before.mean() > _BEFORE_SHARE or is_in[is_chest].mean() < _FLAT_SHARE:
+        return False
+    return bool(is_in[~is_before].mean() >= _FLAT_SHARE)
 
 
 def _by_lidar(box: Box, view: View, unmapped: Array) -> float | None:
@@ -239,6 +264,14 @@ def _by_floor(box: Box, view: View, *, is_behind: bool) -> tuple[float, float] |
 def _farthest(box: Box, view: View) -> float:
     """How far what a box shows can be at most, along the optical axis [m]: the floor ends its lower edge."""
     return _floor_at(box, view, box.ymax - box.slack)
+
+
+def _about_floor(box: Box, view: View) -> tuple[float, float]:
+    """Between which distances a thing stands that meets the floor at the lower edge of a box [m]; 0, 0: it does not."""
+    if box.ymax >= view.lens.height - _EDGE:
+        return 0.0, 0.0
+    found = _floor_at(box, view, float(box.ymax))
+    return 0.85 * _floor_at(box, view, box.ymax + box.slack), 1.1 * found if found < 15.0 else 0.0
 
 
 def _floor_at(box: Box, view: View, row: float) -> float:

@@ -92,6 +92,9 @@ class Views(Protocol):
     def blind(self) -> str:
         """Why what was seen is too little for a verdict, "" where it is not."""
 
+    def is_seen(self) -> bool:
+        """Whether as much of the room was seen as is wanted, however it came about."""
+
     def moved(self) -> str:
         """What moved in the room as far as the lidar tells, "" where nothing did."""
 
@@ -127,6 +130,10 @@ class OneTurn:
         """Nobody measures."""
         return ""
 
+    def is_seen(self) -> bool:
+        """Nobody measures."""
+        return False
+
     def moved(self) -> str:
         """Nobody watches."""
         return ""
@@ -159,6 +166,7 @@ class LookAround:
         self._at = pose
         self.turned_deg = 360.0 * len(mission.views_done)
         self._goes_on = bool(mission.views_done)
+        self._stuck: list[str] = []  # why turns ended early
         self._look: Look = self._new_look()
 
     @property
@@ -189,6 +197,9 @@ class LookAround:
         if not step.done:
             return step
         self.turned_deg += self._look.turned_deg
+        if step.is_stuck:  # perhaps enough is seen, or will be from elsewhere
+            self._stuck.append(step.problem)
+            return self._go_on(inputs, step)
         if step.problem:
             return step
         if self._at is not None:
@@ -201,9 +212,10 @@ class LookAround:
     def _go_on(self, inputs: Inputs, step: LookStep) -> LookStep:
         self._view = self._views.next(inputs)
         if self._view is None:
-            return step
+            is_enough = not self._stuck or self._views.is_seen()
+            return dataclasses.replace(step, problem="" if is_enough else self._stuck[0])
         self._at = pose = self._view.pose
-        name = f"{self._mission.id}/view{len(self._mission.views_done)}"
+        name = f"{self._mission.id}/view{len(self._mission.views_done) + len(self._stuck)}"
         once = dataclasses.replace(self._parts.drive, goal_attempts=1)
         self._drive = Drive(name, pose, once)
         return LookStep(why="going to a further viewpoint", progress=True)

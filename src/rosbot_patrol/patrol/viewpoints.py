@@ -30,6 +30,13 @@ class ViewpointParams:
     viewpoints_most: int = param(4, lo=0, hi=50, doc="further viewpoints in one mission, at most")
     viewpoints_time: float = param(150.0, unit="s", lo=0.0, doc="no further viewpoint is begun later than this")
     viewpoint_gain: float = param(0.01, lo=0.0, hi=1.0, doc="share of the floor that a viewpoint must show anew")
+    hideout: float = param(
+        0.2,
+        unit="m",
+        lo=0.0,
+        hi=2.0,
+        doc="radius of unseen floor that could hide somebody, however much is seen; 0: none",
+    )
     viewpoint_clearance: float = param(
         0.35, unit="m", lo=0.1, doc="from a viewpoint to the nearest thing, so that the robot can turn there"
     )
@@ -84,6 +91,7 @@ class ViewpointPlanner:
         width: float,
         stands: Mask | None = None,
         tried: tuple[tuple[float, float], ...] = (),
+        least: float | None = None,
     ) -> Viewpoint | None:
         """The best further viewpoint, None where none is worth its way.
 
@@ -94,16 +102,18 @@ class ViewpointPlanner:
             width: of the camera's view [rad].
             stands: cells on which something stands that the map does not show, grown by the robot's radius.
             tried: places [m] that could not be reached; their surroundings are left out.
+            least: floor that it must show anew [m2], None for the share of the room that the parameters ask for.
         """
         ways = self.ways(start, stands)
         places = self._places(room, ways, stands, tried)
-        least = max(self.params.viewpoint_gain * int(room.sum()), 1.0)
+        share = self.params.viewpoint_gain * int(room.sum())
+        fewest = max(share if least is None else least / self.floor.cell_area, 1.0)
         best: tuple[float, float, float, float, int] | None = None
         for x, y, way in places:
             sight = sight_on_map(self.floor, x, y, self._coverage.view_range)
             shown = int(visible(self.floor, unseen, sight, self._coverage)[2].sum())
             worth = shown / (way + 1.5)  # a turn costs as much as a metre and a half
-            if shown >= least and (best is None or worth > best[0]):
+            if shown >= fewest and (best is None or worth > best[0]):
                 best = worth, x, y, way, shown
         if best is None:
             return None

@@ -155,6 +155,7 @@ def evaluate(
         home_error=home,
         home=None if home is None or went_on else home < HOME,
         suspects=[event.text for event in kept.events if event.kind == "suspect"] if kept is not None else [],
+        people=len(patrol.people),
         mails=mails,
         missions=len({s.message.mission for s in heard.states if s.message.mission}),
         sim_s=round(robot.times[-1], 1) if robot.times else 0.0,

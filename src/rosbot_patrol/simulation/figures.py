@@ -31,6 +31,7 @@ MODELS = ("person", "fire_hydrant", *PETS, "poster")
 _PACE_OF_FULL_STEPS = 0.25  # a pet that walks slower takes smaller ones [m/s]
 _CYCLE = 1.3  # length of two steps of a person [m]
 _SWING = 0.22  # how far a person's foot goes before and behind the body [m]
+_HEAD_AND_TAIL = 0.65  # of a pet from its middle, in lengths of the trunk
 _WARM_SHARES = (0.2, 0.5, 0.75, 0.92)  # shins, hips, chest, head of a person, in heights
 _KNEE = 0.8  # a cut below meets legs that swing [m]
 
@@ -125,7 +126,7 @@ class PetFigure:
         self.look = look.name
         self.warmth = 0.5 if look.model == "cat" else 0.8
         self.warm_heights: tuple[float, ...] = (0.75 * look.height,)
-        self.radius = 0.5 * look.length * look.height
+        self.radius = _HEAD_AND_TAIL * look.length * look.height
         self.cycle = look.cycle
         self._look = look
         self._cuts = _Cuts(Body(name=name, kind="pet", collisions=self.body.collisions[:2]))  # trunk and head

@@ -154,6 +154,17 @@ def test_a_box_that_begins_about_the_upper_edge_may_go_on_above_it() -> None:
         assert m.is_cut == is_cut
 
 
+def test_legs_right_before_the_camera_go_on_above_a_box_that_begins_far_below_the_edge() -> None:
+    near = Box(label="person", probability=0.9, xmin=100, ymin=40, xmax=260, ymax=479)
+    m = measure(near, view_from(), depth_of(near, 0.55)).measured
+    assert m is not None
+    assert m.is_cut_above
+    dog = Box(label="person", probability=0.9, xmin=100, ymin=70, xmax=260, ymax=350)
+    m = measure(dog, view_from(), depth_of(dog, 1.0)).measured
+    assert m is not None
+    assert not m.is_cut_above
+
+
 def test_a_leg_too_near_to_be_measured_stands_beneath_the_picture() -> None:
     view = view_from()
     box = Box(label="person", probability=0.9, xmin=100, ymin=0, xmax=400, ymax=479)
@@ -173,6 +184,31 @@ def test_somebody_whose_feet_furniture_hides_is_where_depth_says() -> None:
     assert m is not None
     assert m.source == "depth"
     assert m.x == pytest.approx(2.5, abs=0.15)
+
+
+def test_somebody_who_comes_into_view_is_where_the_leg_is_and_not_the_wall() -> None:
+    view = view_from()
+    box = Box(label="person", probability=0.9, xmin=0, ymin=5, xmax=90, ymax=283)
+    metres = np.full((480, 640), 5.0, np.float32)
+    metres[90:283, :18] = 3.0  # a leg, behind which the box is empty
+    m = measure(box, view, Depth(metres, LENS)).measured
+    assert m is not None
+    assert m.away == pytest.approx(3.5, abs=0.3)  # along its bearing
+    assert m.source == "depth"
+
+
+def test_a_poster_behind_a_sofas_arm_is_flat_and_somebody_there_is_not() -> None:
+    view = view_from()
+    box = Box(label="person", probability=0.9, xmin=370, ymin=13, xmax=420, ymax=250)
+    rows, columns = np.mgrid[0:480, 0:640]
+    wall = (4.2 + 0.002 * (columns - 320)).astype(np.float32)
+    sofa = (rows > 150) & (columns > 400)
+    poster = np.where(sofa, 2.6, wall).astype(np.float32)
+    assert measure(box, view, Depth(poster, LENS)).measured.is_flat is True
+    aside = np.abs((columns - 395) / 25.0)
+    body = np.where((aside < 0.6) & (rows > 20), 3.6 + 0.2 * aside**2, wall)
+    somebody = np.where(sofa, 2.6, body).astype(np.float32)
+    assert measure(box, view, Depth(somebody, LENS)).measured.is_flat is False
 
 
 def test_a_box_without_width_is_left_alone() -> None:
