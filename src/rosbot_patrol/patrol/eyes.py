@@ -31,6 +31,9 @@ _SAME_DOUBT = 1.5  # boxes too far off to be measured that are nearer are of one
 _SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
 _CLOSE = 1.0  # so near one may come to what is half hidden [m]
 _BACK = 2.0, 4.5  # from there a person shows whole [m]
+_WHOLE = 1.7  # from so far off one who stands cannot be taken for a pet [m]
+_INSIDE = 0.1  # of the picture's edges a place must lie [rad]
+_BODY = 0.4  # in front of a place its own body may end a beam [m]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -61,6 +64,7 @@ class _Doubt:
     is_grave: bool = True  # without a second look nobody can say that nobody is there
     is_near: bool = False  # too near to be told from a pet
     is_visited: bool = False
+    looks: int = 0  # pictures that showed its place from farther off
 
     @property
     def text(self) -> str:
@@ -91,6 +95,7 @@ class Eyes:
         self._views = 0
         self._tried: list[tuple[float, float]] = []
         self._doubts: list[_Doubt] = []
+        self._too_near: list[Sighting] = []  # what nobody has told from a pet yet
 
     # -- Views
 
@@ -98,6 +103,7 @@ class Eyes:
         """Begin with a room; what earlier viewpoints showed before a restart is taken from the map."""
         self._mission, self.coverage, self._began = mission, None, None
         self._views, self._tried, self._doubts, self._has_eye = 0, [], [], False
+        self._too_near = []
         self._witness.start()
 
     def see(self, now: float, inputs: Inputs) -> None:
@@ -119,6 +125,8 @@ class Eyes:
             for box in frame.boxes:
                 if box.doubt is not None:
                     self._doubt(*box.doubt)
+            for doubt in self._doubts:
+                doubt.looks += doubt.is_near and _shows(frame.eye, sight, doubt)
 
     def suspect(self, doubtful: Sequence[Suspect]) -> None:
         """Look at what seems to be a person from another side."""
@@ -145,6 +153,7 @@ class Eyes:
         for doubt in self._doubts:
             if doubt.is_near and not any(_apart(doubt, thing) < _SAME_DOUBT for thing in doubtful):
                 doubt.is_visited = True
+        self._too_near = list(doubtful)
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """The best further viewpoint within the bounds."""
@@ -167,7 +176,6 @@ class Eyes:
         nearer = self._nearer(inputs)
         if nearer is not None:
             self._views += 1
-            log.info("%s: something like a person is to be looked at from near", mission.room.title)
             return nearer
         if not wanted.any():
             return None
@@ -211,6 +219,9 @@ class Eyes:
         doubts = [doubt for doubt in self._open_doubts() if doubt.is_grave]
         if doubts:
             return doubts[0].text
+        unsure = [thing for thing in self._too_near if not any(self._was_looked_at(d, thing) for d in self._doubts)]
+        if unsure:
+            return _Doubt(unsure[0].x, unsure[0].y, is_near=True).text
         share = self.share()
         if share is None or share >= self.params.clear_share:
             return ""
@@ -278,8 +289,19 @@ class Eyes:
             )
             if found is not None:
                 doubt.is_visited = True
+                log.info(
+                    "something like a person at (%.1f, %.1f) is to be looked at from (%.1f, %.1f)",
+                    doubt.x,
+                    doubt.y,
+                    found.pose.x,
+                    found.pose.y,
+                )
                 return found
         return None
+
+    def _was_looked_at(self, doubt: _Doubt, thing: Sighting) -> bool:
+        """Whether the place of what was too near was seen from farther off: if anybody was there, the watch knows."""
+        return doubt.is_near and doubt.looks >= self.params.coverage.seen_in and _apart(doubt, thing) < _SAME_DOUBT
 
     # -- parts
 
@@ -339,3 +361,12 @@ class Eyes:
 
 def _apart(doubt: _Doubt, thing: Sighting) -> float:
     return math.hypot(doubt.x - thing.x, doubt.y - thing.y)
+
+
+def _shows(eye: Eye, sight: Sight, doubt: _Doubt) -> bool:
+    """Whether a picture shows a place from as far off as a person shows whole."""
+    away = math.hypot(doubt.x - eye.pose.x, doubt.y - eye.pose.y)
+    bearing = math.atan2(doubt.y - eye.pose.y, doubt.x - eye.pose.x)
+    if not _WHOLE <= away <= _BACK[1] + 0.5 or abs(angle_difference(bearing, eye.pose.yaw)) > 0.5 * eye.width - _INSIDE:
+        return False
+    return bool(sight.reaches(np.array([bearing]), np.array([away - _BODY]))[0])

@@ -183,10 +183,12 @@ def _nearer(samples: NDArray[np.float64], most: float) -> float | None:
 def _upright(samples: NDArray[np.float64], least: float, most: float) -> float | None:
     """How far the upright thing is that lies between two distances [m], None where there is none.
 
-    A leg at the edge of a box, before a wall that fills it: little of the box, but most of its rows.
+    A leg at the edge of a box, before a wall that fills it: little of the box, but most of its rows, the upper ones
+    with them, where furniture that hides the feet has none.
     """
     is_between = (samples >= least) & (samples <= most)
-    if is_between.mean() < _BELIEVED or is_between.any(axis=1).mean() < _UPRIGHT_ROWS:
+    rows = is_between.any(axis=1)
+    if is_between.mean() < _BELIEVED or rows.mean() < _UPRIGHT_ROWS or not rows[: len(rows) // 3].any():
         return None
     return float(np.median(samples[is_between]))
 
