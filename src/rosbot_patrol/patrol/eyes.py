@@ -284,9 +284,12 @@ class Eyes:
             span = {"nearest": _BACK[0], "most": _BACK[1]} if doubt.is_near else {}
             if doubt.seen_from:
                 span = {"nearest": _CLOSE}
-            found = self._planner.near(
-                inputs.pose, doubt.x, doubt.y, stands=self._stands(inputs), seen_from=doubt.seen_from, **span
-            )
+            for stands in (self._stands(inputs), None):  # by the map alone: move_base gets through where we see no way
+                found = self._planner.near(
+                    inputs.pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, **span
+                )
+                if found is not None:
+                    break
             if found is not None:
                 doubt.is_visited = True
                 log.info(
@@ -300,7 +303,12 @@ class Eyes:
         return None
 
     def _was_looked_at(self, doubt: _Doubt, thing: Sighting) -> bool:
-        """Whether the place of what was too near was seen from farther off: if anybody was there, the watch knows."""
+        """Whether the place of what was too near was seen from farther off: if anybody was there, the watch knows.
+
+        Where something moves in the room, it may have gone.
+        """
+        if self._witness.text():
+            return False
         return doubt.is_near and doubt.looks >= self.params.coverage.seen_in and _apart(doubt, thing) < _SAME_DOUBT
 
     # -- parts

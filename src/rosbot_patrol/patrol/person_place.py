@@ -33,6 +33,7 @@ _GRID = 48  # samples along each side of a box, at most
 _FLAT_SHARE = 0.92  # of the samples lie in a picture's plane
 _BELIEVED = 0.05  # of a box's samples speak for the nearer thing
 _UPRIGHT_ROWS = 0.5  # of the rows show one who stands
+_CHEST = 0.45  # of a box, from above, show head and chest
 _BEFORE_SHARE = 0.35  # of a picture on the wall may be hidden
 _NOISE = 0.003  # of a depth camera, at 1 m; it grows with the square [m]
 
@@ -208,7 +209,7 @@ def _is_flat(samples: NDArray[np.float64]) -> bool | None:
     rows, columns = np.nonzero(is_known)
     metres = samples[rows, columns]
     terms = np.column_stack((rows, columns, np.ones(len(rows)))).astype(np.float64)
-    is_chest = (rows < 0.6 * high) & (columns >= wide // 8) & (columns < wide - wide // 8)
+    is_chest = (rows < _CHEST * high) & (columns >= wide // 8) & (columns < wide - wide // 8)
     kept: NDArray[np.bool_] = is_chest
     fitted: Array = metres
     bound = np.maximum(0.03, 3.0 * _NOISE * metres**2)
