@@ -264,7 +264,7 @@ class Eyes:
         self._doubts.append(_Doubt(x, y))
 
     def _open_doubts(self) -> list[_Doubt]:
-        """Those of the mission's room, seen in some pictures, that were not looked at from near."""
+        """Those seen in some pictures and not looked at again: of the mission's room, or right before the robot."""
         house, mission = self._house, self._mission
         if house is None or mission is None:
             return []
@@ -273,7 +273,7 @@ class Eyes:
             for doubt in self._doubts
             if not doubt.is_visited
             and doubt.pictures >= self.params.coverage.seen_in
-            and house.room_at(doubt.x, doubt.y) == mission.room.id
+            and (doubt.is_near or house.room_at(doubt.x, doubt.y) == mission.room.id)
         ]
 
     def _nearer(self, inputs: Inputs) -> Viewpoint | None:
