@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.geometry import Pose2D
+
 Array = NDArray[np.float64]
 
 
@@ -40,6 +42,14 @@ class LaserScan:
         """Which beams measured something, shape (N,)."""
         with np.errstate(invalid="ignore"):
             return np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
+
+
+@dataclass(frozen=True)
+class Mount:
+    """How the laser sits on the robot: its pose, and whether it hangs upside down."""
+
+    pose: Pose2D = Pose2D()
+    is_upside_down: bool = False
 
 
 def scan_points(scan: LaserScan) -> Array:

@@ -20,19 +20,11 @@ from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances, obstac
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan import LaserScan, Mount
 
 Array = NDArray[np.float64]
 
 CONVERGED_M = 0.5  # upstream's
-
-
-@dataclass(frozen=True)
-class Mount:
-    """How the laser sits on the robot: the direction of its x axis, and whether it hangs upside down."""
-
-    pose: Pose2D = Pose2D()
-    is_upside_down: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Simultaneous localisation and mapping: a Rao-Blackwellised particle filter with grid maps."""

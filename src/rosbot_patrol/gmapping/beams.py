@@ -1,0 +1,63 @@
+"""The beams of a scan that count, in the robot's frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.scan import LaserScan, Mount
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Beams:
+    """Beams that hit something or showed that nothing is there.
+
+    Attributes:
+        ends: where they end, or are cut at the usable range, in the robot's frame [m], shape (K, 2).
+        directions: unit vectors from the sensor, shape (K, 2).
+        is_hit: whether the end is a wall, shape (K,).
+        sensor: place of the sensor in the robot's frame [m], shape (2,).
+    """
+
+    ends: Array
+    directions: Array
+    is_hit: NDArray[np.bool_]
+    sensor: Array
+
+    @property
+    def hits(self) -> Array:
+        """Ends and directions of the beams that hit, shape (H, 4)."""
+        return np.ascontiguousarray(np.hstack((self.ends[self.is_hit], self.directions[self.is_hit])))
+
+    @property
+    def reach(self) -> float:
+        """Farthest from the robot that a beam comes [m]."""
+        return float(np.hypot(*self.ends.T).max(initial=0.0))
+
+
+def pick_beams(scan: LaserScan, mount: Mount, params: GmappingParams) -> Beams:
+    """The beams that the parameters let through.
+
+    A beam that is no number or shorter than `range_min` says nothing. One that met nothing (inf, or `range_max` and
+    more) shows free space up to `maxUrange` where `maxRange` is set to `range_max` or more, and says nothing else.
+    """
+    longest = params.maxRange if params.maxRange > 0.0 else scan.range_max - 0.01
+    usable = min(params.maxUrange, longest) if params.maxUrange > 0.0 else longest
+    lengths = np.minimum(scan.ranges, scan.range_max)
+    with np.errstate(invalid="ignore"):
+        counts = (scan.ranges >= max(scan.range_min, 1e-6)) & (lengths <= longest)
+    lengths = lengths[counts]
+    is_miss = (scan.ranges[counts] >= scan.range_max) | (lengths >= usable)
+    angles = scan.angles[counts]
+    if mount.is_upside_down:
+        angles = -angles
+    angles = angles + mount.pose.yaw
+    directions = np.column_stack((np.cos(angles), np.sin(angles)))
+    sensor = np.array([mount.pose.x, mount.pose.y])
+    ends = sensor + np.minimum(lengths, usable)[:, None] * directions
+    return Beams(ends=ends, directions=directions, is_hit=~is_miss, sensor=sensor)

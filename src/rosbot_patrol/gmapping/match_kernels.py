@@ -1,0 +1,355 @@
+"""Where in its map a scan fits best: a search from the odometry's guess, refined by Gauss-Newton, and how sure that is.
+
+The objective is the sum over the beams of exp(-d2 / sigma), d the distance of a beam's end to the nearest wall cell's
+mean within a few cells (the score of Grisetti, Stachniss, Burgard 2007 as gmapping takes it: the cell before the end,
+seen from the sensor, must be no wall), and the odometry's Gaussian as a prior. The refinement measures the distance
+across the wall where the wall forms a line, so that a corridor holds a scan only across it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.gmapping.tile_kernels import BITS, FULL, MASK, MEAN_X, MEAN_Y, NORMAL, is_wall, wall_at
+from rosbot_patrol.kernels import kernel
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int32]
+Cells = NDArray[np.uint16]
+
+FREE_RATIO = 1.4143  # cells before a beam's end where the cell must be free
+NULL = 0.5  # squared distance [m2] that a beam which found no wall counts as
+MOST_MOVES = 200
+LOSS = 0.95  # a refinement that brings less than this share of the score before is not taken
+
+
+@kernel()
+def nearest_wall(
+    table: Table, cells: Cells, gx: float, gy: float, back_x: float, back_y: float, reach: int
+) -> tuple[float, float, float, int]:
+    """The nearest wall cell's mean within `reach` cells of a beam's end.
+
+    Args:
+        table: of the map.
+        cells: of all maps.
+        gx: the end [cells].
+        gy: likewise.
+        back_x: from the end back to the place that must be free [cells].
+        back_y: likewise.
+        reach: how many cells to look to each side.
+
+    Returns:
+        Squared distance [cells2], -1 where there is none; from the mean to the end in x and y; its NORMAL.
+    """
+    ix, iy = math.floor(gx), math.floor(gy)
+    free_x, free_y = math.floor(gx + back_x) - ix, math.floor(gy + back_y) - iy
+    best, best_x, best_y, normal = 1e300, 0.0, 0.0, 0
+    height, width = table.shape
+    for y in range(iy - reach, iy + reach + 1):
+        ty = y >> BITS
+        if ty < 0 or ty >= height:
+            continue
+        for x in range(ix - reach, ix + reach + 1):
+            tx = x >> BITS
+            if tx < 0 or tx >= width or table[ty, tx] < 0:
+                continue
+            tile, cell = table[ty, tx], ((y & MASK) << BITS) + (x & MASK)
+            if not is_wall(cells, tile, cell):
+                continue
+            dx = gx - x - cells[tile, cell, MEAN_X] / FULL
+            dy = gy - y - cells[tile, cell, MEAN_Y] / FULL
+            d2 = dx * dx + dy * dy
+            if d2 < best and not wall_at(table, cells, x + free_x, y + free_y):
+                best, best_x, best_y, normal = d2, dx, dy, int(cells[tile, cell, NORMAL])
+    if best == 1e300:
+        return -1.0, 0.0, 0.0, 0
+    return best, best_x, best_y, normal
+
+
+@kernel()
+def score_of(
+    table: Table, cells: Cells, x: float, y: float, yaw: float, beams: Array, every: int, reach: int, sigma: float
+) -> float:
+    """Sum of exp(-d2 / sigma) over every so many-th beam."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    total = 0.0
+    for k in range(0, beams.shape[0], every):
+        bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
+        d2, _, _, _ = nearest_wall(
+            table, cells, x + c * bx - s * by, y + s * bx + c * by, c * ux - s * uy, s * ux + c * uy, reach
+        )
+        if d2 >= 0.0:
+            total += math.exp(-d2 / sigma)
+    return total
+
+
+@kernel()
+def log_likelihood_of(
+    table: Table, cells: Cells, pose: Array, beams: Array, every: int, reach: int, sigma: float, null: float
+) -> float:
+    """Sum of -d2 / sigma over every so many-th beam, `null` / sigma for each that finds no wall."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    total = 0.0
+    for k in range(0, beams.shape[0], every):
+        bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
+        d2, _, _, _ = nearest_wall(
+            table, cells, pose[0] + c * bx - s * by, pose[1] + s * bx + c * by, c * ux - s * uy, s * ux + c * uy, reach
+        )
+        total -= (d2 if d2 >= 0.0 else null) / sigma
+    return total
+
+
+@kernel()
+def prior_cost(dx: float, dy: float, turn: float, prior: Array) -> float:
+    """Half the squared Mahalanobis distance from the odometry's guess; `prior` is its information, shape (3, 3)."""
+    return 0.5 * (
+        prior[0, 0] * dx * dx + 2.0 * prior[0, 1] * dx * dy + prior[1, 1] * dy * dy + prior[2, 2] * turn * turn
+    )
+
+
+@kernel()
+def climb(
+    table: Table,
+    cells: Cells,
+    pose: Array,
+    beams: Array,
+    prior: Array,
+    lstep: float,
+    astep: float,
+    halvings: int,
+    every: int,
+    reach: int,
+    sigma: float,
+    gain: float,
+) -> None:
+    """Move a pose (in place) by steps to the side that fits best, and halve the steps where none does.
+
+    Args:
+        table: of the map.
+        cells: of all maps.
+        pose: x, y [cells], yaw; the odometry's guess before, shape (3,).
+        beams: see `match_particles`.
+        prior: information of the guess, shape (3, 3).
+        lstep: first step [cells].
+        astep: first turn [rad].
+        halvings: how often the steps are halved.
+        every: use every so many-th beam.
+        reach: of `nearest_wall`.
+        sigma: of `score_of`.
+        gain: what a beam's score counts against the prior.
+    """
+    x0, y0, yaw0 = pose[0], pose[1], pose[2]
+    best = gain * every * score_of(table, cells, x0, y0, yaw0, beams, every, reach, sigma)
+    level = 0
+    for _ in range(MOST_MOVES):
+        bx, by, byaw, found = pose[0], pose[1], pose[2], False
+        for move in range(6):
+            x, y, yaw = pose[0], pose[1], pose[2]
+            step = 1.0 if move % 2 == 0 else -1.0
+            if move < 2:
+                x += step * lstep
+            elif move < 4:
+                y += step * lstep
+            else:
+                yaw += step * astep
+            value = gain * every * score_of(table, cells, x, y, yaw, beams, every, reach, sigma)
+            value -= prior_cost(x - x0, y - y0, yaw - yaw0, prior)
+            if value > best:
+                best, bx, by, byaw, found = value, x, y, yaw, True
+        pose[0], pose[1], pose[2] = bx, by, byaw
+        if found:
+            continue
+        level += 1
+        if level > halvings:
+            return
+        lstep *= 0.5
+        astep *= 0.5
+
+
+@kernel()
+def factorise(a: Array, lower: Array) -> None:
+    """Cholesky: a = lower @ lower.T, shapes (3, 3); `a` is positive definite."""
+    lower[:] = 0.0
+    for i in range(3):
+        for j in range(i + 1):
+            total = a[i, j]
+            for k in range(j):
+                total -= lower[i, k] * lower[j, k]
+            lower[i, j] = math.sqrt(max(total, 1e-12)) if i == j else total / lower[j, j]
+
+
+@kernel()
+def solve_upper(lower: Array, v: Array) -> None:
+    """Solve lower.T @ x = v in place, v of shape (3,)."""
+    for i in range(2, -1, -1):
+        for k in range(i + 1, 3):
+            v[i] -= lower[k, i] * v[k]
+        v[i] /= lower[i, i]
+
+
+@kernel()
+def solve(lower: Array, v: Array) -> None:
+    """Solve lower @ lower.T @ x = v in place, v of shape (3,)."""
+    for i in range(3):
+        for k in range(i):
+            v[i] -= lower[i, k] * v[k]
+        v[i] /= lower[i, i]
+    solve_upper(lower, v)
+
+
+@kernel()
+def add_beams(
+    table: Table, cells: Cells, pose: Array, beams: Array, reach: int, weight: float, information: Array, slope: Array
+) -> None:
+    """Add what the beams say to the normal equations of a pose: information (3, 3) and slope (3,)."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    a00, a01, a02, a11, a12, a22, g0, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(beams.shape[0]):
+        bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
+        rx, ry = c * bx - s * by, s * bx + c * by
+        d2, dx, dy, normal = nearest_wall(
+            table, cells, pose[0] + rx, pose[1] + ry, c * ux - s * uy, s * ux + c * uy, reach
+        )
+        if d2 < 0.0:
+            continue
+        if normal > 0:
+            angle = (normal - 1) * (math.pi / (FULL - 1))
+            nx, ny = math.cos(angle), math.sin(angle)
+            n00, n01, n11 = nx * nx, nx * ny, ny * ny
+            across = nx * dx + ny * dy
+            d2 = across * across
+        else:
+            n00, n01, n11 = 1.0, 0.0, 1.0
+        w = weight * math.exp(-0.5 * d2)
+        tx, ty = n00 * -ry + n01 * rx, n01 * -ry + n11 * rx  # N times the derivative by the turn
+        ex, ey = n00 * dx + n01 * dy, n01 * dx + n11 * dy
+        a00 += w * n00
+        a01 += w * n01
+        a11 += w * n11
+        a02 += w * tx
+        a12 += w * ty
+        a22 += w * (-ry * tx + rx * ty)
+        g0 += w * ex
+        g1 += w * ey
+        g2 += w * (-ry * ex + rx * ey)
+    information[0, 0] += a00
+    information[0, 1] += a01
+    information[1, 0] += a01
+    information[1, 1] += a11
+    information[0, 2] += a02
+    information[2, 0] += a02
+    information[1, 2] += a12
+    information[2, 1] += a12
+    information[2, 2] += a22
+    slope[0] += g0
+    slope[1] += g1
+    slope[2] += g2
+
+
+@kernel()
+def refine(
+    table: Table,
+    cells: Cells,
+    pose: Array,
+    guess: Array,
+    beams: Array,
+    prior: Array,
+    rounds: int,
+    reach: int,
+    weight: float,
+    lower: Array,
+) -> None:
+    """Gauss-Newton on the distances to the walls and the prior about `guess`.
+
+    Args:
+        table: of the map.
+        cells: of all maps.
+        pose: where to begin, changed in place, shape (3,).
+        guess: the odometry's, shape (3,).
+        beams: see `match_particles`.
+        prior: information of the guess, shape (3, 3).
+        rounds: most steps.
+        reach: of `nearest_wall`.
+        weight: information of one beam [1/cells2].
+        lower: becomes the Cholesky factor of the information at the last step, shape (3, 3).
+    """
+    information, slope = np.empty((3, 3)), np.empty(3)
+    for _ in range(rounds):
+        information[:] = prior
+        off_x, off_y, turn = pose[0] - guess[0], pose[1] - guess[1], pose[2] - guess[2]
+        for i in range(3):
+            slope[i] = prior[i, 0] * off_x + prior[i, 1] * off_y + prior[i, 2] * turn
+        add_beams(table, cells, pose, beams, reach, weight, information, slope)
+        factorise(information, lower)
+        solve(lower, slope)
+        way = math.hypot(slope[0], slope[1])
+        shrink = min(1.0, 1.0 / max(way, 1e-9), 0.05 / max(abs(slope[2]), 1e-9))
+        for i in range(3):
+            pose[i] -= shrink * slope[i]
+        if way < 2e-3 and abs(slope[2]) < 2e-5:
+            return
+
+
+@kernel(
+    "void(int32[:, :, ::1], uint16[:, :, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1],"
+    " float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1])"
+)
+def match_particles(
+    tables: Table,
+    cells: Cells,
+    guesses: Array,
+    beams: Array,
+    headings: Array,
+    deviation: Array,
+    noise: Array,
+    tuning: Array,
+    poses: Array,
+    fits: Array,
+) -> None:
+    """Match a scan into each particle's map and draw each pose from the Gaussian about the match.
+
+    Args:
+        tables: of the particles' maps, shape (N, TY, TX).
+        cells: of all maps.
+        guesses: the odometry's poses x, y [cells], yaw, shape (N, 3).
+        beams: ends x, y [cells] and direction in the robot's frame, shape (K, 4).
+        headings: before the move, shape (N,).
+        deviation: of the odometry's move ahead, to the left [cells] and in turning, shape (3,).
+        noise: standard normal numbers, shape (N, 3).
+        tuning: lstep [cells], astep, halvings, rounds, beams to skip in the search, reach, sigma, lsigma [cells2],
+            null [cells2], beams to skip in the likelihood, information of a beam [1/cells2], least score, shape (12,).
+        poses: becomes the drawn poses, shape (N, 3).
+        fits: becomes score (0 where the match failed), logarithm of the likelihood at the match and the match's x, y
+            [cells], yaw, shape (N, 5).
+    """
+    lstep, astep, halvings, rounds, every, reach_, sigma, lsigma, null, lskip, weight, least = tuning
+    reach = int(reach_)
+    gain = 0.5 * sigma * weight
+    lower, prior, pose, climbed, drawn = np.empty((3, 3)), np.zeros((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(guesses.shape[0]):
+        table = tables[i]
+        c, s = math.cos(headings[i]), math.sin(headings[i])
+        ahead, aside = 1.0 / deviation[0] ** 2, 1.0 / deviation[1] ** 2
+        prior[0, 0], prior[1, 1] = c * c * ahead + s * s * aside, s * s * ahead + c * c * aside
+        prior[0, 1] = prior[1, 0] = c * s * (ahead - aside)
+        prior[2, 2] = 1.0 / deviation[2] ** 2
+        pose[:] = guesses[i]
+        climb(table, cells, pose, beams, prior, lstep, astep, int(halvings), int(every), reach, sigma, gain)
+        climbed[:] = pose
+        refine(table, cells, pose, guesses[i], beams, prior, int(rounds), reach, weight, lower)
+        before = score_of(table, cells, climbed[0], climbed[1], climbed[2], beams, 1, reach, sigma)
+        score = score_of(table, cells, pose[0], pose[1], pose[2], beams, 1, reach, sigma)
+        if score < LOSS * before:
+            pose[:], score = climbed, before
+        if score <= least:
+            pose[:], score = guesses[i], 0.0
+            factorise(prior, lower)
+        fits[i, 0] = score
+        fits[i, 1] = log_likelihood_of(table, cells, pose, beams, int(lskip), reach, lsigma, null)
+        fits[i, 2:] = pose
+        drawn[:] = noise[i]
+        solve_upper(lower, drawn)
+        poses[i] = pose + drawn

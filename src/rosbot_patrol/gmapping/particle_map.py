@@ -1,0 +1,178 @@
+"""The maps of all particles: grids of 16 x 16 tiles, shared until a particle writes (copy on write)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.errors import MapError
+from rosbot_patrol.gmapping import tile_kernels as kernels
+from rosbot_patrol.gmapping.beams import Beams
+from rosbot_patrol.gmapping.tile_kernels import AREA, FIELDS, FULL, HITS, MEAN_X, MEAN_Y, TILE, VISITS
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.occupancy import FREE, OCCUPIED, UNKNOWN
+
+Array = NDArray[np.float64]
+
+PATCH = 32  # cells: upstream rounds the first extent down to so many
+MARGIN = 10.0  # m that a map grows by
+GROWTH = 1.25
+SEED_BEAMS = 20  # what a cell of a saved map counts as
+
+
+class ParticleMaps:
+    """One map for each particle.
+
+    Args:
+        lows: lower left corner of the first extent [m].
+        highs: upper right corner [m].
+        resolution: edge of a cell [m].
+        count: number of particles.
+
+    Raises:
+        MapError: the extent makes no sense.
+    """
+
+    def __init__(self, lows: tuple[float, float], highs: tuple[float, float], resolution: float, count: int) -> None:
+        sizes = [(high - low) / resolution for low, high in zip(lows, highs, strict=True)]
+        if not all(math.isfinite(size) and 1.0 <= size <= 1e5 for size in sizes):
+            raise MapError(
+                "map",
+                f"an extent from {lows} to {highs} m makes no sense, expected xmin < xmax and ymin < ymax,"
+                " 100000 cells at most to a side",
+            )
+        self.resolution = resolution
+        self.origin = np.array(lows, dtype=np.float64)
+        columns, rows = (max(int(size) // PATCH, 1) * PATCH // TILE for size in sizes)
+        self.tables = np.full((count, rows, columns), -1, dtype=np.int32)
+        self.cells = np.zeros((0, AREA, FIELDS), dtype=np.uint16)
+        self.refs = np.zeros(0, dtype=np.int32)
+        self.free = np.zeros(1, dtype=np.int32)
+
+    @property
+    def count(self) -> int:
+        """Number of maps."""
+        return len(self.tables)
+
+    @property
+    def tiles_used(self) -> int:
+        """Tiles that hold something."""
+        return len(self.refs) - int(self.free[0])
+
+    @property
+    def info(self) -> GridInfo:
+        """Place and size of the maps."""
+        _, rows, columns = self.tables.shape
+        return GridInfo(
+            resolution=self.resolution,
+            width=columns * TILE,
+            height=rows * TILE,
+            origin_x=float(self.origin[0]),
+            origin_y=float(self.origin[1]),
+        )
+
+    def to_cells(self, poses: Array) -> Array:
+        """Poses with their place in cells from the lower left corner, shape (N, 3)."""
+        moved = np.array(poses, dtype=np.float64)
+        moved[:, :2] = (moved[:, :2] - self.origin) / self.resolution
+        return moved
+
+    def from_cells(self, poses: Array) -> Array:
+        """The way back."""
+        moved = np.array(poses, dtype=np.float64)
+        moved[:, :2] = moved[:, :2] * self.resolution + self.origin
+        return moved
+
+    def register(self, poses: Array, beams: Beams) -> None:
+        """Write a scan into each map, seen from that particle's pose; poses of shape (N, 3) [m, rad]."""
+        self._cover(poses, beams.reach)
+        placed = self.to_cells(poses)
+        for table, (x, y, yaw) in zip(self.tables, placed, strict=True):
+            c, s = math.cos(yaw), math.sin(yaw)
+            turn = np.array([[c, s], [-s, c]]) / self.resolution
+            ends = beams.ends @ turn + (x, y)
+            self._write(table, beams.sensor @ turn + (x, y), ends, beams.is_hit)
+            kernels.find_normals(table, self.cells, ends, beams.is_hit)
+
+    def _write(self, table: NDArray[np.int32], start: Array, ends: Array, is_hit: NDArray[np.bool_]) -> None:
+        done = 0
+        while done < len(ends):
+            arguments = (table, self.cells, self.refs, self.free, start, ends, is_hit, done)
+            done = kernels.register_beams(*arguments)
+            if done < len(ends):
+                longest = np.abs(ends - start).sum(axis=1).max()
+                self._grow(2 * (int(longest) // TILE + 4))
+
+    def _grow(self, least: int) -> None:
+        """More unused tiles."""
+        old, unused = len(self.refs), int(self.free[0])
+        new = int(old * GROWTH) + max(least, 256)
+        self.cells.resize((new, AREA, FIELDS), refcheck=False)  # in place where the system can
+        self.refs.resize(new, refcheck=False)
+        self.free.resize(new + 1, refcheck=False)
+        self.free[1 + unused : 1 + unused + new - old] = np.arange(new - 1, old - 1, -1)
+        self.free[0] = unused + new - old
+
+    def _cover(self, poses: Array, reach: float) -> None:
+        """Grow the tables so that scans from these poses lie within."""
+        _, rows, columns = self.tables.shape
+        edge = TILE * self.resolution
+        far = reach + 2.0 * self.resolution
+        low = np.floor((poses[:, :2].min(axis=0) - far - self.origin) / edge)
+        high = np.floor((poses[:, :2].max(axis=0) + far - self.origin) / edge)
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            raise MapError("map", "a pose is not finite")
+        margin = math.ceil(MARGIN / edge)
+        before = [int(margin - v) if v < 0 else 0 for v in low]
+        after = [int(v - size + 1 + margin) if v >= size else 0 for v, size in zip(high, (columns, rows), strict=True)]
+        if any(before) or any(after):
+            pads = ((0, 0), (before[1], after[1]), (before[0], after[0]))
+            self.tables = np.pad(self.tables, pads, constant_values=-1)
+            self.origin = self.origin - np.array(before) * edge
+
+    def select(self, indices: NDArray[np.int64]) -> None:
+        """Keep the maps of these particles, some several times, others not."""
+        self.tables = np.ascontiguousarray(self.tables[indices])
+        kernels.count_references(self.tables, self.refs, self.free)
+
+    def grid(self, index: int, threshold: float) -> Grid:
+        """One map as int8 cells: 100 where more than `threshold` of the beams ended, 0 where fewer, -1 unknown."""
+        info = self.info
+        out = np.empty(info.shape, dtype=np.int8)
+        kernels.render(self.tables[index], self.cells, threshold, out)
+        return Grid(info, out)
+
+    def seed(self, grid: Grid) -> None:
+        """Begin all maps with a saved one.
+
+        Raises:
+            MapError: it is turned, or its cells are of another size.
+        """
+        grid.info.require_aligned("slam_gmapping")
+        if abs(grid.info.resolution / self.resolution - 1.0) > 1e-3:
+            raise MapError("map", f"its cells are {grid.info.resolution} m, expected delta, {self.resolution} m")
+        edge = TILE * self.resolution
+        corner = np.array([grid.info.origin_x, grid.info.origin_y])
+        first = np.floor((corner - self.origin) / edge + 1e-6)
+        self.origin = corner - first * edge  # a whole number of tiles from the saved map's corner
+        centre = corner + 0.5 * np.array(grid.info.size)
+        self._cover(np.array([[*centre, 0.0]]), 0.5 * max(grid.info.size))
+        tx, ty = np.rint((corner - self.origin) / edge).astype(int)
+        height, width = (-(-n // TILE) * TILE for n in grid.cells.shape)
+        cells = np.full((height, width), UNKNOWN, dtype=np.int8)
+        cells[: grid.cells.shape[0], : grid.cells.shape[1]] = grid.cells
+        blocks = cells.reshape(height // TILE, TILE, width // TILE, TILE).swapaxes(1, 2).reshape(-1, AREA)
+        shown = np.flatnonzero((blocks != UNKNOWN).any(axis=1))
+        self._grow(len(shown))
+        tiles = self.free[int(self.free[0]) - np.arange(len(shown))]
+        ys, xs = np.divmod(shown, width // TILE)
+        self.tables[:, ty + ys, tx + xs] = tiles
+        known = blocks[shown]
+        self.cells[tiles] = 0
+        self.cells[tiles, :, VISITS] = np.where((known == FREE) | (known == OCCUPIED), SEED_BEAMS, 0)
+        self.cells[tiles, :, HITS] = np.where(known == OCCUPIED, SEED_BEAMS, 0)
+        self.cells[tiles, :, MEAN_X] = self.cells[tiles, :, MEAN_Y] = FULL // 2
+        kernels.find_all_normals(self.tables[0], self.cells)
+        kernels.count_references(self.tables, self.refs, self.free)

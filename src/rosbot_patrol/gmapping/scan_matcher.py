@@ -1,0 +1,101 @@
+"""Matches scans into the particles' maps and draws their poses from the improved proposal.
+
+Grisetti, Stachniss, Burgard: Improved techniques for grid mapping with Rao-Blackwellized particle filters (2007). The
+Gaussian of the proposal is taken from the curvature at the match and the odometry's prior, not from samples about it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.gmapping import match_kernels as kernels
+from rosbot_patrol.gmapping.beams import Beams
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.gmapping.particle_map import ParticleMaps
+
+Array = NDArray[np.float64]
+
+SEARCH_BEAMS = 90  # about so many beams take part in the search
+HALVINGS = 2  # of the search's steps; the refinement does the rest
+INDEPENDENT = 90  # beams beyond these say nothing new about the pose: their errors hang together
+
+
+@dataclass(frozen=True)
+class Matches:
+    """What a scan says about each particle.
+
+    Attributes:
+        poses: drawn from the proposal, shape (N, 3).
+        modes: where the scan fits best, shape (N, 3).
+        scores: of the matches, 0 where one failed, shape (N,).
+        log_likelihoods: of the scan there, shape (N,).
+    """
+
+    poses: Array
+    modes: Array
+    scores: Array
+    log_likelihoods: Array
+
+
+class ScanMatcher:
+    """Matches scans by the parameters of gmapping.
+
+    Args:
+        params: of slam_gmapping.
+    """
+
+    def __init__(self, params: GmappingParams) -> None:
+        self._params = params
+
+    def match(
+        self, maps: ParticleMaps, guesses: Array, headings: Array, beams: Beams, deviation: Array, noise: Array
+    ) -> Matches:
+        """Match a scan into each particle's map.
+
+        Args:
+            maps: of the particles.
+            guesses: the odometry's poses [m, rad], shape (N, 3).
+            headings: of the particles before the move [rad], shape (N,).
+            beams: of the scan.
+            deviation: of the odometry's move ahead, to the left [m] and in turning [rad], shape (3,).
+            noise: standard normal numbers, shape (N, 3).
+        """
+        hits = beams.hits
+        hits[:, :2] /= maps.resolution
+        sigmas = deviation / np.array([maps.resolution, maps.resolution, 1.0])
+        poses, fits = np.empty_like(guesses), np.empty((len(guesses), 5))
+        kernels.match_particles(
+            maps.tables,
+            maps.cells,
+            maps.to_cells(guesses),
+            hits,
+            np.ascontiguousarray(headings),
+            sigmas,
+            noise,
+            self._tuning(len(hits), maps.resolution),
+            poses,
+            fits,
+        )
+        return Matches(maps.from_cells(poses), maps.from_cells(fits[:, 2:]), fits[:, 0], fits[:, 1])
+
+    def _tuning(self, beams: int, resolution: float) -> Array:
+        p, area = self._params, resolution * resolution
+        return np.array(
+            [
+                p.lstep / resolution,
+                p.astep,
+                min(p.iterations, HALVINGS),
+                2 * p.iterations,
+                max(beams // SEARCH_BEAMS, 1),
+                p.kernelSize,
+                p.sigma / area,
+                p.lsigma / area,
+                kernels.NULL / area,
+                p.lskip + 1,
+                1.0 / max(1.0, beams / INDEPENDENT),
+                p.minimumScore,
+            ]
+        )

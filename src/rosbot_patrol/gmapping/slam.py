@@ -1,0 +1,233 @@
+"""slam_gmapping without ROS: fed with odometry and scans, it says where the robot is and what the house looks like.
+
+A Rao-Blackwellised particle filter with improved proposals and adaptive resampling (Grisetti, Stachniss, Burgard 2007).
+The decisions are upstream's: an update once the robot drove `linearUpdate` or turned `angularUpdate` in all, or after
+`temporalUpdate`; resampling where the effective share of the particles is less than `resampleThreshold`; the map is
+that of the particle whose line gathered the most likelihood.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert, wrap_angle
+from rosbot_patrol.gmapping.beams import Beams, pick_beams
+from rosbot_patrol.gmapping.motion_model import move_deviation, move_poses
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.gmapping.particle_map import ParticleMaps
+from rosbot_patrol.gmapping.scan_matcher import ScanMatcher
+from rosbot_patrol.gmapping.trajectories import Trajectories
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.scan import LaserScan, Mount
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+JUMP_M, JUMP_SPEED = 1.0, 5.0  # odometry that moves farther than this and faster is a restart, not a motion
+RESTART_S = 1.0  # time that goes back by more than this is a restart; by less, scans came out of order
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one scan brought.
+
+    Attributes:
+        updated: the maps were written.
+        resampled: the particles were drawn anew.
+        failed: particles whose scan match failed and who followed the odometry.
+        is_blind: the robot moved, but no beam of the scan measured anything.
+        effective: effective number of particles at this update.
+    """
+
+    updated: bool = False
+    resampled: bool = False
+    failed: int = 0
+    is_blind: bool = False
+    effective: float = 0.0
+
+
+class Slam:
+    """Maps the surroundings of one robot.
+
+    Args:
+        params: of slam_gmapping.
+        saved: a map to go on with, None for an empty one.
+        start: where the robot is on it; None: where the odometry says.
+
+    Raises:
+        MapError: the extent or the saved map makes no sense.
+    """
+
+    def __init__(self, params: GmappingParams, *, saved: Grid | None = None, start: Pose2D | None = None) -> None:
+        self._params = params
+        self._rng = np.random.default_rng(params.seed)
+        p = params
+        self.maps = ParticleMaps((p.xmin, p.ymin), (p.xmax, p.ymax), p.delta, p.particles)
+        if saved is not None:
+            self.maps.seed(saved)
+        self._has_map = saved is not None
+        self._start = start
+        self._matcher = ScanMatcher(params)
+        self._trajectories = Trajectories()
+        self.poses: Array = np.empty((0, 3))
+        self._log_weights = np.zeros(p.particles)  # since the last resampling
+        self._totals = np.zeros(p.particles)  # of the whole line
+        self._odometry: Pose2D | None = None  # at the last scan
+        self._updated_at = Pose2D()  # odometry at the last update
+        self._way = self._turn = 0.0
+        self._stamp = self._updated_stamp = -math.inf
+        self.stamps: list[float] = []  # of the updates
+        self.map_from_odom: Pose2D | None = None
+
+    @property
+    def best(self) -> int:
+        """The particle whose line gathered the most likelihood."""
+        return int(np.argmax(self._totals))
+
+    @property
+    def weights(self) -> Array:
+        """Of the particles, adding up to 1, shape (N,)."""
+        gain = 1.0 / (self._params.ogain * self._params.particles)
+        weights = np.exp(gain * (self._log_weights - self._log_weights.max()))
+        return np.asarray(weights / weights.sum())
+
+    @property
+    def entropy(self) -> float:
+        """Of the particles' weights: 0 where one is right for sure, log(N) where none is better than another."""
+        weights = self.weights
+        return float(-np.sum(weights * np.log(np.maximum(weights, 1e-300))))
+
+    @property
+    def trajectory(self) -> Array:
+        """The best particle's pose at each update, shape (U, 3)."""
+        return self._trajectories.of(self.best)
+
+    def grid(self) -> Grid:
+        """The best particle's map, int8 cells (-1 unknown, 0 free, 100 occupied)."""
+        return self.maps.grid(self.best, self._params.occ_thresh)
+
+    def update(self, scan: LaserScan, odom_from_base: Pose2D, mount: Mount) -> Outcome:
+        """Take in a scan and the odometry at its time.
+
+        Args:
+            scan: one sweep.
+            odom_from_base: the robot in the odometry's frame at the scan's stamp.
+            mount: how the laser sits on the robot.
+        """
+        beams = pick_beams(scan, mount, self._params)
+        if self._odometry is None:
+            return self._begin(scan.stamp, odom_from_base, beams)
+        self._check_restart(scan.stamp, odom_from_base)
+        self._way += math.hypot(odom_from_base.x - self._odometry.x, odom_from_base.y - self._odometry.y)
+        self._turn += abs(angle_difference(odom_from_base.yaw, self._odometry.yaw))
+        self._odometry, self._stamp = odom_from_base, scan.stamp
+        if not self._is_due():
+            return Outcome()
+        move = compose(invert(self._updated_at), odom_from_base)
+        outcome = self._step(move, beams)
+        self._note(scan.stamp, odom_from_base)
+        return outcome
+
+    def _begin(self, stamp: float, odometry: Pose2D, beams: Beams) -> Outcome:
+        if not beams.is_hit.any():
+            return Outcome(is_blind=True)
+        first = odometry if self._start is None else self._start
+        self.poses = np.tile(np.array(first, dtype=np.float64), (self._params.particles, 1))
+        self._odometry = self._updated_at = odometry
+        if self._has_map:
+            return self._resume(stamp, odometry, beams)
+        self.maps.register(self.poses, beams)
+        self._trajectories.add(self.poses, np.arange(len(self.poses)))
+        self._note(stamp, odometry)
+        return Outcome(updated=True, effective=float(len(self.poses)))
+
+    def _resume(self, stamp: float, odometry: Pose2D, beams: Beams) -> Outcome:
+        """The first scan on a saved map is matched, from anywhere near the start."""
+        outcome = self._step(Pose2D(), beams, deviation=np.array([0.25, 0.25, 0.25]))
+        self._note(stamp, odometry)
+        return outcome
+
+    def _is_due(self) -> bool:
+        p = self._params
+        elapsed = self._stamp - self._updated_stamp
+        return (
+            self._way >= p.linearUpdate
+            or self._turn >= p.angularUpdate
+            or (p.temporalUpdate >= 0.0 and elapsed > p.temporalUpdate)
+        )
+
+    def _step(self, move: Pose2D, beams: Beams, deviation: Array | None = None) -> Outcome:
+        """Move, match, weigh, resample, write."""
+        sigmas = move_deviation(move, self._params) if deviation is None else deviation
+        noise = self._rng.standard_normal((len(self.poses), 3))
+        guesses, headings = move_poses(self.poses, move), self.poses[:, 2]
+        if not beams.is_hit.any():
+            self.poses = move_poses(guesses, Pose2D())
+            self.poses += _in_map(noise * sigmas, headings)
+            self._trajectories.add(self.poses, np.arange(len(self.poses)))
+            return Outcome(updated=True, is_blind=True)
+        found = self._matcher.match(self.maps, guesses, headings, beams, sigmas, noise)
+        self.poses = found.poses
+        self._log_weights += found.log_likelihoods
+        self._totals += found.log_likelihoods
+        parents, effective = self._resample_when_due()
+        self.maps.register(self.poses, beams)
+        self._trajectories.add(self.poses, parents)
+        failed = int(np.count_nonzero(found.scores <= self._params.minimumScore))
+        resampled = effective < self._params.resampleThreshold * len(self.poses)
+        return Outcome(updated=True, resampled=resampled, failed=failed, effective=effective)
+
+    def _resample_when_due(self) -> tuple[NDArray[np.int64], float]:
+        """Which particle each goes on from, and how many were effective."""
+        weights = self.weights
+        count = len(weights)
+        effective = float(1.0 / np.sum(weights**2))
+        parents = np.arange(count)
+        if effective < self._params.resampleThreshold * count:
+            steps = (np.arange(count) + self._rng.random()) / count
+            parents = np.minimum(np.searchsorted(np.cumsum(weights), steps), count - 1)
+            self.poses = self.poses[parents]
+            self._totals = self._totals[parents]
+            self._log_weights = np.zeros(count)
+            self.maps.select(parents)
+        return parents, effective
+
+    def _note(self, stamp: float, odometry: Pose2D) -> None:
+        """An update is done."""
+        self._updated_at, self._updated_stamp, self._stamp = odometry, stamp, stamp
+        self._way = self._turn = 0.0
+        self.stamps.append(stamp)
+        self._correct()
+
+    def _correct(self) -> None:
+        x, y, yaw = self.poses[self.best].tolist()
+        self.map_from_odom = compose(Pose2D(x, y, wrap_angle(yaw)), invert(self._updated_at))
+
+    def _check_restart(self, stamp: float, odometry: Pose2D) -> None:
+        """Where time or odometry jumped, go on from here without believing the jump."""
+        assert self._odometry is not None
+        elapsed = stamp - self._stamp
+        way = math.hypot(odometry.x - self._odometry.x, odometry.y - self._odometry.y)
+        if elapsed < -RESTART_S:
+            log.warning("time went back by %.3f s: going on from the last pose", -elapsed)
+        elif way > JUMP_M + JUMP_SPEED * abs(elapsed):
+            log.warning("the odometry jumped by %.2f m in %.2f s: taken as its restart, not as a motion", way, elapsed)
+        else:
+            return
+        last = compose(invert(self._updated_at), self._odometry)  # moved since the last update
+        self._odometry = odometry
+        self._updated_at = compose(odometry, invert(last))
+        self._updated_stamp = stamp
+        self._correct()
+
+
+def _in_map(errors: Array, headings: Array) -> Array:
+    """Errors ahead, to the left and in turning, turned to the map's axes, shape (N, 3)."""
+    c, s = np.cos(headings), np.sin(headings)
+    return np.column_stack((c * errors[:, 0] - s * errors[:, 1], s * errors[:, 0] + c * errors[:, 1], errors[:, 2]))

@@ -1,0 +1,241 @@
+"""Cells of many maps in tiles of 16 x 16 that the maps share until one of them writes.
+
+A map is a table of tile numbers, shape (TY, TX), -1 where nothing was seen yet. All maps take their tiles from one
+array `cells` of shape (T, 256, 5). Of each cell it keeps
+
+    HITS     beams that ended here
+    VISITS   beams that ended here or went through
+    MEAN_X   mean place of the ends within the cell, in 1/65535 of its edge
+    MEAN_Y   likewise
+    NORMAL   direction across the wall here, 0 to pi as 1 to 65535; 0 where the ends form no line
+
+`refs` counts the maps that use a tile, shape (T,). `free` is a stack of unused tiles: free[0] of them, their numbers
+follow, shape (T + 1,). Coordinates are in cells from the lower left corner of the table.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.kernels import kernel
+
+Array = NDArray[np.float64]
+Table = NDArray[np.int32]
+Cells = NDArray[np.uint16]
+
+BITS, TILE, MASK, AREA = 4, 16, 15, 256
+HITS, VISITS, MEAN_X, MEAN_Y, NORMAL, FIELDS = 0, 1, 2, 3, 4, 5
+FULL = 65535
+FULL_SHARE = 10  # a cell is taken for a wall where more than one in so many beams ended in it
+LINE = 0.15  # ends form a line where their spread across it is less than this share of that along it
+
+
+@kernel()
+def is_wall(cells: Cells, tile: int, cell: int) -> bool:
+    """Whether a cell counts as a wall for the matching of scans."""
+    hits = int(cells[tile, cell, HITS])
+    return hits > 0 and hits * FULL_SHARE > int(cells[tile, cell, VISITS])
+
+
+@kernel()
+def wall_at(table: Table, cells: Cells, x: int, y: int) -> bool:
+    """The same for the cell of column x and row y, which may lie anywhere."""
+    tx, ty = x >> BITS, y >> BITS
+    if tx < 0 or ty < 0 or ty >= table.shape[0] or tx >= table.shape[1]:
+        return False
+    tile = table[ty, tx]
+    return tile >= 0 and is_wall(cells, tile, ((y & MASK) << BITS) + (x & MASK))
+
+
+@kernel()
+def own_tile(table: Table, cells: Cells, refs: Table, free: Table, ty: int, tx: int) -> int:
+    """A tile of the table that no other map uses: fresh, or a copy of the shared one."""
+    tile = table[ty, tx]
+    if tile >= 0 and refs[tile] == 1:
+        return int(tile)
+    new = free[free[0]]
+    free[0] -= 1
+    refs[new] = 1
+    table[ty, tx] = new
+    if tile < 0:
+        cells[new] = 0
+    else:
+        cells[new] = cells[tile]
+        refs[tile] -= 1
+    return int(new)
+
+
+@kernel()
+def _count_hit(cells: Cells, tile: int, cell: int, x: float, y: float) -> None:
+    """One more beam that ended at (x, y) within the cell."""
+    n = int(cells[tile, cell, HITS]) + 1
+    cells[tile, cell, HITS] = n
+    for field, at in ((MEAN_X, x), (MEAN_Y, y)):
+        old = float(cells[tile, cell, field])
+        cells[tile, cell, field] = int(old + (at * FULL - old) / n + 0.5)
+
+
+@kernel()
+def _count_visit(cells: Cells, tile: int, cell: int) -> None:
+    """One more beam; before the counts overflow both are halved."""
+    visits = int(cells[tile, cell, VISITS])
+    if visits >= FULL:
+        visits >>= 1
+        cells[tile, cell, HITS] = int(cells[tile, cell, HITS]) >> 1
+    cells[tile, cell, VISITS] = visits + 1
+
+
+@kernel(
+    "int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[::1], float64[:, ::1], boolean[::1],"
+    " int64)"
+)
+def register_beams(
+    table: Table,
+    cells: Cells,
+    refs: Table,
+    free: Table,
+    start: Array,
+    ends: Array,
+    is_hit: NDArray[np.bool_],
+    first: int,
+) -> int:
+    """Write a scan into a map: each cell that a beam goes through is visited, the last one is hit.
+
+    Args:
+        table: of the map; its tiles must cover the scan.
+        cells: of all maps.
+        refs: of the tiles.
+        free: unused tiles.
+        start: the sensor, x and y, shape (2,).
+        ends: of the beams, shape (K, 2).
+        is_hit: whether a beam ended there, or was only cut there, shape (K,).
+        first: number of the beam to begin with.
+
+    Returns:
+        The beam before which the unused tiles might run out, K where all are written.
+    """
+    x0, y0 = start[0], start[1]
+    for k in range(first, ends.shape[0]):
+        x1, y1 = ends[k, 0], ends[k, 1]
+        if free[0] < 2 * (int(abs(x1 - x0) + abs(y1 - y0)) // TILE + 4):
+            return k
+        ix, iy, jx, jy = math.floor(x0), math.floor(y0), math.floor(x1), math.floor(y1)
+        dx, dy = x1 - x0, y1 - y0
+        step_x, step_y = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
+        each_x = 1.0 / abs(dx) if dx != 0.0 else 1e300
+        each_y = 1.0 / abs(dy) if dy != 0.0 else 1e300
+        next_x = (ix + 1.0 - x0 if dx > 0.0 else x0 - ix) * each_x
+        next_y = (iy + 1.0 - y0 if dy > 0.0 else y0 - iy) * each_y
+        steps = abs(jx - ix) + abs(jy - iy)
+        tx, ty, tile = -1, -1, -1
+        for i in range(steps + 1):
+            if i == steps:  # rounding never leads the walk astray by a cell
+                ix, iy = jx, jy
+            if ix >> BITS != tx or iy >> BITS != ty:
+                tx, ty = ix >> BITS, iy >> BITS
+                tile = own_tile(table, cells, refs, free, ty, tx)
+            cell = ((iy & MASK) << BITS) + (ix & MASK)
+            if i < steps or is_hit[k]:
+                _count_visit(cells, tile, cell)
+            if next_x < next_y:
+                next_x += each_x
+                ix += step_x
+            else:
+                next_y += each_y
+                iy += step_y
+        if is_hit[k]:
+            _count_hit(cells, tile, ((jy & MASK) << BITS) + (jx & MASK), x1 - jx, y1 - jy)
+    return ends.shape[0]
+
+
+@kernel()
+def _normal_at(table: Table, cells: Cells, ix: int, iy: int) -> int:
+    """Direction across the line that the ends about a cell form, as NORMAL keeps it."""
+    n, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for y in range(iy - 2, iy + 3):
+        for x in range(ix - 2, ix + 3):
+            if not wall_at(table, cells, x, y):
+                continue
+            tile, cell = table[y >> BITS, x >> BITS], ((y & MASK) << BITS) + (x & MASK)
+            u = x - ix + cells[tile, cell, MEAN_X] / FULL
+            v = y - iy + cells[tile, cell, MEAN_Y] / FULL
+            n += 1
+            sx += u
+            sy += v
+            sxx += u * u
+            sxy += u * v
+            syy += v * v
+    if n < 3:
+        return 0
+    a, b, c = sxx / n - (sx / n) ** 2, sxy / n - sx * sy / n**2, syy / n - (sy / n) ** 2
+    mean, radius = 0.5 * (a + c), math.sqrt(0.25 * (a - c) ** 2 + b * b)
+    if mean - radius > LINE * LINE * (mean + radius) or mean + radius < 0.3:
+        return 0
+    along = 0.5 * math.atan2(2.0 * b, a - c)
+    across = (along + 0.5 * math.pi) % math.pi
+    return 1 + int(across / math.pi * (FULL - 1))
+
+
+@kernel("void(int32[:, ::1], uint16[:, :, ::1], float64[:, ::1], boolean[::1])")
+def find_normals(table: Table, cells: Cells, ends: Array, is_hit: NDArray[np.bool_]) -> None:
+    """Renew the directions across the walls where a scan just written hit them."""
+    for k in range(ends.shape[0]):
+        if is_hit[k]:
+            x, y = math.floor(ends[k, 0]), math.floor(ends[k, 1])
+            tile = table[y >> BITS, x >> BITS]
+            cells[tile, ((y & MASK) << BITS) + (x & MASK), NORMAL] = _normal_at(table, cells, x, y)
+
+
+@kernel("void(int32[:, ::1], uint16[:, :, ::1])")
+def find_all_normals(table: Table, cells: Cells) -> None:
+    """The directions across all walls of a map whose tiles are its own."""
+    for ty in range(table.shape[0]):
+        for tx in range(table.shape[1]):
+            if table[ty, tx] < 0:
+                continue
+            for cell in range(AREA):
+                if is_wall(cells, table[ty, tx], cell):
+                    x, y = (tx << BITS) + (cell & MASK), (ty << BITS) + (cell >> BITS)
+                    cells[table[ty, tx], cell, NORMAL] = _normal_at(table, cells, x, y)
+
+
+@kernel("void(int32[:, :, ::1], int32[::1], int32[::1])")
+def count_references(tables: Table, refs: Table, free: Table) -> None:
+    """Count anew which tiles are used how often, and stack those that are not."""
+    refs[:] = 0
+    count, height, width = tables.shape
+    for i in range(count):
+        for y in range(height):
+            for x in range(width):
+                if tables[i, y, x] >= 0:
+                    refs[tables[i, y, x]] += 1
+    unused = 0
+    for tile in range(refs.shape[0] - 1, -1, -1):
+        if refs[tile] == 0:
+            unused += 1
+            free[unused] = tile
+    free[0] = unused
+
+
+@kernel("void(int32[:, ::1], uint16[:, :, ::1], float64, int8[:, ::1])")
+def render(table: Table, cells: Cells, threshold: float, out: NDArray[np.int8]) -> None:
+    """A map as occupancy: 100 where more than `threshold` of the beams ended, 0 where fewer, -1 where none came.
+
+    `out` has 16 rows and columns for each of the table's.
+    """
+    out[:] = -1
+    for ty in range(table.shape[0]):
+        for tx in range(table.shape[1]):
+            tile = table[ty, tx]
+            if tile < 0:
+                continue
+            for cell in range(AREA):
+                visits = int(cells[tile, cell, VISITS])
+                if visits > 0:
+                    hits = int(cells[tile, cell, HITS])
+                    out[(ty << BITS) + (cell >> BITS), (tx << BITS) + (cell & MASK)] = (
+                        100 if hits > threshold * visits else 0
+                    )

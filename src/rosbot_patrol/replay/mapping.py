@@ -1,0 +1,74 @@
+"""slam_gmapping offline, over scans and odometry in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import Pose2D, compose, invert
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.gmapping.slam import Outcome, Slam
+from rosbot_patrol.scan import LaserScan, Mount
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """What came of a log.
+
+    Attributes:
+        slam: as it stands at the end.
+        poses: of the best particle at each scan, by the odometry where a scan brought no update, shape (N, 3).
+        updates: number of updates.
+        resamplings: how often the particles were drawn anew.
+    """
+
+    slam: Slam
+    poses: Array
+    updates: int
+    resamplings: int
+
+
+def map_log(
+    scans: Sequence[LaserScan],
+    odometry: Array,
+    params: GmappingParams,
+    *,
+    mount: Mount | None = None,
+    heard: Callable[[int, Outcome], None] | None = None,
+) -> Mapping:
+    """Map a whole log.
+
+    Args:
+        scans: in their order.
+        odometry: of the robot at each scan, shape (N, 3).
+        params: of slam_gmapping.
+        mount: how the laser sits on the robot.
+        heard: called with each scan's number and outcome.
+    """
+    slam, last_update, resamplings = Slam(params), [], 0
+    mount = mount or Mount()
+    for i, (scan, row) in enumerate(zip(scans, odometry, strict=True)):
+        outcome = slam.update(scan, Pose2D(*row), mount)
+        last_update.append(i if outcome.updated else (last_update[-1] if i else -1))
+        resamplings += outcome.resampled
+        if heard is not None:
+            heard(i, outcome)
+    poses = _poses(odometry, np.array(last_update), slam.trajectory)
+    return Mapping(slam, poses, len(slam.stamps), resamplings)
+
+
+def _poses(odometry: Array, last_update: NDArray[np.int64], trajectory: Array) -> Array:
+    """The trajectory's poses, carried on by the odometry between the updates, shape (N, 3)."""
+    rows, numbers = [], {int(scan): k for k, scan in enumerate(np.unique(last_update[last_update >= 0]))}
+    for row, update in zip(odometry, last_update, strict=True):
+        if update < 0:  # nothing was seen yet
+            rows.append(Pose2D(*row))
+            continue
+        since = compose(invert(Pose2D(*odometry[update])), Pose2D(*row))
+        rows.append(compose(Pose2D(*trajectory[numbers[int(update)]]), since))
+    return np.array(rows)

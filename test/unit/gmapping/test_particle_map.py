@@ -1,0 +1,173 @@
+"""Tiles that maps share until they are written to, and what scans leave in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mapped_room import scan_at, small
+
+from rosbot_patrol.errors import MapError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.gmapping import tile_kernels as kernels
+from rosbot_patrol.gmapping.beams import Beams, pick_beams
+from rosbot_patrol.gmapping.particle_map import ParticleMaps
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.scan import Mount
+
+STILL = np.zeros((1, 3))
+
+
+def maps(count: int = 1, half: float = 8.0) -> ParticleMaps:
+    return ParticleMaps((-half, -half), (half, half), 0.05, count)
+
+
+def room_beams() -> Beams:
+    return pick_beams(scan_at(Pose2D()), Mount(), small())
+
+
+def beam_to(x: float, y: float, *, is_hit: bool = True) -> Beams:
+    length = np.hypot(x, y)
+    return Beams(
+        ends=np.array([[x, y]]),
+        directions=np.array([[x, y]]) / length,
+        is_hit=np.array([is_hit]),
+        sensor=np.zeros(2),
+    )
+
+
+def test_the_extent_is_rounded_down_to_patches_as_upstream_does() -> None:
+    info = maps(half=50.0).info
+    assert (info.width, info.height, info.origin_x, info.origin_y) == (1984, 1984, -50.0, -50.0)
+
+
+@pytest.mark.parametrize("lows", [(8.0, -8.0), (-float("inf"), -8.0), (-1e5, -8.0)])
+def test_an_extent_that_makes_no_sense_is_named(lows: tuple[float, float]) -> None:
+    with pytest.raises(MapError, match="expected xmin < xmax"):
+        ParticleMaps(lows, (8.0, 8.0), 0.05, 1)
+
+
+def test_a_beam_frees_its_way_and_marks_its_end() -> None:
+    made = maps()
+    made.register(STILL, beam_to(1.02, 0.02))
+    grid = made.grid(0, 0.25)
+    assert grid.at(1.02, 0.02) == 100
+    assert all(grid.at(x, 0.02) == 0 for x in np.arange(0.02, 0.95, 0.05))
+    assert grid.at(1.07, 0.02) == -1
+    assert np.count_nonzero(grid.cells == 100) == 1
+
+
+def test_a_beam_that_is_cut_marks_nothing() -> None:
+    made = maps()
+    made.register(STILL, beam_to(1.02, 0.02, is_hit=False))
+    cells = made.grid(0, 0.25).cells
+    assert not (cells == 100).any()
+    assert (cells == 0).sum() == 20
+
+
+def test_a_cell_is_a_wall_above_the_threshold_only() -> None:
+    made = maps()
+    for _ in range(3):
+        made.register(STILL, beam_to(2.02, 0.02))
+    made.register(STILL, beam_to(1.02, 0.02))
+    assert made.grid(0, 0.25).at(1.02, 0.02) == 0  # one of four, and not more than a quarter
+    assert made.grid(0, 0.24).at(1.02, 0.02) == 100
+
+
+def test_a_cell_keeps_the_mean_place_of_its_hits() -> None:
+    made = maps()
+    for x in (1.01, 1.02, 1.03):
+        made.register(STILL, beam_to(x, 0.02))
+    ix, iy = made.info.cell_of(1.02, 0.02)
+    tile = made.tables[0, iy >> 4, ix >> 4]
+    record = made.cells[tile, (iy & 15) * 16 + (ix & 15)]
+    assert record[kernels.HITS] == 3
+    assert record[kernels.MEAN_X] / kernels.FULL * 0.05 == pytest.approx(0.02, abs=1e-5)
+
+
+def test_counts_that_would_overflow_are_halved() -> None:
+    made = maps()
+    made.register(STILL, beam_to(1.02, 0.02))
+    made.cells[made.cells[:, :, kernels.HITS] == 1, : kernels.VISITS + 1] = kernels.FULL
+    made.register(STILL, beam_to(1.02, 0.02))
+    ix, iy = made.info.cell_of(1.02, 0.02)
+    record = made.cells[made.tables[0, iy >> 4, ix >> 4], (iy & 15) * 16 + (ix & 15)]
+    assert record[kernels.HITS] == record[kernels.VISITS] == 32768
+
+
+def test_walls_know_the_direction_across() -> None:
+    made = maps()
+    made.register(STILL, room_beams())
+    ix, iy = made.info.cell_of(3.99, 0.5)  # of the wall at x = 4
+    near = [made.info.cell_of(x, 0.5) for x in (3.98, 4.02)]
+    records = [made.cells[made.tables[0, y >> 4, x >> 4], (y & 15) * 16 + (x & 15)] for x, y in near]
+    across = [(r[kernels.NORMAL] - 1) / (kernels.FULL - 1) * np.pi for r in records if r[kernels.NORMAL]]
+    assert across
+    assert all(min(a, np.pi - a) < 0.1 for a in across)
+    del ix, iy
+
+
+def test_particles_of_one_line_share_their_tiles_until_they_write() -> None:
+    made = maps(8)
+    made.register(np.zeros((8, 3)), room_beams())
+    alone = made.tiles_used // 8
+    made.select(np.zeros(8, dtype=np.int64))
+    assert made.tiles_used == alone
+    before = made.grid(1, 0.25).cells
+    poses = np.zeros((8, 3))
+    poses[0, 0] = 0.3
+    made.register(poses[:1], beam_to(1.0, 1.0)) if False else None
+    made._write(made.tables[0], np.array([160.0, 160.0]), np.array([[200.5, 160.5]]), np.array([True]))
+    assert alone < made.tiles_used <= alone + 4
+    assert (made.grid(1, 0.25).cells == before).all()
+    assert (made.grid(0, 0.25).cells != before).any()
+
+
+def test_tiles_of_particles_that_died_are_used_again() -> None:
+    made = maps(4)
+    beams = room_beams()
+    poses = np.zeros((4, 3))
+    made.register(poses, beams)
+    size = len(made.refs)
+    for _ in range(10):
+        made.select(np.array([2, 2, 3, 3]))
+        made.register(poses, beams)
+    assert len(made.refs) <= size * 1.5
+    counts = np.bincount(made.tables[made.tables >= 0], minlength=len(made.refs))
+    assert (counts == made.refs).all()
+    unused = made.free[1 : 1 + made.free[0]]
+    assert sorted(unused) == np.flatnonzero(made.refs == 0).tolist()
+
+
+def test_a_map_grows_where_the_robot_leaves_it() -> None:
+    made = maps(2)
+    poses = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    made.register(poses, room_beams())
+    old = made.grid(0, 0.25)
+    made.register(poses - (30.0, 0.0, 0.0), room_beams())
+    new = made.grid(0, 0.25)
+    shift = round((old.info.origin_x - new.info.origin_x) / 0.05)
+    assert new.info.origin_x < -34.0
+    assert new.info.origin_x == pytest.approx(old.info.origin_x - shift * 0.05)
+    kept = new.cells[: old.cells.shape[0], shift : shift + old.cells.shape[1]]
+    assert (kept[old.cells == 100] == 100).all()
+
+
+def test_a_saved_map_is_gone_on_with() -> None:
+    made = maps()
+    made.register(STILL, room_beams())
+    saved = made.grid(0, 0.25)
+    info = GridInfo(resolution=0.05, width=saved.info.width, height=saved.info.height, origin_x=-7.98, origin_y=-8.01)
+    again = maps(3)
+    again.seed(Grid(info, saved.cells))
+    grid = again.grid(2, 0.25)
+    row, column = (round(v / 0.05) for v in (-8.01 - grid.info.origin_y, -7.98 - grid.info.origin_x))
+    part = grid.cells[row : row + info.height, column : column + info.width]
+    assert (part == saved.cells).all()
+    assert np.count_nonzero(grid.cells != -1) == np.count_nonzero(saved.cells != -1)
+    assert again.refs[again.tables[0][again.tables[0] >= 0]].tolist() == [3] * again.tiles_used
+
+
+def test_a_saved_map_of_other_cells_is_refused() -> None:
+    grid = Grid(GridInfo(resolution=0.1, width=10, height=10), np.zeros((10, 10), dtype=np.int8))
+    with pytest.raises(MapError, match=r"its cells are 0.1 m, expected delta, 0.05 m"):
+        maps().seed(grid)

@@ -1,0 +1,132 @@
+"""Where a scan fits, and which beams of it count."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from mapped_room import CORRIDOR, scan_at, small
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.gmapping.beams import pick_beams
+from rosbot_patrol.gmapping.motion_model import move_deviation, move_poses
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.gmapping.particle_map import ParticleMaps
+from rosbot_patrol.gmapping.scan_matcher import Matches, ScanMatcher
+from rosbot_patrol.scan import LaserScan, Mount
+
+SIGMAS = np.array([0.1, 0.1, 0.1])
+
+
+def matched(
+    guess: Pose2D, *, walls: np.ndarray | None = None, truth: Pose2D | None = None, beams: int = 360, **changes: object
+) -> Matches:
+    """A map made at the origin, and a scan at `truth` matched into it from a guess."""
+    params = small(**changes)
+    options = {} if walls is None else {"walls": walls}
+    maps = ParticleMaps((-8.0, -8.0), (8.0, 8.0), 0.05, 1)
+    for x in (0.0, 0.1):
+        first = pick_beams(scan_at(Pose2D(x, 0.0, 0.01), beams=beams, **options), Mount(), params)
+        maps.register(np.array([[x, 0.0, 0.01]]), first)
+    seen = pick_beams(scan_at(truth or Pose2D(), beams=beams, **options), Mount(), params)
+    guesses = np.array([guess])
+    return ScanMatcher(params).match(maps, guesses, np.zeros(1), seen, SIGMAS, np.zeros((1, 3)))
+
+
+@pytest.mark.parametrize("off", [(0.06, -0.04, 0.0), (-0.12, 0.1, 0.08), (0.0, 0.0, -0.12)])
+def test_a_scan_is_found_again(off: tuple[float, float, float]) -> None:
+    truth = Pose2D(0.3, -0.2, 0.4)
+    found = matched(Pose2D(*(np.array(truth) + off)), truth=truth).modes[0]
+    assert math.hypot(found[0] - truth.x, found[1] - truth.y) < 0.01
+    assert abs(found[2] - truth.yaw) < math.radians(0.3)
+
+
+def test_along_a_corridor_the_odometry_is_believed() -> None:
+    found = matched(Pose2D(0.3, 0.08, 0.03), walls=CORRIDOR, truth=Pose2D(0.2, 0.0, 0.0)).modes[0]
+    assert abs(found[1]) < 0.01
+    assert abs(found[2]) < math.radians(0.3)
+    assert abs(found[0] - 0.3) < 0.03
+
+
+def test_the_proposal_is_wide_along_a_corridor_and_narrow_across() -> None:
+    params = small()
+    maps = ParticleMaps((-8.0, -8.0), (8.0, 8.0), 0.05, 1)
+    seen = pick_beams(scan_at(Pose2D(), walls=CORRIDOR), Mount(), params)
+    maps.register(np.zeros((1, 3)), seen)
+    matcher, rng = ScanMatcher(params), np.random.default_rng(1)
+    drawn = np.array(
+        [
+            matcher.match(maps, np.zeros((1, 3)), np.zeros(1), seen, SIGMAS, rng.standard_normal((1, 3))).poses[0]
+            for _ in range(200)
+        ]
+    )
+    along, across, turn = drawn.std(axis=0)
+    assert 0.07 < along < 0.12
+    assert across < 0.01
+    assert turn < 0.01
+
+
+def test_a_match_that_is_not_believed_follows_the_odometry() -> None:
+    found = matched(Pose2D(0.05, 0.0, 0.0), minimumScore=1e6)
+    assert found.scores[0] == 0.0
+    assert found.poses[0] == pytest.approx((0.05, 0.0, 0.0))
+
+
+def test_a_better_fit_is_more_likely() -> None:
+    right = matched(Pose2D()).log_likelihoods[0]
+    wrong = matched(Pose2D(2.0, 1.0, 0.5)).log_likelihoods[0]
+    assert wrong < right - 100.0
+
+
+def scan_of(*ranges: float) -> LaserScan:
+    return LaserScan(
+        stamp=0.0,
+        frame_id="laser",
+        angle_min=0.0,
+        angle_increment=0.1,
+        range_min=0.2,
+        range_max=10.0,
+        ranges=np.array(ranges),
+    )
+
+
+def test_beams_that_measured_nothing_say_nothing() -> None:
+    beams = pick_beams(scan_of(math.nan, 0.1, -math.inf, math.inf, 10.0, 9.995, 5.0, 0.0), Mount(), GmappingParams())
+    assert beams.is_hit.tolist() == [True]
+    assert np.hypot(*beams.ends[0]) == pytest.approx(5.0)
+
+
+def test_misses_free_the_floor_where_max_range_asks_for_it() -> None:
+    params = GmappingParams(maxRange=10.0, maxUrange=8.0)
+    beams = pick_beams(scan_of(5.0, math.inf, 10.0, 9.0), Mount(), params)
+    assert beams.is_hit.tolist() == [True, False, False, False]
+    assert np.hypot(*beams.ends.T) == pytest.approx([5.0, 8.0, 8.0, 8.0])
+
+
+def test_lasers_upside_down_and_backwards_see_the_same_room() -> None:
+    pose, params = Pose2D(0.4, 0.3, 0.7), small()
+    for mount in (Mount(Pose2D(0.1, 0.05, math.pi)), Mount(Pose2D(-0.1, 0.0, 0.3), True)):
+        beams = pick_beams(scan_at(pose, mount=mount), mount, params)
+        truth = pick_beams(scan_at(pose, mount=Mount(mount.pose)), Mount(mount.pose), params)
+        shape = {tuple(np.round(p, 6)) for p in beams.ends}
+        if not mount.is_upside_down:
+            assert shape == {tuple(np.round(p, 6)) for p in truth.ends}
+        c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+        world = beams.ends @ np.array([[c, s], [-s, c]]) + (pose.x, pose.y)
+        on_outer = (np.abs(np.abs(world[:, 0]) - 4.0) < 1e-6) | (np.abs(world[:, 1] + 3.0) < 1e-6)
+        assert on_outer.mean() > 0.4
+
+
+def test_a_move_errs_as_the_parameters_say() -> None:
+    params = GmappingParams(srr=0.1, srt=0.2, str_=0.3, stt=0.4)
+    ahead = move_deviation(Pose2D(2.0, 0.0, 0.0), params)
+    assert ahead == pytest.approx([0.2, 0.06, 0.4], rel=0.01)
+    turned = move_deviation(Pose2D(0.0, 0.0, -1.0), params)
+    assert turned == pytest.approx([0.3, 0.3, 0.4], rel=0.01)
+    assert (move_deviation(Pose2D(), params) > 0.0).all()
+
+
+def test_poses_move_in_their_own_frames() -> None:
+    moved = move_poses(np.array([[1.0, 2.0, math.pi / 2], [0.0, 0.0, 0.0]]), Pose2D(1.0, 0.5, 0.1))
+    assert moved == pytest.approx(np.array([[0.5, 3.0, math.pi / 2 + 0.1], [1.0, 0.5, 0.1]]))

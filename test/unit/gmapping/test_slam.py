@@ -1,0 +1,198 @@
+"""The whole of slam_gmapping without ROS, on drives through a made-up room."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mapped_room import ROOM, scan_at, small
+
+from rosbot_patrol.geometry import Pose2D, compose, invert
+from rosbot_patrol.gmapping.slam import Slam
+from rosbot_patrol.gmapping.trajectories import Trajectories
+from rosbot_patrol.scan import Mount
+
+WAY = [Pose2D(0.1 * i, 0.3 * math.sin(0.2 * i), 0.06 * math.cos(0.2 * i)) for i in range(20)]
+SLIP = Pose2D(0.004, -0.003, 0.01)  # what each move of the odometry is off
+
+
+def odometry_of(way: list[Pose2D], slip: Pose2D = SLIP) -> list[Pose2D]:
+    rows = [way[0]]
+    for before, after in zip(way[:-1], way[1:], strict=True):
+        rows.append(compose(compose(rows[-1], compose(invert(before), after)), slip))
+    return rows
+
+
+def driven(slam: Slam, way: list[Pose2D] = WAY, *, mount: Mount | None = None, beams: int = 180) -> np.ndarray:
+    """Errors in place and heading at each scan, shape (N, 2)."""
+    mount, rows = mount or Mount(), []
+    for i, (pose, odometry) in enumerate(zip(way, odometry_of(way), strict=True)):
+        slam.update(scan_at(pose, stamp=0.1 * i, beams=beams, mount=mount), odometry, mount)
+        assert slam.map_from_odom is not None
+        found = compose(slam.map_from_odom, odometry)
+        rows.append((math.hypot(found.x - pose.x, found.y - pose.y), abs(found.yaw - pose.yaw)))
+    return np.array(rows)
+
+
+def test_a_drive_is_followed_better_than_by_the_wheels() -> None:
+    slam = Slam(small())
+    errors = driven(slam)
+    assert errors[:, 0].max() < 0.03
+    assert errors[:, 1].max() < math.radians(1.0)
+    last = odometry_of(WAY)[-1]
+    assert math.hypot(last.x - WAY[-1].x, last.y - WAY[-1].y) > 0.15
+
+
+def test_the_map_has_the_rooms_walls() -> None:
+    slam = Slam(small())
+    driven(slam, beams=720)
+    grid = slam.grid()
+    steps = np.linspace(0.02, 0.98, 60)
+    on_walls = np.concatenate([w[:2] + steps[:, None] * (w[2:] - w[:2]) for w in ROOM[:4]])
+    near = [max(grid.at(x + dx, y + dy) for dx in (-0.05, 0.0, 0.05) for dy in (-0.05, 0.0, 0.05)) for x, y in on_walls]
+    assert np.mean(np.array(near) == 100) > 0.97
+    assert grid.at(0.5, 0.5) == 0
+    assert grid.at(6.0, 6.0) == -1
+
+
+@pytest.mark.parametrize(
+    "mount",
+    [
+        Mount(Pose2D(0.05, 0.0, math.pi)),
+        Mount(Pose2D(0.1, -0.02, 0.4), is_upside_down=True),
+        Mount(Pose2D(-0.1, 0.0, math.pi), is_upside_down=True),
+    ],
+)
+def test_lasers_may_hang_upside_down_and_look_backwards(mount: Mount) -> None:
+    errors = driven(Slam(small()), WAY[:10], mount=mount)
+    assert errors[:, 0].max() < 0.03
+    assert errors[:, 1].max() < math.radians(1.0)
+
+
+def test_the_same_inputs_and_seed_give_the_same_result_bit_for_bit() -> None:
+    first, second, other = Slam(small(seed=3)), Slam(small(seed=3)), Slam(small(seed=4))
+    for slam in (first, second, other):
+        driven(slam)
+    assert (first.poses == second.poses).all()
+    assert (first.trajectory == second.trajectory).all()
+    assert (first.grid().cells == second.grid().cells).all()
+    assert first.entropy == second.entropy
+    assert (first.poses != other.poses).any()
+
+
+def test_an_update_waits_for_a_way_a_turn_or_a_time() -> None:
+    slam = Slam(small(linearUpdate=0.2, angularUpdate=0.3, temporalUpdate=1.0))
+
+    def updated(pose: Pose2D, stamp: float) -> bool:
+        return slam.update(scan_at(pose, stamp=stamp), pose, Mount()).updated
+
+    assert updated(Pose2D(), 0.0)
+    assert not updated(Pose2D(0.15, 0.0, 0.0), 0.1)
+    assert updated(Pose2D(0.05, 0.0, 0.0), 0.2)  # there and back is a way, too
+    assert not updated(Pose2D(0.05, 0.0, 0.2), 0.3)
+    assert updated(Pose2D(0.05, 0.0, 0.35), 0.4)
+    assert not updated(Pose2D(0.05, 0.0, 0.35), 1.3)
+    assert updated(Pose2D(0.05, 0.0, 0.35), 1.5)
+    assert len(slam.trajectory) == len(slam.stamps) == 4
+
+
+def test_the_map_begins_where_the_odometry_is() -> None:
+    slam = Slam(small())
+    start = Pose2D(2.0, 1.0, 0.5)
+    slam.update(scan_at(start), start, Mount())
+    assert slam.map_from_odom == pytest.approx((0.0, 0.0, 0.0))
+
+
+def test_a_scan_that_sees_nothing_leaves_the_map_alone() -> None:
+    slam = Slam(small())
+    empty = replace(scan_at(Pose2D()), ranges=np.full(180, np.inf))
+    assert slam.update(empty, Pose2D(), Mount()).is_blind
+    assert slam.map_from_odom is None
+    driven(slam, WAY[:3])
+    before = slam.grid().cells
+    blind = slam.update(replace(empty, stamp=1.0), compose(WAY[2], Pose2D(0.5, 0.0, 0.0)), Mount())
+    assert blind.updated
+    assert blind.is_blind
+    assert (slam.grid().cells == before).all()
+    assert abs(slam.poses[:, 0].mean() - WAY[2].x - 0.5) < 0.1
+
+
+def test_another_number_of_beams_is_no_matter() -> None:
+    slam = Slam(small())
+    driven(slam, WAY[:5])
+    for i, (pose, odometry) in enumerate(zip(WAY[5:10], odometry_of(WAY)[5:10], strict=True)):
+        slam.update(scan_at(pose, stamp=1.0 + i, beams=100 + 60 * i), odometry, Mount())
+    assert math.hypot(slam.poses[0, 0] - WAY[9].x, slam.poses[0, 1] - WAY[9].y) < 0.03
+
+
+@pytest.mark.parametrize(("stamp", "odometry"), [(-50.0, Pose2D()), (2.1, Pose2D(7.0, 7.0, 1.0))])
+def test_a_restart_of_time_or_wheels_is_no_motion(
+    stamp: float, odometry: Pose2D, caplog: pytest.LogCaptureFixture
+) -> None:
+    slam = Slam(small())
+    driven(slam)
+    with caplog.at_level(logging.WARNING):
+        slam.update(scan_at(WAY[-1], stamp=stamp), odometry, Mount())
+    assert "time went back" in caplog.text or "the odometry jumped" in caplog.text
+    assert slam.map_from_odom is not None
+    found = compose(slam.map_from_odom, odometry)
+    assert math.hypot(found.x - WAY[-1].x, found.y - WAY[-1].y) < 0.03
+    ahead = compose(odometry, Pose2D(0.1, 0.0, 0.0))
+    slam.update(scan_at(compose(WAY[-1], Pose2D(0.1, 0.0, 0.0)), stamp=stamp + 0.1), ahead, Mount())
+    assert abs(slam.poses[0, 0] - WAY[-1].x - 0.1) < 0.03
+
+
+def test_scans_out_of_order_are_followed(caplog: pytest.LogCaptureFixture) -> None:
+    slam = Slam(small())
+    driven(slam, WAY[:5])
+    with caplog.at_level(logging.WARNING):
+        slam.update(scan_at(WAY[6], stamp=0.35), odometry_of(WAY)[6], Mount())
+    assert not caplog.records
+    assert abs(slam.poses[0, 0] - WAY[6].x) < 0.03
+
+
+def test_weights_entropy_and_resampling() -> None:
+    slam = Slam(small(particles=30, ogain=0.5))
+    driven(slam, WAY[:1])
+    assert slam.entropy == pytest.approx(math.log(30))
+    outcomes = []
+    for i, (pose, odometry) in enumerate(zip(WAY[1:], odometry_of(WAY)[1:], strict=True)):
+        before = slam.entropy
+        outcomes.append(slam.update(scan_at(pose, stamp=0.1 * i), odometry, Mount()))
+        assert slam.weights.sum() == pytest.approx(1.0)
+        assert outcomes[-1].resampled == (outcomes[-1].effective < 15.0)
+        assert slam.entropy <= math.log(30) + 1e-9
+        del before
+    assert any(o.resampled for o in outcomes)
+
+
+def test_a_saved_map_is_gone_on_with_from_a_start() -> None:
+    first = Slam(small())
+    driven(first)
+    saved = first.grid()
+    start = Pose2D(WAY[8].x + 0.12, WAY[8].y - 0.1, WAY[8].yaw + 0.05)
+    again = Slam(small(), saved=saved, start=start)
+    again.update(scan_at(WAY[8]), Pose2D(), Mount())
+    assert again.map_from_odom is not None
+    assert math.hypot(again.map_from_odom.x - WAY[8].x, again.map_from_odom.y - WAY[8].y) < 0.04
+    both = (saved.cells == 100) & (again.grid().cells == 100) if saved.info == again.grid().info else None
+    assert both is None or both.sum() > 0.9 * (saved.cells == 100).sum()
+
+
+def test_a_long_past_is_kept_once() -> None:
+    made, rng, rows = Trajectories(), np.random.default_rng(1), []
+    for _ in range(600):
+        poses = rng.standard_normal((4, 3))
+        parents = rng.integers(0, 4, 4)
+        rows.append((poses, parents))
+        made.add(poses, parents)
+    assert len(made._poses) < 300
+    for index in range(4):
+        wanted, at = [], index
+        for poses, parents in reversed(rows):
+            wanted.append(poses[at])
+            at = parents[at]
+        assert (made.of(index) == np.array(wanted[::-1])).all()
