@@ -7,10 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.gmapping.beam_kernels import find_normals
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.scan import LaserScan, Mount
 
 Array = NDArray[np.float64]
+
+SPAN = 0.15  # m to each side of a beam's end that tell how the wall runs
+STRAIGHT = 0.25  # largest spread across a wall, as a share of that along it
+THIN = 0.03  # m; largest spread across a wall
+GRAZING = 30.0  # ends farther apart than this many times what a wall seen square would show are of two things
+LEAST_GAP = 0.1  # m
 
 
 @dataclass(frozen=True)
@@ -22,6 +29,7 @@ class Beams:
         directions: unit vectors from the sensor, shape (K, 2).
         is_hit: whether the end is a wall, shape (K,).
         sensor: place of the sensor in the robot's frame [m], shape (2,).
+        spacing: angle from beam to beam [rad].
     """
 
     ends: Array
@@ -29,10 +37,17 @@ class Beams:
     is_hit: NDArray[np.bool_]
     sensor: Array
 
+    spacing: float
+
     @property
     def hits(self) -> Array:
-        """Ends and directions of the beams that hit, shape (H, 4)."""
-        return np.ascontiguousarray(np.hstack((self.ends[self.is_hit], self.directions[self.is_hit])))
+        """End, direction, and the unit vector across the wall (0 where no line is seen) of each hit, shape (H, 6)."""
+        ends = np.ascontiguousarray(self.ends[self.is_hit])
+        lengths = np.hypot(*(ends - self.sensor).T)
+        gaps = np.maximum(GRAZING * self.spacing * lengths, LEAST_GAP)
+        normals = np.empty_like(ends)
+        find_normals(ends, gaps, SPAN, STRAIGHT, THIN, normals)
+        return np.ascontiguousarray(np.hstack((ends, self.directions[self.is_hit], normals)))
 
     @property
     def reach(self) -> float:
@@ -60,4 +75,4 @@ def pick_beams(scan: LaserScan, mount: Mount, params: GmappingParams) -> Beams:
     directions = np.column_stack((np.cos(angles), np.sin(angles)))
     sensor = np.array([mount.pose.x, mount.pose.y])
     ends = sensor + np.minimum(lengths, usable)[:, None] * directions
-    return Beams(ends=ends, directions=directions, is_hit=~is_miss, sensor=sensor)
+    return Beams(ends=ends, directions=directions, is_hit=~is_miss, sensor=sensor, spacing=abs(scan.angle_increment))

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.gmapping.tile_kernels import BITS, FULL, MASK, MEAN_X, MEAN_Y, NORMAL, is_wall, wall_at
+from rosbot_patrol.gmapping.tile_kernels import BITS, FULL, MASK, MEAN_X, MEAN_Y, is_wall, wall_at
 from rosbot_patrol.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -23,13 +23,14 @@ Cells = NDArray[np.uint16]
 FREE_RATIO = 1.4143  # cells before a beam's end where the cell must be free
 NULL = 0.5  # squared distance [m2] that a beam which found no wall counts as
 MOST_MOVES = 200
-LOSS = 0.95  # a refinement that brings less than this share of the score before is not taken
+LONELY = 0.5  # what a beam counts in both directions whose wall's direction is not known
+LOSS = 0.8  # a refinement that brings less than this share of the score before is not taken
 
 
 @kernel()
 def nearest_wall(
     table: Table, cells: Cells, gx: float, gy: float, back_x: float, back_y: float, reach: int
-) -> tuple[float, float, float, int]:
+) -> tuple[float, float, float]:
     """The nearest wall cell's mean within `reach` cells of a beam's end.
 
     Args:
@@ -42,11 +43,11 @@ def nearest_wall(
         reach: how many cells to look to each side.
 
     Returns:
-        Squared distance [cells2], -1 where there is none; from the mean to the end in x and y; its NORMAL.
+        Squared distance [cells2], -1 where there is none; from the mean to the end in x and y.
     """
     ix, iy = math.floor(gx), math.floor(gy)
     free_x, free_y = math.floor(gx + back_x) - ix, math.floor(gy + back_y) - iy
-    best, best_x, best_y, normal = 1e300, 0.0, 0.0, 0
+    best, best_x, best_y = 1e300, 0.0, 0.0
     height, width = table.shape
     for y in range(iy - reach, iy + reach + 1):
         ty = y >> BITS
@@ -63,10 +64,10 @@ def nearest_wall(
             dy = gy - y - cells[tile, cell, MEAN_Y] / FULL
             d2 = dx * dx + dy * dy
             if d2 < best and not wall_at(table, cells, x + free_x, y + free_y):
-                best, best_x, best_y, normal = d2, dx, dy, int(cells[tile, cell, NORMAL])
+                best, best_x, best_y = d2, dx, dy
     if best == 1e300:
-        return -1.0, 0.0, 0.0, 0
-    return best, best_x, best_y, normal
+        return -1.0, 0.0, 0.0
+    return best, best_x, best_y
 
 
 @kernel()
@@ -78,7 +79,7 @@ def score_of(
     total = 0.0
     for k in range(0, beams.shape[0], every):
         bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
-        d2, _, _, _ = nearest_wall(
+        d2, _, _ = nearest_wall(
             table, cells, x + c * bx - s * by, y + s * bx + c * by, c * ux - s * uy, s * ux + c * uy, reach
         )
         if d2 >= 0.0:
@@ -95,7 +96,7 @@ def log_likelihood_of(
     total = 0.0
     for k in range(0, beams.shape[0], every):
         bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
-        d2, _, _, _ = nearest_wall(
+        d2, _, _ = nearest_wall(
             table, cells, pose[0] + c * bx - s * by, pose[1] + s * bx + c * by, c * ux - s * uy, s * ux + c * uy, reach
         )
         total -= (d2 if d2 >= 0.0 else null) / sigma
@@ -210,19 +211,16 @@ def add_beams(
     for k in range(beams.shape[0]):
         bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
         rx, ry = c * bx - s * by, s * bx + c * by
-        d2, dx, dy, normal = nearest_wall(
-            table, cells, pose[0] + rx, pose[1] + ry, c * ux - s * uy, s * ux + c * uy, reach
-        )
+        d2, dx, dy = nearest_wall(table, cells, pose[0] + rx, pose[1] + ry, c * ux - s * uy, s * ux + c * uy, reach)
         if d2 < 0.0:
             continue
-        if normal > 0:
-            angle = (normal - 1) * (math.pi / (FULL - 1))
-            nx, ny = math.cos(angle), math.sin(angle)
+        nx, ny = c * beams[k, 4] - s * beams[k, 5], s * beams[k, 4] + c * beams[k, 5]
+        if nx != 0.0 or ny != 0.0:
             n00, n01, n11 = nx * nx, nx * ny, ny * ny
             across = nx * dx + ny * dy
             d2 = across * across
         else:
-            n00, n01, n11 = 1.0, 0.0, 1.0
+            n00, n01, n11 = LONELY, 0.0, LONELY
         w = weight * math.exp(-0.5 * d2)
         tx, ty = n00 * -ry + n01 * rx, n01 * -ry + n11 * rx  # N times the derivative by the turn
         ex, ey = n00 * dx + n01 * dy, n01 * dx + n11 * dy
@@ -315,7 +313,8 @@ def match_particles(
         tables: of the particles' maps, shape (N, TY, TX).
         cells: of all maps.
         guesses: the odometry's poses x, y [cells], yaw, shape (N, 3).
-        beams: ends x, y [cells] and direction in the robot's frame, shape (K, 4).
+        beams: ends x, y [cells], directions and unit vectors across the walls (0 where there is no line) in the
+            robot's frame, shape (K, 6).
         headings: before the move, shape (N,).
         deviation: of the odometry's move ahead, to the left [cells] and in turning, shape (3,).
         noise: standard normal numbers, shape (N, 3).

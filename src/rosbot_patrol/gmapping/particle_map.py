@@ -50,6 +50,7 @@ class ParticleMaps:
         self.cells = np.zeros((0, AREA, FIELDS), dtype=np.uint16)
         self.refs = np.zeros(0, dtype=np.int32)
         self.free = np.zeros(1, dtype=np.int32)
+        self._scans = 0  # number of the last one, 1 to 65535
 
     @property
     def count(self) -> int:
@@ -89,21 +90,29 @@ class ParticleMaps:
         """Write a scan into each map, seen from that particle's pose; poses of shape (N, 3) [m, rad]."""
         self._cover(poses, beams.reach)
         placed = self.to_cells(poses)
+        self._scans = self._scans % FULL + 1
         for table, (x, y, yaw) in zip(self.tables, placed, strict=True):
             c, s = math.cos(yaw), math.sin(yaw)
             turn = np.array([[c, s], [-s, c]]) / self.resolution
             ends = beams.ends @ turn + (x, y)
-            self._write(table, beams.sensor @ turn + (x, y), ends, beams.is_hit)
-            kernels.find_normals(table, self.cells, ends, beams.is_hit)
+            self.write(table, beams.sensor @ turn + (x, y), ends, beams.is_hit)
 
-    def _write(self, table: NDArray[np.int32], start: Array, ends: Array, is_hit: NDArray[np.bool_]) -> None:
+    def write(self, table: NDArray[np.int32], start: Array, ends: Array, is_hit: NDArray[np.bool_]) -> None:
+        """Write one scan into one map.
+
+        Args:
+            table: of the map.
+            start: the sensor [cells], shape (2,).
+            ends: of the beams [cells], shape (K, 2).
+            is_hit: whether the beams ended there, shape (K,).
+        """
+        arrays = (table, self.cells, self.refs, self.free)
+        done, stamp = 0, self._scans
+        while (done := kernels.register_hits(*arrays, ends, is_hit, stamp, done)) < len(ends):
+            self._grow(0)
         done = 0
-        while done < len(ends):
-            arguments = (table, self.cells, self.refs, self.free, start, ends, is_hit, done)
-            done = kernels.register_beams(*arguments)
-            if done < len(ends):
-                longest = np.abs(ends - start).sum(axis=1).max()
-                self._grow(2 * (int(longest) // TILE + 4))
+        while (done := kernels.register_rays(*arrays, start, ends, stamp, done)) < len(ends):
+            self._grow(int(np.abs(ends - start).sum(axis=1).max()) // TILE + 4)
 
     def _grow(self, least: int) -> None:
         """More unused tiles."""
@@ -174,5 +183,4 @@ class ParticleMaps:
         self.cells[tiles, :, VISITS] = np.where((known == FREE) | (known == OCCUPIED), SEED_BEAMS, 0)
         self.cells[tiles, :, HITS] = np.where(known == OCCUPIED, SEED_BEAMS, 0)
         self.cells[tiles, :, MEAN_X] = self.cells[tiles, :, MEAN_Y] = FULL // 2
-        kernels.find_all_normals(self.tables[0], self.cells)
         kernels.count_references(self.tables, self.refs, self.free)

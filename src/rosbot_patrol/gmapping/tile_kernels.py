@@ -7,7 +7,7 @@ array `cells` of shape (T, 256, 5). Of each cell it keeps
     VISITS   beams that ended here or went through
     MEAN_X   mean place of the ends within the cell, in 1/65535 of its edge
     MEAN_Y   likewise
-    NORMAL   direction across the wall here, 0 to pi as 1 to 65535; 0 where the ends form no line
+    STAMP    number of the scan that hit it last
 
 `refs` counts the maps that use a tile, shape (T,). `free` is a stack of unused tiles: free[0] of them, their numbers
 follow, shape (T + 1,). Coordinates are in cells from the lower left corner of the table.
@@ -27,10 +27,9 @@ Table = NDArray[np.int32]
 Cells = NDArray[np.uint16]
 
 BITS, TILE, MASK, AREA = 4, 16, 15, 256
-HITS, VISITS, MEAN_X, MEAN_Y, NORMAL, FIELDS = 0, 1, 2, 3, 4, 5
+HITS, VISITS, MEAN_X, MEAN_Y, STAMP, FIELDS = 0, 1, 2, 3, 4, 5
 FULL = 65535
 FULL_SHARE = 10  # a cell is taken for a wall where more than one in so many beams ended in it
-LINE = 0.15  # ends form a line where their spread across it is less than this share of that along it
 
 
 @kernel()
@@ -88,21 +87,52 @@ def _count_visit(cells: Cells, tile: int, cell: int) -> None:
     cells[tile, cell, VISITS] = visits + 1
 
 
-@kernel(
-    "int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[::1], float64[:, ::1], boolean[::1],"
-    " int64)"
-)
-def register_beams(
+@kernel("int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[:, ::1], boolean[::1], int64, int64)")
+def register_hits(
     table: Table,
     cells: Cells,
     refs: Table,
     free: Table,
-    start: Array,
     ends: Array,
     is_hit: NDArray[np.bool_],
+    stamp: int,
     first: int,
 ) -> int:
-    """Write a scan into a map: each cell that a beam goes through is visited, the last one is hit.
+    """Write the ends of a scan's beams into a map.
+
+    Args:
+        table: of the map; its tiles must cover the scan.
+        cells: of all maps.
+        refs: of the tiles.
+        free: unused tiles.
+        ends: of the beams, shape (K, 2).
+        is_hit: whether a beam ended there, or was only cut there, shape (K,).
+        stamp: number of the scan, 1 to 65535.
+        first: number of the beam to begin with.
+
+    Returns:
+        The beam before which the unused tiles might run out, K where all are written.
+    """
+    for k in range(first, ends.shape[0]):
+        if free[0] < 1:
+            return k
+        if is_hit[k]:
+            ix, iy = math.floor(ends[k, 0]), math.floor(ends[k, 1])
+            tile = own_tile(table, cells, refs, free, iy >> BITS, ix >> BITS)
+            cell = ((iy & MASK) << BITS) + (ix & MASK)
+            _count_visit(cells, tile, cell)
+            _count_hit(cells, tile, cell, ends[k, 0] - ix, ends[k, 1] - iy)
+            cells[tile, cell, STAMP] = stamp
+    return ends.shape[0]
+
+
+@kernel("int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[::1], float64[:, ::1], int64, int64)")
+def register_rays(
+    table: Table, cells: Cells, refs: Table, free: Table, start: Array, ends: Array, stamp: int, first: int
+) -> int:
+    """Count a visit for each cell that a beam goes through before its end.
+
+    A cell that a beam of the same scan hit is left out: beams that graze a wall would wear it away.
 
     Args:
         table: of the map; its tiles must cover the scan.
@@ -111,7 +141,7 @@ def register_beams(
         free: unused tiles.
         start: the sensor, x and y, shape (2,).
         ends: of the beams, shape (K, 2).
-        is_hit: whether a beam ended there, or was only cut there, shape (K,).
+        stamp: number of the scan, 1 to 65535.
         first: number of the beam to begin with.
 
     Returns:
@@ -119,26 +149,22 @@ def register_beams(
     """
     x0, y0 = start[0], start[1]
     for k in range(first, ends.shape[0]):
-        x1, y1 = ends[k, 0], ends[k, 1]
-        if free[0] < 2 * (int(abs(x1 - x0) + abs(y1 - y0)) // TILE + 4):
+        dx, dy = ends[k, 0] - x0, ends[k, 1] - y0
+        if free[0] < int(abs(dx) + abs(dy)) // TILE + 4:
             return k
-        ix, iy, jx, jy = math.floor(x0), math.floor(y0), math.floor(x1), math.floor(y1)
-        dx, dy = x1 - x0, y1 - y0
+        ix, iy = math.floor(x0), math.floor(y0)
         step_x, step_y = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
         each_x = 1.0 / abs(dx) if dx != 0.0 else 1e300
         each_y = 1.0 / abs(dy) if dy != 0.0 else 1e300
         next_x = (ix + 1.0 - x0 if dx > 0.0 else x0 - ix) * each_x
         next_y = (iy + 1.0 - y0 if dy > 0.0 else y0 - iy) * each_y
-        steps = abs(jx - ix) + abs(jy - iy)
         tx, ty, tile = -1, -1, -1
-        for i in range(steps + 1):
-            if i == steps:  # rounding never leads the walk astray by a cell
-                ix, iy = jx, jy
+        for _ in range(abs(math.floor(ends[k, 0]) - ix) + abs(math.floor(ends[k, 1]) - iy)):
             if ix >> BITS != tx or iy >> BITS != ty:
                 tx, ty = ix >> BITS, iy >> BITS
                 tile = own_tile(table, cells, refs, free, ty, tx)
             cell = ((iy & MASK) << BITS) + (ix & MASK)
-            if i < steps or is_hit[k]:
+            if cells[tile, cell, STAMP] != stamp:
                 _count_visit(cells, tile, cell)
             if next_x < next_y:
                 next_x += each_x
@@ -146,60 +172,7 @@ def register_beams(
             else:
                 next_y += each_y
                 iy += step_y
-        if is_hit[k]:
-            _count_hit(cells, tile, ((jy & MASK) << BITS) + (jx & MASK), x1 - jx, y1 - jy)
     return ends.shape[0]
-
-
-@kernel()
-def _normal_at(table: Table, cells: Cells, ix: int, iy: int) -> int:
-    """Direction across the line that the ends about a cell form, as NORMAL keeps it."""
-    n, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for y in range(iy - 2, iy + 3):
-        for x in range(ix - 2, ix + 3):
-            if not wall_at(table, cells, x, y):
-                continue
-            tile, cell = table[y >> BITS, x >> BITS], ((y & MASK) << BITS) + (x & MASK)
-            u = x - ix + cells[tile, cell, MEAN_X] / FULL
-            v = y - iy + cells[tile, cell, MEAN_Y] / FULL
-            n += 1
-            sx += u
-            sy += v
-            sxx += u * u
-            sxy += u * v
-            syy += v * v
-    if n < 3:
-        return 0
-    a, b, c = sxx / n - (sx / n) ** 2, sxy / n - sx * sy / n**2, syy / n - (sy / n) ** 2
-    mean, radius = 0.5 * (a + c), math.sqrt(0.25 * (a - c) ** 2 + b * b)
-    if mean - radius > LINE * LINE * (mean + radius) or mean + radius < 0.3:
-        return 0
-    along = 0.5 * math.atan2(2.0 * b, a - c)
-    across = (along + 0.5 * math.pi) % math.pi
-    return 1 + int(across / math.pi * (FULL - 1))
-
-
-@kernel("void(int32[:, ::1], uint16[:, :, ::1], float64[:, ::1], boolean[::1])")
-def find_normals(table: Table, cells: Cells, ends: Array, is_hit: NDArray[np.bool_]) -> None:
-    """Renew the directions across the walls where a scan just written hit them."""
-    for k in range(ends.shape[0]):
-        if is_hit[k]:
-            x, y = math.floor(ends[k, 0]), math.floor(ends[k, 1])
-            tile = table[y >> BITS, x >> BITS]
-            cells[tile, ((y & MASK) << BITS) + (x & MASK), NORMAL] = _normal_at(table, cells, x, y)
-
-
-@kernel("void(int32[:, ::1], uint16[:, :, ::1])")
-def find_all_normals(table: Table, cells: Cells) -> None:
-    """The directions across all walls of a map whose tiles are its own."""
-    for ty in range(table.shape[0]):
-        for tx in range(table.shape[1]):
-            if table[ty, tx] < 0:
-                continue
-            for cell in range(AREA):
-                if is_wall(cells, table[ty, tx], cell):
-                    x, y = (tx << BITS) + (cell & MASK), (ty << BITS) + (cell >> BITS)
-                    cells[table[ty, tx], cell, NORMAL] = _normal_at(table, cells, x, y)
 
 
 @kernel("void(int32[:, :, ::1], int32[::1], int32[::1])")

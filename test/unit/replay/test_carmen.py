@@ -83,13 +83,13 @@ def moves(odometry: np.ndarray) -> np.ndarray:
 def test_the_wheels_err_as_stated() -> None:
     rng = np.random.default_rng(1)
     ahead = np.column_stack((np.arange(3.0), np.zeros(3), np.zeros(3)))
-    ends = np.array([noisy_odometry(ahead, rng)[1] for _ in range(3000)])
-    assert ends[:, 0].std() == pytest.approx(0.02, rel=0.05)
-    assert ends[:, 1].std() == pytest.approx(0.005, rel=0.05)
-    assert ends[:, 2].std() == pytest.approx(0.005 * math.sqrt(2.0), rel=0.05)
+    ends = np.array([noisy_odometry(ahead, rng)[1] for _ in range(1500)])
+    assert ends[:, 0].std() == pytest.approx(0.02, rel=0.1)
+    assert ends[:, 1].std() == pytest.approx(0.005, rel=0.1)
+    assert ends[:, 2].std() == pytest.approx(0.005 * math.sqrt(2.0), rel=0.1)
     turning = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    ends = np.array([noisy_odometry(turning, rng)[1] for _ in range(3000)])
-    assert ends[:, 2].std() == pytest.approx(0.02, rel=0.05)
+    ends = np.array([noisy_odometry(turning, rng)[1] for _ in range(1500)])
+    assert ends[:, 2].std() == pytest.approx(0.02, rel=0.1)
     assert np.hypot(*ends[:, :2].T).std() < 0.005
 
 
