@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,17 @@ class Mount:
 
     pose: Pose2D = Pose2D()
     is_upside_down: bool = False
+
+
+def scan_problem(scan: LaserScan) -> str:
+    """Why a scan cannot be used at all, "" where it can."""
+    if not len(scan.ranges):
+        return "it has no beams"
+    if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment) and math.isfinite(scan.stamp)):
+        return f"its angles make no sense (angle_min {scan.angle_min}, angle_increment {scan.angle_increment})"
+    if not (scan.range_max > 0.0 and math.isfinite(scan.range_max) and math.isfinite(scan.range_min)):
+        return f"its bounds make no sense (range_min {scan.range_min}, range_max {scan.range_max})"
+    return ""
 
 
 def scan_points(scan: LaserScan) -> Array:

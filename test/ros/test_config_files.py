@@ -16,6 +16,7 @@ import roslaunch.xmlloader
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
 from rosbot_patrol.patrol.arming import load_rules
@@ -76,6 +77,12 @@ def test_move_base(profile: str, simulation: str) -> None:
 @pytest.mark.parametrize("profile", ["tuned", "tutorial"])
 def test_amcl(profile: str) -> None:
     load(AmclParams, given("amcl_only.launch", "amcl", f"profile:={profile}"), name="/amcl/")
+
+
+def test_slam_gmapping() -> None:
+    params = load(GmappingParams, given("gmapping_only.launch", "slam_gmapping"), name="/slam_gmapping/")
+    assert params.particles == 30
+    assert params.str_ == 0.1
 
 
 def test_twist_mux() -> None:

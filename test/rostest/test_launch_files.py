@@ -64,8 +64,7 @@ def check_programs(config: roslaunch.config.ROSLaunchConfig) -> None:
 def test_parses(path: Path) -> None:
     arguments = ["world_name:=x"] if path.name == "empty_world.launch" else []
     config = parse(path, *arguments)
-    if "gmapping" not in path.name:
-        check_programs(config)
+    check_programs(config)
 
 
 def test_image_transports_republish_is_ours() -> None:

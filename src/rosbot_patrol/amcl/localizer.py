@@ -25,6 +25,7 @@ from rosbot_patrol.amcl.trust import State, Trust, Witness, agreement
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan import scan_problem as scan_problem
 
 Array = NDArray[np.float64]
 
@@ -304,14 +305,3 @@ def start_of(params: AmclParams) -> tuple[Pose2D, Array]:
     p = params
     pose = Pose2D(p.initial_pose_x, p.initial_pose_y, p.initial_pose_a)
     return pose, np.diag([p.initial_cov_xx, p.initial_cov_yy, p.initial_cov_aa])
-
-
-def scan_problem(scan: LaserScan) -> str:
-    """Why a scan cannot be used at all, "" where it can."""
-    if not len(scan.ranges):
-        return "it has no beams"
-    if not (math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment) and math.isfinite(scan.stamp)):
-        return f"its angles make no sense (angle_min {scan.angle_min}, angle_increment {scan.angle_increment})"
-    if not (scan.range_max > 0.0 and math.isfinite(scan.range_max) and math.isfinite(scan.range_min)):
-        return f"its bounds make no sense (range_min {scan.range_min}, range_max {scan.range_max})"
-    return ""

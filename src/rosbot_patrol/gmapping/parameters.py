@@ -57,4 +57,8 @@ class GmappingParams:
     llsamplestep: float = param(0.01, unit="m", doc="accepted for upstream's sake; without effect, as there")
     lasamplerange: float = param(0.005, unit="rad", doc="accepted for upstream's sake; without effect, as there")
     lasamplestep: float = param(0.005, unit="rad", doc="accepted for upstream's sake; without effect, as there")
+    map_file: str = param("", doc="yaml of a saved map to go on with; empty: begin a new one")
+    initial_pose_x: float = param(0.0, unit="m", doc="where the robot stands on the saved map")
+    initial_pose_y: float = param(0.0, unit="m", doc="where the robot stands on the saved map")
+    initial_pose_a: float = param(0.0, unit="rad", doc="where the robot stands on the saved map")
     seed: int = param(0, lo=0, doc="of all chance: the same inputs and seed give the same map")

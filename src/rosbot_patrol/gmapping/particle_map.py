@@ -63,6 +63,11 @@ class ParticleMaps:
         return len(self.refs) - int(self.free[0])
 
     @property
+    def megabytes(self) -> float:
+        """What all maps take together [MB]."""
+        return (self.tables.nbytes + self.cells.nbytes + self.refs.nbytes + self.free.nbytes) / 1e6
+
+    @property
     def info(self) -> GridInfo:
         """Place and size of the maps."""
         _, rows, columns = self.tables.shape

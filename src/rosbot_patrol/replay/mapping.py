@@ -50,7 +50,8 @@ def map_log(
         mount: how the laser sits on the robot.
         heard: called with each scan's number and outcome.
     """
-    slam, last_update, resamplings = Slam(params), [], 0
+    slam, resamplings = Slam(params), 0
+    last_update: list[int] = []
     mount = mount or Mount()
     for i, (scan, row) in enumerate(zip(scans, odometry, strict=True)):
         outcome = slam.update(scan, Pose2D(*row), mount)

@@ -22,6 +22,7 @@ from rosbot_patrol.costmap.params import (
 )
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.images.compressed import CompressedParams
 from rosbot_patrol.images.compressed_depth import CompressedDepthParams
 from rosbot_patrol.navigation.params import MoveBaseParams
@@ -93,6 +94,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
         ],
     ),
     ("amcl", [("", AmclParams)]),
+    ("slam_gmapping", [("", GmappingParams)]),
     ("map_server", [("", MapServerParams)]),
     ("darknet_ros", [("", DarknetParams)]),
     (

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import rospy
 import tf2_ros
 
-from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
 from rosbot_patrol.ros.transforms import Transforms
-from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan import LaserScan, Mount
 
 POLL_S, IDLE_S = 0.008, 0.2
 GIVE_UP_S, GIVE_UP_WALL_S = 1.0, 2.0  # a scan this much older than the newest, or waiting for so long, is dropped

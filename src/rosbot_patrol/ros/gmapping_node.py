@@ -1,0 +1,220 @@
+"""slam_gmapping: a map of the surroundings and the robot's place on it, from odometry and a lidar.
+
+Matches slam_gmapping of ROS Noetic (gmapping 1.4): topic `scan` and tf in; `map` and `map_metadata` (latched),
+`~entropy` and tf map -> odom out, that stamped now + tf_delay every transform_publish_period; service `dynamic_map`;
+parameters in `GmappingParams`. Written from Grisetti, Stachniss, Burgard 2007 and upstream's documentation.
+
+Differs: a map's cell lies where its origin says, where upstream's lies half a cell off. The search for the best fit is
+refined by Gauss-Newton across the walls, the proposal is the Gaussian of match and odometry, and the odometry errs by
+the way between updates, not by the number of scans. Beams that graze a wall do not wear it away within a scan. A scan
+of another number of beams is taken as it is, upstream drops it. A beam that met nothing (inf) frees the floor where
+`maxRange` is range_max or more. The entropy is that of the weights and comes with each update. A saved map may be gone
+on with (`map_file`, `initial_pose_x`, `_y`, `_a`). A clock that goes back or an odometry that jumps is a restart, not
+a motion. The parameters llsample* and lasample* are accepted without effect.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+
+import rospy
+import tf2_ros
+from nav_msgs.msg import MapMetaData
+from nav_msgs.srv import GetMapResponse
+from rospy.numpy_msg import numpy_msg
+from sensor_msgs.msg import LaserScan as LaserScanMsg
+from std_msgs.msg import Float64
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.gmapping.slam import Outcome, Slam
+from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.ros.convert import grid_to_msg, scan_from_msg, transform_to_msg
+from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.ros.grids import GetMapFast, GridMsg
+from rosbot_patrol.ros.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
+from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.scan import LaserScan, scan_problem
+
+log = logging.getLogger(__name__)
+
+SILENT_S = 15.0  # a lidar that says nothing for so long is warned of
+WAITING = 5  # scans, as upstream
+
+
+class GmappingNode:
+    """The edge of a Slam.
+
+    Args:
+        params: of slam_gmapping.
+
+    Raises:
+        MapError: the extent or the saved map makes no sense.
+    """
+
+    def __init__(self, params: GmappingParams) -> None:
+        self._params = params
+        self._map_frame = params.map_frame.lstrip("/")
+        self._odom = params.odom_frame.lstrip("/")
+        self._slam = started(params)
+        self._transforms = Transforms()
+        self._scans = ScanQueue(self._transforms, self._odom, params.base_frame.lstrip("/"), WAITING)
+        self._last_scan = self._last_time = now()
+        self._heard = self._beams = 0
+        self._map_stamp = -math.inf  # of the scan that the map was last made after
+        self._map: GridMsg | None = None
+        self._correction = Pose2D()  # map_from_odom
+        self._note = ""  # what was wrong with the last update
+        self._lock = threading.Lock()  # of the map's message
+        self._health = Health()
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        self._grid = rospy.Publisher("map", GridMsg, queue_size=1, latch=True)
+        self._metadata = rospy.Publisher("map_metadata", MapMetaData, queue_size=1, latch=True)
+        self._entropy = rospy.Publisher("~entropy", Float64, queue_size=1, latch=True)
+        self._service = rospy.Service("dynamic_map", GetMapFast, self._get_map)
+        self._subscriber = rospy.Subscriber(
+            "scan", numpy_msg(LaserScanMsg), self._scan, queue_size=WAITING, buff_size=1 << 20
+        )
+
+    def run(self) -> None:
+        """Work until shutdown."""
+        info, p = self._slam.maps.info, self._params
+        log.info("Mapping %d X %d cells @ %.3f m with %d particles", info.width, info.height, p.delta, p.particles)
+        Loop(1.0, self._tell_health, name="health").start()
+        if self._params.transform_publish_period > 0.0:
+            Loop(1.0 / self._params.transform_publish_period, self._send_transform, name="transform").start()
+        while not rospy.is_shutdown():
+            placed = self._scans.take()
+            if placed is not None:
+                self._step(placed)
+
+    # Inputs
+
+    def _scan(self, message: LaserScanMsg) -> None:
+        self._last_scan = now()
+        self._heard += 1
+        if (self._heard - 1) % self._params.throttle_scans:
+            return
+        scan = scan_from_msg(message)
+        problem = scan_problem(scan)
+        if problem:
+            rospy.logwarn_throttle(10.0, f"scan of frame '{scan.frame_id}': {problem}; it is left out")
+            return
+        self._compare(scan)
+        self._scans.put(scan)
+
+    def _compare(self, scan: LaserScan) -> None:
+        beams, before = len(scan.ranges), self._beams
+        self._beams = beams
+        if before and beams != before:
+            rospy.logwarn_throttle(
+                10.0, f"scan of frame '{scan.frame_id}': it has {beams} beams, {before} before; it is taken as it is"
+            )
+
+    def _get_map(self, _request: object) -> GetMapResponse:
+        with self._lock:
+            if self._map is None:
+                raise rospy.ServiceException("there is no map yet: no scan has been taken in")
+            return GetMapFast._response_class(map=self._map)
+
+    # Step and outputs
+
+    def _step(self, placed: PlacedScan) -> None:
+        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.mount)
+        if self._slam.map_from_odom is not None:
+            self._correction = self._slam.map_from_odom
+        self._note = self._describe(outcome, placed.scan)
+        if not outcome.updated:
+            return
+        self._entropy.publish(Float64(data=self._slam.entropy))
+        since = placed.scan.stamp - self._map_stamp
+        if self._map is None or since > self._params.map_update_interval or since < 0.0:
+            self._map_stamp = placed.scan.stamp
+            self._publish_map(placed.scan.stamp)
+
+    def _describe(self, outcome: Outcome, scan: LaserScan) -> str:
+        """What is wrong with an update, in a sentence; warned of now and then."""
+        text = ""
+        if outcome.is_blind:
+            text = f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
+        elif outcome.failed:
+            count = self._params.particles
+            text = f"scan matching failed for {outcome.failed} of {count} particles: they follow the odometry"
+        elif not outcome.updated:
+            return self._note
+        if text:
+            rospy.logwarn_throttle(10.0, text)
+        return text
+
+    def _publish_map(self, stamp: float) -> None:
+        plain = grid_to_msg(self._slam.grid(), self._map_frame, stamp, load_time=stamp)
+        message = GridMsg()
+        message.header, message.info, message.data = plain.header, plain.info, plain.data
+        with self._lock:
+            self._map = message
+        self._grid.publish(message)
+        self._metadata.publish(message.info)
+
+    def _send_transform(self, current: float) -> None:
+        delay = self._params.tf_delay
+        stamp = current + (delay if delay >= 0.0 else self._params.transform_publish_period)
+        self._broadcaster.sendTransform(transform_to_msg(self._correction, self._map_frame, self._odom, stamp))
+
+    def _tell_health(self, current: float) -> None:
+        if current < self._last_time - 1.0:
+            log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
+            self._transforms.buffer.clear()
+        if abs(current - self._last_time) > SILENT_S:  # the clock was set, nobody was silent for so long
+            self._last_scan = current
+        self._last_time = current
+        level, text = self._state(current)
+        maps = self._slam.maps
+        values = {
+            "updates": len(self._slam.stamps),
+            "scans dropped": self._scans.dropped,
+            "tiles": maps.tiles_used,
+            "map [MB]": f"{maps.megabytes:.1f}",
+        }
+        self._health.set("", level, text, values)
+
+    def _state(self, current: float) -> tuple[int, str]:
+        silent = current - self._last_scan
+        if silent > SILENT_S:
+            text = f"no laser scan received on {rospy.resolve_name('scan')} for {silent:.0f} seconds: nothing is mapped"
+            rospy.logwarn_throttle(SILENT_S, text)
+            return WARN, text
+        if self._scans.problem:
+            rospy.logwarn_throttle(10.0, f"scans are dropped: {self._scans.problem}")
+            return ERROR, f"scans are dropped: {self._scans.problem}"
+        if self._slam.map_from_odom is None:
+            return WARN, "waiting for the first scan"
+        if self._note:
+            return WARN, self._note
+        return OK, "mapping"
+
+
+def started(params: GmappingParams) -> Slam:
+    """A Slam, on a saved map where the parameters name one.
+
+    Raises:
+        MapError: the saved map cannot be read or does not fit.
+    """
+    if not params.map_file:
+        return Slam(params)
+    saved = read_map(params.map_file)
+    start = Pose2D(params.initial_pose_x, params.initial_pose_y, params.initial_pose_a)
+    log.info("Going on with the map %s from %.2f %.2f %.2f", params.map_file, *start)
+    return Slam(params, saved=saved, start=start)
+
+
+def body() -> None:
+    """Load, build, run."""
+    GmappingNode(load_params(GmappingParams)).run()
+
+
+def main() -> None:
+    """The program."""
+    run_node("slam_gmapping", body)
