@@ -88,7 +88,7 @@ class ScanMatcher:
                 p.lstep / resolution,
                 p.astep,
                 min(p.iterations, HALVINGS),
-                2 * p.iterations,
+                max(2 * p.iterations, 1),
                 max(beams // SEARCH_BEAMS, 1),
                 p.kernelSize,
                 p.sigma / area,
