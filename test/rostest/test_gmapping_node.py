@@ -81,9 +81,7 @@ def test_bad_scans_are_named_and_survived(ros):
     peer.do("drive", scans=2, broken="few")
     node.says("it has 90 beams, 180 before; it is taken as it is")
     peer.do("drive", scans=2, back=3.0)
-    peer.do("drive", scans=2, frame="tilted")
-    peer.do("drive", scans=12)
-    node.says("the laser is not mounted level")
+    wait_for(lambda: peer.do("drive", scans=10, frame="tilted") and "is not mounted level" in node.output)
     assert peer.do("drive", scans=2)["tf"] > 0
     assert node.popen.poll() is None
 

@@ -120,9 +120,8 @@ class Slam:
             odom_from_base: the robot in the odometry's frame at the scan's stamp.
             mount: how the laser sits on the robot.
         """
-        beams = pick_beams(scan, mount, self._params)
         if self._odometry is None:
-            return self._begin(scan.stamp, odom_from_base, beams)
+            return self._begin(scan.stamp, odom_from_base, pick_beams(scan, mount, self._params))
         self._check_restart(scan.stamp, odom_from_base)
         self._way += math.hypot(odom_from_base.x - self._odometry.x, odom_from_base.y - self._odometry.y)
         self._turn += abs(angle_difference(odom_from_base.yaw, self._odometry.yaw))
@@ -130,7 +129,7 @@ class Slam:
         if not self._is_due():
             return Outcome()
         move = compose(invert(self._updated_at), odom_from_base)
-        outcome = self._step(move, beams)
+        outcome = self._step(move, pick_beams(scan, mount, self._params))
         self._note(scan.stamp, odom_from_base)
         return outcome
 

@@ -42,7 +42,7 @@ from rosbot_patrol.scan import LaserScan, scan_problem
 log = logging.getLogger(__name__)
 
 SILENT_S = 15.0  # a lidar that says nothing for so long is warned of
-WAITING = 5  # scans, as upstream
+WAITING = 50  # scans: more than a fast lidar sends before one that tf cannot place is given up and told of
 
 
 class GmappingNode:
@@ -76,7 +76,7 @@ class GmappingNode:
         self._entropy = rospy.Publisher("~entropy", Float64, queue_size=1, latch=True)
         self._service = rospy.Service("dynamic_map", GetMapFast, self._get_map)
         self._subscriber = rospy.Subscriber(
-            "scan", numpy_msg(LaserScanMsg), self._scan, queue_size=WAITING, buff_size=1 << 20
+            "scan", numpy_msg(LaserScanMsg), self._scan, queue_size=5, buff_size=1 << 20
         )
 
     def run(self) -> None:
