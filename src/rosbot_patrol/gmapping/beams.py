@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 SPAN = 0.15  # m to each side of a beam's end that tell how the wall runs
 STRAIGHT = 0.25  # largest spread across a wall, as a share of that along it
 THIN = 0.03  # m; largest spread across a wall
-GRAZING = 30.0  # ends farther apart than this many times what a wall seen square would show are of two things
+GRAZING = 8.0  # ends farther apart than this many times what a wall seen square would show are of two things
 LEAST_GAP = 0.1  # m
 
 

@@ -63,8 +63,8 @@ def test_the_proposal_is_wide_along_a_corridor_and_narrow_across(corridor: Parti
         found = matcher.match(corridor, still, np.zeros(1), seen, SIGMAS, np.array([noise]))
         return found.poses[0] - found.modes[0]
 
-    assert 0.04 < abs(drawn(1.0, 0.0, 0.0)[0]) < 0.11
-    assert abs(drawn(0.0, 1.0, 0.0)[1]) < 0.02
+    assert 0.03 < abs(drawn(1.0, 0.0, 0.0)[0]) < 0.11  # a few lone far ends hold it, too
+    assert abs(drawn(0.0, 1.0, 0.0)[1]) < 0.01
     assert abs(drawn(0.0, 0.0, 1.0)[2]) < 0.02
 
 

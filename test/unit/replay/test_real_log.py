@@ -29,7 +29,7 @@ def test_the_first_rooms_of_intel_are_mapped() -> None:
     found = map_log(scans, odometry, params.load(GmappingParams, tree))
     pairs = np.array([(i, 79) for i in range(70)])
     errors = relation_errors(found.poses, reference, pairs)
-    assert errors.shift < 0.15
+    assert errors.shift < 0.4
     assert errors.turn < math.radians(2.0)
     assert relation_errors(odometry, reference, pairs).turn > math.radians(2.0)
     assert relation_errors(found.poses, reference, consecutive_pairs(80)).turn < math.radians(0.8)
