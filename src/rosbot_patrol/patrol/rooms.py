@@ -14,14 +14,17 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.geometry import Pose2D, wrap_angle
+from rosbot_patrol.files import write_atomic
 from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)
@@ -82,7 +85,8 @@ def _not_finite(value: float) -> str | None:
     return None if math.isfinite(value) else f"is {value}, expected a finite number"
 
 
-def _bad_name(value: str) -> str | None:
+def bad_name(value: str) -> str | None:
+    """What is wrong with a room's name, None where nothing is."""
     if not value.strip():
         return "is empty, expected a name"
     if not value.isprintable():
@@ -92,7 +96,7 @@ def _bad_name(value: str) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry:
-    name: str = params.param(doc="for people", check=_bad_name)
+    name: str = params.param(doc="for people", check=bad_name)
     x: float = params.param(unit="m", check=_not_finite)
     y: float = params.param(unit="m", check=_not_finite)
     angle: float = params.param(doc="heading, in the file's angle_unit", check=_not_finite)
@@ -162,3 +166,26 @@ def _room(file: _File, index: int, key: str, prefix: str) -> Room:
             math.degrees(wrap_angle(entry.angle)),
         )
     return Room(id=index, name=entry.name.strip(), pose=Pose2D(entry.x, entry.y, wrap_angle(angle)))
+
+
+def save_rooms(path: str | Path, rooms: Iterable[Room]) -> None:
+    """Write a points file, whole or not at all; angles in degrees. Raises OSError."""
+    listed = list(rooms)
+    head = (
+        "# Where the robot looks from in each room, and the base (room 0) that it comes home to. Frame: map, metres.\n"
+    )
+    content = {
+        "rooms_num": len(listed),
+        "angle_unit": "deg",
+        "rooms": {
+            f"room{room.id}": {
+                "name": room.name,
+                "x": round(room.pose.x, 3),
+                "y": round(room.pose.y, 3),
+                "angle": round(math.degrees(room.pose.yaw), 1),
+            }
+            for room in listed
+        },
+    }
+    text = head + yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    write_atomic(Path(path), text.encode())
