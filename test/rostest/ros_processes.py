@@ -85,8 +85,8 @@ class Ros:
                 return [sys.executable, str(path)]
         raise AssertionError(f"{program} is not built")
 
-    def node(self, program, *arguments):
-        process = Process([*self.command(program), *arguments], self.env, stdin=subprocess.DEVNULL)
+    def node(self, program, *arguments, stdin=subprocess.DEVNULL):
+        process = Process([*self.command(program), *arguments], self.env, stdin=stdin)
         self.processes.append(process)
         return process
 

@@ -23,8 +23,8 @@ import yaml
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.files import write_atomic
+from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)

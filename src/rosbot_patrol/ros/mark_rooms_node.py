@@ -106,7 +106,8 @@ class MarkRooms:
             if not self._take(click):
                 break
         print(
-            f"\n{len(self._marks.rooms)} points in {self._path}. path_to_params:={self._path.resolve()} gives them to the launch."
+            f"\n{len(self._marks.rooms)} points in {self._path}; the launch takes them by"
+            f" path_to_params:={self._path.resolve()}"
         )
 
     def _say_what_next(self) -> None:

@@ -36,7 +36,7 @@ def marks() -> Marks:
     ("place", "told"),
     [
         ((5.5, 2.5), ""),
-        ((9.0, 2.5), "no floor there; the nearest place for it is (6.8"),
+        ((8.0, 2.5), "no floor there; the nearest place for it is (6."),
         ((5.5, 1.0), "the map shows no floor there"),
         ((40.0, 40.0), "the map shows no floor there"),
         ((0.6, 2.5), "0.10 m from the nearest thing, and the robot needs 0.20 m to turn; the nearest place"),
