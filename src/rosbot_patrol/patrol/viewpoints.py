@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import Pose2D, wrap_angles
+from rosbot_patrol.maps.ways import steps_over
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.coverage import CoverageParams, sight_on_map, visible
 from rosbot_patrol.patrol.floor import Array, Floor, Mask
@@ -211,7 +211,7 @@ class ViewpointPlanner:
         cell = self.floor.nearest(wide, start.x, start.y, 1.0)
         if cell is None:
             return np.full(self.floor.info.shape, _FAR)
-        return _ways(wide, cell) * self.floor.info.resolution
+        return steps_over(wide, cell) * self.floor.info.resolution
 
     def reached(self, start: Pose2D) -> Mask:
         """Cells of the floor that the robot gets to from a pose."""
@@ -246,26 +246,3 @@ class ViewpointPlanner:
     def _place(self, iy: int, ix: int, ways: Array) -> tuple[float, float, float]:
         x, y = self.floor.info.centre_of(ix, iy)
         return x, y, float(ways[iy, ix])
-
-
-def _ways(wide: Mask, start: tuple[int, int]) -> Array:
-    """Steps from a cell to each other over a mask, by waves over the whole grid: a diagonal counts 1.4."""
-    out = np.full(wide.shape, _FAR)
-    ix, iy = start
-    out[iy, ix] = 0.0
-    front: tuple[NDArray[np.int64], NDArray[np.int64]] = (np.array([iy]), np.array([ix]))
-    steps = [(dy, dx, math.hypot(dy, dx)) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
-    while len(front[0]):
-        reached = []
-        for dy, dx, length in steps:
-            y, x = front[0] + dy, front[1] + dx
-            gone = out[front] + length
-            inside = (y >= 0) & (x >= 0) & (y < wide.shape[0]) & (x < wide.shape[1])
-            y, x, gone = y[inside], x[inside], gone[inside]
-            better = wide[y, x] & (gone < out[y, x] - 1e-9)
-            y, x, gone = y[better], x[better], gone[better]
-            np.minimum.at(out, (y, x), gone)
-            reached.append(y * wide.shape[1] + x)
-        cells = np.unique(np.concatenate(reached))
-        front = cells // wide.shape[1], cells % wide.shape[1]
-    return out

@@ -38,6 +38,7 @@ from rosbot_patrol.planning.navfn import NavfnParams
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
 from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 from rosbot_patrol.ros.demo_intruder_node import DemoParams
+from rosbot_patrol.ros.explore_node import ExploreParams
 from rosbot_patrol.ros.incident_keeper import RecordParams
 from rosbot_patrol.ros.map_server_node import MapServerParams
 from rosbot_patrol.ros.narrator_node import NarratorParams
@@ -95,6 +96,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ),
     ("amcl", [("", AmclParams)]),
     ("slam_gmapping", [("", GmappingParams)]),
+    ("explore", [("", ExploreParams)]),
     ("map_server", [("", MapServerParams)]),
     ("darknet_ros", [("", DarknetParams)]),
     (

@@ -1,0 +1,133 @@
+"""Where a map ends before a wall does: borders between floor and the unknown, and where to stand to look beyond.
+
+Frontier-based exploration (Yamauchi, A frontier-based approach for autonomous exploration, CIRA 1997); frontiers are
+weighed by way and length.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.maps.ways import steps_over
+from rosbot_patrol.params import param
+
+Mask = NDArray[np.bool_]
+Array = NDArray[np.float64]
+
+_FREE_BELOW, _WALL_ABOVE = 25, 65  # occupancy, map_server's thresholds
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontierParams:
+    """What is worth a drive."""
+
+    robot_radius: float = param(0.2, unit="m", lo=0.05, doc="no goal, and no way to one, lies nearer to an obstacle")
+    frontier_length: float = param(0.5, unit="m", lo=0.05, doc="shorter borders to the unknown are left alone")
+    frontier_clearance: float = param(
+        0.12, unit="m", lo=0.0, doc="what is nearer to an obstacle is no border: beams pass along walls"
+    )
+    frontier_near: float = param(1.0, unit="m", lo=0.1, doc="so near to a border the robot has to get")
+    frontier_gain: float = param(0.8, lo=0.0, doc="metres of way that a metre of border is worth")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frontier:
+    """One border to the unknown.
+
+    Attributes:
+        x: of its middle in map [m]; y: likewise.
+        length: of it [m].
+        goal: where to stand, looking at it.
+        way: to there [m].
+        cost: the less the better.
+    """
+
+    x: float
+    y: float
+    length: float
+    goal: Pose2D
+    way: float
+    cost: float
+
+
+class Borders:
+    """A map and what of it the robot reaches.
+
+    Args:
+        grid: occupancy, -1 unknown, 0 free to 100 occupied.
+        start: of the robot in map.
+        params: what is worth a drive.
+    """
+
+    def __init__(self, grid: Grid, start: Pose2D, params: FrontierParams) -> None:
+        self._info, self._params = grid.info, params
+        cells = grid.cells
+        self._free = (cells >= 0) & (cells <= _FREE_BELOW)
+        is_wall = cells >= _WALL_ABOVE
+        self._unknown = ~self._free & ~is_wall
+        self._clearance = _distances(is_wall, grid.info.resolution)
+        wide = self._free & (self._clearance >= params.robot_radius)
+        self._ways = np.full(cells.shape, math.inf)
+        cell = self._nearest(wide, start.x, start.y)
+        if cell is not None:
+            self._ways = steps_over(wide, cell) * grid.info.resolution
+
+    @property
+    def area(self) -> float:
+        """Floor that is known [m2]."""
+        return float(self._free.sum()) * self._info.resolution**2
+
+    def frontiers(self) -> list[Frontier]:
+        """Those that can be reached, the best first."""
+        p, beside = self._params, cv2.dilate(self._unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        border = self._free & beside & (self._clearance >= p.frontier_clearance)
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(border.astype(np.uint8), connectivity=8)
+        found = []
+        for k in range(1, count):
+            length = float(max(stats[k, cv2.CC_STAT_WIDTH], stats[k, cv2.CC_STAT_HEIGHT])) * self._info.resolution
+            if length < p.frontier_length:
+                continue
+            frontier = self._frontier(np.argwhere(labels == k), length)
+            if frontier is not None:
+                found.append(frontier)
+        return sorted(found, key=lambda f: f.cost)
+
+    def _frontier(self, cells: NDArray[np.intp], length: float) -> Frontier | None:
+        iy, ix = cells[int(np.hypot(*(cells - cells.mean(axis=0)).T).argmin())]
+        x, y = self._info.centre_of(int(ix), int(iy))
+        stand = self._nearest(np.isfinite(self._ways), x, y, self._params.frontier_near)
+        if stand is None:
+            return None
+        at = self._info.centre_of(*stand)
+        way = float(self._ways[stand[1], stand[0]])
+        yaw = math.atan2(y - at[1], x - at[0])
+        cost = way - self._params.frontier_gain * length
+        return Frontier(x=x, y=y, length=length, goal=Pose2D(*at, yaw), way=way, cost=cost)
+
+    def _nearest(self, mask: Mask, x: float, y: float, within: float = 1.0) -> tuple[int, int] | None:
+        """(ix, iy) of the mask's cell that is nearest to a place, None where none lies within a distance [m]."""
+        info, reach = self._info, math.ceil(within / self._info.resolution)
+        ix, iy = info.cell_of(x, y)
+        x0, y0 = max(ix - reach, 0), max(iy - reach, 0)
+        part = np.argwhere(mask[y0 : max(iy + reach + 1, 0), x0 : max(ix + reach + 1, 0)])
+        if not len(part):
+            return None
+        gaps = np.hypot(part[:, 1] + x0 - ix, part[:, 0] + y0 - iy)
+        k = int(gaps.argmin())
+        if gaps[k] * info.resolution > within:
+            return None
+        return int(part[k, 1]) + x0, int(part[k, 0]) + y0
+
+
+def _distances(is_wall: Mask, resolution: float) -> Array:
+    """Of each cell to the nearest wall [m]."""
+    if not is_wall.any():
+        return np.full(is_wall.shape, math.inf)
+    return np.asarray(cv2.distanceTransform((~is_wall).astype(np.uint8), cv2.DIST_L2, 5), np.float64) * resolution
