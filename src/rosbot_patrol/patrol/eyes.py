@@ -13,6 +13,7 @@ from rosbot_patrol.geometry import Pose2D, angle_difference, transform_points
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.close_ups import Sighting
 from rosbot_patrol.patrol.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
+from rosbot_patrol.patrol.doubts import Doubt, Doubts
 from rosbot_patrol.patrol.floor import Mask
 from rosbot_patrol.patrol.inputs import Eye, Inputs
 from rosbot_patrol.patrol.mission import Mission
@@ -27,13 +28,6 @@ log = logging.getLogger(__name__)
 
 VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
-_SAME_DOUBT = 1.5  # boxes too far off to be measured that are nearer are of one thing [m]
-_SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
-_CLOSE = 1.0  # so near one may come to what is half hidden [m]
-_BACK = 2.0, 4.5  # from there a person shows whole [m]
-_WHOLE = 1.7  # from so far off one who stands cannot be taken for a pet [m]
-_INSIDE = 0.1  # of the picture's edges a place must lie [rad]
-_BODY = 0.4  # in front of a place its own body may end a beam [m]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -53,25 +47,6 @@ class EyesParams:
     coverage: CoverageParams = CoverageParams()
     viewpoints: ViewpointParams = ViewpointParams()
     witness: WitnessParams = WitnessParams()
-
-
-@dataclass
-class _Doubt:
-    x: float
-    y: float
-    pictures: int = 1
-    seen_from: tuple[Pose2D, ...] = ()  # where a second side is wanted
-    is_grave: bool = True  # without a second look nobody can say that nobody is there
-    is_near: bool = False  # too near to be told from a pet
-    is_visited: bool = False
-    looks: int = 0  # pictures that showed its place from farther off
-
-    @property
-    def text(self) -> str:
-        looked = "was seen from one side only" if self.seen_from else "was not seen from near"
-        if self.is_near:
-            looked = "was too near to be told from a pet"
-        return f"something like a person at about ({self.x:.1f}, {self.y:.1f}) {looked}"
 
 
 class Eyes:
@@ -94,16 +69,15 @@ class Eyes:
         self._now = 0.0
         self._views = 0
         self._tried: list[tuple[float, float]] = []
-        self._doubts: list[_Doubt] = []
-        self._too_near: list[Sighting] = []  # what nobody has told from a pet yet
+        self._doubts = Doubts(self.params.coverage.seen_in)
 
     # -- Views
 
     def start(self, mission: Mission) -> None:
         """Begin with a room; what earlier viewpoints showed before a restart is taken from the map."""
         self._mission, self.coverage, self._began = mission, None, None
-        self._views, self._tried, self._doubts, self._has_eye = 0, [], [], False
-        self._too_near = []
+        self._views, self._tried, self._has_eye = 0, [], False
+        self._doubts = Doubts(self.params.coverage.seen_in)
         self._witness.start()
 
     def see(self, now: float, inputs: Inputs) -> None:
@@ -124,36 +98,16 @@ class Eyes:
             self.coverage.look(frame.eye, sight)
             for box in frame.boxes:
                 if box.doubt is not None:
-                    self._doubt(*box.doubt)
-            for doubt in self._doubts:
-                doubt.looks += doubt.is_near and _shows(frame.eye, sight, doubt)
+                    self._doubts.far(*box.doubt)
+            self._doubts.look(frame.eye, sight)
 
     def suspect(self, doubtful: Sequence[Suspect]) -> None:
         """Look at what seems to be a person from another side."""
-        for suspect in doubtful:
-            known = next((d for d in self._doubts if d.seen_from and suspect.apart(d.x, d.y) < _SAME_SUSPECT), None)
-            if known is None:
-                known = _Doubt(suspect.x, suspect.y, pictures=self.params.coverage.seen_in)
-                self._doubts.append(known)
-            known.is_grave = suspect.is_grave
-            known.seen_from = tuple(side.eye for side in suspect.sides)
-        gone = [d for d in self._doubts if d.seen_from and not any(s.apart(d.x, d.y) < _SAME_SUSPECT for s in doubtful)]
-        for doubt in gone:  # told, or no longer like one
-            doubt.is_visited = True
+        self._doubts.suspect(doubtful)
 
     def step_back(self, doubtful: Sequence[Sighting]) -> None:
         """Look from farther off at what is too near to be told from a pet."""
-        for thing in doubtful:
-            known = next((d for d in self._doubts if d.is_near and _apart(d, thing) < _SAME_DOUBT), None)
-            if known is None:
-                seen_in = self.params.coverage.seen_in
-                self._doubts.append(_Doubt(thing.x, thing.y, pictures=seen_in, is_near=True))
-            elif not known.is_visited:
-                known.x, known.y = thing.x, thing.y
-        for doubt in self._doubts:
-            if doubt.is_near and not any(_apart(doubt, thing) < _SAME_DOUBT for thing in doubtful):
-                doubt.is_visited = True
-        self._too_near = list(doubtful)
+        self._doubts.near(doubtful)
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """The best further viewpoint within the bounds."""
@@ -219,9 +173,9 @@ class Eyes:
         doubts = [doubt for doubt in self._open_doubts() if doubt.is_grave]
         if doubts:
             return doubts[0].text
-        unsure = [thing for thing in self._too_near if not any(self._was_looked_at(d, thing) for d in self._doubts)]
+        unsure = self._doubts.unsure(bool(self._witness.text()))
         if unsure:
-            return _Doubt(unsure[0].x, unsure[0].y, is_near=True).text
+            return unsure
         share = self.share()
         if share is None or share >= self.params.clear_share:
             return ""
@@ -255,43 +209,26 @@ class Eyes:
 
     # -- doubts
 
-    def _doubt(self, x: float, y: float) -> None:
-        """Something like a person was seen at about a place, too far off to be measured."""
-        for doubt in self._doubts:
-            if not doubt.seen_from and not doubt.is_near and math.hypot(doubt.x - x, doubt.y - y) < _SAME_DOUBT:
-                doubt.pictures += 1
-                return
-        self._doubts.append(_Doubt(x, y))
-
-    def _open_doubts(self) -> list[_Doubt]:
+    def _open_doubts(self) -> list[Doubt]:
         """Those seen in some pictures and not looked at again: of the mission's room, or right before the robot."""
         house, mission = self._house, self._mission
         if house is None or mission is None:
             return []
-        return [
-            doubt
-            for doubt in self._doubts
-            if not doubt.is_visited
-            and doubt.pictures >= self.params.coverage.seen_in
-            and (doubt.is_near or house.room_at(doubt.x, doubt.y) == mission.room.id)
-        ]
+        return [d for d in self._doubts.open() if d.is_near or house.room_at(d.x, d.y) == mission.room.id]
 
     def _nearer(self, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the first doubt that has one."""
         assert self._planner is not None
         assert inputs.pose is not None
         for doubt in self._open_doubts():
-            span = {"nearest": _BACK[0], "most": _BACK[1]} if doubt.is_near else {}
-            if doubt.seen_from:
-                span = {"nearest": _CLOSE}
             for stands in (self._stands(inputs), None):  # by the map alone: move_base gets through where we see no way
                 found = self._planner.near(
-                    inputs.pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, **span
+                    inputs.pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, **doubt.span
                 )
                 if found is not None:
                     break
             if found is not None:
-                doubt.is_visited = True
+                doubt.visit()
                 log.info(
                     "something like a person at (%.1f, %.1f) is to be looked at from (%.1f, %.1f)",
                     doubt.x,
@@ -301,15 +238,6 @@ class Eyes:
                 )
                 return found
         return None
-
-    def _was_looked_at(self, doubt: _Doubt, thing: Sighting) -> bool:
-        """Whether the place of what was too near was seen from farther off: if anybody was there, the watch knows.
-
-        Where something moves in the room, it may have gone.
-        """
-        if self._witness.text():
-            return False
-        return doubt.is_near and doubt.looks >= self.params.coverage.seen_in and _apart(doubt, thing) < _SAME_DOUBT
 
     # -- parts
 
@@ -365,16 +293,3 @@ class Eyes:
         if met:
             mask |= floor.mark_near(np.array(met), self.params.person_distance)
         return mask
-
-
-def _apart(doubt: _Doubt, thing: Sighting) -> float:
-    return math.hypot(doubt.x - thing.x, doubt.y - thing.y)
-
-
-def _shows(eye: Eye, sight: Sight, doubt: _Doubt) -> bool:
-    """Whether a picture shows a place from as far off as a person shows whole."""
-    away = math.hypot(doubt.x - eye.pose.x, doubt.y - eye.pose.y)
-    bearing = math.atan2(doubt.y - eye.pose.y, doubt.x - eye.pose.x)
-    if not _WHOLE <= away <= _BACK[1] + 0.5 or abs(angle_difference(bearing, eye.pose.yaw)) > 0.5 * eye.width - _INSIDE:
-        return False
-    return bool(sight.reaches(np.array([bearing]), np.array([away - _BODY]))[0])

@@ -1,0 +1,165 @@
+"""What looked like a person and was not told surely: places that are worth another look, and whether they had it.
+
+Three kinds. What was too far off to be measured is looked at from nearer. What looks like a person from one side only
+is looked at from another. What was too near to be told from a pet is looked at from farther off, again where it has
+moved meanwhile, and is nothing only where its place was seen from there and nothing moves in the room.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rosbot_patrol.geometry import Pose2D, angle_difference
+from rosbot_patrol.patrol.close_ups import Sighting
+from rosbot_patrol.patrol.coverage import Sight
+from rosbot_patrol.patrol.inputs import Eye
+from rosbot_patrol.patrol.suspects import Suspect
+
+_SAME_FAR = 1.5  # boxes too far off to be measured that are nearer are of one thing, and so are those too near [m]
+_SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
+_MOVED = 0.6  # what was too near and stands so much farther on has to be looked for again [m]
+_VISITS = 3  # of what is too near wherever the robot goes: it comes along
+_CLOSE = 1.0  # so near one may come to what is half hidden [m]
+_BACK = 2.0, 4.5  # from there a person shows whole [m]
+_WHOLE = 1.7  # from so far off one who stands cannot be taken for a pet [m]
+_INSIDE = 0.1  # of the picture's edges a place must lie [rad]
+_BODY = 0.4  # in front of a place its own body may end a beam [m]
+
+
+@dataclass
+class Doubt:
+    """A place [m] in map where something like a person was seen.
+
+    Attributes:
+        pictures: that showed it.
+        seen_from: where a second side is wanted, the sides that are known.
+        is_grave: without a second look nobody can say that nobody is there.
+        is_near: too near to be told from a pet.
+        is_visited: it had its look, or needs none.
+        visits: viewpoints that it was looked at from.
+        looks: pictures that showed its place from farther off.
+    """
+
+    x: float
+    y: float
+    pictures: int = 1
+    seen_from: tuple[Pose2D, ...] = ()
+    is_grave: bool = True
+    is_near: bool = False
+    is_visited: bool = False
+    visits: int = 0
+    looks: int = 0
+
+    @property
+    def text(self) -> str:
+        """What is to be said of it where it stays one."""
+        looked = "was seen from one side only" if self.seen_from else "was not seen from near"
+        if self.is_near:
+            looked = "was too near to be told from a pet"
+        return f"something like a person at about ({self.x:.1f}, {self.y:.1f}) {looked}"
+
+    @property
+    def span(self) -> dict[str, float]:
+        """From how near and how far it is to be looked at, as far as that matters [m]."""
+        if self.is_near:
+            return {"nearest": _BACK[0], "most": _BACK[1]}
+        return {"nearest": _CLOSE} if self.seen_from else {}
+
+    def visit(self) -> None:
+        """Take it that the robot goes and looks."""
+        self.is_visited = True
+        self.visits += 1
+
+
+class Doubts:
+    """Those of one mission.
+
+    Args:
+        seen_in: pictures that have to show a thing to make it one.
+    """
+
+    def __init__(self, seen_in: int) -> None:
+        self._seen_in = seen_in
+        self._all: list[Doubt] = []
+        self._too_near: Sequence[Sighting] = ()  # what nobody has told from a pet yet
+
+    def __iter__(self) -> Iterator[Doubt]:
+        return iter(self._all)
+
+    def far(self, x: float, y: float) -> None:
+        """Take in that something like a person was seen at about a place, too far off to be measured."""
+        for doubt in self._all:
+            if not doubt.seen_from and not doubt.is_near and math.hypot(doubt.x - x, doubt.y - y) < _SAME_FAR:
+                doubt.pictures += 1
+                return
+        self._all.append(Doubt(x, y))
+
+    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+        """Take in what seems to be a person from one side, all that is so by now."""
+        for suspect in doubtful:
+            known = next((d for d in self._all if d.seen_from and suspect.apart(d.x, d.y) < _SAME_SUSPECT), None)
+            if known is None:
+                known = Doubt(suspect.x, suspect.y, pictures=self._seen_in)
+                self._all.append(known)
+            known.is_grave = suspect.is_grave
+            known.seen_from = tuple(side.eye for side in suspect.sides)
+        for doubt in self._all:
+            if doubt.seen_from and not any(s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in doubtful):
+                doubt.is_visited = True  # told, or no longer like one
+
+    def near(self, doubtful: Sequence[Sighting]) -> None:
+        """Take in what is too near to be told from a pet, all that is so by now."""
+        for thing in doubtful:
+            known = next((d for d in self._all if d.is_near and _apart(d, thing) < _SAME_FAR), None)
+            if known is None:
+                self._all.append(Doubt(thing.x, thing.y, pictures=self._seen_in, is_near=True))
+            elif not known.is_visited:
+                known.x, known.y = thing.x, thing.y
+            elif _apart(known, thing) > _MOVED and known.visits < _VISITS:
+                known.x, known.y, known.is_visited, known.looks = thing.x, thing.y, False, 0
+        for doubt in self._all:
+            if doubt.is_near and not any(_apart(doubt, thing) < _SAME_FAR for thing in doubtful):
+                doubt.is_visited = True
+        self._too_near = tuple(doubtful)
+
+    def look(self, eye: Eye, sight: Sight) -> None:
+        """Count a picture for the places of what was too near that it shows from farther off."""
+        for doubt in self._all:
+            doubt.looks += doubt.is_near and _shows(eye, sight, doubt)
+
+    def open(self) -> list[Doubt]:
+        """Those seen in some pictures and not looked at again."""
+        return [doubt for doubt in self._all if not doubt.is_visited and doubt.pictures >= self._seen_in]
+
+    def unsure(self, is_moving: bool) -> str:
+        """What is still too near to be told, "" where there is nothing.
+
+        A place that was seen from farther off is told: if anybody was there, the watch knows.
+
+        Args:
+            is_moving: something moves in the room: it may have gone from there.
+        """
+        for thing in self._too_near:
+            if is_moving or not any(self._was_looked_at(doubt, thing) for doubt in self._all):
+                return Doubt(thing.x, thing.y, is_near=True).text
+        return ""
+
+    def _was_looked_at(self, doubt: Doubt, thing: Sighting) -> bool:
+        return doubt.is_near and doubt.looks >= self._seen_in and _apart(doubt, thing) < _SAME_FAR
+
+
+def _apart(doubt: Doubt, thing: Sighting) -> float:
+    return math.hypot(doubt.x - thing.x, doubt.y - thing.y)
+
+
+def _shows(eye: Eye, sight: Sight, doubt: Doubt) -> bool:
+    """Whether a picture shows a place from as far off as a person shows whole."""
+    away = math.hypot(doubt.x - eye.pose.x, doubt.y - eye.pose.y)
+    bearing = math.atan2(doubt.y - eye.pose.y, doubt.x - eye.pose.x)
+    if not _WHOLE <= away <= _BACK[1] + 0.5 or abs(angle_difference(bearing, eye.pose.yaw)) > 0.5 * eye.width - _INSIDE:
+        return False
+    return bool(sight.reaches(np.array([bearing]), np.array([away - _BODY]))[0])
