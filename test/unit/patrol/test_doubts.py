@@ -1,0 +1,72 @@
+"""Places that are worth another look: what was too near comes along, goes, and is told."""
+
+import math
+
+import numpy as np
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.close_ups import Sighting
+from rosbot_patrol.patrol.coverage import Sight
+from rosbot_patrol.patrol.doubts import Doubts
+from rosbot_patrol.patrol.inputs import Eye
+
+SEEN_IN = 3
+ALL_AROUND = Sight(x=3.0, y=0.0, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 5.0))
+
+
+def near(x: float, y: float, at: float = 0.0) -> Sighting:
+    return Sighting(x, y, at)
+
+
+def test_what_was_too_near_wants_one_look():
+    doubts = Doubts(SEEN_IN)
+    doubts.near([near(1.0, 0.0)])
+    (doubt,) = doubts.open()
+    assert doubt.span == {"nearest": 2.0, "most": 4.5}
+    doubt.visit()
+    doubts.near([near(1.2, 0.1)])
+    assert doubts.open() == []
+
+
+def test_what_was_too_near_and_came_along_is_looked_at_again_but_not_for_ever():
+    doubts = Doubts(SEEN_IN)
+    doubts.near([near(0.0, 0.0)])
+    visits = 0
+    for k in range(10):
+        for doubt in doubts.open():
+            doubt.visit()
+            visits += 1
+        doubts.near([near(0.9 * ((k + 1) % 2), 0.0, at=float(k))])
+    assert visits == 3
+
+
+def test_a_look_counts_for_the_place_it_showed_only():
+    doubts = Doubts(SEEN_IN)
+    doubts.near([near(0.0, 0.0)])
+    doubts.open()[0].visit()
+    for _ in range(SEEN_IN):
+        doubts.look(Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
+    assert doubts.unsure(is_moving=False) == ""
+    doubts.near([near(0.0, 1.0)])
+    assert "(0.0, 1.0) was too near to be told from a pet" in doubts.unsure(is_moving=False)
+    assert [(d.x, d.y) for d in doubts.open()] == [(0.0, 1.0)]
+
+
+def test_where_something_moves_what_was_too_near_may_have_gone():
+    doubts = Doubts(SEEN_IN)
+    doubts.near([near(0.0, 0.0)])
+    for _ in range(SEEN_IN):
+        doubts.look(Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
+    assert doubts.unsure(is_moving=True)
+    doubts.near([])
+    assert doubts.unsure(is_moving=True) == ""
+    assert doubts.open() == []
+
+
+def test_what_was_seen_far_off_takes_some_pictures():
+    doubts = Doubts(SEEN_IN)
+    for k in range(SEEN_IN):
+        assert doubts.open() == []
+        doubts.far(6.0 + 0.1 * k, 0.0)
+    assert len(doubts.open()) == 1
+    assert "was not seen from near" in doubts.open()[0].text
