@@ -114,7 +114,7 @@ class House:
             if self.detecting:
                 self.count.publish(ObjectCount(count=1 if self.person else 0))
                 if self.person:
-                    box = BoundingBox(probability=0.9, xmin=10, ymin=5, xmax=30, ymax=45, Class="person")
+                    box = BoundingBox(probability=0.9, xmin=10, ymin=5, xmax=30, ymax=28, Class="person")
                     self.boxes.publish(BoundingBoxes(image_header=image.header, bounding_boxes=[box]))
             time.sleep(0.1)
 
