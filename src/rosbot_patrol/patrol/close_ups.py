@@ -1,8 +1,8 @@
 """What is so near that the picture shows its legs only: a pet and a person look alike there.
 
 A low camera sees up to 0.9 m at a metre and a half. What is nearer than that, and goes on above the picture, counts as
-a person only where somebody of a person's height was seen about there shortly before or after; where a pet was, it is
-the pet; else it is a doubt, and worth a look from farther off.
+a person only where depth shows a person's legs, or somebody of a person's height was seen about there shortly before or
+after; where a pet was, it is the pet; else it is a doubt, and worth a look from farther off.
 """
 
 from __future__ import annotations
@@ -75,14 +75,14 @@ class CloseUps:
                 kept.append(box)
                 continue
             place = Sighting(m.x, m.y, stamp)
-            if self._judge.is_too_near(box):
+            if self._judge.is_too_near(box) and not m.has_legs:
                 near.append((box, place))
                 continue
             kept.append(box)
             refusal = self._judge.refusal(box)
             if refusal == PET:
                 self._pets.append(place)
-            elif not refusal and box.probability >= _SURE and m.top >= _TALL:
+            elif not refusal and box.probability >= _SURE and (m.has_legs or m.top >= _TALL):
                 self._people.append(place)
         self._open = [s for s in self._open if not self._is_told(s)]
         is_left = False

@@ -60,6 +60,8 @@ class Measured:
         is_cut: the box ends about the picture's upper edge, or at its lower one: there may be more of it.
         is_cut_above: there may be more of it above the picture.
         is_flat: all of it lies in one plane, None where no depth tells.
+        has_legs: of what goes on above the picture: it stands as a person does, where the map shows nothing; None where
+            that is not known.
         source: what told the distance: "depth", "lidar", "floor" (the box's lower edge).
     """
 
@@ -73,6 +75,7 @@ class Measured:
     is_cut: bool = False
     is_cut_above: bool = False
     is_flat: bool | None = None
+    has_legs: bool | None = None
     source: str = "depth"
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import angle_difference, wrap_angles
 from rosbot_patrol.patrol.inputs import Box, Measured
+from rosbot_patrol.patrol.legs import go_straight_up
 
 Array = NDArray[np.float64]
 
@@ -106,6 +107,7 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
         return box
     flat: bool | None = None
     most, is_behind = _farthest(box, view), False
+    found = _by_lidar(box, view, unmapped) if unmapped is not None else None
     if depth is not None:
         samples = _samples(box, view.lens, depth)
         along = _nearest(samples)
@@ -118,8 +120,10 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
         else:
             flat = _is_flat(samples)
         if along is not None:
-            return replace(box, measured=_at(box, view, along, source="depth", error=0.1 + 0.02 * along, flat=flat))
-    found = _by_lidar(box, view, unmapped) if unmapped is not None else None
+            measured = _at(box, view, along, source="depth", error=0.1 + 0.02 * along, flat=flat)
+            if measured.is_cut_above and found is not None and abs(found - along) < _DEEP:
+                measured = replace(measured, has_legs=_has_legs(samples, box, view, along))
+            return replace(box, measured=measured)
     if found is not None and found <= most:
         return replace(box, measured=_at(box, view, found, source="lidar", error=0.15 + 0.02 * found, flat=flat))
     told = _by_floor(box, view, is_behind=is_behind)
@@ -156,12 +160,16 @@ def _samples(box: Box, lens: Lens, depth: Depth) -> NDArray[np.float64]:
     other = depth.lens
 
     def along(first: float, last: float, middle: float, focal: float, centre: float, scale: float, most: int) -> Array:
-        places = np.linspace(first, last, _GRID + 1)[:-1] + (last - first) / _GRID / 2.0
-        return np.clip(np.rint((places - middle) / focal * scale + centre), 0, most - 1)
+        return np.clip(np.rint((_middles(first, last) - middle) / focal * scale + centre), 0, most - 1)
 
     columns = along(box.xmin, box.xmax, lens.cx, lens.fx, other.cx, other.fx, depth.metres.shape[1])
     rows = along(box.ymin, box.ymax, lens.cy, lens.fy, other.cy, other.fy, depth.metres.shape[0])
     return np.asarray(depth.metres[np.ix_(rows.astype(int), columns.astype(int))], np.float64)
+
+
+def _middles(first: float, last: float) -> Array:
+    """Middles of the rows or columns of the grid over a span."""
+    return np.linspace(first, last, _GRID + 1)[:-1] + (last - first) / _GRID / 2.0
 
 
 def _nearest(samples: NDArray[np.float64]) -> float | None:
@@ -225,6 +233,13 @@ def _is_flat(samples: NDArray[np.float64]) -> bool | None:
     if is_before.mean() > _BEFORE_SHARE or is_in[is_chest].mean() < _FLAT_SHARE:
         return False
     return bool(is_in[~is_before].mean() >= _FLAT_SHARE)
+
+
+def _has_legs(samples: Array, box: Box, view: View, along: float) -> bool | None:
+    """Whether what is so far along the optical axis [m] stands as a person does."""
+    lens, eye = view.lens, float(view.eye[2])
+    heights = eye - (_middles(box.ymin, box.ymax) - lens.cy) / lens.fy * along
+    return go_straight_up(samples, along, heights, eye, box.width / _GRID / lens.fx * along)
 
 
 def _by_lidar(box: Box, view: View, unmapped: Array) -> float | None:

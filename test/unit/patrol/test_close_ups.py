@@ -82,3 +82,12 @@ def test_legs_of_a_pet_are_the_pets_whenever_it_is_seen_whole(close_ups: CloseUp
     assert not close_ups.doubtful
     assert close_ups.sort(4.0, (box(1.0),)) == ((), False)
     assert not close_ups.doubtful
+
+
+def test_a_persons_legs_are_theirs_and_those_that_follow_too(close_ups: CloseUps) -> None:
+    legs = box(has_legs=True)
+    for k in range(3):
+        assert close_ups.sort(1.0 + 0.1 * k, (legs,)) == ((legs,), False)
+    strode = box(has_legs=False)
+    assert close_ups.sort(1.4, (strode,)) == ((strode,), False)
+    assert not close_ups.doubtful
