@@ -2,7 +2,7 @@
 """amcl: how long an update takes, and how well it knows where the robot is.
 
     PYTHONPATH=src .ws/venv/bin/python benchmarks/localization.py [--json FILE] [--quick] [--parts NAME ...]
-        [--seeds 3] [--starts 100] [--carried 30]
+        [--seeds 3] [--starts 100] [--carried 30] [--seconds 120]
 
 update: amcl_update_NxK_ms: motion, sensor model and resampling together for N particles and K beams of the likelihood
 field on the house map, with upstream's other defaults, pinned to one core; median of the repeats after a warm-up. KLD
@@ -13,6 +13,9 @@ which other work on the machine disturbs least.
 accuracy: patrols of the three houses (each room, a full turn in each) with encoder odometry, both profiles, by seeds.
 starts: global localisation at random places, driving to random places for 60 s; right is within 0.3 m and 15 degrees,
 and until the end. carried: a robot that drives is put down elsewhere, and has 60 s. Drives: `localization_drives.py`.
+
+node: what amcl takes of a core while the robot patrols the whole house at real time, and its memory; `. scripts/env`
+first. Where the package path has the original amcl, it is the one that is measured, and said so.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
 
 from localization_quality import accuracy, global_starts, kidnappings  # noqa: E402
+from node_cost import PROFILES, measure_profiles, original  # noqa: E402
 
 from rosbot_patrol.amcl.localizer import Localizer  # noqa: E402
 from rosbot_patrol.amcl.parameters import AmclParams  # noqa: E402
@@ -48,8 +52,10 @@ AIMS = {
     "rms_heading_deg": "<= 2",
     "global_localization_rate": ">= 0.95",
     "kidnap_recovery_rate": ">= 0.9",
+    "amcl_cpu_percent": "<= 8",
+    "amcl_mb": "<= 200",
 }
-PARTS = ("update", "accuracy", "starts", "carried")
+PARTS = ("update", "accuracy", "starts", "carried", "node")
 STEP = Pose2D(0.12, 0.0, 0.0)
 
 
@@ -112,6 +118,19 @@ def update_figures(repeats: int) -> dict[str, float]:
     return figures
 
 
+def node_figures(seconds: float) -> dict[str, float]:
+    """What the node costs in patrols with either profile."""
+    print(
+        f"measured: {original('amcl') or 'amcl of rosbot_patrol; the original is not on the package path'}", flush=True
+    )
+    figures = {}
+    for profile, costs in zip(PROFILES, measure_profiles(["/amcl"], PROFILES, seconds), strict=True):
+        end, cost = "" if profile == "tuned" else f"_{profile}", costs["/amcl"]
+        figures |= {f"amcl_cpu_percent{end}": round(cost.percent, 2), f"amcl_mb{end}": round(cost.megabytes, 1)}
+        print(f"{profile}: {cost.seconds:.0f} s of driving, peak {cost.peak:.0f} MB")
+    return figures
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -121,10 +140,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="patrols of each house")
     parser.add_argument("--starts", type=int, default=100)
     parser.add_argument("--carried", type=int, default=30)
+    parser.add_argument("--seconds", type=float, default=120.0, help="of driving, for each profile")
     wanted = parser.parse_args()
+    figures: dict[str, float] = {}
+    if "node" in wanted.parts:  # first: it has all cores
+        figures |= node_figures(20.0 if wanted.quick else wanted.seconds)
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     print(f"1 core of {os.cpu_count()}")
-    figures: dict[str, float] = {}
     if "update" in wanted.parts:
         figures |= update_figures(30 if wanted.quick else 300)
     if "accuracy" in wanted.parts:
