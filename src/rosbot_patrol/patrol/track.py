@@ -1,7 +1,8 @@
 """Keep the camera on a person: the bearing to turn by, how fast, and when to let go.
 
-A pure controller for a base that turns on the spot. It is bounded: whoever stays in view is watched for some seconds
-and then let go, and whoever is lost is waited for a moment, so that a mission goes on.
+A pure controller for a base that turns on the spot. It is bounded, so that a mission goes on: whoever stays in view is
+watched for some seconds and then let go, and whoever is lost is waited for a moment. Somebody who walks to and fro, and
+is lost and found, is watched for no longer in all.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from rosbot_patrol.params import param
 class TrackParams:
     """How to keep somebody in view."""
 
-    track_time: float = param(8.0, unit="s", lo=0.0, doc="so long the camera is kept on a person, in one go; 0: never")
+    track_time: float = param(
+        8.0, unit="s", lo=0.0, doc="so long the camera is kept on whom it sees before a pause; 0: never"
+    )
     track_lost: float = param(1.5, unit="s", lo=0.1, doc="a person not seen for so long is lost")
     track_pause: float = param(20.0, unit="s", lo=0.0, doc="after that the patrol goes on for so long whatever it sees")
     track_gain: float = param(1.5, unit="1/s", lo=0.1, hi=10.0, doc="turning speed for each radian that is missing")
@@ -34,6 +37,7 @@ class Track:
         self._seen_at = -math.inf
         self._yaw: float | None = None
         self._free_at = -math.inf
+        self._spent = 0.0  # on those who were lost and found since the last pause [s]
 
     @property
     def is_on(self) -> bool:
@@ -43,6 +47,7 @@ class Track:
     def reset(self) -> None:
         """Let go and forget, for a new mission."""
         self._since, self._seen_at, self._yaw, self._free_at = None, -math.inf, None, -math.inf
+        self._spent = 0.0
 
     def see(self, now: float, bearing: float, yaw: float | None) -> None:
         """A person is in view.
@@ -55,6 +60,8 @@ class Track:
         if self.params.track_time <= 0.0 or now < self._free_at or yaw is None:
             return
         if self._since is None:
+            if not 0.0 <= now - self._seen_at <= self.params.track_pause:
+                self._spent = 0.0
             self._since = now
         self._seen_at, self._yaw = now, yaw + bearing
 
@@ -63,11 +70,15 @@ class Track:
         p = self.params
         if self._since is None or self._yaw is None:
             return None
-        if now - self._seen_at > p.track_lost or now < self._since - 1.0:
-            self._let_go(now, pause=0.0)
+        if now < self._since - 1.0:  # another clock
+            self.reset()
             return None
-        if now - self._since > p.track_time:
-            self._let_go(now, pause=p.track_pause)
+        held = self._spent + now - self._since
+        if held > p.track_time:
+            self._let_go(free_at=now + p.track_pause, spent=0.0)
+            return None
+        if now - self._seen_at > p.track_lost:
+            self._let_go(free_at=now, spent=held)
             return None
         if yaw is None:
             return 0.0
@@ -76,5 +87,5 @@ class Track:
             return 0.0
         return math.copysign(min(p.track_gain * abs(off), p.track_speed), off)
 
-    def _let_go(self, now: float, *, pause: float) -> None:
-        self._since, self._yaw, self._free_at = None, None, now + pause
+    def _let_go(self, *, free_at: float, spent: float) -> None:
+        self._since, self._yaw, self._free_at, self._spent = None, None, free_at, spent

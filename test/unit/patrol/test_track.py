@@ -61,6 +61,28 @@ def test_whoever_stays_is_let_go_and_not_taken_again_for_a_while() -> None:
     assert track.is_on
 
 
+def test_one_who_walks_to_and_fro_is_watched_no_longer_in_all() -> None:
+    track = Track(TrackParams(track_time=6.0, track_lost=1.0, track_pause=10.0))
+    held = []
+    for k in range(1200):  # in view for 3 of 5 s, a minute long
+        now = 0.05 * k
+        if now % 5.0 < 3.0:
+            track.see(now, 0.0, 0.0)
+        track.step(now, 0.0)
+        held.append(track.is_on)
+    free = "".join("-" if on else "." for on in held).split("-")
+    assert sum(len(part) >= 190 for part in free) >= 3
+    assert sum(held) < 0.45 * len(held)
+
+
+def test_whoever_comes_much_later_is_watched_from_the_beginning() -> None:
+    track = Track(TrackParams(track_time=4.0, track_pause=10.0))
+    play(track, lambda _: 0.0, 6.0, seen=lambda now: now < 2.0)
+    track.see(20.0, 0.0, 0.0)
+    track.see(23.0, 0.0, 0.0)
+    assert track.step(23.9, 0.0) == 0.0
+
+
 def test_it_can_be_switched_off() -> None:
     track = Track(TrackParams(track_time=0.0))
     track.see(0.0, 1.0, 0.0)
