@@ -19,7 +19,7 @@ class TrackParams:
     """How to keep somebody in view."""
 
     track_time: float = param(
-        8.0, unit="s", lo=0.0, doc="so long the camera is kept on whom it sees before a pause; 0: never"
+        8.0, unit="s", lo=0.0, doc="so long the camera is kept on whom it sees, lost and found or not; 0: never"
     )
     track_lost: float = param(1.5, unit="s", lo=0.1, doc="a person not seen for so long is lost")
     track_pause: float = param(20.0, unit="s", lo=0.0, doc="after that the patrol goes on for so long whatever it sees")
