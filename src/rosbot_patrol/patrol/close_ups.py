@@ -61,6 +61,13 @@ class CloseUps:
         """What was too near to be told, and was not told otherwise."""
         return self._open
 
+    def add_pets(self, sightings: Iterable[Sighting]) -> None:
+        """Take in where something was that moves and is no person."""
+        new = [s for s in sightings if s not in self._pets]
+        self._pets.extend(new)
+        if new:
+            self._open = [s for s in self._open if not self._is_told(s)]
+
     def sort(self, stamp: float, boxes: Iterable[Box]) -> tuple[tuple[Box, ...], bool]:
         """The boxes of a picture that can be judged, and whether one was left out that may be a person.
 

@@ -129,7 +129,7 @@ class Doubts:
     def look(self, eye: Eye, sight: Sight) -> None:
         """Count a picture for the places of what was too near that it shows from farther off."""
         for doubt in self._all:
-            doubt.looks += doubt.is_near and _shows(eye, sight, doubt)
+            doubt.looks += doubt.is_near and shows_whole(eye, sight, doubt.x, doubt.y)
 
     def open(self) -> list[Doubt]:
         """Those seen in some pictures and not looked at again."""
@@ -156,10 +156,9 @@ def _apart(doubt: Doubt, thing: Sighting) -> float:
     return math.hypot(doubt.x - thing.x, doubt.y - thing.y)
 
 
-def _shows(eye: Eye, sight: Sight, doubt: Doubt) -> bool:
-    """Whether a picture shows a place from as far off as a person shows whole."""
-    away = math.hypot(doubt.x - eye.pose.x, doubt.y - eye.pose.y)
-    bearing = math.atan2(doubt.y - eye.pose.y, doubt.x - eye.pose.x)
+def shows_whole(eye: Eye, sight: Sight, x: float, y: float) -> bool:
+    """Whether a picture shows a place in map [m] from as far off as a person shows whole."""
+    away, bearing = math.hypot(x - eye.pose.x, y - eye.pose.y), math.atan2(y - eye.pose.y, x - eye.pose.x)
     if not _WHOLE <= away <= _BACK[1] + 0.5 or abs(angle_difference(bearing, eye.pose.yaw)) > 0.5 * eye.width - _INSIDE:
         return False
     return bool(sight.reaches(np.array([bearing]), np.array([away - _BODY]))[0])

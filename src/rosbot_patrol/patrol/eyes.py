@@ -15,6 +15,7 @@ from rosbot_patrol.patrol.close_ups import Sighting
 from rosbot_patrol.patrol.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
 from rosbot_patrol.patrol.doubts import Doubt, Doubts
 from rosbot_patrol.patrol.floor import Mask
+from rosbot_patrol.patrol.harmless import Harmless
 from rosbot_patrol.patrol.inputs import Eye, Inputs
 from rosbot_patrol.patrol.mission import Mission
 from rosbot_patrol.patrol.room_regions import RoomRegions
@@ -60,6 +61,7 @@ class Eyes:
         self.params = params or EyesParams()
         self.coverage: Coverage | None = None
         self._witness = Witness(self.params.witness)
+        self._harmless = Harmless()
         self._mission: Mission | None = None
         self._house: RoomRegions | None = None
         self._planner: ViewpointPlanner | None = None
@@ -79,6 +81,7 @@ class Eyes:
         self._views, self._tried, self._has_eye = 0, [], False
         self._doubts = Doubts(self.params.coverage.seen_in)
         self._witness.start()
+        self._harmless = Harmless()
 
     def see(self, now: float, inputs: Inputs) -> None:
         """Take in what detector and lidar saw since the last step."""
@@ -100,6 +103,8 @@ class Eyes:
                 if box.doubt is not None:
                     self._doubts.far(*box.doubt)
             self._doubts.look(frame.eye, sight)
+            if view is not None:
+                self._harmless.look(view.scan.stamp, frame.eye, sight, frame.boxes, self._witness.things)
 
     def suspect(self, doubtful: Sequence[Suspect]) -> None:
         """Look at what seems to be a person from another side."""
@@ -108,6 +113,10 @@ class Eyes:
     def step_back(self, doubtful: Sequence[Sighting]) -> None:
         """Look from farther off at what is too near to be told from a pet."""
         self._doubts.near(doubtful)
+
+    def harmless(self) -> Sequence[Sighting]:
+        """What moves, was shown whole, and was taken for nobody."""
+        return self._harmless.sightings
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """The best further viewpoint within the bounds."""

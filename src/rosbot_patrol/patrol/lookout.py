@@ -24,6 +24,7 @@ class Lookout(Conduct):
         assert mission is not None
         if inputs.house is not None:
             self._judge.floor = inputs.house.floor
+        self._close_ups.add_pets(self._views.harmless())
         for given in inputs.frames:
             frame = self._leave_out_close_ups(given)
             for seen in self._watch.add(self._now, frame):

@@ -80,6 +80,9 @@ class Views(Protocol):
     def step_back(self, doubtful: Sequence[Sighting]) -> None:
         """What is too near to be told from a pet, all of it."""
 
+    def harmless(self) -> Sequence[Sighting]:
+        """What moves in the room and is no person."""
+
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """Where to look from next, None where the room is seen well enough or there is nowhere."""
 
@@ -113,6 +116,10 @@ class OneTurn:
 
     def step_back(self, doubtful: Sequence[Sighting]) -> None:
         """There is no other place."""
+
+    def harmless(self) -> Sequence[Sighting]:
+        """Nobody knows."""
+        return ()
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """One turn is enough."""

@@ -9,7 +9,7 @@ stands off the map, too, but stays; where much is off the map the robot does not
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -51,14 +51,25 @@ class Moved:
 
 
 @dataclass
-class _Thing:
-    first: Array  # its points when it was first seen
+class Thing:
+    """Something that is followed.
+
+    Attributes:
+        first: its points in map when it was first seen [m], shape (N, 2); start: their middle; since: when [s].
+        x, y: where it is in map [m]; at: when it was seen last [s]; looks: how often.
+        has_moved: it is some way from where it was first seen, and the lidar looks through that place.
+        shown: pictures of it in a row that show nobody (see `harmless`).
+    """
+
+    first: Array
+    start: tuple[float, float]
     since: float
     x: float
     y: float
     at: float
     looks: int = 1
-    start: tuple[float, float] = field(default=(0.0, 0.0))
+    has_moved: bool = False
+    shown: int = 0
 
 
 class Witness:
@@ -66,24 +77,27 @@ class Witness:
 
     Args:
         params: what counts.
+
+    Attributes:
+        things: that it follows; moved: what moved farthest.
     """
 
     def __init__(self, params: WitnessParams | None = None) -> None:
         self.params = params or WitnessParams()
-        self._things: list[_Thing] = []
+        self.things: list[Thing] = []
         self._last = -math.inf
         self.moved: Moved | None = None
 
     def start(self) -> None:
         """Forget everything."""
-        self._things.clear()
+        self.things.clear()
         self._last, self.moved = -math.inf, None
 
     def see(self, scan: LaserScan, map_from_laser: Pose2D, floor: Floor) -> None:
         """Take a scan; `moved` holds what moved farthest since `start`."""
         p, now = self.params, scan.stamp
         if now < self._last - 1.0:
-            self._things.clear()
+            self.things.clear()
         elif now < self._last + p.witness_period:
             return
         self._last = now
@@ -91,7 +105,7 @@ class Witness:
         points = points[np.hypot(*points.T) < p.witness_reach] if len(points) else points
         off = off_the_map(floor, transform_points(map_from_laser, points), p.off_map)
         if len(off) > p.lost_share * max(len(points), 1):
-            self._things.clear()
+            self.things.clear()
             return
         self._follow(now, groups(off, p.thing_gap, p.thing_points), scan, map_from_laser)
 
@@ -105,7 +119,7 @@ class Witness:
         places = [(points.min(axis=0) + points.max(axis=0)) / 2.0 for points in found]
         small = [k for k, points in enumerate(found) if np.ptp(points, axis=0).max() <= p.thing_size]
         pairs = sorted(
-            (math.dist((thing.x, thing.y), places[k]), i, k) for i, thing in enumerate(self._things) for k in small
+            (math.dist((thing.x, thing.y), places[k]), i, k) for i, thing in enumerate(self.things) for k in small
         )
         things: set[int] = set()
         taken: set[int] = set()
@@ -114,23 +128,27 @@ class Witness:
                 continue
             things.add(i)
             taken.add(k)
-            self._see_again(self._things[i], now, places[k], scan, map_from_laser)
+            self._see_again(self.things[i], now, places[k], scan, map_from_laser)
         for k in small:
             if k not in taken:
                 x, y = float(places[k][0]), float(places[k][1])
-                self._things.append(_Thing(first=found[k], since=now, x=x, y=y, at=now, start=(x, y)))
-        self._things = [thing for thing in self._things if now - thing.at <= p.thing_memory]
+                self.things.append(Thing(first=found[k], start=(x, y), since=now, x=x, y=y, at=now))
+        self.things = [thing for thing in self.things if now - thing.at <= p.thing_memory]
 
-    def _see_again(self, thing: _Thing, now: float, place: Array, scan: LaserScan, map_from_laser: Pose2D) -> None:
+    def _see_again(self, thing: Thing, now: float, place: Array, scan: LaserScan, map_from_laser: Pose2D) -> None:
         thing.x, thing.y, thing.at = float(place[0]), float(place[1]), now
         thing.looks += 1
         far = math.dist(thing.start, (thing.x, thing.y))
         away = math.dist(thing.start, (map_from_laser.x, map_from_laser.y))
         if thing.looks < 3 or far < self.params.moved + self.params.moved_drift * away:
             return
-        if self.moved is not None and far <= self.moved.far:
+        is_farthest = self.moved is None or far > self.moved.far
+        if thing.has_moved and not is_farthest:
             return
-        if _is_looked_through(thing.first, scan, map_from_laser):
+        if not _is_looked_through(thing.first, scan, map_from_laser):
+            return
+        thing.has_moved = True
+        if is_farthest:
             self.moved = Moved(x=thing.x, y=thing.y, at=now, far=far)
 
 

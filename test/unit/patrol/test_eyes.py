@@ -74,7 +74,7 @@ class World:
         self.camera_at = self.now
         self.triggers: tuple[int, ...] = ()
         self.goals, self.notices, self.ended, self.reports, self.tracked = [], [], [], [], []
-        self.cancels, self.flat, self.count, self.measures_to = 0, False, 0, 99.0
+        self.cancels, self.flat, self.count, self.measures_to, self.sees_to = 0, False, 0, 99.0, 7.0
         self.top = 1.7  # height of people
         self.score: Callable[[Pose2D], float] = lambda pose: 0.9
 
@@ -85,7 +85,7 @@ class World:
             dx, dy = x - self.pose.x, y - self.pose.y
             away, bearing = math.hypot(dx, dy), wrap_angle(math.atan2(dy, dx) - self.pose.yaw)
             seen = sight_reaches(sight, math.atan2(dy, dx), away - 0.2)
-            if abs(bearing) < WIDTH / 2 and away < 7.0 and seen:
+            if abs(bearing) < WIDTH / 2 and away < self.sees_to and seen:
                 boxes.append(self.box(x, y, away, bearing))
         eye = Eye(pose=self.pose, width=WIDTH, columns=640)
         return Frame(stamp=self.now - 0.05 if boxes else None, boxes=tuple(boxes), eye=eye)
@@ -398,6 +398,22 @@ def test_what_is_too_near_to_be_told_from_a_pet_is_looked_at_from_farther_off(to
     mission = world.until(lambda w: bool(w.ended)).ended[-1]
     assert mission.verdict.value == verdict
     assert any(math.dist(view[:2], (10.5, 2.2)) > 1.9 for view in mission.views_done)
+
+
+def to_and_fro(now: float) -> list[Place]:
+    """From right before the room's point to 3 m off and back, at 0.5 m/s."""
+    return [(6.5 + abs(now % 10.0 - 5.0) * 0.4, 1.6)]
+
+
+@pytest.mark.parametrize(("sees_to", "verdict"), [(1.3, "clear"), (7.0, "confirmed")])
+def test_what_moves_and_is_shown_whole_without_a_person_is_a_pet(sees_to: float, verdict: str) -> None:
+    world = World()
+    world.sees_to = sees_to
+    world.triggers = (1,)
+    world.until(lambda w: w.phase is Phase.LOOKING)
+    world.people = to_and_fro
+    mission = world.until(lambda w: bool(w.ended)).ended[-1]
+    assert mission.verdict.value == verdict, mission.reason
 
 
 def test_what_is_too_near_and_seen_from_nowhere_else_is_unverified() -> None:
