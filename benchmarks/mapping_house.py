@@ -1,9 +1,7 @@
 """The house mapped by slam_gmapping, without ROS: a drive through all its rooms, and the map against the true walls.
 
 The robot follows the shortest ways from room to room at 0.3 m/s with 1 cm of noise on 720 beams of 12 m at 10 Hz, and
-wheels that lie as in the logs. A wall cell of the map is right where a true one is at most one cell off (house_wall_f1
-from that and the same the other way round); house_wall_error_m is the mean distance of the map's wall cells, taken at
-their centres, from the true walls.
+wheels that lie as in the logs. The figures of the walls are those of `map_truth.py`.
 """
 
 from __future__ import annotations
@@ -18,6 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from map_truth import map_figures, plan
 from numpy.typing import NDArray
 
 from rosbot_patrol.amcl.field_kernels import cast_ray
@@ -25,28 +24,20 @@ from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.gmapping.slam import Slam
-from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.distance_kernels import bounded_distances
-from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
+from rosbot_patrol.maps.occupancy import FREE
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.replay.carmen import noisy_odometry
 from rosbot_patrol.scan import LaserScan, Mount
-from rosbot_patrol.simulation.floor_plan import floor_plan
-from rosbot_patrol.simulation.world import load_world
 
 ROOT = Path(__file__).resolve().parents[1]
 MOUNT = Mount(Pose2D(0.02, 0.0, math.pi))
-HEIGHT, BEAMS, REACH, NOISE = 0.158, 720, 12.0, 0.01
+BEAMS, REACH, NOISE = 720, 12.0, 0.01
 SPEED, TURNING, RATE = 0.3, 0.8, 10.0
 CLEARANCE = 0.4  # m from walls that the ways keep
-LOW, HIGH = (-9.0, -4.0), (19.0, 17.0)
-
-
-def plan(resolution: float) -> Grid:
-    """The house's true floor plan."""
-    width, height = (round((high - low) / resolution) for low, high in zip(LOW, HIGH, strict=True))
-    info = GridInfo(resolution=resolution, width=width, height=height, origin_x=LOW[0], origin_y=LOW[1])
-    return floor_plan(load_world(ROOT / "worlds" / "house.world").bodies, info, height=HEIGHT, start=(0.0, 0.0))
+BOUNDS = (-9.0, -4.0), (19.0, 17.0)
+WORLD = ROOT / "worlds" / "house.world"
 
 
 def way_between(clear: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]) -> list[tuple[int, int]]:
@@ -71,7 +62,7 @@ def way_between(clear: NDArray[np.bool_], start: tuple[int, int], goal: tuple[in
 
 def waypoints(rooms: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """From room to room, a point at each 0.4 m."""
-    grid = plan(0.1)
+    grid = plan(WORLD, BOUNDS, 0.1)
     clear = bounded_distances(grid.cells != FREE, 10) * 0.1 > CLEARANCE
     points: list[tuple[float, float]] = []
     for start, goal in itertools.pairwise(rooms):
@@ -113,28 +104,12 @@ def scans(poses: NDArray[np.float64], field: Field, rng: np.random.Generator) ->
 
 def wall_figures(found: Grid) -> dict[str, float]:
     """How far the map's walls are the true ones."""
-    cell = found.info.resolution
-    fine, coarse = plan(0.01), plan(cell)
-    ys, xs = np.nonzero(found.cells == OCCUPIED)
-    centres = np.column_stack([found.info.origin_x + (xs + 0.5) * cell, found.info.origin_y + (ys + 0.5) * cell])
-    places = np.floor((centres - LOW) / 0.01).astype(int)
-    inside = ((places >= 0) & (places < fine.cells.shape[::-1])).all(axis=1)
-    far = np.full(len(places), 1.0)
-    far[inside] = bounded_distances(fine.cells == OCCUPIED, 100)[places[inside, 1], places[inside, 0]] * 0.01
-    ty, tx = np.nonzero(coarse.cells == OCCUPIED)
-    truth = np.column_stack([LOW[0] + (tx + 0.5) * cell, LOW[1] + (ty + 0.5) * cell])
-    near_found = bounded_distances(np.ascontiguousarray(found.cells == OCCUPIED), 10)
-    near_truth = bounded_distances(coarse.cells == OCCUPIED, 10)
-    fx, fy = np.floor((truth - (found.info.origin_x, found.info.origin_y)) / cell).astype(int).T
-    gx, gy = np.floor((centres[inside] - LOW) / cell).astype(int).T
-    recall = float(np.mean(near_found[fy, fx] < 1.5))
-    precision = float(np.sum(near_truth[gy, gx] < 1.5) / max(len(centres), 1))
-    f1 = 2.0 * recall * precision / max(recall + precision, 1e-9)
+    figures = map_figures(found, WORLD, BOUNDS)
     return {
-        "house_wall_f1": round(f1, 4),
-        "house_wall_precision": round(precision, 4),
-        "house_wall_recall": round(recall, 4),
-        "house_wall_error_m": round(float(far.mean()), 4),
+        "house_wall_f1": round(figures.f1, 4),
+        "house_wall_precision": round(figures.precision, 4),
+        "house_wall_recall": round(figures.recall, 4),
+        "house_wall_error_m": round(figures.error_m, 4),
     }
 
 
@@ -142,7 +117,7 @@ def measure_house(params: GmappingParams, *, quick: bool) -> tuple[dict[str, flo
     """The figures of the drive, and the map that came of it."""
     rooms = [(room.pose.x, room.pose.y) for room in load_rooms(ROOT / "params" / "room_points.yaml")]
     poses = drive(waypoints([rooms[0], *([rooms[1]] if quick else rooms[1:]), rooms[0]]))
-    field = blocked_distances(plan(0.02), 3.0)
+    field = blocked_distances(plan(WORLD, BOUNDS, 0.02), 3.0)
     odometry = noisy_odometry(poses, np.random.default_rng(1))
     slam, times, spent = Slam(params), [], 0.0
     for scan, row in zip(scans(poses, field, np.random.default_rng(2)), odometry, strict=True):

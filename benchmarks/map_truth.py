@@ -1,0 +1,91 @@
+"""A map against the true walls of its world.
+
+A wall cell of the map is right where a true one is at most one cell off, and a true one is found where the map has one
+so near: `f1` from both. `error_m` is the mean distance of the map's wall cells, taken at their centres, from the true
+walls, `floor` the share of the true floor that the map knows as free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.maps.distance_kernels import bounded_distances
+from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
+from rosbot_patrol.simulation.floor_plan import floor_plan
+from rosbot_patrol.simulation.world import load_world
+
+HEIGHT = 0.158  # of the lidar's plane [m]
+FINE = 0.01  # cells of the plan that the error is measured on [m]
+FAR = 1.0  # what is farther from all walls counts so far [m]
+
+Bounds = tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class MapFigures:
+    """How good a map is; see the module."""
+
+    f1: float
+    precision: float
+    recall: float
+    error_m: float
+    floor: float
+
+
+def plan(world: Path, bounds: Bounds, resolution: float) -> Grid:
+    """The true floor plan of a world at the lidar's height, seen from (0, 0)."""
+    low, high = bounds
+    width, height = (round((b - a) / resolution) for a, b in zip(low, high, strict=True))
+    info = GridInfo(resolution=resolution, width=width, height=height, origin_x=low[0], origin_y=low[1])
+    return floor_plan(load_world(world).bodies, info, height=HEIGHT, start=(0.0, 0.0))
+
+
+def bounds_of(found: Grid, around: float = 1.0) -> Bounds:
+    """Of the known part of a map, with so much around it [m], on whole cells."""
+    info, margin = found.info, round(around / found.info.resolution)
+    ys, xs = np.nonzero(found.cells >= 0)
+    low = int(xs.min()) - margin, int(ys.min()) - margin
+    high = int(xs.max()) + 1 + margin, int(ys.max()) + 1 + margin
+    at = [(info.origin_x + x * info.resolution, info.origin_y + y * info.resolution) for x, y in (low, high)]
+    return at[0], at[1]
+
+
+def map_figures(found: Grid, world: Path, bounds: Bounds | None = None) -> MapFigures:
+    """How far a map's walls are the true ones."""
+    bounds = bounds or bounds_of(found)
+    low, cell = bounds[0], found.info.resolution
+    fine, coarse = plan(world, bounds, FINE), plan(world, bounds, cell)
+    origin = (found.info.origin_x, found.info.origin_y)
+    ys, xs = np.nonzero(found.cells == OCCUPIED)
+    centres = np.column_stack((xs, ys)) * cell + origin + 0.5 * cell
+    places = np.floor((centres - low) / FINE).astype(int)
+    inside = ((places >= 0) & (places < fine.cells.shape[::-1])).all(axis=1)
+    far = np.full(len(places), FAR)
+    distances = bounded_distances(fine.cells == OCCUPIED, round(FAR / FINE)) * FINE
+    far[inside] = distances[places[inside, 1], places[inside, 0]]
+    near_found = bounded_distances(np.ascontiguousarray(found.cells == OCCUPIED), 10)
+    near_truth = bounded_distances(coarse.cells == OCCUPIED, 10)
+    shift = np.round((np.array(low) - origin) / cell).astype(int)  # from the plan's cells to the map's
+    recall = float(np.mean(_at(near_found, np.argwhere(coarse.cells == OCCUPIED)[:, ::-1] + shift, 10.0) < 1.5))
+    gaps = _at(near_truth, np.floor((centres - low) / cell).astype(int), 10.0)
+    precision = float(np.mean(gaps < 1.5))
+    is_free = _at((found.cells == FREE).astype(float), np.argwhere(coarse.cells == FREE)[:, ::-1] + shift, 0.0)
+    return MapFigures(
+        f1=2.0 * recall * precision / max(recall + precision, 1e-9),
+        precision=precision,
+        recall=recall,
+        error_m=float(far.mean()),
+        floor=float(is_free.mean()),
+    )
+
+
+def _at(field: np.ndarray, cells: np.ndarray, outside: float) -> np.ndarray:
+    """Values of a field at cells (ix, iy), shape (N, 2)."""
+    inside = ((cells >= 0) & (cells < field.shape[::-1])).all(axis=1)
+    values = np.full(len(cells), outside)
+    values[inside] = field[cells[inside, 1], cells[inside, 0]]
+    return values
