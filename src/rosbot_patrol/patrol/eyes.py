@@ -69,7 +69,7 @@ class Eyes:
         self._has_eye = False
         self._began: float | None = None
         self._now = 0.0
-        self._views = 0
+        self._views = self._second_looks = 0
         self._tried: list[tuple[float, float]] = []
         self._doubts = Doubts(self.params.coverage.seen_in)
 
@@ -78,7 +78,8 @@ class Eyes:
     def start(self, mission: Mission) -> None:
         """Begin with a room; what earlier viewpoints showed before a restart is taken from the map."""
         self._mission, self.coverage, self._began = mission, None, None
-        self._views, self._tried, self._has_eye = 0, [], False
+        self._views = self._second_looks = 0
+        self._tried, self._has_eye = [], False
         self._doubts = Doubts(self.params.coverage.seen_in)
         self._witness.start()
         self._harmless = Harmless()
@@ -129,19 +130,20 @@ class Eyes:
         wanted, least = self.coverage.unseen(), None
         if self.coverage.share >= p.viewpoints.coverage_goal:
             wanted, least = self._hideouts(wanted), math.pi * p.viewpoints.hideout**2
-        if not wanted.any() and not self._open_doubts():
-            return None
-        late = self._now - self._began > p.viewpoints.viewpoints_time
-        if late or self._views >= p.viewpoints.viewpoints_most:
-            log.info("%s: no further viewpoint, %s", mission.room.title, "time is up" if late else "enough were tried")
-            return None
-        assert self._planner is not None
-        nearer = self._nearer(inputs)
-        if nearer is not None:
-            self._views += 1
-            return nearer
+        is_late = self._now - self._began > p.viewpoints.viewpoints_time
+        doubts = self._open_doubts()
+        if doubts and not is_late and self._second_looks < p.viewpoints.second_looks_most:
+            nearer = self._nearer(doubts, inputs.pose, inputs)
+            if nearer is not None:
+                self._second_looks += 1
+                return nearer
         if not wanted.any():
             return None
+        if is_late or self._views >= p.viewpoints.viewpoints_most:
+            why = "time is up" if is_late else "enough were tried"
+            log.info("%s: no further viewpoint, %s", mission.room.title, why)
+            return None
+        assert self._planner is not None
         found = self._planner.next(
             inputs.pose,
             self._room(mission.room),
@@ -225,14 +227,13 @@ class Eyes:
             return []
         return [d for d in self._doubts.open() if d.is_near or house.room_at(d.x, d.y) == mission.room.id]
 
-    def _nearer(self, inputs: Inputs) -> Viewpoint | None:
+    def _nearer(self, doubts: Sequence[Doubt], pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the first doubt that has one."""
         assert self._planner is not None
-        assert inputs.pose is not None
-        for doubt in self._open_doubts():
+        for doubt in doubts:
             for stands in (self._stands(inputs), None):  # by the map alone: move_base gets through where we see no way
                 found = self._planner.near(
-                    inputs.pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, **doubt.span
+                    pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, **doubt.span
                 )
                 if found is not None:
                     break

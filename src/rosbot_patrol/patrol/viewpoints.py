@@ -28,6 +28,12 @@ class ViewpointParams:
 
     coverage_goal: float = param(0.95, lo=0.0, hi=1.0, doc="share of the room's floor that is enough")
     viewpoints_most: int = param(4, lo=0, hi=50, doc="further viewpoints in one mission, at most")
+    second_looks_most: int = param(
+        8,
+        lo=0,
+        hi=50,
+        doc="viewpoints in one mission that are for what looks like a person, at most, beside the others",
+    )
     viewpoints_time: float = param(150.0, unit="s", lo=0.0, doc="no further viewpoint is begun later than this")
     viewpoint_gain: float = param(0.01, lo=0.0, hi=1.0, doc="share of the floor that a viewpoint must show anew")
     hideout: float = param(
