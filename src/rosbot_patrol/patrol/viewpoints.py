@@ -19,6 +19,8 @@ from rosbot_patrol.patrol.coverage import CoverageParams, sight_on_map, visible
 from rosbot_patrol.patrol.floor import Array, Floor, Mask
 
 _FAR = math.inf
+_ROOMY = 0.6  # so far from all that the map shows nothing low that it does not show is met: the feet of a chair [m]
+_TIGHT = 0.8  # what a viewpoint nearer to things is worth against one that is not
 _NEARER = 0.7  # where there is no other side, so much nearer than before is a second look
 
 
@@ -119,6 +121,8 @@ class ViewpointPlanner:
             sight = sight_on_map(self.floor, x, y, self._coverage.view_range)
             shown = int(visible(self.floor, unseen, sight, self._coverage)[2].sum())
             worth = shown / (way + 1.5)  # a turn costs as much as a metre and a half
+            if self._is_tight(x, y):
+                worth *= _TIGHT
             if shown >= fewest and (best is None or worth > best[0]):
                 best = worth, x, y, way, shown
         if best is None:
@@ -169,12 +173,18 @@ class ViewpointPlanner:
                 aside &= self._is_aside(math.atan2(eye.y - y, eye.x - x), x, y)
             before = min(math.hypot(eye.x - x, eye.y - y) for eye in seen_from)
             good = aside if aside.any() else good & (distances.reshape(good.shape) <= _NEARER * before)
+        roomy = good & (floor.clearance >= _ROOMY)
+        good = roomy if roomy.any() else good
         if not good.any():
             return None
         iy, ix = np.unravel_index(int(np.where(good, ways, _FAR).argmin()), good.shape)
         at = floor.info.centre_of(int(ix), int(iy))
         yaw = math.atan2(y - at[1], x - at[0])
         return Viewpoint(pose=Pose2D(*at, yaw), turn=0.0, gain=0.0, way=float(ways[iy, ix]))
+
+    def _is_tight(self, x: float, y: float) -> bool:
+        ix, iy = self.floor.info.cell_of(x, y)
+        return bool(self.floor.clearance[iy, ix] < _ROOMY)
 
     def _is_aside(self, bearing: float, x: float, y: float) -> Mask:
         """The floor that lies in another direction from a place than a bearing in map [rad]."""

@@ -214,7 +214,7 @@ def test_at_a_further_viewpoint_only_what_is_unseen_is_turned_over() -> None:
         if world.link.state is GoalState.SUCCEEDED:
             turned += 0.0 if last is None else abs(wrap_angle(world.pose.yaw - last))
             last = world.pose.yaw
-    assert turned < math.pi
+    assert turned < 1.25 * math.pi  # of 2 pi
 
 
 def test_too_little_seen_is_unverified() -> None:

@@ -145,3 +145,23 @@ def test_what_no_way_leads_to_is_not_reached() -> None:
     assert xs.max() < 1.5
     assert np.isinf(planner.ways(start)[~reached]).all()
     assert planner.near(start, 2.5, 1.5, nearest=0.1, most=1.0) is None  # floor there is, but no way to it
+
+
+def test_a_second_look_is_from_where_there_is_room_to_turn() -> None:
+    floor = drawn_floor(
+        *(
+            "#" * 20,
+            *["#" + "." * 18 + "#"] * 5,
+            "#" + "." * 8 + "#" + "." * 9 + "#",
+            *["#" + "." * 18 + "#"] * 5,
+            "#" * 20,
+        )
+    )
+    planner = ViewpointPlanner(floor)
+    for start in ((3.7, 3.2), (4.2, 2.6), (4.8, 3.3)):  # beside the post
+        view = planner.near(Pose2D(*start, 0.0), 6.5, 3.2)
+        assert view is not None
+        ix, iy = floor.info.cell_of(*view.pose[:2])
+        assert floor.clearance[iy, ix] >= 0.6
+    narrow = drawn_floor("#" * 12, "#..........#", "#..........#", "#" * 12)
+    assert ViewpointPlanner(narrow).near(Pose2D(0.9, 1.0, 0.0), 4.0, 1.0) is not None
