@@ -32,9 +32,10 @@ _BODY = 0.4  # in front of a place its own body may end a beam [m]
 
 @dataclass
 class Doubt:
-    """A place [m] in map where something like a person was seen.
+    """A place [m] in map where something like a person, or what else alarms, was seen.
 
     Attributes:
+        label: class of object that it may be.
         pictures: that showed it.
         seen_from: where a second side is wanted, the sides that are known.
         is_grave: without a second look nobody can say that nobody is there.
@@ -46,6 +47,7 @@ class Doubt:
 
     x: float
     y: float
+    label: str = "person"
     pictures: int = 1
     seen_from: tuple[Pose2D, ...] = ()
     is_grave: bool = True
@@ -60,7 +62,7 @@ class Doubt:
         looked = "was seen from one side only" if self.seen_from else "was not seen from near"
         if self.is_near:
             looked = "was too near to be told from a pet"
-        return f"something like a person at about ({self.x:.1f}, {self.y:.1f}) {looked}"
+        return f"something like a {self.label} at about ({self.x:.1f}, {self.y:.1f}) {looked}"
 
     @property
     def span(self) -> dict[str, float]:
@@ -90,20 +92,20 @@ class Doubts:
     def __iter__(self) -> Iterator[Doubt]:
         return iter(self._all)
 
-    def far(self, x: float, y: float) -> None:
-        """Take in that something like a person was seen at about a place, too far off to be measured."""
+    def far(self, label: str, x: float, y: float) -> None:
+        """Take in that something of a class was seen at about a place, too far off to be measured."""
         for doubt in self._all:
             if not doubt.seen_from and not doubt.is_near and math.hypot(doubt.x - x, doubt.y - y) < _SAME_FAR:
                 doubt.pictures += 1
                 return
-        self._all.append(Doubt(x, y))
+        self._all.append(Doubt(x, y, label))
 
     def suspect(self, doubtful: Sequence[Suspect]) -> None:
         """Take in what seems to be a person from one side, all that is so by now."""
         for suspect in doubtful:
             known = next((d for d in self._all if d.seen_from and suspect.apart(d.x, d.y) < _SAME_SUSPECT), None)
             if known is None:
-                known = Doubt(suspect.x, suspect.y, pictures=self._seen_in)
+                known = Doubt(suspect.x, suspect.y, suspect.label, pictures=self._seen_in)
                 self._all.append(known)
             known.is_grave = suspect.is_grave
             known.seen_from = tuple(side.eye for side in suspect.sides)

@@ -102,7 +102,7 @@ class Eyes:
             self.coverage.look(frame.eye, sight)
             for box in frame.boxes:
                 if box.doubt is not None:
-                    self._doubts.far(*box.doubt)
+                    self._doubts.far(box.label, *box.doubt)
             self._doubts.look(frame.eye, sight)
             if view is not None:
                 self._harmless.look(view.scan.stamp, frame.eye, sight, frame.boxes, self._witness.things)
@@ -240,7 +240,8 @@ class Eyes:
             if found is not None:
                 doubt.visit()
                 log.info(
-                    "something like a person at (%.1f, %.1f) is to be looked at from (%.1f, %.1f)",
+                    "something like a %s at (%.1f, %.1f) is to be looked at from (%.1f, %.1f)",
+                    doubt.label,
                     doubt.x,
                     doubt.y,
                     found.pose.x,

@@ -67,6 +67,6 @@ def test_what_was_seen_far_off_takes_some_pictures():
     doubts = Doubts(SEEN_IN)
     for k in range(SEEN_IN):
         assert doubts.open() == []
-        doubts.far(6.0 + 0.1 * k, 0.0)
+        doubts.far("fire hydrant", 6.0 + 0.1 * k, 0.0)
     assert len(doubts.open()) == 1
-    assert "was not seen from near" in doubts.open()[0].text
+    assert doubts.open()[0].text == "something like a fire hydrant at about (6.0, 0.0) was not seen from near"
