@@ -11,7 +11,7 @@ way there, but not from everywhere that the robot can reach in that room.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ import yaml
 from rosbot_patrol.campaign.cast import CASTS, Cast, Person, Stage
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses import HouseFiles
+from rosbot_patrol.campaign.mishaps import mishap_of
 from rosbot_patrol.errors import WorldError
 
 KINDS = ("standing", "walking", "hidden", "late", "standing", "walking", "two", "pets", "poster", "empty")
@@ -41,6 +42,7 @@ class Patrol:
         people: who should be found; expected: the verdict.
         viewpoint: a place from which a hidden one is seen [m], None where nobody hides.
         scenario: the file's tree.
+        mishap: what breaks, in words, "" where nothing does; allowed: verdicts that it makes as right.
     """
 
     number: int
@@ -53,6 +55,8 @@ class Patrol:
     scenario: dict[str, Any]
     people: tuple[Person, ...] = ()
     viewpoint: tuple[float, float] | None = None
+    mishap: str = ""
+    allowed: tuple[str, ...] = ()
 
     @property
     def title(self) -> str:
@@ -69,7 +73,7 @@ def patrol_from_plain(tree: dict[str, Any]) -> Patrol:
     people = tuple(Person(**person) for person in tree["people"])
     viewpoint = tree["viewpoint"]
     at = (float(viewpoint[0]), float(viewpoint[1])) if viewpoint else None
-    return Patrol(**{**tree, "people": people, "viewpoint": at})
+    return Patrol(**{**tree, "people": people, "viewpoint": at, "allowed": tuple(tree.get("allowed", ()))})
 
 
 def kind_of(seed: int, number: int) -> str:
@@ -83,7 +87,7 @@ def house_of(seed: int, number: int, houses: Sequence[str]) -> str:
     return houses[(number + number // len(KINDS) + seed) % len(houses)]
 
 
-def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor) -> Patrol:
+def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor, *, faults: bool = False) -> Patrol:
     """Draw a patrol.
 
     Args:
@@ -91,6 +95,7 @@ def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor) -> Patr
         number: of the patrol.
         files: of the house that it is in.
         floor: of that house.
+        faults: something breaks in every other patrol; who is there stays the same.
 
     Raises:
         WorldError: no room of the house has a place for what the kind asks for.
@@ -102,8 +107,24 @@ def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor) -> Patr
         for room in rng.permutation(rooms):
             cast = make(Stage(floor, int(room), rng))
             if cast is not None:
-                return _patrol(seed, number, kind, files, floor, int(room), cast)
+                patrol = _patrol(seed, number, kind, files, floor, int(room), cast)
+                return _broken(patrol, rooms) if faults else patrol
     raise WorldError(files.name, f"has no room with a place for a patrol of the kind '{kind}'")
+
+
+def _broken(patrol: Patrol, rooms: Sequence[int]) -> Patrol:
+    """A patrol with its mishap, if it has one."""
+    mishap = mishap_of(patrol.seed, patrol.number, patrol.room, rooms)
+    if mishap is None:
+        return patrol
+    expect = {key: value for key, value in patrol.scenario["expect"].items() if key != "verdicts"}
+    tree = {
+        **patrol.scenario,
+        "title": f"{patrol.title}; {mishap.told}",
+        "faults": [mishap.fault],
+        "expect": expect if mishap.allowed else patrol.scenario["expect"],
+    }
+    return replace(patrol, scenario=tree, mishap=mishap.told, allowed=mishap.allowed)
 
 
 def _patrol(seed: int, number: int, kind: str, files: HouseFiles, floor: Floor, room: int, cast: Cast) -> Patrol:
@@ -138,5 +159,6 @@ def _patrol(seed: int, number: int, kind: str, files: HouseFiles, floor: Floor, 
 def scenario_text(patrol: Patrol) -> str:
     """The scenario's file."""
     expect = dict(patrol.scenario["expect"])
-    expect["verdicts"] = {int(room): verdict for room, verdict in expect["verdicts"].items()}  # JSON made them text
+    if "verdicts" in expect:  # JSON made the rooms text
+        expect["verdicts"] = {int(room): verdict for room, verdict in expect["verdicts"].items()}
     return yaml.safe_dump({**patrol.scenario, "expect": expect}, sort_keys=False, allow_unicode=True, width=120)

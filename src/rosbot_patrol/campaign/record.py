@@ -32,6 +32,7 @@ class Result:
         home_error: from where the robot began, at the end [m].
         home: whether it came back; None where it went on to another room, or nobody knows.
         suspects: what looked like somebody to the guard, as it says.
+        mishap: what broke, "" where nothing did; allowed: verdicts that it made as right.
         people: who were to be found; mails: that were delivered; missions: that ended.
         sim_s, wall_s: how long it took.
     """
@@ -59,6 +60,8 @@ class Result:
     home_error: float | None = None
     home: bool | None = None
     suspects: list[str] = field(default_factory=list)
+    mishap: str = ""
+    allowed: tuple[str, ...] = ()
     people: int = 1
     mails: int = 0
     missions: int = 0
@@ -72,8 +75,8 @@ class Result:
 
     @property
     def missed(self) -> bool:
-        """Whether somebody was there and was not found."""
-        return self.detected is False
+        """Whether somebody was there and was not found, though nothing that broke excuses it."""
+        return self.detected is False and self.verdict not in self.allowed
 
     @property
     def false_alarm(self) -> bool:
@@ -91,7 +94,8 @@ class Result:
         found = [self.problem] if self.problem else []
         found += ["missed"] if self.missed else []
         found += ["false alarm"] if self.false_alarm else []
-        if not (self.missed or self.false_alarm or self.problem) and not self.was_there and self.verdict != "clear":
+        is_right = self.verdict in ("clear", *self.allowed)
+        if not (self.missed or self.false_alarm or self.problem) and not self.was_there and not is_right:
             found.append(f"{self.verdict or 'no verdict'} in a room without anybody")
         if self.verdict == CONFIRMED and not self.has_its_mails:
             found.append(f"{self.mails} mails")
@@ -113,6 +117,7 @@ def result_from_plain(tree: Mapping[str, Any]) -> Result:
     """
     known = {f.name for f in fields(Result)}
     kept = {key: value for key, value in tree.items() if key in known}
+    kept["allowed"] = tuple(kept.get("allowed", ()))
     if kept.get("localisation"):
         kept["localisation"] = tuple(kept["localisation"])
     return Result(**kept)
@@ -125,6 +130,7 @@ class Settings:
     seed: int
     houses: tuple[str, ...]
     kind: str = "patrols"
+    faults: bool = False
 
 
 class CampaignFolder:
@@ -147,7 +153,7 @@ class CampaignFolder:
         now = json.loads(json.dumps(asdict(settings)))
         if begun is None:
             write_atomic(path, json.dumps(now, indent=1).encode())
-        elif begun != now:
+        elif (begun := {"faults": False, **begun}) != now:  # from before there were any
             differs = ", ".join(f"{k} {begun.get(k)}, not {v}" for k, v in now.items() if begun.get(k) != v)
             raise ParamError(str(folder), f"holds a campaign of another kind ({differs}): name another folder")
 

@@ -36,7 +36,9 @@ class Share:
 
 def shares(results: Sequence[Result]) -> list[Share]:
     """What a campaign is about."""
-    there = [r for r in results if r.was_there]
+    there = [r for r in results if r.was_there and not r.mishap]
+    broken = [r for r in results if r.mishap]
+    also = [Share("as it should be though something broke", sum(not r.failures for r in broken), len(broken))]
     nobody = [r for r in results if not r.was_there and not r.problem]
     played = [r for r in results if not r.problem]
     return [
@@ -50,6 +52,7 @@ def shares(results: Sequence[Result]) -> list[Share]:
             sum(r.has_its_mails for r in played if r.verdict == CONFIRMED),
             sum(r.verdict == CONFIRMED for r in played),
         ),
+        *(also if broken else []),
     ]
 
 
@@ -96,7 +99,7 @@ def _share_error(result: Result) -> float | None:
 
 HEADINGS = (
     "no.", "kind", "house", "room", "there", "in view [s]", "verdict", "place off [m]", "seen [%]", "true [%]",
-    "goal [s]", "notice [s]", "home [s]", "loc. max [m]", "touched", "mails", "",
+    "goal [s]", "notice [s]", "home [s]", "loc. max [m]", "touched", "mails", "broke", "",
 )  # fmt: skip
 
 
@@ -120,6 +123,7 @@ def row(result: Result) -> tuple[str, ...]:
         _cell(localisation),
         str(len(result.contacts)),
         str(result.mails),
+        result.mishap,
         "; ".join(result.failures),
     )
 
@@ -160,7 +164,7 @@ def summary(results: Sequence[Result]) -> str:
 
 def figures(results: Sequence[Result]) -> dict[str, float]:
     """The figures of a campaign by name, for a benchmark."""
-    detected, alarms, _, home, _, _ = shares(results)
+    detected, alarms, _, home, _, _, *survived = shares(results)
     named = {
         "detection_rate": detected.hits / detected.trials if detected.trials else 0.0,
         "false_alarms": float(alarms.hits),
@@ -168,6 +172,8 @@ def figures(results: Sequence[Result]) -> dict[str, float]:
         "home_rate": home.hits / home.trials if home.trials else 0.0,
         "patrols": float(len(results)),
     }
+    for share in survived:
+        named["survived_rate"] = share.hits / share.trials
     if times := [r.times["notice"] for r in results if "notice" in r.times]:
         named["trigger_to_notice_s"] = statistics.median(times)
     return named

@@ -1,6 +1,7 @@
 """campaign: many seeded patrols of the simulated houses, each judged against what really was there.
 
     rosrun rosbot_patrol campaign FOLDER --patrols 60
+    rosrun rosbot_patrol campaign FOLDER --patrols 100 --faults    # something breaks in every other one
     rosrun rosbot_patrol campaign FOLDER --only 17        # one of them again
     rosrun rosbot_patrol campaign FOLDER --crash 200      # patrols in which programs are killed
 
@@ -62,6 +63,7 @@ def options(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--crash", type=int, metavar="KILLS", help="kill programs instead, so often; see docs/campaign.md"
     )
+    parser.add_argument("--faults", action="store_true", help="something breaks in every other patrol")
     parser.add_argument("--life", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # the program in its own space
     parser.add_argument("--space", action="store_true", help=argparse.SUPPRESS)
@@ -75,7 +77,7 @@ class Campaign:
         self._given = given
         self._root = package_root()
         self._folder = CampaignFolder(
-            given.folder.resolve(), Settings(seed=given.seed, houses=tuple(given.houses), kind="patrols")
+            given.folder.resolve(), Settings(seed=given.seed, houses=tuple(given.houses), faults=given.faults)
         )
         self._floors: dict[str, tuple[HouseFiles, Floor]] = {}
         self._began = time.monotonic()
@@ -115,7 +117,7 @@ class Campaign:
         if name not in self._floors:
             house = load_house(name, self._root)
             self._floors[name] = house.files, Floor(house.bodies, house.rooms)
-        return plan_patrol(self._given.seed, number, *self._floors[name])
+        return plan_patrol(self._given.seed, number, *self._floors[name], faults=self._given.faults)
 
     def _done(self, job: Job, problem: str) -> None:
         number = int(job.name)
@@ -130,6 +132,8 @@ class Campaign:
                 room=patrol.room,
                 title=patrol.title,
                 expected=patrol.expected,
+                mishap=patrol.mishap,
+                allowed=patrol.allowed,
                 problem=problem or "left no result",
             )
             write_atomic(folder / RESULT, failed.to_json().encode())
@@ -163,8 +167,8 @@ class Campaign:
     def command(self, result: Result) -> str:
         """What plays a patrol again."""
         houses = f" --houses {' '.join(self._given.houses)}" if tuple(self._given.houses) != HOUSES else ""
-        folder = f"again-{result.number}"
-        return f"rosrun rosbot_patrol campaign {folder} --seed {result.seed}{houses} --only {result.number}"
+        folder, faults = f"again-{result.number}", " --faults" if self._given.faults else ""
+        return f"rosrun rosbot_patrol campaign {folder} --seed {result.seed}{houses}{faults} --only {result.number}"
 
     def _write(self) -> None:
         results = self._folder.results()

@@ -155,6 +155,8 @@ def evaluate(
         home_error=home,
         home=None if home is None or went_on else home < HOME,
         suspects=[event.text for event in kept.events if event.kind == "suspect"] if kept is not None else [],
+        mishap=patrol.mishap,
+        allowed=patrol.allowed,
         people=len(patrol.people),
         mails=mails,
         missions=len({s.message.mission for s in heard.states if s.message.mission}),

@@ -13,6 +13,7 @@ import pytest
 from rosbot_patrol.campaign.cast import HIDDEN, PLAIN
 from rosbot_patrol.campaign.floor import EYE_LEVEL, Floor
 from rosbot_patrol.campaign.houses import HOUSES, House, house_files
+from rosbot_patrol.campaign.mishaps import MISHAPS
 from rosbot_patrol.campaign.plan import (
     KINDS,
     Patrol,
@@ -48,6 +49,29 @@ def test_a_patrol_is_the_same_whenever_it_is_planned(flat: House, flat_floor: Fl
     assert patrol_from_plain(json.loads(json.dumps(patrols[7].to_plain()))).scenario == json.loads(
         json.dumps(patrols[7].scenario)
     )
+
+
+def test_with_faults_something_breaks_in_every_other_patrol_and_each_kind_of_it(
+    flat: House, flat_floor: Floor, tmp_path: Path
+) -> None:
+    kinds = set()
+    for number in range(20):
+        whole = plan_patrol(SEED, number, flat.files, flat_floor)
+        patrol = plan_patrol(SEED, number, flat.files, flat_floor, faults=True)
+        assert bool(patrol.mishap) == ((number + SEED) % 2 == 0)
+        assert patrol.scenario["actors"] == whole.scenario["actors"]
+        if not patrol.mishap:
+            assert patrol == whole
+            continue
+        kept = patrol_from_plain(json.loads(json.dumps(patrol.to_plain())))
+        assert kept.allowed == patrol.allowed
+        file = tmp_path / f"{number}.yaml"
+        file.write_text(scenario_text(kept))
+        scenario = read_scenario(file)
+        kinds.add(scenario.faults[0].kind)
+        assert scenario.expect is not None
+        assert bool(scenario.expect.verdicts) == (not patrol.allowed)
+    assert len(kinds) == len(MISHAPS)
 
 
 def test_every_scenario_can_be_played(patrols: list[Patrol], tmp_path: Path) -> None:

@@ -62,6 +62,37 @@ def test_what_went_wrong_is_named(changes: dict[str, Any], failures: tuple[str, 
     assert result(**changes).failures == failures
 
 
+@pytest.mark.parametrize(
+    ("changes", "failures"),
+    [
+        ({"verdict": "unverified", "mails": 0}, ()),
+        ({"verdict": "clear", "mails": 0}, ("missed",)),
+        ({**EMPTY, "verdict": "unverified"}, ()),
+        ({**EMPTY, "verdict": "unreachable"}, ("unreachable in a room without anybody",)),
+        ({**EMPTY, "verdict": "confirmed"}, ("false alarm", "0 mails")),
+    ],
+)
+def test_what_broke_excuses_only_what_it_has_to(changes: dict[str, Any], failures: tuple[str, ...]) -> None:
+    broken = result(mishap="the camera is gone for 9 s", allowed=("unverified",), **changes)
+    assert broken.failures == failures
+    assert result_from_plain(json.loads(broken.to_json())) == broken
+
+
+def test_patrols_in_which_something_broke_are_counted_by_themselves() -> None:
+    results = [result(0), result(1, mishap="m", allowed=("unverified",), verdict="unverified", mails=0)]
+    counted = {share.name.partition(",")[0]: (share.hits, share.trials) for share in shares(results)}
+    assert counted["detected"] == counted["as it should be though something broke"] == (1, 1)
+    assert figures(results)["survived_rate"] == 1.0
+    assert "survived_rate" not in figures(results[:1])
+
+
+def test_a_folder_from_before_there_were_faults_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "campaign.json").write_text('{"seed": 1, "houses": ["flat"], "kind": "patrols"}')
+    CampaignFolder(tmp_path, Settings(seed=1, houses=("flat",)))
+    with pytest.raises(ParamError, match="faults False, not True"):
+        CampaignFolder(tmp_path, Settings(seed=1, houses=("flat",), faults=True))
+
+
 def test_a_result_outlives_the_file_and_a_newer_version() -> None:
     kept = result()
     tree = json.loads(kept.to_json())

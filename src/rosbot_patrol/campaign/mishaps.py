@@ -1,0 +1,97 @@
+"""What breaks in the patrols of a campaign with faults, and which verdicts are then as right as the expected one.
+
+Every other patrol has one fault of the simulator (docs/scenarios.md), begun while the robot drives or looks, most of
+them for some seconds. A guard whose camera fails may say `unverified`, never `clear` with somebody there; one whose
+lidar or wheels fail may also say that the room was not reached. What befalls a motion sensor changes no verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rosbot_patrol.patrol.mission import Verdict
+
+UNSURE = (Verdict.UNVERIFIED.value,)
+STRANDED = (Verdict.UNVERIFIED.value, Verdict.UNREACHABLE.value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mishap:
+    """One fault of a patrol.
+
+    Attributes:
+        told: what breaks, in words.
+        fault: its entry in the scenario.
+        allowed: verdicts that are right beside the expected one.
+    """
+
+    told: str
+    fault: dict[str, Any]
+    allowed: tuple[str, ...] = ()
+
+
+def mishap_of(seed: int, number: int, room: int, rooms: Sequence[int]) -> Mishap | None:
+    """The mishap of a patrol, None in every other one.
+
+    Args:
+        seed: of the campaign.
+        number: of the patrol.
+        room: that is triggered.
+        rooms: all but the base.
+    """
+    if (number + seed) % 2:
+        return None
+    rng = np.random.default_rng([seed, number // 2 // len(MISHAPS), 4])
+    make = MISHAPS[int(rng.permutation(len(MISHAPS))[number // 2 % len(MISHAPS)])]
+    own = np.random.default_rng([seed, number, 3])
+    others = [other for other in rooms if other != room] or [room]
+    return make(own, room, int(own.choice(others)))
+
+
+def _camera(kind: str, told: str) -> Callable[[np.random.Generator, int, int], Mishap]:
+    def make(rng: np.random.Generator, room: int, other: int) -> Mishap:
+        after = str(rng.choice(["driving", "looking"]))
+        fault = {"kind": kind, "after": after, "at": _drawn(rng, 0.0, 8.0), "duration": _drawn(rng, 5.0, 40.0)}
+        return Mishap(told=f"{told} for {fault['duration']:g} s", fault=fault, allowed=UNSURE)
+
+    return make
+
+
+def _driving(kind: str, told: str, longest: float, **keys: Any) -> Callable[[np.random.Generator, int, int], Mishap]:
+    def make(rng: np.random.Generator, room: int, other: int) -> Mishap:
+        lasts = _drawn(rng, 2.0, longest)
+        fault = {"kind": kind, "after": "driving", "at": _drawn(rng, 0.0, 10.0), "duration": lasts, **keys}
+        return Mishap(told=f"{told} for {lasts:g} s", fault=fault, allowed=STRANDED)
+
+    return make
+
+
+def _sensor(kind: str, told: str, *, own: bool, **keys: Any) -> Callable[[np.random.Generator, int, int], Mishap]:
+    def make(rng: np.random.Generator, room: int, other: int) -> Mishap:
+        target = room if own else other
+        fault = {"kind": kind, "target": target, "after": "driving", "at": _drawn(rng, 0.0, 5.0), **keys}
+        return Mishap(told=f"motion sensor {target} {told}", fault=fault)
+
+    return make
+
+
+def _drawn(rng: np.random.Generator, low: float, high: float) -> float:
+    return round(float(rng.uniform(low, high)), 1)
+
+
+MISHAPS: tuple[Callable[[np.random.Generator, int, int], Mishap], ...] = (
+    _camera("camera_frozen", "the camera freezes"),
+    _camera("camera_black", "the camera is covered"),
+    _camera("camera_silent", "the camera is gone"),
+    _driving("lidar_silent", "the lidar is gone", 10.0),
+    _driving("odometry_slip", "the wheels slip", 6.0, factor=0.6),
+    _driving("wheel_stuck", "the left wheels are stuck", 4.0, target="left"),
+    _sensor("motion_stuck", "calls once and not again", own=True),
+    _sensor("motion_rebooting", "starts anew", own=True),
+    _sensor("motion_silent", "is silent on its link", own=False),
+    _sensor("link_poor", "has a poor link", own=True, loss=0.2, delay=0.3, jitter=0.2),
+)
