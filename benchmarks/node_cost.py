@@ -93,7 +93,7 @@ def measure(folder: Path, profile: str, seconds: float, nodes: Sequence[str]) ->
             costs[message.name].missed += 1
 
     listener = rospy.Subscriber("/rosout_agg", Log, on_log, queue_size=100)
-    with House(folder, detector="pc", profile=profile) as house:
+    with House(folder, detector="pc", standby="false", profile=profile) as house:
         house.wait_ready(120.0)
         pids = {node: house.pids()[node] for node in nodes}
         moving = (PatrolState.DRIVING, PatrolState.RETURNING)

@@ -271,6 +271,31 @@ def switch():
     say(counts=len(client.look(make_message(101))[0]))
 
 
+def standby():
+    """Another detector is there, goes, and comes back."""
+    client = Client()
+    other = rospy.Publisher("/darknet_ros/found_object", ObjectCount, queue_size=1)
+
+    def play(seconds, *, with_other):
+        before, until, stamp = len(client.heard["count"]), time.monotonic() + seconds, len(client.heard["count"]) + 100
+        while time.monotonic() < until:
+            stamp += 1
+            client.camera.publish(make_message(stamp))
+            if with_other:
+                other.publish(ObjectCount(count=0))
+            time.sleep(0.05)
+        time.sleep(0.2)
+        return sum(m._connection_header["callerid"] == "/darknet_ros" for m in client.heard["count"][before:])
+
+    client.wait(lambda: other.get_num_connections() > 1)
+    play(0.5, with_other=True)
+    for with_other in (True, False, True, True):
+        say(with_other=with_other, looked_at=play(1.5, with_other=with_other))
+        if not with_other:
+            told = [[s.level, s.message] for m in client.heard["health"] for s in m.status if "standing in" in s.name]
+            say(health=told[-1])
+
+
 def silent():
     """A camera that goes on with one picture, stops, and comes back."""
     client = Client()

@@ -94,6 +94,18 @@ def test_boxes_belong_to_their_picture(ros, models):
     assert nothing == {"nothing": [0], "messages": 0}  # silent, but for the count
 
 
+def test_it_stands_in_for_another_detector_that_has_gone(ros, models):
+    node = start(ros, models, standby_after=0.6)
+    there, alone, health, back, again = play(ros, "standby")
+    assert there == {"with_other": True, "looked_at": 0}
+    assert alone["looked_at"] > 5
+    assert health["health"][0] == 1
+    assert "has gone: looks at pictures in its place" in health["health"][1]
+    assert back["looked_at"] <= 2  # those that were on their way
+    assert again["looked_at"] == 0
+    wait_for(lambda: "standing by" in node.output, 5.0, "that it says so")
+
+
 def test_publish_empty(ros, models):
     start(ros, models, publish_empty="true")
     assert play(ros, "empty") == [{"messages": [[]]}]

@@ -93,6 +93,11 @@ def test_detector_on_the_pc() -> None:
     assert "darknet_ros" not in robot
     assert "esp_client1" not in robot
     assert "sensor_watch" in robot
+    assert "darknet_ros_standby" in robot
+    assert "darknet_ros_standby" not in names(
+        parse(ROOT / "launch" / "rosbot_patrol.launch", "detector:=pc", "standby:=false")
+    )
+    assert "darknet_ros_standby" not in names(parse(ROOT / "launch" / "rosbot_patrol.launch"))
     computer = names(parse(ROOT / "launch" / "rosbot_patrol_pc.launch"))
     assert set(computer) == {"rgb_decompress", "darknet_ros", "esp_client1", "esp_client2", "esp_client3"}
 

@@ -75,7 +75,7 @@ def test_an_intruder_is_mailed_once_and_an_empty_room_is_not(master: object, fol
 def test_without_the_detector_nothing_is_called_clear_and_nobody_is_mailed(master: object, folder: Path) -> None:
     # The proof that the test above needs the network: the same intruder, with darknet_ros killed first.
     detector_folder = folder / "detector"
-    with House(folder, rate=2.0, detector="pc") as house:
+    with House(folder, rate=2.0, detector="pc", standby="false") as house:
         detector = House(detector_folder, "rosbot_patrol", "darknet_yolo_simulation_only.launch", plain=True)
         with detector:
             house.wait_ready(90.0)

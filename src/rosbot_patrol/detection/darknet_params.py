@@ -131,6 +131,12 @@ class DarknetParams:
     publish_empty: bool = param(False, doc="send bounding_boxes also of pictures in which nothing is seen")
     enabled: bool = param(True, doc="look from the start; the service ~enable switches it")
     max_rate: float = param(0.0, unit="Hz", lo=0.0, doc="most pictures looked at in a second, 0 for all")
+    standby_after: float = param(
+        0.0,
+        unit="s",
+        lo=0.0,
+        doc="look only while no other detector on the same topics was heard for so long; 0: always",
+    )
     threads: int = param(1, lo=1, doc="cores that the network may use")
     camera_timeout: float = param(2.0, unit="s", lo=0.1, doc="a camera silent for longer has stopped (wall time)")
     frozen_timeout: float = param(10.0, unit="s", lo=0.0, doc="pictures the same for longer are a fault, 0 for never")

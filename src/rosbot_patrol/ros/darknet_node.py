@@ -12,7 +12,8 @@ Differs:
 - More encodings (`rosbot_patrol.images.encodings`); upstream takes mono8, mono16, rgb8, bgr8, rgba8 and bgra8.
 - Weights that do not fit the network, and class names that do not, end it in a sentence; upstream goes on.
 - Further: compressed input (`~image_transport`), `~network` hog, `~publish_empty`, `~max_rate`, `~threads`, the service
-  `~enable`, `~camera_ok` (std_msgs/Bool, latched) and /diagnostics, which know a camera that has stopped or is frozen.
+  `~enable`, `~standby_after`, to stand in for another detector that has gone, `~camera_ok` (std_msgs/Bool, latched) and
+  /diagnostics, which know a camera that has stopped or is frozen.
 - There is no nodelet: Python has none.
 """
 
@@ -44,6 +45,7 @@ from rosbot_patrol.ros.convert_images import picture_to_msg
 from rosbot_patrol.ros.display import display_problem
 from rosbot_patrol.ros.heap import share_one_heap
 from rosbot_patrol.ros.node import Worker, load_params, run_node
+from rosbot_patrol.ros.standby import Standby
 
 log = logging.getLogger(__name__)
 
@@ -115,6 +117,7 @@ class DarknetNode:
         self._console = _Console() if params.image_view.enable_console_output else None
         self._window = self._open_window()
         self._advertise()
+        self._standby = Standby(_private(params.publishers.object_detector.topic), params.standby_after, self._health)
         self._action = CheckForObjects(_private(params.actions.camera_reading.topic), self._notify)
         self._camera = Camera(
             _private(params.subscribers.camera_reading.topic),
@@ -142,7 +145,7 @@ class DarknetNode:
             self._answer(goal)
             return True
         message = self._camera.take()  # also while switched off: what came then is not looked at later
-        if message is None or not self._enabled:
+        if not self._standby.is_wanted() or message is None or not self._enabled:
             return False
         started = time.monotonic()
         try:
