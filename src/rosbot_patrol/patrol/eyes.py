@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 
 VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
+_STAY = 3.0  # a pet rests for some seconds before it goes on [s]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -247,7 +248,7 @@ class Eyes:
                     found.pose.x,
                     found.pose.y,
                 )
-                return found
+                return replace(found, stay=_STAY) if doubt.is_near else found
         return None
 
     # -- parts

@@ -213,8 +213,9 @@ class LookAround:
             self._mission.views_done.append((self._at.x, self._at.y, self._at.yaw))
         return self._go_on(inputs, step)
 
-    def _new_look(self, turn: float = math.tau) -> Look:
-        return Look(self._parts.look, self._parts.spin, needs_camera=self._parts.needs_camera, turn=turn)
+    def _new_look(self, turn: float = math.tau, stay: float = 0.0) -> Look:
+        look = dataclasses.replace(self._parts.look, linger=self._parts.look.linger + stay)
+        return Look(look, self._parts.spin, needs_camera=self._parts.needs_camera, turn=turn)
 
     def _go_on(self, inputs: Inputs, step: LookStep) -> LookStep:
         self._view = self._views.next(inputs)
@@ -236,6 +237,7 @@ class LookAround:
             return dataclasses.replace(next_step, cancel=step.cancel)
         if step.reached:
             self._drive = None
-            self._look = self._new_look(self._views.turn_from(inputs.pose, self._view) if self._view else math.tau)
+            assert self._view is not None
+            self._look = self._new_look(self._views.turn_from(inputs.pose, self._view), self._view.stay)
             return LookStep(why="at a further viewpoint")
         return LookStep(speed=None, goal=step.goal, cancel=step.cancel, why="driving to a further viewpoint")

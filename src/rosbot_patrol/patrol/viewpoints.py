@@ -67,12 +67,14 @@ class Viewpoint:
         turn: to the left from there [rad], 0 where one look ahead is enough.
         gain: unseen floor that it shows [m^2].
         way: to it [m].
+        stay: longer than elsewhere, as what was there may come and go [s].
     """
 
     pose: Pose2D
     turn: float
     gain: float
     way: float
+    stay: float = 0.0
 
 
 class ViewpointPlanner:

@@ -400,6 +400,17 @@ def test_what_is_too_near_to_be_told_from_a_pet_is_looked_at_from_farther_off(to
     assert any(math.dist(view[:2], (10.5, 2.2)) > 1.9 for view in mission.views_done)
 
 
+def test_what_was_too_near_is_looked_at_for_some_seconds() -> None:
+    world = World()
+    world.triggers = (1,)
+    world.until(lambda w: w.phase is Phase.LOOKING)
+    world.people = lambda now: [(10.5, 2.2)] if not world.goals[1:] else []
+    world.until(lambda w: any("at a further viewpoint" in r.why for r in w.reports))
+    began = world.now
+    world.until(lambda w: w.phase is not Phase.LOOKING)
+    assert world.now - began > 4.0
+
+
 def to_and_fro(now: float) -> list[Place]:
     """From right before the room's point to 3 m off and back, at 0.5 m/s."""
     return [(6.5 + abs(now % 10.0 - 5.0) * 0.4, 1.6)]
