@@ -5,6 +5,10 @@
     |- MapError           a map file or a grid that cannot be used
     |- WorldError         a world, robot or actor description of the simulator
     |- TransformError     a pose that cannot be had
+    |  |- TransformNotYet  it may still come
+    |  `- TransformTooOld  what was known of that time is no longer kept
+    |- BagError           a recorded bag that cannot be used
+    |- ResultError        a stored result of a replay that cannot be used
     |- PlanningError      no global plan
     |  |- StartOccupied
     |  |- GoalOccupied
@@ -63,6 +67,22 @@ class TransformError(PatrolError):
         super().__init__(f"no transform from '{source}' to '{target}': {problem}")
         self.target = target
         self.source = source
+
+
+class TransformNotYet(TransformError):
+    """The pose may be known later: a frame is not told of yet, or not until that time."""
+
+
+class TransformTooOld(TransformError):
+    """The pose will never be known: the time lies before all that is kept."""
+
+
+class BagError(_FileError):
+    """A recorded bag that cannot be used: which file, which topic, and what to do."""
+
+
+class ResultError(_FileError):
+    """A stored result of a replay that cannot be used: which file, and why."""
 
 
 class PlanningError(PatrolError):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
 
 Array = NDArray[np.float64]
 
@@ -51,6 +51,19 @@ class Mount:
 
     pose: Pose2D = Pose2D()
     is_upside_down: bool = False
+
+
+def level_mount(x: float, y: float, quaternion: tuple[float, float, float, float]) -> Mount:
+    """The mount of a laser that stands at x, y [m] of the robot, turned by a quaternion of length 1.
+
+    Raises:
+        ValueError: the laser does not look along the floor.
+    """
+    qx, qy, qz, qw = quaternion
+    upright = 1.0 - 2.0 * (qx * qx + qy * qy)  # z component of the sensor's z axis
+    if abs(upright) < 0.9:
+        raise ValueError("the laser is not mounted level, its scan is no plan of the room")
+    return Mount(Pose2D(x, y, yaw_from_quaternion(qx, qy, qz, qw)), upright < 0.0)
 
 
 def scan_problem(scan: LaserScan) -> str:

@@ -28,6 +28,18 @@ class LateTf:
             self.known += self.step
 
 
+def scan_at(stamp):
+    return LaserScan(
+        stamp=stamp,
+        frame_id="laser",
+        angle_min=0.0,
+        angle_increment=0.1,
+        range_min=0.1,
+        range_max=10.0,
+        ranges=np.ones(3),
+    )
+
+
 @pytest.fixture
 def queued(monkeypatch):
     monkeypatch.setattr(scan_queue, "mount_of", lambda *_: Mount())
@@ -37,17 +49,7 @@ def queued(monkeypatch):
     def made(tf, stamps):
         queue = ScanQueue(tf, "odom", "base_link")
         for stamp in stamps:
-            queue.put(
-                LaserScan(
-                    stamp=stamp,
-                    frame_id="laser",
-                    angle_min=0.0,
-                    angle_increment=0.1,
-                    range_min=0.1,
-                    range_max=10.0,
-                    ranges=np.ones(3),
-                )
-            )
+            queue.put(scan_at(stamp))
         return queue
 
     return made
@@ -77,5 +79,5 @@ def test_a_scan_from_before_tf_began_holds_up_no_other(queued):
 
 def test_a_clock_that_is_set_back_begins_a_new_queue(queued):
     queue = queued(LateTf(5.0), [4.0, 4.1])
-    queue.put(LaserScan(**{**queue._waiting[0][0].__dict__, "stamp": 1.0}))
+    queue.put(scan_at(1.0))
     assert taken(queue) == [1.0]
