@@ -1,0 +1,65 @@
+"""Scans and transforms from the bytes of ROS 1 messages, several times faster than by a general deserialiser.
+
+Only for the definitions whose md5 sums stand here; all other messages, and all of ROS 2, are rosbags' to read.
+"""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+from rosbot_patrol.replay.transform_tree import Edge
+from rosbot_patrol.scan import LaserScan
+
+SCAN_MD5 = "90c7ef2dc6895d81024acba2ac42f369"  # sensor_msgs/LaserScan
+TF_MD5 = "94810edda583a504dfda3829e70d7eec"  # tf2_msgs/TFMessage and tf/tfMessage
+
+_HEADER = struct.Struct("<IIII")  # seq, seconds, nanoseconds, length of the frame's name
+_BEAMS = struct.Struct("<7fI")  # angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max
+_COUNT = struct.Struct("<I")
+_TRANSFORM = struct.Struct("<7d")  # x, y, z and the quaternion
+
+
+def read_scan(raw: bytes) -> LaserScan:
+    """A sensor_msgs/LaserScan; NaN beams become inf (no measurement).
+
+    Raises:
+        struct.error, ValueError: the bytes end too early.
+    """
+    _, seconds, nanoseconds, length = _HEADER.unpack_from(raw)
+    at = _HEADER.size + length
+    frame = raw[_HEADER.size : at].decode()
+    angle_min, _, increment, _, _, range_min, range_max, count = _BEAMS.unpack_from(raw, at)
+    ranges = np.frombuffer(raw, dtype="<f4", count=count, offset=at + _BEAMS.size).astype(np.float64)
+    ranges[np.isnan(ranges)] = np.inf
+    return LaserScan(
+        stamp=seconds + nanoseconds / 1e9,
+        frame_id=frame.lstrip("/"),
+        angle_min=angle_min,
+        angle_increment=increment,
+        range_min=range_min,
+        range_max=range_max,
+        ranges=ranges,
+    )
+
+
+def read_transforms(raw: bytes) -> list[Edge]:
+    """A tf2_msgs/TFMessage.
+
+    Raises:
+        struct.error, ValueError: the bytes end too early or a name is no text.
+    """
+    edges, at = [], _COUNT.size
+    for _ in range(_COUNT.unpack_from(raw)[0]):
+        _, seconds, nanoseconds, length = _HEADER.unpack_from(raw, at)
+        at += _HEADER.size
+        parent = raw[at : at + length].decode()
+        at += length
+        (length,) = _COUNT.unpack_from(raw, at)
+        at += _COUNT.size
+        child = raw[at : at + length].decode()
+        at += length
+        edges.append(Edge(parent, child, seconds + nanoseconds / 1e9, *_TRANSFORM.unpack_from(raw, at)))
+        at += _TRANSFORM.size
+    return edges

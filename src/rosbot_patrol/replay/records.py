@@ -1,0 +1,140 @@
+"""What the messages of a bag become: plain records that know no ROS.
+
+Messages come as bytes and as rosbags' objects, whose fields are named as in ROS 2 (stamp.sec, stamp.nanosec).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.replay import definitions, raw_ros1
+from rosbot_patrol.replay.transform_tree import Edge
+from rosbot_patrol.scan import LaserScan
+
+
+class MapRecord(NamedTuple):
+    """A nav_msgs/OccupancyGrid and its frame."""
+
+    grid: Grid
+    frame: str
+
+
+class PoseRecord(NamedTuple):
+    """A geometry_msgs/PoseWithCovarianceStamped: frame, time [s], pose, covariance, shape (6, 6)."""
+
+    frame: str
+    stamp: float
+    pose: Pose2D
+    covariance: NDArray[np.float64]
+
+
+class Refused(NamedTuple):
+    """A message that is whole, but says something that makes no sense; the nodes leave it out with a warning."""
+
+    problem: str
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One message type that a replay can use.
+
+    Attributes:
+        convert: makes the record of a message as rosbags gives it.
+        needed: fields that the definition must have.
+        fast: makes the same of ROS 1 bytes.
+        md5: of the one definition that `fast` knows.
+    """
+
+    convert: Callable[[Any], Any]
+    needed: Mapping[str, str]
+    fast: Callable[[bytes], Any] | None = None
+    md5: str = ""
+
+
+def stamp_of(stamp: Any) -> float:
+    """A message's time [s]."""
+    return float(stamp.sec + stamp.nanosec / 1e9)
+
+
+def scan_of(message: Any) -> LaserScan:
+    """sensor_msgs/LaserScan; NaN beams become inf (no measurement)."""
+    ranges = np.array(message.ranges, dtype=np.float64)
+    ranges[np.isnan(ranges)] = np.inf
+    return LaserScan(
+        stamp=stamp_of(message.header.stamp),
+        frame_id=message.header.frame_id.lstrip("/"),
+        angle_min=message.angle_min,
+        angle_increment=message.angle_increment,
+        range_min=message.range_min,
+        range_max=message.range_max,
+        ranges=ranges,
+    )
+
+
+def edges_of(message: Any) -> list[Edge]:
+    """tf2_msgs/TFMessage."""
+    return [_edge(each) for each in message.transforms]
+
+
+def _edge(message: Any) -> Edge:
+    header, t, q = message.header, message.transform.translation, message.transform.rotation
+    stamp = stamp_of(header.stamp)
+    return Edge(header.frame_id, message.child_frame_id, stamp, t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+
+
+def map_of(message: Any) -> MapRecord | Refused:
+    """nav_msgs/OccupancyGrid; refused where its size or its origin makes no sense."""
+    origin = _pose(message.info.origin)
+    if isinstance(origin, Refused):
+        return origin
+    info = GridInfo(
+        resolution=float(message.info.resolution),
+        width=int(message.info.width),
+        height=int(message.info.height),
+        origin_x=origin.x,
+        origin_y=origin.y,
+        yaw=origin.yaw,
+    )
+    cells = np.array(message.data, dtype=np.int8)
+    if cells.size != info.width * info.height:
+        return Refused(f"it has {cells.size} cells, expected {info.width} x {info.height}")
+    return MapRecord(Grid(info, cells.reshape(info.shape)), message.header.frame_id.lstrip("/"))
+
+
+def pose_of(message: Any) -> PoseRecord | Refused:
+    """geometry_msgs/PoseWithCovarianceStamped; refused where it is no pose."""
+    pose = _pose(message.pose.pose)
+    if isinstance(pose, Refused):
+        return pose
+    header = message.header
+    covariance = np.array(message.pose.covariance, dtype=np.float64).reshape(6, 6)
+    return PoseRecord(header.frame_id.lstrip("/"), stamp_of(header.stamp), pose, covariance)
+
+
+def _pose(message: Any) -> Pose2D | Refused:
+    p, q = message.position, message.orientation
+    if not (math.isfinite(p.x) and math.isfinite(p.y)):
+        return Refused(f"({p.x}, {p.y}) is no position")
+    try:
+        return Pose2D(float(p.x), float(p.y), yaw_from_quaternion(q.x, q.y, q.z, q.w))
+    except ValueError as err:
+        return Refused(str(err))
+
+
+_TRANSFORMS = Kind(edges_of, definitions.TRANSFORMS, raw_ros1.read_transforms, raw_ros1.TF_MD5)
+
+KINDS: dict[str, Kind] = {
+    "sensor_msgs/msg/LaserScan": Kind(scan_of, definitions.SCAN, raw_ros1.read_scan, raw_ros1.SCAN_MD5),
+    "tf2_msgs/msg/TFMessage": _TRANSFORMS,
+    "tf/msg/tfMessage": _TRANSFORMS,
+    "nav_msgs/msg/OccupancyGrid": Kind(map_of, definitions.GRID),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": Kind(pose_of, definitions.POSE_ESTIMATE),
+}
