@@ -5,7 +5,6 @@ amcl, slam_gmapping and their replay offline decide by it which scan is taken in
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections import deque
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.scan import LaserScan, Mount
 
 GIVE_UP_S, GIVE_UP_WAITING_S = 1.0, 2.0  # a scan this much older than the newest, or waiting for so long, is dropped
+FARTHEST_M = 1e6  # from where the odometry began: what says more is a bit fault on the way from the wheels
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,14 @@ class PlacedScan:
     scan: LaserScan
     odom_from_base: Pose2D
     mount: Mount
+
+
+@dataclass(frozen=True, eq=False)
+class _Entry:
+    """A scan that waits and when it came [s]; known by itself, not by what it holds."""
+
+    scan: LaserScan
+    arrival: float
 
 
 class ScanLine:
@@ -39,7 +47,7 @@ class ScanLine:
 
     def __init__(self, place: Callable[[LaserScan], PlacedScan], size: int = 100) -> None:
         self._place = place
-        self._waiting: deque[tuple[LaserScan, float]] = deque(maxlen=size)
+        self._waiting: deque[_Entry] = deque(maxlen=size)
         self._newest = -math.inf
         self.problem = ""  # why the last scan that was dropped could not be placed
         self.dropped = 0
@@ -52,7 +60,7 @@ class ScanLine:
         if scan.stamp < self._newest - GIVE_UP_S:  # the clock was set back: what waits is of another time
             self._waiting.clear()
         self._newest = scan.stamp
-        self._waiting.append((scan, now))
+        self._waiting.append(_Entry(scan, now))
 
     def take(self, now: float) -> PlacedScan | None:
         """The oldest scan that can be placed, None where none can be; the time [s] is of the clock of `put`."""
@@ -72,23 +80,30 @@ class ScanLine:
             return placed
         return None
 
-    def _try(self, entry: tuple[LaserScan, float], now: float) -> PlacedScan | None:
+    def _try(self, entry: _Entry, now: float) -> PlacedScan | None:
         try:
-            return self._place(entry[0])
+            placed = self._place(entry.scan)
+            x, y, _ = placed.odom_from_base
+            if not math.hypot(x, y) <= FARTHEST_M:
+                raise ValueError(f"the odometry says ({x:.3g}, {y:.3g}) m, which is no place")
+            return placed
         except (TransformError, ValueError) as err:
             self._drop_when_old(entry, now, str(err))
             return None
 
-    def _drop_when_old(self, entry: tuple[LaserScan, float], now: float, why: str) -> None:
-        scan, arrival = entry
-        if self._newest - scan.stamp > GIVE_UP_S or now - arrival > GIVE_UP_WAITING_S:
-            self._forget(entry)
+    def _drop_when_old(self, entry: _Entry, now: float, why: str) -> None:
+        is_old = self._newest - entry.scan.stamp > GIVE_UP_S or now - entry.arrival > GIVE_UP_WAITING_S
+        if is_old and self._forget(entry):
             self.problem = why
             self.dropped += 1
 
-    def _forget(self, entry: tuple[LaserScan, float]) -> None:
-        with contextlib.suppress(ValueError, IndexError):  # a full queue or a clock set back was faster
+    def _forget(self, entry: _Entry) -> bool:
+        """Take it out; False where a full queue, a clock set back or an earlier try was faster."""
+        try:
             if self._waiting[0] is entry:
                 self._waiting.popleft()
             else:
                 self._waiting.remove(entry)
+        except (ValueError, IndexError):
+            return False
+        return True

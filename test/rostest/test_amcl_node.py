@@ -88,7 +88,7 @@ def test_services_and_initial_poses(ros, room):
     node, peer = started(ros, room)
     peer.do("drive", scans=3)
     peer.do("initialpose", x=0.7, frame="odom")
-    node.says("initial pose in frame 'odom' is ignored, expected frame 'map'")
+    node.says("initial pose is ignored: it is in frame 'odom', expected 'map'")
     peer.do("initialpose", x=0.7)
     placed = peer.do("drive", scans=1)
     assert abs(placed["pose"] - 0.7) < 0.1

@@ -35,11 +35,11 @@ from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 from std_srvs.srv import Empty, EmptyResponse, Trigger, TriggerResponse
 
+from rosbot_patrol.amcl.initial_pose import taken_pose
 from rosbot_patrol.amcl.localizer import Localizer, Outcome, scan_problem, start_of
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.trust import State
-from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import Pose2D, compose, invert
+from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.ros.amcl_look_around import LookAround
 from rosbot_patrol.ros.amcl_maps import MapSource
@@ -137,40 +137,26 @@ class AmclNode:
         return SetMapResponse(success=taken)
 
     def _initial_pose(self, message: PoseWithCovarianceStamped) -> None:
-        frame = message.header.frame_id.lstrip("/")
-        if not frame:
-            log.warning("received an initial pose without a frame, it is taken as in '%s'", self._global)
-        elif frame != self._global:
-            log.warning("initial pose in frame '%s' is ignored, expected frame '%s'", frame, self._global)
-            return
-        covariance = np.array(message.pose.covariance).reshape(6, 6)[np.ix_([0, 1, 5], [0, 1, 5])]
         try:
-            pose = pose2d_from_pose(message.pose.pose)
-            if not np.isfinite(covariance).all():
-                raise ValueError("its covariance is not finite")
+            taken = taken_pose(
+                pose2d_from_pose(message.pose.pose),
+                np.array(message.pose.covariance),
+                frame=message.header.frame_id.lstrip("/"),
+                stamp=message.header.stamp.to_sec(),
+                global_frame=self._global,
+                odometry=lambda stamp: self._transforms.lookup(self._odom, self._base, stamp),
+            )
         except ValueError as err:
             log.warning("initial pose is ignored: %s", err)
             return
-        motion, newest = self._motion_since(message.header.stamp.to_sec())
-        pose = compose(pose, motion)
-        log.info("Setting pose (%.6f): %.3f %.3f %.3f", now(), pose.x, pose.y, pose.yaw)
-        covariance[2, :2] = covariance[:2, 2] = 0.0  # as upstream
+        for note in taken.notes:
+            log.warning("%s", note)
+        log.info("Setting pose (%.6f): %.3f %.3f %.3f", now(), *taken.pose)
         with self._lock:
             self._was_placed = True
-            self._localizer.set_pose(pose, covariance, newest)
+            self._localizer.set_pose(taken.pose, taken.covariance, taken.odom_from_base)
             if self._params.force_update_after_initialpose:
                 self._localizer.request_update()
-
-    def _motion_since(self, stamp: float) -> tuple[Pose2D, Pose2D | None]:
-        """How the robot moved since a pose was clicked, and the odometry now, None where it is not known."""
-        try:
-            then = self._transforms.lookup(self._odom, self._base, stamp if stamp > 0.0 else None)
-            newest = self._transforms.lookup(self._odom, self._base)
-        except TransformError as err:
-            if stamp > 0.0:
-                log.warning("the motion since the initial pose's stamp is not known, taken as none: %s", err)
-            return Pose2D(), None
-        return compose(invert(then), newest), newest
 
     def _localize_globally(self, _request: object) -> EmptyResponse:
         with self._lock:

@@ -29,8 +29,8 @@ from std_msgs.msg import Float64
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.gmapping.parameters import GmappingParams
-from rosbot_patrol.gmapping.slam import Outcome, Slam
-from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.gmapping.slam import Outcome
+from rosbot_patrol.gmapping.start import started
 from rosbot_patrol.ros.convert import grid_to_msg, scan_from_msg, transform_to_msg
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.grids import GetMapFast, GridMsg
@@ -194,20 +194,6 @@ class GmappingNode:
         if self._note:
             return WARN, self._note
         return OK, "mapping"
-
-
-def started(params: GmappingParams) -> Slam:
-    """A Slam, on a saved map where the parameters name one.
-
-    Raises:
-        MapError: the saved map cannot be read or does not fit.
-    """
-    if not params.map_file:
-        return Slam(params)
-    saved = read_map(params.map_file)
-    start = Pose2D(params.initial_pose_x, params.initial_pose_y, params.initial_pose_a)
-    log.info("Going on with the map %s from %.2f %.2f %.2f", params.map_file, *start)
-    return Slam(params, saved=saved, start=start)
 
 
 def body() -> None:

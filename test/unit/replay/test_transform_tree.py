@@ -10,7 +10,6 @@ from rosbot_patrol.errors import TransformError, TransformNotYet, TransformTooOl
 from rosbot_patrol.geometry import Pose2D, compose, invert, quaternion_from_yaw
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree
 
-
 ORIGIN = Pose2D()
 
 

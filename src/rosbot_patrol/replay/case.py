@@ -1,0 +1,129 @@
+"""A test case of a replay: NAME.replay.yaml beside a bag.
+
+    bag: house.bag
+    node: amcl
+    parameters: amcl.yaml           # a file, or the parameters themselves; left out: the package's config
+    map: house.yaml                 # left out: the bag's /map
+    topics: {scan: /front_scan}     # where the bag's topics differ from the node's
+    transforms: ["0 0 0.1 0 0 0 base_link laser"]
+    seed: 0
+    expected: house.expected.npz    # left out: NAME.expected.npz
+    tolerances: {poses.x: 0.1}
+
+Paths are taken from the folder of the yaml.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import param
+from rosbot_patrol.replay.comparison import field_names, field_of
+from rosbot_patrol.replay.results import Result
+from rosbot_patrol.replay.runner import Field
+from rosbot_patrol.replay.setup import Setup, node_of, parse_transform, read_parameters
+from rosbot_patrol.yaml_files import read_mapping
+
+SUFFIX = ".replay.yaml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseParams:
+    """Keys of a NAME.replay.yaml."""
+
+    bag: str = param(doc="the bag")
+    node: str = param(doc="whose replay: amcl, slam_gmapping")
+    parameters: Any = param(None, doc="of the node: a yaml file, or the parameters themselves; none: our config")
+    map: str = param("", doc="yaml of the map; empty: the bag's")
+    topics: dict[str, Any] = param({}, doc="topics of the bag by the node's own names")
+    transforms: list[str] = param([], doc="static transforms that the bag lacks: 'x y z yaw pitch roll PARENT CHILD'")
+    seed: int = param(0, lo=0, doc="of all chance")
+    expected: str = param("", doc="the stored result; empty: NAME.expected.npz")
+    tolerances: dict[str, Any] = param({}, doc="by field, as poses.x or poses.*; others keep the node's own")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One replay and what has to come of it.
+
+    Attributes:
+        path: of the yaml.
+        bag: the bag.
+        setup: what is replayed.
+        remaps: topics of the bag by the node's names.
+        expected: where the stored result lies.
+        fields: how it is compared.
+    """
+
+    path: Path
+    bag: Path
+    setup: Setup
+    remaps: Mapping[str, str]
+    expected: Path
+    fields: Mapping[str, Field]
+
+
+def read_case(path: Path) -> Case:
+    """Read and check a case.
+
+    Raises:
+        ParamError: the yaml or the parameters that it names are broken; names file and key.
+    """
+    tree = read_mapping(path, keys="bag, node, ...")
+    loaded = params.load_strict(CaseParams, tree, name=f"{path}: ")
+    node_of(loaded.node)
+    folder = path.parent
+    setup = Setup(
+        node=loaded.node,
+        tree=_tree(path, loaded),
+        name=f"{path}: parameters/",
+        map=folder / loaded.map if loaded.map else None,
+        static=tuple(parse_transform(text) for text in loaded.transforms),
+        seed=loaded.seed,
+    )
+    expected = folder / (loaded.expected or f"{path.name.removesuffix(SUFFIX)}.expected.npz")
+    remaps = {name: str(topic) for name, topic in loaded.topics.items()}
+    fields = with_tolerances(node_of(loaded.node).fields, loaded.tolerances, name=f"{path}: tolerances/")
+    return Case(path, folder / loaded.bag, setup, remaps, expected, fields)
+
+
+def _tree(path: Path, loaded: CaseParams) -> Mapping[str, Any] | None:
+    given = loaded.parameters
+    if given is None or isinstance(given, Mapping):
+        return given
+    if isinstance(given, str):
+        return read_parameters(path.parent / given, loaded.node)
+    raise ParamError(f"{path}: parameters", f"expected a yaml file or the parameters themselves, got {given!r}")
+
+
+def with_tolerances(fields: Mapping[str, Field], given: Mapping[str, Any], *, name: str) -> dict[str, Field]:
+    """Fields with other tolerances; what is given comes last, so that its wildcards win.
+
+    Raises:
+        ParamError: a tolerance is no number, or less than 0.
+    """
+    found = dict(fields)
+    for key, value in given.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not value >= 0.0:
+            raise ParamError(f"{name}{key}", f"expected a number from 0 up, got {value!r}")
+        for known in [each for each in found if _fits(each, key)] or [key]:
+            found[known] = replace(field_of(known, found), tolerance=float(value))
+        found[key] = replace(field_of(key, found), tolerance=float(value))
+    return found
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return field_of(name, {pattern: Field(tolerance=1.0)}).tolerance == 1.0
+
+
+def check_names(given: Mapping[str, Field], result: Result, *, name: str) -> None:
+    """Refuse tolerances for what a result has not; raises ParamError, which names the nearest."""
+    names = field_names(result)
+    for key in given:
+        if not any(_fits(each, key) for each in names):
+            raise ParamError(f"{name}{key}", params.unknown_name(key, names))

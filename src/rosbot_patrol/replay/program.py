@@ -1,0 +1,222 @@
+"""replay: a bag through the objects of a node, offline and as fast as they go, the same result each time.
+
+    rosrun rosbot_patrol replay house.bag                          # what is in it, and what can be replayed
+    rosrun rosbot_patrol replay house.bag --node amcl --map house.yaml --record amcl.npz
+    rosrun rosbot_patrol replay house.bag --node amcl --map house.yaml --check amcl.npz --plots out
+    rosrun rosbot_patrol replay house.bag --node slam_gmapping scan:=/front_scan --save-map my_house
+    rosrun rosbot_patrol replay house.replay.yaml                  # a test case; --record refreshes it
+
+Exit status: 0 the same (or nothing to compare with), 1 it differs, 2 something given cannot be used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rosbot_patrol.errors import BagError, ParamError, PatrolError
+from rosbot_patrol.maps.map_io import write_map
+from rosbot_patrol.replay.bag import Bag
+from rosbot_patrol.replay.case import SUFFIX, Case, check_names, read_case, with_tolerances
+from rosbot_patrol.replay.comparison import compare
+from rosbot_patrol.replay.plots import write_plots
+from rosbot_patrol.replay.results import Result, load_result, save_result
+from rosbot_patrol.replay.runner import Field, chosen_topics, run_replay
+from rosbot_patrol.replay.setup import NODES, Setup, build_replay, node_of, parse_transform, read_parameters
+
+SAME, DIFFERS, BAD_INPUT = 0, 1, 2
+BAR, EVERY_S = 30, 0.1  # width of the progress bar, and how often it is drawn
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(
+        prog="replay",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="NAME:=TOPIC takes an input of the node from another topic of the bag, as in scan:=/front_scan.",
+    )
+    add = found.add_argument
+    add("bag", type=Path, metavar="BAG", help=f"a ROS 1 bag, a ROS 2 bag's folder, or a test case (NAME{SUFFIX})")
+    add("--node", choices=sorted(NODES), help="whose objects; without it the bag's topics are listed")
+    add("--params", type=Path, metavar="FILE", help="yaml of the node's parameters; without it the package's own")
+    add("--map", type=Path, metavar="FILE", help="yaml of the map; without it amcl takes the bag's /map")
+    add(
+        "--transform",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help="a static transform that the bag lacks: 'x y z yaw pitch roll PARENT CHILD'",
+    )
+    add("--seed", type=int, default=0, help="of all chance (0)")
+    what = found.add_mutually_exclusive_group()
+    what.add_argument("--record", nargs="?", const="", metavar="FILE", help="store the result; a case knows its file")
+    what.add_argument("--check", type=Path, metavar="FILE", help="compare with a stored result")
+    add("--tolerance", action="append", default=[], metavar="FIELD=VALUE", help="as poses.x=0.1, poses.*=0 or map=0.05")
+    add("--exact", action="store_true", help="bit for bit, whatever the tolerances")
+    add("--plots", type=Path, metavar="FOLDER", help="draw the result there, the stored one behind it")
+    add("--save-map", metavar="STEM", help="write the map that was made as STEM.pgm and STEM.yaml")
+    add("--quiet", action="store_true", help="say only what differs")
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The program."""
+    logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
+    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Do what the command line says; returns the exit status."""
+    remaps = dict(word.split(":=", 1) for word in arguments if ":=" in word)
+    options = parser().parse_args([word for word in arguments if ":=" not in word])
+    try:
+        if options.node is None and not options.bag.name.endswith(SUFFIX):
+            return _list(options.bag)
+        case = _case(options, remaps)
+        result = _replayed(case, is_quiet=options.quiet)
+        return _judge(case, result, options)
+    except PatrolError as err:
+        sys.stderr.write(f"replay: {err}\n")
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        sys.stderr.write("replay: ended by hand, nothing was compared\n")
+        return BAD_INPUT
+
+
+def _case(options: argparse.Namespace, remaps: Mapping[str, str]) -> Case:
+    """What the command line, or the case that it names, says."""
+    given = with_tolerances({}, _tolerances(options.tolerance), name="--tolerance ")
+    if options.bag.name.endswith(SUFFIX):
+        case = read_case(options.bag)
+    else:
+        setup = Setup(
+            node=options.node,
+            tree=None if options.params is None else read_parameters(options.params, options.node),
+            name=f"{options.params}: ",
+            map=options.map,
+            static=tuple(parse_transform(text) for text in options.transform),
+            seed=options.seed,
+        )
+        fields = node_of(options.node).fields
+        case = Case(options.bag, options.bag, setup, remaps, options.check or Path(options.record or ""), fields)
+    numbers = {name: field.tolerance for name, field in given.items()}
+    fields = with_tolerances(case.fields, numbers, name="--tolerance ")
+    if options.exact:
+        fields = {name: replace(field, tolerance=0.0) for name, field in fields.items()}
+    expected = Path(options.record) if options.record else options.check or case.expected
+    return replace(case, fields=fields, expected=expected)
+
+
+def _tolerances(texts: Sequence[str]) -> dict[str, float]:
+    found = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError as err:
+            raise ParamError("--tolerance", f"expected FIELD=VALUE as poses.x=0.1, got '{text}'") from err
+    return found
+
+
+def _replayed(case: Case, *, is_quiet: bool) -> Result:
+    begin = time.perf_counter()
+    replay = build_replay(case.setup)
+    with Bag(case.bag) as bag:
+        bar = _Bar(bag.duration)
+        result = run_replay(bag, replay, remaps=case.remaps, told=bar.show)
+        bar.clear()
+        elapsed, duration = time.perf_counter() - begin, bag.duration
+    if not is_quiet:
+        counts = ", ".join(f"{name} {value}" for name, value in result.counts.items())
+        times = f"{duration:.1f} s of bag in {elapsed:.2f} s, {duration / max(elapsed, 1e-9):.0f} times real time"
+        sys.stdout.write(f"{result.node} over {case.bag}: {times}\n  {counts}\n  result {result.digest}\n")
+    return replace(result, facts={"bag": case.bag.name, "duration": f"{duration:.3f} s", "node": result.node})
+
+
+def _judge(case: Case, result: Result, options: argparse.Namespace) -> int:
+    """Store or compare, and draw."""
+    if options.save_map:
+        if "map" not in result.grids:
+            raise ParamError("--save-map", f"{result.node} makes no map")
+        write_map(options.save_map, result.grids["map"])
+    is_case = options.bag.name.endswith(SUFFIX)
+    if options.record is not None:
+        if case.expected == Path():
+            raise ParamError("--record", "expected the file to store the result in")
+        save_result(case.expected, result)
+        _say(options, f"stored in {case.expected}")
+    stored = load_result(case.expected) if options.check or (is_case and options.record is None) else None
+    if options.plots:
+        written = write_plots(options.plots, result, stored, case.fields)
+        _say(options, f"{len(written)} pictures in {options.plots}")
+    return SAME if stored is None else _compared(case, stored, result, options)
+
+
+def _compared(case: Case, stored: Result, result: Result, options: argparse.Namespace) -> int:
+    check_names(_given_only(case, options), result, name="--tolerance ")
+    differences = compare(stored, result, case.fields)
+    if not differences:
+        exactly = "bit for bit" if stored.digest == result.digest else "within the tolerances"
+        _say(options, f"the same as {case.expected}, {exactly}")
+        return SAME
+    sys.stdout.write(f"{result.node} over {case.bag} differs from {case.expected}:\n")
+    sys.stdout.writelines(f"  {difference}\n" for difference in differences)
+    return DIFFERS
+
+
+def _given_only(case: Case, options: argparse.Namespace) -> dict[str, Field]:
+    return {name: case.fields[name] for name in _tolerances(options.tolerance)}
+
+
+def _say(options: argparse.Namespace, text: str) -> None:
+    if not options.quiet:
+        sys.stdout.write(f"  {text}\n")
+
+
+def _list(path: Path) -> int:
+    """What is in a bag, and of which nodes it can be replayed."""
+    with Bag(path) as bag:
+        sys.stdout.write(f"{path}: {bag.duration:.1f} s\n")
+        counts, width = bag.counts(), max(map(len, bag.topics), default=0)
+        for topic, kind in sorted(bag.topics.items()):
+            sys.stdout.write(f"  {topic:{width}s}  {counts[topic]:7d}  {kind}\n")
+        for name in NODES:
+            try:
+                chosen_topics(bag, build_replay(Setup(node=name)).inputs, {})
+                sys.stdout.write(f"  --node {name}: has all that it needs\n")
+            except BagError as err:
+                sys.stdout.write(f"  --node {name}: {err.problem}\n")
+    return SAME
+
+
+class _Bar:
+    """A progress bar, on a terminal only."""
+
+    def __init__(self, duration: float) -> None:
+        self._duration = duration
+        self._begin = self._drawn = time.perf_counter()
+        self._is_shown = sys.stderr.isatty()
+
+    def show(self, share: float) -> None:
+        """Draw it, where that is due."""
+        if not self._is_shown or time.perf_counter() - self._drawn < EVERY_S:
+            return
+        self._drawn = time.perf_counter()
+        elapsed = self._drawn - self._begin
+        filled = round(BAR * share)
+        left = elapsed * (1.0 - share) / share if share else 0.0
+        speed = self._duration * share / elapsed
+        text = f"\r[{'#' * filled}{'.' * (BAR - filled)}] {share:4.0%}, {speed:.0f} times real time, {left:.0f} s left "
+        sys.stderr.write(text)
+        sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Take it away."""
+        if self._is_shown:
+            sys.stderr.write("\r\x1b[K")

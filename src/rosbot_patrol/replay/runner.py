@@ -1,0 +1,124 @@
+"""What all replays share: what a node hears, and a bag fed to it on the bag's own clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from rosbot_patrol.errors import BagError
+from rosbot_patrol.replay.bag import Bag
+from rosbot_patrol.replay.results import Result
+
+TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Input:
+    """One topic that a node hears.
+
+    Attributes:
+        name: as the node calls it; the topic where it is not remapped.
+        types: of message, in ROS 1's spelling, any of which will do.
+        is_needed: nothing can be replayed without it.
+        instead: what else to give where it is needed and not there.
+    """
+
+    name: str
+    types: tuple[str, ...]
+    is_needed: bool = True
+    instead: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """How a value of a result is compared.
+
+    Attributes:
+        tolerance: by how much it may differ, absolutely; of a map the share of known cells, 0 to 1.
+        unit: for the report.
+        is_angle: differences are wrapped.
+    """
+
+    tolerance: float = 0.0
+    unit: str = ""
+    is_angle: bool = False
+
+
+class Replay(Protocol):
+    """A node's pure object and what its node does around it."""
+
+    @property
+    def inputs(self) -> Sequence[Input]:
+        """What it hears."""
+
+    def hear(self, name: str, now: float, content: Any) -> None:
+        """Take in a record of the input of that name, recorded at a time [s]."""
+
+    def finish(self) -> Result:
+        """What came of it."""
+
+
+def run_replay(
+    bag: Bag,
+    replay: Replay,
+    *,
+    remaps: Mapping[str, str] | None = None,
+    told: Callable[[float], None] = lambda _share: None,
+) -> Result:
+    """Feed a whole bag.
+
+    Args:
+        bag: open.
+        replay: of a node.
+        remaps: topics of the bag by the names of the inputs, where they differ.
+        told: called with the share that is done, after each record.
+
+    Raises:
+        BagError: a needed topic is missing or of another type, or the bag is broken.
+    """
+    names = chosen_topics(bag, replay.inputs, remaps or {})
+    for record in bag.records(names):
+        replay.hear(names[record.topic], record.time, record.content)
+        told(bag.done)
+    return replay.finish()
+
+
+def chosen_topics(bag: Bag, inputs: Sequence[Input], remaps: Mapping[str, str]) -> dict[str, str]:
+    """The inputs' names by the bag's topics.
+
+    Raises:
+        BagError: a topic is missing or of another type; names those that could be meant.
+    """
+    unknown = sorted(set(remaps) - {each.name for each in inputs})
+    if unknown:
+        known = ", ".join(each.name for each in inputs)
+        raise BagError(bag.path, f"nothing is called '{unknown[0]}' there, expected one of {known} before the ':='")
+    chosen = {}
+    for each in inputs:
+        topic = _topic_of(bag, each, remaps.get(each.name))
+        if topic is not None:
+            chosen[topic] = each.name
+    return chosen
+
+
+def _topic_of(bag: Bag, wanted: Input, remapped: str | None) -> str | None:
+    topic = bag.find(remapped or wanted.name)
+    if topic is None:
+        if wanted.is_needed or remapped is not None:
+            raise BagError(bag.path, _missing(bag, wanted, remapped or f"/{wanted.name}"))
+        return None
+    found = bag.topics[topic]
+    if found not in wanted.types:
+        raise BagError(bag.path, f"topic '{topic}' is {found}, expected {' or '.join(wanted.types)}")
+    return topic
+
+
+def _missing(bag: Bag, wanted: Input, topic: str) -> str:
+    others = sorted(name for name, kind in bag.topics.items() if kind in wanted.types)
+    text = f"has no topic '{topic}' ({wanted.types[0]})"
+    if others:
+        text += f"; of that type there is {', '.join(others)}: give {wanted.name}:={others[0]}"
+    else:
+        text += f" and no other of that type; it has {', '.join(sorted(bag.topics)) or 'no topics'}"
+    return f"{text}; or give {wanted.instead}" if wanted.instead else text
