@@ -9,13 +9,14 @@
     seed: 0
     expected: house.expected.npz    # left out: NAME.expected.npz
     tolerances: {poses.x: 0.1}
+    optional: false                 # true: the test is skipped where the bag is not there
 
 Paths are taken from the folder of the yaml.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,10 +24,11 @@ from typing import Any
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import param
+from rosbot_patrol.replay.bag import Bag
 from rosbot_patrol.replay.comparison import field_names, field_of
 from rosbot_patrol.replay.results import Result
-from rosbot_patrol.replay.runner import Field
-from rosbot_patrol.replay.setup import Setup, node_of, parse_transform, read_parameters
+from rosbot_patrol.replay.runner import Field, run_replay
+from rosbot_patrol.replay.setup import Setup, build_replay, node_of, parse_transform, read_parameters
 from rosbot_patrol.yaml_files import read_mapping
 
 SUFFIX = ".replay.yaml"
@@ -45,6 +47,7 @@ class CaseParams:
     seed: int = param(0, lo=0, doc="of all chance")
     expected: str = param("", doc="the stored result; empty: NAME.expected.npz")
     tolerances: dict[str, Any] = param({}, doc="by field, as poses.x or poses.*; others keep the node's own")
+    optional: bool = param(False, doc="as a test it is skipped where the bag is not there")
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ class Case:
         remaps: topics of the bag by the node's names.
         expected: where the stored result lies.
         fields: how it is compared.
+        is_optional: as a test it is skipped where the bag is not there.
     """
 
     path: Path
@@ -66,6 +70,7 @@ class Case:
     remaps: Mapping[str, str]
     expected: Path
     fields: Mapping[str, Field]
+    is_optional: bool = False
 
 
 def read_case(path: Path) -> Case:
@@ -89,7 +94,19 @@ def read_case(path: Path) -> Case:
     expected = folder / (loaded.expected or f"{path.name.removesuffix(SUFFIX)}.expected.npz")
     remaps = {name: str(topic) for name, topic in loaded.topics.items()}
     fields = with_tolerances(node_of(loaded.node).fields, loaded.tolerances, name=f"{path}: tolerances/")
-    return Case(path, folder / loaded.bag, setup, remaps, expected, fields)
+    return Case(path, folder / loaded.bag, setup, remaps, expected, fields, loaded.optional)
+
+
+def run_case(case: Case, *, told: Callable[[float], None] = lambda _share: None) -> Result:
+    """Replay a case; the result says where it comes from.
+
+    Raises:
+        PatrolError: bag, parameters or map cannot be used.
+    """
+    replay = build_replay(case.setup)
+    with Bag(case.bag) as bag:
+        result = run_replay(bag, replay, remaps=case.remaps, told=told)
+        return replace(result, facts={"bag": case.bag.name, "duration": f"{bag.duration:.3f} s"})
 
 
 def _tree(path: Path, loaded: CaseParams) -> Mapping[str, Any] | None:

@@ -156,8 +156,9 @@ class _Frame:
         step = max(1, len(times) // MOST)
         is_there = np.isfinite(values)
         x, y = self.places(times[is_there][::step], values[is_there][::step])
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-        return f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="{width}"/>'
+        points = " L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
+        way = f"M{points}" if points else ""
+        return f'<path d="{way}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"/>'
 
     def marks(self, times: Array, values: Array) -> list[str]:
         step = max(1, len(times) // 500)

@@ -22,11 +22,11 @@ from pathlib import Path
 from rosbot_patrol.errors import BagError, ParamError, PatrolError
 from rosbot_patrol.maps.map_io import write_map
 from rosbot_patrol.replay.bag import Bag
-from rosbot_patrol.replay.case import SUFFIX, Case, check_names, read_case, with_tolerances
+from rosbot_patrol.replay.case import SUFFIX, Case, check_names, read_case, run_case, with_tolerances
 from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.plots import write_plots
 from rosbot_patrol.replay.results import Result, load_result, save_result
-from rosbot_patrol.replay.runner import Field, chosen_topics, run_replay
+from rosbot_patrol.replay.runner import Field, chosen_topics
 from rosbot_patrol.replay.setup import NODES, Setup, build_replay, node_of, parse_transform, read_parameters
 
 SAME, DIFFERS, BAD_INPUT = 0, 1, 2
@@ -125,18 +125,16 @@ def _tolerances(texts: Sequence[str]) -> dict[str, float]:
 
 
 def _replayed(case: Case, *, is_quiet: bool) -> Result:
-    begin = time.perf_counter()
-    replay = build_replay(case.setup)
-    with Bag(case.bag) as bag:
-        bar = _Bar(bag.duration)
-        result = run_replay(bag, replay, remaps=case.remaps, told=bar.show)
+    bar = _Bar()
+    try:
+        result = run_case(case, told=bar.show)
+    finally:
         bar.clear()
-        elapsed, duration = time.perf_counter() - begin, bag.duration
     if not is_quiet:
         counts = ", ".join(f"{name} {value}" for name, value in result.counts.items())
-        times = f"{duration:.1f} s of bag in {elapsed:.2f} s, {duration / max(elapsed, 1e-9):.0f} times real time"
-        sys.stdout.write(f"{result.node} over {case.bag}: {times}\n  {counts}\n  result {result.digest}\n")
-    return replace(result, facts={"bag": case.bag.name, "duration": f"{duration:.3f} s", "node": result.node})
+        sys.stdout.write(f"{result.node} over {case.bag}: {result.facts['duration']} of bag in {bar.elapsed:.2f} s\n")
+        sys.stdout.write(f"  {counts}\n  result {result.digest}\n")
+    return result
 
 
 def _judge(case: Case, result: Result, options: argparse.Namespace) -> int:
@@ -198,22 +196,23 @@ def _list(path: Path) -> int:
 class _Bar:
     """A progress bar, on a terminal only."""
 
-    def __init__(self, duration: float) -> None:
-        self._duration = duration
+    def __init__(self) -> None:
         self._begin = self._drawn = time.perf_counter()
         self._is_shown = sys.stderr.isatty()
+
+    @property
+    def elapsed(self) -> float:
+        """Since it was made [s]."""
+        return time.perf_counter() - self._begin
 
     def show(self, share: float) -> None:
         """Draw it, where that is due."""
         if not self._is_shown or time.perf_counter() - self._drawn < EVERY_S:
             return
         self._drawn = time.perf_counter()
-        elapsed = self._drawn - self._begin
         filled = round(BAR * share)
-        left = elapsed * (1.0 - share) / share if share else 0.0
-        speed = self._duration * share / elapsed
-        text = f"\r[{'#' * filled}{'.' * (BAR - filled)}] {share:4.0%}, {speed:.0f} times real time, {left:.0f} s left "
-        sys.stderr.write(text)
+        left = self.elapsed * (1.0 - share) / share if share else 0.0
+        sys.stderr.write(f"\r[{'#' * filled}{'.' * (BAR - filled)}] {share:4.0%}, {left:.0f} s left \x1b[K")
         sys.stderr.flush()
 
     def clear(self) -> None:
