@@ -115,7 +115,7 @@ def drive_messages(seconds: float, *, is2: bool = False, seed: int = 1) -> list[
     mount = maker.transform("base_link", "laser", BEGIN, (LASER.x, LASER.y, 0.1), (0.0, 0.0, 1.0, 0.0))
     found = [(BEGIN, "/tf_static", maker.tf(mount)), (BEGIN, "/map", maker.map(room_map()))]
     clicked = maker.initial_pose(BEGIN + 0.5, Pose2D(0.1, -0.05, 0.05), 0.04)
-    found.append((BEGIN + 0.52, "/initialpose", clicked))
+    found.append((BEGIN + 0.525, "/initialpose", clicked))
     for i, moment in enumerate(drive(seconds, seed=seed)):
         stamp = BEGIN + moment.time
         found.append((stamp + 0.02, "/tf", maker.tf(maker.planar("odom", "base_link", stamp, moment.odometry))))
