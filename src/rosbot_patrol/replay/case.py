@@ -16,7 +16,7 @@ Paths are taken from the folder of the yaml.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,7 @@ class Case:
         expected: where the stored result lies.
         fields: how it is compared.
         is_optional: as a test it is skipped where the bag is not there.
+        named: fields that somebody gave a tolerance for.
     """
 
     path: Path
@@ -71,6 +72,7 @@ class Case:
     expected: Path
     fields: Mapping[str, Field]
     is_optional: bool = False
+    named: tuple[str, ...] = ()
 
 
 def read_case(path: Path) -> Case:
@@ -94,18 +96,20 @@ def read_case(path: Path) -> Case:
     expected = folder / (loaded.expected or f"{path.name.removesuffix(SUFFIX)}.expected.npz")
     remaps = {name: str(topic) for name, topic in loaded.topics.items()}
     fields = with_tolerances(node_of(loaded.node).fields, loaded.tolerances, name=f"{path}: tolerances/")
-    return Case(path, folder / loaded.bag, setup, remaps, expected, fields, loaded.optional)
+    named = tuple(loaded.tolerances)
+    return Case(path, folder / loaded.bag, setup, remaps, expected, fields, loaded.optional, named)
 
 
 def run_case(case: Case, *, told: Callable[[float], None] = lambda _share: None) -> Result:
     """Replay a case; the result says where it comes from.
 
     Raises:
-        PatrolError: bag, parameters or map cannot be used.
+        PatrolError: bag, parameters or map cannot be used, or a tolerance is for what the result has not.
     """
     replay = build_replay(case.setup)
     with Bag(case.bag) as bag:
         result = run_replay(bag, replay, remaps=case.remaps, told=told)
+        _check_names(case.named, result)
         return replace(result, facts={"bag": case.bag.name, "duration": f"{bag.duration:.3f} s"})
 
 
@@ -138,9 +142,9 @@ def _fits(name: str, pattern: str) -> bool:
     return field_of(name, {pattern: Field(tolerance=1.0)}).tolerance == 1.0
 
 
-def check_names(given: Mapping[str, Field], result: Result, *, name: str) -> None:
+def _check_names(given: Iterable[str], result: Result) -> None:
     """Refuse tolerances for what a result has not; raises ParamError, which names the nearest."""
     names = field_names(result)
     for key in given:
         if not any(_fits(each, key) for each in names):
-            raise ParamError(f"{name}{key}", params.unknown_name(key, names))
+            raise ParamError(f"tolerance of {key}", params.unknown_name(key, names))

@@ -22,11 +22,11 @@ from pathlib import Path
 from rosbot_patrol.errors import BagError, ParamError, PatrolError
 from rosbot_patrol.maps.map_io import write_map
 from rosbot_patrol.replay.bag import Bag
-from rosbot_patrol.replay.case import SUFFIX, Case, check_names, read_case, run_case, with_tolerances
+from rosbot_patrol.replay.case import SUFFIX, Case, read_case, run_case, with_tolerances
 from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.plots import write_plots
 from rosbot_patrol.replay.results import Result, load_result, save_result
-from rosbot_patrol.replay.runner import Field, chosen_topics
+from rosbot_patrol.replay.runner import chosen_topics
 from rosbot_patrol.replay.setup import NODES, Setup, build_replay, node_of, parse_transform, read_parameters
 
 SAME, DIFFERS, BAD_INPUT = 0, 1, 2
@@ -91,7 +91,7 @@ def run(arguments: Sequence[str]) -> int:
 
 def _case(options: argparse.Namespace, remaps: Mapping[str, str]) -> Case:
     """What the command line, or the case that it names, says."""
-    given = with_tolerances({}, _tolerances(options.tolerance), name="--tolerance ")
+    given = _tolerances(options.tolerance)
     if options.bag.name.endswith(SUFFIX):
         case = read_case(options.bag)
     else:
@@ -105,12 +105,11 @@ def _case(options: argparse.Namespace, remaps: Mapping[str, str]) -> Case:
         )
         fields = node_of(options.node).fields
         case = Case(options.bag, options.bag, setup, remaps, options.check or Path(options.record or ""), fields)
-    numbers = {name: field.tolerance for name, field in given.items()}
-    fields = with_tolerances(case.fields, numbers, name="--tolerance ")
+    fields = with_tolerances(case.fields, given, name="--tolerance ")
     if options.exact:
         fields = {name: replace(field, tolerance=0.0) for name, field in fields.items()}
     expected = Path(options.record) if options.record else options.check or case.expected
-    return replace(case, fields=fields, expected=expected)
+    return replace(case, fields=fields, expected=expected, named=(*case.named, *given))
 
 
 def _tolerances(texts: Sequence[str]) -> dict[str, float]:
@@ -157,7 +156,6 @@ def _judge(case: Case, result: Result, options: argparse.Namespace) -> int:
 
 
 def _compared(case: Case, stored: Result, result: Result, options: argparse.Namespace) -> int:
-    check_names(_given_only(case, options), result, name="--tolerance ")
     differences = compare(stored, result, case.fields)
     if not differences:
         exactly = "bit for bit" if stored.digest == result.digest else "within the tolerances"
@@ -166,10 +164,6 @@ def _compared(case: Case, stored: Result, result: Result, options: argparse.Name
     sys.stdout.write(f"{result.node} over {case.bag} differs from {case.expected}:\n")
     sys.stdout.writelines(f"  {difference}\n" for difference in differences)
     return DIFFERS
-
-
-def _given_only(case: Case, options: argparse.Namespace) -> dict[str, Field]:
-    return {name: case.fields[name] for name in _tolerances(options.tolerance)}
 
 
 def _say(options: argparse.Namespace, text: str) -> None:

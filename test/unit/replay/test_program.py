@@ -126,7 +126,7 @@ def test_a_tolerance_of_what_is_not_there(run, drive: Path, tmp_path: Path) -> N
     run(*amcl(drive, "--record", tmp_path / "a.npz"))
     status, said = run(*amcl(drive, "--check", tmp_path / "a.npz", "--tolerance", "pose.x=1"))
     assert status == 2
-    assert "--tolerance pose.x: 'pose.x' is not known here, did you mean 'poses.x'?" in said
+    assert "tolerance of pose.x: 'pose.x' is not known here, did you mean 'poses.x'?" in said
 
 
 def test_transforms_as_static_transform_publisher_takes_them() -> None:
