@@ -22,9 +22,9 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points, wrap_angles
-from rosbot_patrol.params import param
 from rosbot_patrol.patrol.floor import floor_of
 from rosbot_patrol.patrol.inputs import Box, Eye, Frame, ScanView
+from rosbot_patrol.patrol.node_params import EyesTopics
 from rosbot_patrol.patrol.person_place import View, measure
 from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.rooms import Rooms
@@ -42,32 +42,6 @@ log = logging.getLogger(__name__)
 
 _HELD = 0.25  # so long a picture waits for its depth, wall time [s]
 _BEFORE = 0.2  # so far before a wall is what hangs on it, or sits behind what the lidar hits [m]
-
-
-@dataclass(frozen=True, kw_only=True)
-class EyesTopics:
-    """Where camera, depth and map are heard."""
-
-    camera_info_topic: str = param("/camera/rgb/camera_info", doc="lens of the camera that the detector looks through")
-    depth_topic: str = param(
-        "/camera/depth/image_raw", doc="depth in m (32FC1) or mm (16UC1), for places and posters; empty: none"
-    )
-    depth_info_topic: str = param(
-        "/camera/depth/camera_info", doc="lens of the depth camera; silent: the colour camera's"
-    )
-    depth_reach: float = param(
-        4.5,
-        unit="m",
-        lo=0.0,
-        doc="what is farther than depth tells, and stands on nothing new, is looked at from nearer",
-    )
-    view_range: float = param(8.0, unit="m", lo=0.5, doc="so far off is what no beam comes back from")
-    floor_height: float = param(
-        -0.04, unit="m", doc="height of the floor in the map's frame: base_link is at the axles"
-    )
-    off_map: float = param(
-        0.3, unit="m", lo=0.05, hi=1.0, doc="a lidar's point so far from all on the map is not of it"
-    )
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from rosbot_patrol.alerts.incident import Event
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.msg import EspTrigger, SensorEvent
-from rosbot_patrol.params import param
 from rosbot_patrol.patrol.inputs import Battery, Box, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.journal import Journal
+from rosbot_patrol.patrol.node_params import InputParams
 from rosbot_patrol.patrol.repeats import Repeats
 from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms
@@ -39,20 +39,6 @@ from rosbot_patrol.sensors.sensor_file import SensorList
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, kw_only=True)
-class InputParams:
-    """Where the patrol's inputs come from, and how long they are good."""
-
-    base_frame: str = param("base_link", doc="the robot")
-    odom_frame: str = param("odom", doc="frame in which a turn is measured")
-    map_frame: str = param("map", doc="frame of the points file")
-    pose_timeout: float = param(0.5, unit="s", lo=0.05, doc="an older odom -> base_link is not known")
-    scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="an older scan says nothing of obstacles")
-    latched_window: float = param(
-        10.0, unit="s", lo=0.0, doc="so long after its start a latched trigger that it had before is not taken again"
-    )
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.known_objects import load_known
 from rosbot_patrol.patrol.manager import PatrolManager
 from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.node_params import eyes_params
 from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.schedule import Schedule, load_schedule
@@ -62,7 +63,6 @@ from rosbot_patrol.ros.patrol_outputs import StatePublisher, Wheels
 from rosbot_patrol.ros.patrol_settings import (
     NO_ROUNDS,
     NodeParams,
-    eyes_params,
     load_flat,
     load_manager_params,
     load_or_say,

@@ -1,0 +1,134 @@
+"""The parameters of patrol_robot itself, without those of mail and records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.battery import BatteryParams, check_battery
+from rosbot_patrol.patrol.coverage import CoverageParams
+from rosbot_patrol.patrol.drive import DriveParams
+from rosbot_patrol.patrol.eyes import EyesParams
+from rosbot_patrol.patrol.judge import JudgeParams
+from rosbot_patrol.patrol.look import LookParams
+from rosbot_patrol.patrol.people import PeopleParams
+from rosbot_patrol.patrol.queueing import PriorityParams
+from rosbot_patrol.patrol.settings import BehaviourParams, ManagerParams
+from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.suspects import SuspectParams
+from rosbot_patrol.patrol.track import TrackParams
+from rosbot_patrol.patrol.viewpoints import ViewpointParams
+from rosbot_patrol.patrol.watch import WatchParams
+from rosbot_patrol.patrol.witness import WitnessParams
+
+
+@dataclass(frozen=True, kw_only=True)
+class EyesTopics:
+    """Where camera, depth and map are heard."""
+
+    camera_info_topic: str = param("/camera/rgb/camera_info", doc="lens of the camera that the detector looks through")
+    depth_topic: str = param(
+        "/camera/depth/image_raw", doc="depth in m (32FC1) or mm (16UC1), for places and posters; empty: none"
+    )
+    depth_info_topic: str = param(
+        "/camera/depth/camera_info", doc="lens of the depth camera; silent: the colour camera's"
+    )
+    depth_reach: float = param(
+        4.5,
+        unit="m",
+        lo=0.0,
+        doc="what is farther than depth tells, and stands on nothing new, is looked at from nearer",
+    )
+    view_range: float = param(8.0, unit="m", lo=0.5, doc="so far off is what no beam comes back from")
+    floor_height: float = param(
+        -0.04, unit="m", doc="height of the floor in the map's frame: base_link is at the axles"
+    )
+    off_map: float = param(
+        0.3, unit="m", lo=0.05, hi=1.0, doc="a lidar's point so far from all on the map is not of it"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputParams:
+    """Where the patrol's inputs come from, and how long they are good."""
+
+    base_frame: str = param("base_link", doc="the robot")
+    odom_frame: str = param("odom", doc="frame in which a turn is measured")
+    map_frame: str = param("map", doc="frame of the points file")
+    pose_timeout: float = param(0.5, unit="s", lo=0.05, doc="an older odom -> base_link is not known")
+    scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="an older scan says nothing of obstacles")
+    latched_window: float = param(
+        10.0, unit="s", lo=0.0, doc="so long after its start a latched trigger that it had before is not taken again"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodeParams(BehaviourParams):
+    """The node's own parameters; those of mail, drive, look, turn and watch come beside them."""
+
+    path_to_params: str = param(doc="points file (the tutorial's name)")
+    sensors: str = param("", doc="file of the sensors; empty or none: a sensor's id is the number of its room")
+    state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
+    image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
+    rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
+    schedule: str = param("", doc="file of the rounds; empty: none")
+    arming: str = param("", doc="file of the modes; empty: all rooms in each mode, without delays")
+    look_around: str = param(
+        "full", choices=("full", "spin"), doc="full: from further viewpoints, too; spin: one turn at the room's point"
+    )
+    clear_share: float = param(
+        0.5, lo=0.0, hi=1.0, doc="with less of the floor seen a room is not clear but unverified"
+    )
+    known_objects: str = param("", doc="file of things that look like somebody (patrol/known_objects); empty: none")
+    watch: WatchParams = WatchParams()
+    suspects: SuspectParams = SuspectParams()
+    judge: JudgeParams = JudgeParams()
+    coverage: CoverageParams = CoverageParams()
+    viewpoints: ViewpointParams = ViewpointParams()
+    witness: WitnessParams = WitnessParams()
+    track: TrackParams = TrackParams()
+    people: PeopleParams = PeopleParams()
+    eyes: EyesTopics = EyesTopics()
+
+
+def manager_params(node: NodeParams, load: Callable[[type[Any]], Any], prefix: str) -> ManagerParams:
+    """Everything that the manager is told.
+
+    Args:
+        node: the node's own parameters.
+        load: gives one of the groups that share the node's flat namespace.
+        prefix: of the names in messages.
+
+    Raises:
+        ParamError: a parameter makes no sense.
+    """
+    battery = load(BatteryParams)
+    check_battery(battery, prefix)
+    return ManagerParams(
+        alarm_classes=node.alarm_classes,
+        own_motion_radius=node.own_motion_radius,
+        own_motion_memory=node.own_motion_memory,
+        resume_max_age=node.resume_max_age,
+        priorities=load(PriorityParams),
+        battery=battery,
+        drive=load(DriveParams),
+        look=load(LookParams),
+        spin=load(SpinParams),
+        watch=node.watch,
+        suspects=node.suspects,
+        people=node.people,
+        track=node.track,
+    )
+
+
+def eyes_params(node: NodeParams) -> EyesParams:
+    """What counts as seen."""
+    return EyesParams(
+        look_around=node.look_around,
+        clear_share=node.clear_share,
+        coverage=node.coverage,
+        viewpoints=node.viewpoints,
+        witness=node.witness,
+    )
