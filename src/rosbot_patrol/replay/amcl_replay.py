@@ -7,7 +7,7 @@ is given, else that of /map (the first of them, or each where `use_map_topic` is
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
@@ -90,6 +90,9 @@ class AmclReplay:
                 instead="the map's yaml: --map FILE",
             ),
         )
+
+    def begin(self, names: Collection[str]) -> None:
+        """Which of the inputs will be heard: it asks for what it needs itself."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
         """Take in a record of the input of that name, recorded at a time [s]."""

@@ -21,7 +21,8 @@ from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.replay.definitions import definition_problem
-from rosbot_patrol.replay.records import KINDS
+from rosbot_patrol.replay.kinds import KINDS
+from rosbot_patrol.replay.records import ANY
 
 # What rosbags and the decompressors raise where bytes make no sense.
 BROKEN = (
@@ -42,7 +43,7 @@ NS = 1e-9
 
 
 class Record(NamedTuple):
-    """One message: when it was recorded [s], on which topic, and what it became (`records.KINDS`)."""
+    """One message: when it was recorded [s], on which topic, and what it became (`kinds`)."""
 
     time: float
     topic: str
@@ -142,7 +143,8 @@ class Bag:
         kind = KINDS.get(connection.msgtype)
         if kind is None:
             raise BagError(self.path, f"topic '{connection.topic}' is {name}, which no replay can use")
-        if kind.fast is not None and connection.digest == kind.md5 and not self._reader.is2:
+        is_known = kind.md5 == ANY or (connection.digest == kind.md5 and not self._reader.is2)
+        if kind.fast is not None and is_known:
             return kind.fast
         problem = definition_problem(self._reader.typestore.fielddefs, connection.msgtype, kind.needed)
         if problem:

@@ -6,6 +6,7 @@
     map: house.yaml                 # left out: the bag's /map
     topics: {scan: /front_scan}     # where the bag's topics differ from the node's
     transforms: ["0 0 0.1 0 0 0 base_link laser"]
+    rooms: points.yaml              # of patrol_robot
     seed: 0
     expected: house.expected.npz    # left out: NAME.expected.npz
     tolerances: {poses.x: 0.1}
@@ -39,11 +40,12 @@ class CaseParams:
     """Keys of a NAME.replay.yaml."""
 
     bag: str = param(doc="the bag")
-    node: str = param(doc="whose replay: amcl, slam_gmapping")
+    node: str = param(doc="whose replay: amcl, slam_gmapping, patrol_robot")
     parameters: Any = param(None, doc="of the node: a yaml file, or the parameters themselves; none: our config")
     map: str = param("", doc="yaml of the map; empty: the bag's")
     topics: dict[str, Any] = param({}, doc="topics of the bag by the node's own names")
     transforms: list[str] = param([], doc="static transforms that the bag lacks: 'x y z yaw pitch roll PARENT CHILD'")
+    rooms: str = param("", doc="points file of patrol_robot; empty: its path_to_params, or our house's")
     seed: int = param(0, lo=0, doc="of all chance")
     expected: str = param("", doc="the stored result; empty: NAME.expected.npz")
     tolerances: dict[str, Any] = param({}, doc="by field, as poses.x or poses.*; others keep the node's own")
@@ -92,6 +94,7 @@ def read_case(path: Path) -> Case:
         map=folder / loaded.map if loaded.map else None,
         static=tuple(parse_transform(text) for text in loaded.transforms),
         seed=loaded.seed,
+        rooms=folder / loaded.rooms if loaded.rooms else None,
     )
     expected = folder / (loaded.expected or f"{path.name.removesuffix(SUFFIX)}.expected.npz")
     remaps = {name: str(topic) for name, topic in loaded.topics.items()}

@@ -80,7 +80,7 @@ def field_of(name: str, fields: Mapping[str, Field]) -> Field:
 
 def field_names(result: Result) -> list[str]:
     """All names that a tolerance can be given for."""
-    columns = [f"{table}.{name}" for table, rows in result.tables.items() for name in (*rows, "rows") if name != STAMP]
+    columns = [f"{table}.{name}" for table, rows in result.tables.items() for name in (*rows, "rows")]
     return [*(f"counts.{name}" for name in result.counts), *columns, *result.grids]
 
 
@@ -93,6 +93,12 @@ def pair_rows(stored: NDArray[Any], found: NDArray[Any]) -> Pairing:
     missing = np.setdiff1d(np.arange(len(left)), paired[:, 0])
     extra = np.setdiff1d(np.arange(len(right)), paired[:, 1])
     return Pairing(paired[:, 0], paired[:, 1], missing, extra)
+
+
+def pair_by_order(stored: NDArray[Any], found: NDArray[Any]) -> Pairing:
+    """The first row with the first, and so on; what is left over has no other."""
+    both = np.arange(min(len(stored), len(found)))
+    return Pairing(both, both, np.arange(len(both), len(stored)), np.arange(len(both), len(found)))
 
 
 def column_errors(stored: NDArray[Any], found: NDArray[Any], field: Field) -> NDArray[np.float64]:
@@ -153,12 +159,13 @@ def _compare_tables(
 ) -> list[Difference]:
     if STAMP not in stored or STAMP not in found:
         return [Difference(name, "is only in the stored result" if STAMP in stored else "is not in the stored result")]
-    pairing = pair_rows(stored[STAMP], found[STAMP])
+    is_by_order = field_of(f"{name}.rows", fields).is_by_order
+    pairing = (pair_by_order if is_by_order else pair_rows)(stored[STAMP], found[STAMP])
     differences = _compare_rows(name, stored, found, pairing, fields, begin)
     times = stored[STAMP][pairing.stored] - begin
     for column in _names(stored, found):
         full = f"{name}.{column}"
-        if column == STAMP:
+        if column == STAMP and not is_by_order:
             continue
         if column not in stored or column not in found:
             where = "is only in the stored result" if column in stored else "is not in the stored result"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,9 @@ class GmappingReplay:
             Input(name="tf", types=TF_TYPES),
             Input(name="tf_static", types=TF_TYPES, is_needed=False),
         )
+
+    def begin(self, names: Collection[str]) -> None:
+        """Which of the inputs will be heard: it asks for what it needs itself."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
         """Take in a record of the input of that name, recorded at a time [s]."""

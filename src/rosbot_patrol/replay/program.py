@@ -53,6 +53,9 @@ def parser() -> argparse.ArgumentParser:
         metavar="TEXT",
         help="a static transform that the bag lacks: 'x y z yaw pitch roll PARENT CHILD'",
     )
+    add(
+        "--rooms", type=Path, metavar="FILE", help="points file of the patrol; without it path_to_params or our house's"
+    )
     add("--seed", type=int, default=0, help="of all chance (0)")
     what = found.add_mutually_exclusive_group()
     what.add_argument("--record", nargs="?", const="", metavar="FILE", help="store the result; a case knows its file")
@@ -102,6 +105,7 @@ def _case(options: argparse.Namespace, remaps: Mapping[str, str]) -> Case:
             map=options.map,
             static=tuple(parse_transform(text) for text in options.transform),
             seed=options.seed,
+            rooms=options.rooms,
         )
         fields = node_of(options.node).fields
         case = Case(options.bag, options.bag, setup, remaps, options.check or Path(options.record or ""), fields)

@@ -19,6 +19,8 @@ from rosbot_patrol.replay import definitions, raw_ros1
 from rosbot_patrol.replay.transform_tree import Edge
 from rosbot_patrol.scan import LaserScan
 
+ANY = "*"
+
 
 class MapRecord(NamedTuple):
     """A nav_msgs/OccupancyGrid and its frame."""
@@ -50,7 +52,7 @@ class Kind:
         convert: makes the record of a message as rosbags gives it.
         needed: fields that the definition must have.
         fast: makes the same of ROS 1 bytes.
-        md5: of the one definition that `fast` knows.
+        md5: of the one definition that `fast` knows; ANY: the bytes do not matter.
     """
 
     convert: Callable[[Any], Any]

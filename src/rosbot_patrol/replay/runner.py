@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -38,11 +38,13 @@ class Field:
         tolerance: by how much it may differ, absolutely; of a map the share of known cells, 0 to 1.
         unit: for the report.
         is_angle: differences are wrapped.
+        is_by_order: of TABLE.rows: the n-th row is held against the n-th, not the one of the same time.
     """
 
     tolerance: float = 0.0
     unit: str = ""
     is_angle: bool = False
+    is_by_order: bool = False
 
 
 class Replay(Protocol):
@@ -51,6 +53,9 @@ class Replay(Protocol):
     @property
     def inputs(self) -> Sequence[Input]:
         """What it hears."""
+
+    def begin(self, names: Collection[str]) -> None:
+        """Which of the inputs will be heard, told before the first."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
         """Take in a record of the input of that name, recorded at a time [s]."""
@@ -78,6 +83,7 @@ def run_replay(
         BagError: a needed topic is missing or of another type, or the bag is broken.
     """
     names = chosen_topics(bag, replay.inputs, remaps or {})
+    replay.begin(names.values())
     for record in bag.records(names):
         replay.hear(names[record.topic], record.time, record.content)
         told(bag.done)

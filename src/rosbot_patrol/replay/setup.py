@@ -13,11 +13,18 @@ from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.maps.map_io import read_map
-from rosbot_patrol.replay import amcl_replay, gmapping_replay
+from rosbot_patrol.patrol.judge import Judge
+from rosbot_patrol.patrol.known_objects import load_known
+from rosbot_patrol.patrol.node_params import InputParams, NodeParams, manager_params
+from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.replay import amcl_replay, gmapping_replay, patrol_log, patrol_replay
 from rosbot_patrol.replay.package_files import package_file
 from rosbot_patrol.replay.runner import Field, Replay
 from rosbot_patrol.replay.transform_tree import Edge
+from rosbot_patrol.sensors.sensor_file import load_sensors
 from rosbot_patrol.yaml_files import read_mapping
+
+POINTS = "params/room_points.yaml"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +38,7 @@ class Setup:
         map: yaml of the map, None for the bag's.
         static: transforms that the bag lacks.
         seed: of all chance.
+        rooms: points file of the patrol, None for the parameter path_to_params or the package's.
     """
 
     node: str
@@ -39,6 +47,7 @@ class Setup:
     map: Path | None = None
     static: Sequence[Edge] = field(default_factory=tuple)
     seed: int = 0
+    rooms: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -137,7 +146,27 @@ def _gmapping(setup: Setup) -> Replay:
     )
 
 
+def _patrol(setup: Setup) -> Replay:
+    tree, name = _parameters(setup)
+    points = setup.rooms or tree.get("path_to_params") or package_file(POINTS)
+    own = {**tree, "path_to_params": str(points)}
+    node = params.load(NodeParams, own, name=name, ignore=set(tree))
+    frames = params.load(InputParams, tree, name=name, ignore=set(tree))
+    rooms = load_rooms(Path(points))
+    names = {room.id: room.name for room in rooms}
+    return patrol_replay.PatrolReplay(
+        node,
+        manager_params(node, lambda cls: params.load(cls, tree, name=name, ignore=set(tree)), name),
+        frames,
+        rooms=rooms,
+        sensors=load_sensors(node.sensors, names, rooms_source=str(rooms.source)),
+        judge=Judge(node.judge, load_known(node.known_objects)),
+        static=setup.static,
+    )
+
+
 NODES: dict[str, Node] = {
     "amcl": Node("config/tuned/amcl.yaml", _amcl, amcl_replay.FIELDS),
+    "patrol_robot": Node("config/tuned/watch.yaml", _patrol, patrol_log.FIELDS),
     "slam_gmapping": Node("config/gmapping.yaml", _gmapping, gmapping_replay.FIELDS),
 }

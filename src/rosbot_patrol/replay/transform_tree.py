@@ -102,6 +102,11 @@ class TransformTree:
                 return _compose(_invert(falling[frame]), frame_from_source)
         raise self._unknown(target, source, problem or other_problem)
 
+    def newest(self, target: str, source: str) -> tuple[Transform, float]:
+        """The newest target_from_source and its time [s], 0 where nothing between them moves; raises as `lookup`."""
+        stamp = self._newest_common(target.lstrip("/"), source.lstrip("/"))
+        return self.lookup(target, source, stamp), stamp
+
     def pose(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
         """The planar part of `lookup`; raises as that does."""
         return self.lookup(target, source, stamp).pose
