@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,20 @@ from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.replay.records import MapRecord, PoseRecord, Refused
+from rosbot_patrol.replay.records import KINDS, MapRecord, PoseRecord, Refused
 from rosbot_patrol.replay.results import STAMP, Result, Rows
 from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
 from rosbot_patrol.replay.scan_feed import ScanFeed
 from rosbot_patrol.replay.transform_tree import Edge
 from rosbot_patrol.scan_line import PlacedScan
 
+INPUTS = (
+    Input(name="scan", types=("sensor_msgs/LaserScan",)),
+    Input(name="tf", types=TF_TYPES),
+    Input(name="tf_static", types=TF_TYPES, is_needed=False),
+    Input(name="initialpose", types=("geometry_msgs/PoseWithCovarianceStamped",), is_needed=False),
+    Input(name="map", types=("nav_msgs/OccupancyGrid",), instead="the map's yaml: --map FILE"),
+)
 HEALTH_S = 1.0  # between two rows of `health`, as the node tells it
 
 FIELDS = {
@@ -57,6 +65,8 @@ class AmclReplay:
         MapError: the map cannot be used.
     """
 
+    kinds = KINDS
+
     def __init__(
         self, params: AmclParams, *, grid: Grid | None = None, seed: int = 0, static: Iterable[Edge] = ()
     ) -> None:
@@ -78,18 +88,7 @@ class AmclReplay:
     @property
     def inputs(self) -> tuple[Input, ...]:
         """What it hears."""
-        return (
-            Input(name="scan", types=("sensor_msgs/LaserScan",)),
-            Input(name="tf", types=TF_TYPES),
-            Input(name="tf_static", types=TF_TYPES, is_needed=False),
-            Input(name="initialpose", types=("geometry_msgs/PoseWithCovarianceStamped",), is_needed=False),
-            Input(
-                name="map",
-                types=("nav_msgs/OccupancyGrid",),
-                is_needed=not self._has_own_map,
-                instead="the map's yaml: --map FILE",
-            ),
-        )
+        return (*INPUTS[:-1], replace(INPUTS[-1], is_needed=False)) if self._has_own_map else INPUTS
 
     def begin(self, names: Collection[str]) -> None:
         """Which of the inputs will be heard: it asks for what it needs itself."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sqlite3
 import struct
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -21,8 +21,7 @@ from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.replay.definitions import definition_problem
-from rosbot_patrol.replay.kinds import KINDS
-from rosbot_patrol.replay.records import ANY
+from rosbot_patrol.replay.records import ANY, KINDS, Kind
 
 # What rosbags and the decompressors raise where bytes make no sense.
 BROKEN = (
@@ -43,7 +42,7 @@ NS = 1e-9
 
 
 class Record(NamedTuple):
-    """One message: when it was recorded [s], on which topic, and what it became (`kinds`)."""
+    """One message: when it was recorded [s], on which topic, and what it became (`records.Kind`)."""
 
     time: float
     topic: str
@@ -109,17 +108,21 @@ class Bag:
         """A topic as the bag spells it, with or without the first slash; None where it is not there."""
         return next((known for known in self.topics if known.lstrip("/") == topic.lstrip("/")), None)
 
-    def records(self, topics: Iterable[str]) -> Iterator[Record]:
+    def records(self, topics: Iterable[str], kinds: Mapping[str, Kind] = KINDS) -> Iterator[Record]:
         """The messages of some topics in the order in which they were recorded.
 
+        Args:
+            topics: of the bag.
+            kinds: what becomes of messages, by their types.
+
         Raises:
-            BagError: a topic is not there, of a type that no replay knows, its definition lacks a field, or its bytes
+            BagError: a topic is not there, of a type that `kinds` has not, its definition lacks a field, or its bytes
                 make no sense.
         """
         wanted = [each for topic in topics for each in self._connections(topic)]
         if not wanted:
             return
-        decoders = {id(each): self._decoder(each) for each in wanted}
+        decoders = {id(each): self._decoder(each, kinds) for each in wanted}
         begin, span = self._reader.start_time, max(self._reader.duration, 1)
         for connection, time, raw in self._messages(wanted):
             self.done = (time - begin) / span
@@ -138,11 +141,11 @@ class Bag:
         except BROKEN as err:
             raise BagError(self.path, f"is cut short or damaged {self.done:.0%} of the way ({_said(err)})") from err
 
-    def _decoder(self, connection: Connection) -> Callable[[bytes], Any]:
+    def _decoder(self, connection: Connection, kinds: Mapping[str, Kind]) -> Callable[[bytes], Any]:
         name = ros1_name(connection.msgtype)
-        kind = KINDS.get(connection.msgtype)
+        kind = kinds.get(connection.msgtype)
         if kind is None:
-            raise BagError(self.path, f"topic '{connection.topic}' is {name}, which no replay can use")
+            raise BagError(self.path, f"topic '{connection.topic}' is {name}, which cannot be used here")
         is_known = kind.md5 == ANY or (connection.digest == kind.md5 and not self._reader.is2)
         if kind.fast is not None and is_known:
             return kind.fast

@@ -17,12 +17,18 @@ from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.gmapping.slam import Outcome
 from rosbot_patrol.gmapping.start import started
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.replay.records import KINDS
 from rosbot_patrol.replay.results import STAMP, Result, Rows, Table
 from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
 from rosbot_patrol.replay.scan_feed import ScanFeed
 from rosbot_patrol.replay.transform_tree import Edge
 from rosbot_patrol.scan_line import PlacedScan
 
+INPUTS = (
+    Input(name="scan", types=("sensor_msgs/LaserScan",)),
+    Input(name="tf", types=TF_TYPES),
+    Input(name="tf_static", types=TF_TYPES, is_needed=False),
+)
 WAITING = 50  # scans, as the node's
 
 FIELDS = {
@@ -53,6 +59,9 @@ class GmappingReplay:
         MapError: the extent or the saved map makes no sense.
     """
 
+    inputs = INPUTS
+    kinds = KINDS
+
     def __init__(self, params: GmappingParams, *, static: Iterable[Edge] = ()) -> None:
         self._params = params
         self._slam = started(params)
@@ -63,15 +72,6 @@ class GmappingReplay:
         self._counts = {"updates": 0, "resampled": 0, "blind": 0}
         self._poses = Rows(STAMP, "x", "y", "yaw", "entropy", "effective", "failed")
         self._maps = Rows(STAMP, "known", "occupied", "digest")
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """What it hears."""
-        return (
-            Input(name="scan", types=("sensor_msgs/LaserScan",)),
-            Input(name="tf", types=TF_TYPES),
-            Input(name="tf_static", types=TF_TYPES, is_needed=False),
-        )
 
     def begin(self, names: Collection[str]) -> None:
         """Which of the inputs will be heard: it asks for what it needs itself."""

@@ -28,7 +28,7 @@ from rosbot_patrol.replay import patrol_records as heard
 from rosbot_patrol.replay.patrol_link import BagLink
 from rosbot_patrol.replay.patrol_log import PatrolLog
 from rosbot_patrol.replay.patrol_sight import PatrolSight
-from rosbot_patrol.replay.records import MapRecord, Refused
+from rosbot_patrol.replay.records import KINDS, MapRecord, Refused
 from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.runner import TF_TYPES, Input
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree
@@ -36,7 +36,7 @@ from rosbot_patrol.scan import LaserScan, scan_points, scan_problem
 from rosbot_patrol.sensors.sensor_file import SensorList
 
 STOPPED = "the emergency stop was pressed (topic /e_stop)"
-CAMERA = "camera"  # the input that only says that pictures come
+CAMERA, PICTURES = "camera", "camera/rgb/image_raw"  # the input that only says that pictures come
 
 INPUTS = (
     Input(name="motion_trigger", types=("rosbot_patrol/EspTrigger", "rosbot_patrol_simulation/EspTrigger")),
@@ -47,7 +47,12 @@ INPUTS = (
     Input(name="darknet_ros/bounding_boxes", types=("darknet_ros_msgs/BoundingBoxes",), is_needed=False),
     Input(name="darknet_ros/found_object", types=("darknet_ros_msgs/ObjectCount",), is_needed=False),
     Input(name="camera/rgb/camera_info", types=("sensor_msgs/CameraInfo",), is_needed=False),
-    Input(name=CAMERA, types=("sensor_msgs/Image", "sensor_msgs/CompressedImage"), is_needed=False),
+    Input(
+        name=CAMERA,
+        topic="camera/rgb/image_raw",
+        types=("sensor_msgs/Image", "sensor_msgs/CompressedImage"),
+        is_needed=False,
+    ),
     Input(name="move_base/status", types=("actionlib_msgs/GoalStatusArray",), is_needed=False),
     Input(name="move_base/goal", types=("move_base_msgs/MoveBaseActionGoal",), is_needed=False),
     Input(name="move_base/result", types=("move_base_msgs/MoveBaseActionResult",), is_needed=False),
@@ -70,6 +75,7 @@ class PatrolReplay:
     """
 
     inputs = INPUTS
+    kinds = {**KINDS, **heard.KINDS}
 
     def __init__(
         self,

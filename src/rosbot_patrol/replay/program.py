@@ -27,7 +27,7 @@ from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.plots import write_plots
 from rosbot_patrol.replay.results import Result, load_result, save_result
 from rosbot_patrol.replay.runner import chosen_topics
-from rosbot_patrol.replay.setup import NODES, Setup, build_replay, node_of, parse_transform, read_parameters
+from rosbot_patrol.replay.setup import NODES, Setup, node_of, parse_transform, read_parameters
 
 SAME, DIFFERS, BAD_INPUT = 0, 1, 2
 BAR, EVERY_S = 30, 0.1  # width of the progress bar, and how often it is drawn
@@ -182,9 +182,9 @@ def _list(path: Path) -> int:
         counts, width = bag.counts(), max(map(len, bag.topics), default=0)
         for topic, kind in sorted(bag.topics.items()):
             sys.stdout.write(f"  {topic:{width}s}  {counts[topic]:7d}  {kind}\n")
-        for name in NODES:
+        for name, node in NODES.items():
             try:
-                chosen_topics(bag, build_replay(Setup(node=name)).inputs, {})
+                chosen_topics(bag, node.inputs, {})
                 sys.stdout.write(f"  --node {name}: has all that it needs\n")
             except BagError as err:
                 sys.stdout.write(f"  --node {name}: {err.problem}\n")

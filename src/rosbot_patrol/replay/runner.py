@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.replay.bag import Bag
+from rosbot_patrol.replay.records import Kind
 from rosbot_patrol.replay.results import Result
 
 TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
@@ -18,13 +19,15 @@ class Input:
     """One topic that a node hears.
 
     Attributes:
-        name: as the node calls it; the topic where it is not remapped.
+        name: as the node calls it.
+        topic: where the bag should have it, "" for the name.
         types: of message, in ROS 1's spelling, any of which will do.
         is_needed: nothing can be replayed without it.
         instead: what else to give where it is needed and not there.
     """
 
     name: str
+    topic: str = ""
     types: tuple[str, ...]
     is_needed: bool = True
     instead: str = ""
@@ -53,6 +56,10 @@ class Replay(Protocol):
     @property
     def inputs(self) -> Sequence[Input]:
         """What it hears."""
+
+    @property
+    def kinds(self) -> Mapping[str, Kind]:
+        """What becomes of the messages that it hears, by their types."""
 
     def begin(self, names: Collection[str]) -> None:
         """Which of the inputs will be heard, told before the first."""
@@ -84,7 +91,7 @@ def run_replay(
     """
     names = chosen_topics(bag, replay.inputs, remaps or {})
     replay.begin(names.values())
-    for record in bag.records(names):
+    for record in bag.records(names, replay.kinds):
         replay.hear(names[record.topic], record.time, record.content)
         told(bag.done)
     return replay.finish()
@@ -109,10 +116,11 @@ def chosen_topics(bag: Bag, inputs: Sequence[Input], remaps: Mapping[str, str]) 
 
 
 def _topic_of(bag: Bag, wanted: Input, remapped: str | None) -> str | None:
-    topic = bag.find(remapped or wanted.name)
+    usual = wanted.topic or wanted.name
+    topic = bag.find(remapped or usual)
     if topic is None:
         if wanted.is_needed or remapped is not None:
-            raise BagError(bag.path, _missing(bag, wanted, remapped or f"/{wanted.name}"))
+            raise BagError(bag.path, _missing(bag, wanted, remapped or f"/{usual}"))
         return None
     found = bag.topics[topic]
     if found not in wanted.types:

@@ -10,6 +10,8 @@ from typing import Any
 
 from rosbot_patrol import params
 from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.detection.choice import make_detector
+from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.maps.map_io import read_map
@@ -17,9 +19,9 @@ from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.known_objects import load_known
 from rosbot_patrol.patrol.node_params import InputParams, NodeParams, manager_params
 from rosbot_patrol.patrol.rooms import load_rooms
-from rosbot_patrol.replay import amcl_replay, gmapping_replay, patrol_log, patrol_replay
+from rosbot_patrol.replay import amcl_replay, detector_replay, gmapping_replay, patrol_log, patrol_replay
 from rosbot_patrol.replay.package_files import package_file
-from rosbot_patrol.replay.runner import Field, Replay
+from rosbot_patrol.replay.runner import Field, Input, Replay
 from rosbot_patrol.replay.transform_tree import Edge
 from rosbot_patrol.sensors.sensor_file import load_sensors
 from rosbot_patrol.yaml_files import read_mapping
@@ -58,11 +60,13 @@ class Node:
         config: its parameters in the package.
         build: makes its replay of a setup; raises ParamError or MapError.
         fields: how its result is compared.
+        inputs: what it hears, where nothing is given instead.
     """
 
     config: str
     build: Callable[[Setup], Replay]
     fields: Mapping[str, Field]
+    inputs: Sequence[Input]
 
 
 def build_replay(setup: Setup) -> Replay:
@@ -165,8 +169,18 @@ def _patrol(setup: Setup) -> Replay:
     )
 
 
+def _detector(setup: Setup) -> Replay:
+    tree, name = _parameters(setup)
+    loaded = params.load(DarknetParams, tree, name=name)
+    topic = loaded.subscribers.camera_reading.topic
+    detector = make_detector(loaded, str(package_file("models")))
+    is_told = "subscribers" in tree
+    return detector_replay.DetectorReplay(detector, topic if is_told else detector_replay.INPUTS[0].topic)
+
+
 NODES: dict[str, Node] = {
-    "amcl": Node("config/tuned/amcl.yaml", _amcl, amcl_replay.FIELDS),
-    "patrol_robot": Node("config/tuned/watch.yaml", _patrol, patrol_log.FIELDS),
-    "slam_gmapping": Node("config/gmapping.yaml", _gmapping, gmapping_replay.FIELDS),
+    "amcl": Node("config/tuned/amcl.yaml", _amcl, amcl_replay.FIELDS, amcl_replay.INPUTS),
+    "darknet_ros": Node("models/house.yaml", _detector, detector_replay.FIELDS, detector_replay.INPUTS),
+    "patrol_robot": Node("config/tuned/watch.yaml", _patrol, patrol_log.FIELDS, patrol_replay.INPUTS),
+    "slam_gmapping": Node("config/gmapping.yaml", _gmapping, gmapping_replay.FIELDS, gmapping_replay.INPUTS),
 }

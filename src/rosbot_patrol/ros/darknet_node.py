@@ -34,8 +34,9 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
+from rosbot_patrol.detection.choice import make_detector
 from rosbot_patrol.detection.darknet_params import DarknetParams
-from rosbot_patrol.detection.detector import Detection, Detector, load_detector
+from rosbot_patrol.detection.detector import Detection, Detector
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.ros import diagnostics
@@ -65,21 +66,6 @@ def _body() -> None:
     models = os.path.join(rospkg.RosPack().get_path("rosbot_patrol"), "models")
     detector = make_detector(params, models)
     DarknetNode(params, detector).run()
-
-
-def make_detector(params: DarknetParams, own_models: str) -> Detector:
-    """The detector that the parameters name; DetectorError where its files are missing, damaged or do not fit."""
-    threshold = params.yolo_model.threshold.value
-    if params.network == "hog":
-        hog = importlib.import_module("rosbot_patrol.detection.hog")  # brings OpenCV, 98 MB
-        found: Detector = hog.HogDetector(threshold=threshold, threads=params.threads)
-        log.info("people by %s", found.runtime)
-        return found
-    cfg, weights = params.network_files(own_models)
-    names = params.yolo_model.detection_classes.names
-    detector = load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
-    log.info("%s, %d classes, by %s", cfg, len(detector.names), detector.runtime)
-    return detector
 
 
 def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBoxes:

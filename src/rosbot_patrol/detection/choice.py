@@ -1,0 +1,26 @@
+"""Which detector the parameters of darknet_ros name."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+
+from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.detection.detector import Detector, load_detector
+
+log = logging.getLogger(__name__)
+
+
+def make_detector(params: DarknetParams, own_models: str) -> Detector:
+    """The detector that the parameters name; DetectorError where its files are missing, damaged or do not fit."""
+    threshold = params.yolo_model.threshold.value
+    if params.network == "hog":
+        hog = importlib.import_module("rosbot_patrol.detection.hog")  # brings OpenCV, 98 MB
+        found: Detector = hog.HogDetector(threshold=threshold, threads=params.threads)
+        log.info("people by %s", found.runtime)
+        return found
+    cfg, weights = params.network_files(own_models)
+    names = params.yolo_model.detection_classes.names
+    detector = load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
+    log.info("%s, %d classes, by %s", cfg, len(detector.names), detector.runtime)
+    return detector
