@@ -4,7 +4,8 @@
     PYTHONPATH=src .ws/venv/bin/python benchmarks/replay.py [--json FILE] [--quick] [--bag FILE --map YAML]
 
 The bag is a drive through three rooms of the house (mapping_house.py): 720 beams at 10 Hz, odometry on /tf at 50 Hz,
-made once and kept in .ws. A replay is everything from opening the bag to the finished result; what is built before (the
+made once and kept in .ws. The patrol's is one of its small test world: a minute of rest, a mission, a minute of rest; 25
+tf messages and 8 answers of the detector a second, no scans, at the node's 25 steps a second. A replay is everything from opening the bag to the finished result; what is built before (the
 map's distances) stands in a column of its own. Medians of the repeats.
 """
 
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import statistics
 import sys
@@ -25,6 +27,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "src"), str(ROOT / "test" / "unit" / "replay")]
 
+import made_patrol  # noqa: E402
 import mapping_house  # noqa: E402
 from made_bag import Maker, write_bag  # noqa: E402
 
@@ -38,7 +41,7 @@ from rosbot_patrol.replay.setup import Setup, build_replay  # noqa: E402
 
 BEGIN = 1_600_000_000.0
 TF_PER_SCAN = 5
-AIMS = {"amcl_rtf": 200.0, "gmapping_rtf": 5.0}
+AIMS = {"amcl_rtf": 200.0, "gmapping_rtf": 5.0, "patrol_rtf": 1000.0}
 
 
 def messages() -> Iterator[tuple[float, str, Any]]:
@@ -62,6 +65,17 @@ def messages() -> Iterator[tuple[float, str, Any]]:
             pose = compose(here, Pose2D(move.x * share, move.y * share, move.yaw * share))
             when = stamp + share * period
             yield when + 0.003, "/tf", maker.tf(maker.planar("odom", "base_link", when, pose))
+
+
+def patrol_messages() -> list[tuple[float, str, Any]]:
+    """A mission to room 2 between two minutes of rest."""
+    world = made_patrol.RecordedWorld()
+    for _ in range(25 * 60):
+        world.step()
+    world.mission(2)
+    for _ in range(25 * 60):
+        world.step()
+    return sorted(world.messages, key=lambda each: each[0])
 
 
 def measure(bag: Path, setup: Setup, repeats: int) -> tuple[float, float, float]:
@@ -90,13 +104,19 @@ def main() -> None:
     print(f"1 core of {os.cpu_count()}")
     if not options.bag.exists():
         write_bag(options.bag, messages())
+    patrol, points = options.bag.with_suffix(".patrol.bag"), options.bag.with_suffix(".rooms.yaml")
+    if not patrol.exists():
+        write_bag(patrol, patrol_messages())
+        points.write_text(made_patrol.POINTS, encoding="utf-8")
+    logging.disable(logging.WARNING)
     figures: dict[str, float] = {}
     print(f"{'figure':14s} {'found':>8s} {'aim':>8s} {'bag s':>8s} {'build s':>8s} {'replay s':>9s}")
-    for name, setup, repeats in (
-        ("amcl_rtf", Setup(node="amcl", map=options.map), 5),
-        ("gmapping_rtf", Setup(node="slam_gmapping"), 2),
+    for name, bag, setup, repeats in (
+        ("amcl_rtf", options.bag, Setup(node="amcl", map=options.map), 5),
+        ("gmapping_rtf", options.bag, Setup(node="slam_gmapping"), 2),
+        ("patrol_rtf", patrol, Setup(node="patrol_robot", tree={"look_around": "spin"}, rooms=points), 5),
     ):
-        duration, build, spent = measure(options.bag, setup, 1 if options.quick else repeats)
+        duration, build, spent = measure(bag, setup, 1 if options.quick else repeats)
         figures[name] = round(duration / spent, 1)
         aim = f">= {AIMS[name]:g}"
         print(f"{name:14s} {figures[name]:8.1f} {aim:>8s} {duration:8.1f} {build:8.2f} {spent:9.3f}")

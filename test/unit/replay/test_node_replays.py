@@ -10,13 +10,17 @@ import pytest
 from made_bag import Maker, write_bag
 from made_drive import BEGIN, LASER, drive_messages, room_map, truth_at
 
+from rosbot_patrol.amcl import localizer
+from rosbot_patrol.amcl.motion_model import move_particles
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.errors import BagError, MapError
 from rosbot_patrol.geometry import Pose2D, compose, invert
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.replay import amcl_replay
 from rosbot_patrol.replay.amcl_replay import AmclReplay
 from rosbot_patrol.replay.bag import Bag
+from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.gmapping_replay import GmappingReplay, known_part
 from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.runner import Replay, run_replay
@@ -191,3 +195,16 @@ def test_the_known_part_of_a_map() -> None:
     assert part.cells[1:3, 1:3].tolist() == [[0, 0], [0, 0]]
     nothing = known_part(Grid(GridInfo(resolution=0.5, width=20, height=10), np.full((10, 20), -1, dtype=np.int8)))
     assert nothing.cells.tolist() == [[-1]]
+
+
+def test_a_planted_fault_in_amcl_is_caught_and_named(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stored = replayed(bag, AmclReplay(AMCL))
+    assert compare(stored, replayed(bag, AmclReplay(AMCL)), amcl_replay.FIELDS) == []
+
+    def turned_wrong(poses: np.ndarray, start: Pose2D, end: Pose2D, *more: object) -> None:
+        back = end._replace(yaw=start.yaw - 0.5 * (end.yaw - start.yaw))
+        move_particles(poses, start, back, *more)
+
+    monkeypatch.setattr(localizer, "move_particles", turned_wrong)
+    names = [each.name for each in compare(stored, replayed(bag, AmclReplay(AMCL)), amcl_replay.FIELDS)]
+    assert "poses.yaw" in names
