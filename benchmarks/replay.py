@@ -4,9 +4,10 @@
     PYTHONPATH=src .ws/venv/bin/python benchmarks/replay.py [--json FILE] [--quick] [--bag FILE --map YAML]
 
 The bag is a drive through three rooms of the house (mapping_house.py): 720 beams at 10 Hz, odometry on /tf at 50 Hz,
-made once and kept in .ws. The patrol's is one of its small test world: a minute of rest, a mission, a minute of rest; 25
-tf messages and 8 answers of the detector a second, no scans, at the node's 25 steps a second. A replay is everything from opening the bag to the finished result; what is built before (the
-map's distances) stands in a column of its own. Medians of the repeats.
+made once and kept in .ws. The patrol's is one of its small test world: a minute of rest, a mission, a minute of rest,
+with 25 tf messages and 8 answers of the detector a second and no scans, at the node's 25 steps a second. A replay is
+everything from opening the bag to the finished result; what is built before (the map's distances) stands in a column
+of its own. Medians of the repeats.
 """
 
 from __future__ import annotations
