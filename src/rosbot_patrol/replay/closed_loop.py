@@ -35,6 +35,7 @@ from rosbot_patrol.params import load
 from rosbot_patrol.planning.interfaces import Array, GlobalPlanner, LocalView, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
 from rosbot_patrol.replay.low_sight import LowSight
+from rosbot_patrol.replay.profile_files import read_move_base
 from rosbot_patrol.simulation.engine import STEP, Engine
 from rosbot_patrol.yaml_files import read_mapping
 
@@ -64,15 +65,9 @@ class StackParams:
 
 def read_profile(folder: Path) -> StackParams:
     """A profile's yaml files, such as those of `config/tuned`; raises ParamError."""
-
-    def read(name: str, keys: str) -> dict[str, Any]:
-        return read_mapping(folder / name, keys=keys)
-
-    tree = {**read("move_base.yaml", "of move_base"), **read("trajectory_planner.yaml", "TrajectoryPlannerROS")}
-    common = read("costmap_common_params.yaml", "of both costmaps")
-    for which in ("global_costmap", "local_costmap"):
-        tree[which] = {**common, **read(f"{which}_params.yaml", which)[which]}
-    amcl = {k: v for k, v in read("amcl.yaml", "of amcl").items() if not k.endswith("_frame_id")}
+    tree = read_move_base(folder)
+    known = read_mapping(folder / "amcl.yaml", keys="of amcl")
+    amcl = {k: v for k, v in known.items() if not k.endswith("_frame_id")}
     return StackParams(move_base=tree, amcl=load(AmclParams, amcl, name="amcl/"))
 
 

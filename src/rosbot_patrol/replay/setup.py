@@ -19,8 +19,16 @@ from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.known_objects import load_known
 from rosbot_patrol.patrol.node_params import InputParams, NodeParams, manager_params
 from rosbot_patrol.patrol.rooms import load_rooms
-from rosbot_patrol.replay import amcl_replay, detector_replay, gmapping_replay, patrol_log, patrol_replay
+from rosbot_patrol.replay import (
+    amcl_replay,
+    detector_replay,
+    gmapping_replay,
+    move_base_replay,
+    patrol_log,
+    patrol_replay,
+)
 from rosbot_patrol.replay.package_files import package_file
+from rosbot_patrol.replay.profile_files import read_move_base
 from rosbot_patrol.replay.runner import Field, Input, Replay
 from rosbot_patrol.replay.transform_tree import Edge
 from rosbot_patrol.sensors.sensor_file import load_sensors
@@ -178,9 +186,17 @@ def _detector(setup: Setup) -> Replay:
     return detector_replay.DetectorReplay(detector, topic if is_told else detector_replay.INPUTS[0].topic)
 
 
+def _move_base(setup: Setup) -> Replay:
+    folder = package_file(node_of(setup.node).config)
+    tree, name = (read_move_base(folder), f"{folder}: ") if setup.tree is None else (setup.tree, setup.name)
+    grid = None if setup.map is None else read_map(setup.map)
+    return move_base_replay.MoveBaseReplay(tree, name, grid=grid, static=setup.static)
+
+
 NODES: dict[str, Node] = {
     "amcl": Node("config/tuned/amcl.yaml", _amcl, amcl_replay.FIELDS, amcl_replay.INPUTS),
     "darknet_ros": Node("models/house.yaml", _detector, detector_replay.FIELDS, detector_replay.INPUTS),
+    "move_base": Node("config/tuned", _move_base, move_base_replay.FIELDS, move_base_replay.INPUTS),
     "patrol_robot": Node("config/tuned/watch.yaml", _patrol, patrol_log.FIELDS, patrol_replay.INPUTS),
     "slam_gmapping": Node("config/gmapping.yaml", _gmapping, gmapping_replay.FIELDS, gmapping_replay.INPUTS),
 }
