@@ -84,6 +84,11 @@ def field_names(result: Result) -> list[str]:
     return [*(f"counts.{name}" for name in result.counts), *columns, *result.grids]
 
 
+def paired(stored: Table, found: Table, *, is_by_order: bool) -> Pairing:
+    """Which rows of two tables belong together: those of one time, or the n-th and the n-th."""
+    return (pair_by_order if is_by_order else pair_rows)(stored[STAMP], found[STAMP])
+
+
 def pair_rows(stored: NDArray[Any], found: NDArray[Any]) -> Pairing:
     """Rows of one time, by their stamps [s]; of several of one time the first belongs to the first."""
     left, right = _keys(stored), _keys(found)
@@ -160,7 +165,7 @@ def _compare_tables(
     if STAMP not in stored or STAMP not in found:
         return [Difference(name, "is only in the stored result" if STAMP in stored else "is not in the stored result")]
     is_by_order = field_of(f"{name}.rows", fields).is_by_order
-    pairing = (pair_by_order if is_by_order else pair_rows)(stored[STAMP], found[STAMP])
+    pairing = paired(stored, found, is_by_order=is_by_order)
     differences = _compare_rows(name, stored, found, pairing, fields, begin)
     times = stored[STAMP][pairing.stored] - begin
     for column in _names(stored, found):

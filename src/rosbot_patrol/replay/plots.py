@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.errors import ResultError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.replay.comparison import column_errors, field_of, map_difference, pair_rows
+from rosbot_patrol.replay.comparison import column_errors, field_of, map_difference, paired
 from rosbot_patrol.replay.results import STAMP, Result, Table
 from rosbot_patrol.replay.runner import Field
 
@@ -90,21 +90,22 @@ def table_drawing(name: str, found: Table, stored: Table | None, fields: Mapping
     stamps = np.concatenate([table[STAMP] for table in (found, stored) if table is not None and STAMP in table])
     span = (float(stamps.min()), float(stamps.max())) if len(stamps) else (0.0, 1.0)
     for i, column in enumerate(columns):
-        field = field_of(f"{name}.{column}", fields)
-        parts += _panel(TOP + i * (HEIGHT + GAP), f"{name}.{column}", column, found, stored, span, field)
+        parts += _panel(TOP + i * (HEIGHT + GAP), name, column, found, stored, span, fields)
     return "\n".join([*parts, "</svg>\n"])
 
 
 def _panel(
     top: float,
-    title: str,
+    name: str,
     column: str,
     found: Table,
     stored: Table | None,
     span: tuple[float, float],
-    field: Field,
+    fields: Mapping[str, Field],
 ) -> list[str]:
     """One column: its name, bounds, and lines."""
+    title = f"{name}.{column}"
+    field = field_of(title, fields)
     lines = [(found[STAMP], found[column].astype(np.float64), FOUND, 1.2)]
     has_stored = stored is not None and column in stored
     if stored is not None and has_stored:
@@ -126,13 +127,14 @@ def _panel(
     ]
     parts += [frame.line(*line) for line in lines]
     if stored is not None and has_stored:
-        parts += frame.marks(*_wrong_points(column, found, stored, field))
+        is_by_order = field_of(f"{name}.rows", fields).is_by_order
+        parts += frame.marks(*_wrong_points(column, found, stored, field, is_by_order=is_by_order))
     return parts
 
 
-def _wrong_points(column: str, found: Table, stored: Table, field: Field) -> tuple[Array, Array]:
+def _wrong_points(column: str, found: Table, stored: Table, field: Field, *, is_by_order: bool) -> tuple[Array, Array]:
     """Times and new values of the rows that differ by more than they may."""
-    pairs = pair_rows(stored[STAMP], found[STAMP])
+    pairs = paired(stored, found, is_by_order=is_by_order)
     new = found[column][pairs.found]
     wrong = column_errors(stored[column][pairs.stored], new, field) > field.tolerance
     return found[STAMP][pairs.found][wrong], new[wrong].astype(np.float64)
