@@ -40,7 +40,7 @@ class CaseParams:
     """Keys of a NAME.replay.yaml."""
 
     bag: str = param(doc="the bag")
-    node: str = param(doc="whose replay: amcl, slam_gmapping, move_base, darknet_ros, patrol_robot")
+    node: str = param(doc="whose replay: amcl, slam_gmapping, move_base, darknet_ros, patrol_robot, serial_node")
     parameters: Any = param(None, doc="of the node: a yaml file, or the parameters themselves; none: our config")
     map: str = param("", doc="yaml of the map; empty: the bag's")
     topics: dict[str, Any] = param({}, doc="topics of the bag by the node's own names")

@@ -26,11 +26,13 @@ from rosbot_patrol.replay import (
     move_base_replay,
     patrol_log,
     patrol_replay,
+    serial_replay,
 )
 from rosbot_patrol.replay.package_files import package_file
 from rosbot_patrol.replay.profile_files import read_move_base
 from rosbot_patrol.replay.runner import Field, Input, Replay
 from rosbot_patrol.replay.transform_tree import Edge
+from rosbot_patrol.rosserial.settings import SerialNodeParams
 from rosbot_patrol.sensors.sensor_file import load_sensors
 from rosbot_patrol.yaml_files import read_mapping
 
@@ -65,7 +67,7 @@ class Node:
     """A node that can be replayed.
 
     Attributes:
-        config: its parameters in the package.
+        config: its parameters in the package, "" where there are none.
         build: makes its replay of a setup; raises ParamError or MapError.
         fields: how its result is compared.
         inputs: what it hears, where nothing is given instead.
@@ -193,10 +195,18 @@ def _move_base(setup: Setup) -> Replay:
     return move_base_replay.MoveBaseReplay(tree, name, grid=grid, static=setup.static)
 
 
+def _serial(setup: Setup) -> Replay:
+    tree, name = ({"port": "tcp"}, "") if setup.tree is None else (setup.tree, setup.name)
+    loaded = params.load(SerialNodeParams, tree, name=name)
+    silence = loaded.silence_timeout if loaded.is_tcp else None
+    return serial_replay.SerialReplay(loaded.policy(name), silence)
+
+
 NODES: dict[str, Node] = {
     "amcl": Node("config/tuned/amcl.yaml", _amcl, amcl_replay.FIELDS, amcl_replay.INPUTS),
     "darknet_ros": Node("models/house.yaml", _detector, detector_replay.FIELDS, detector_replay.INPUTS),
     "move_base": Node("config/tuned", _move_base, move_base_replay.FIELDS, move_base_replay.INPUTS),
     "patrol_robot": Node("config/tuned/watch.yaml", _patrol, patrol_log.FIELDS, patrol_replay.INPUTS),
+    "serial_node": Node("", _serial, serial_replay.FIELDS, serial_replay.INPUTS),
     "slam_gmapping": Node("config/gmapping.yaml", _gmapping, gmapping_replay.FIELDS, gmapping_replay.INPUTS),
 }

@@ -34,6 +34,7 @@ from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subs
 from rosbot_patrol.ros.serial_links import LinkTeller
 from rosbot_patrol.ros.serial_publishers import SETTLING, Publishers
 from rosbot_patrol.ros.serial_report import Report
+from rosbot_patrol.ros.serial_tap import SerialTap
 from rosbot_patrol.rosserial.client import Client
 from rosbot_patrol.rosserial.complaints import Complaints
 from rosbot_patrol.rosserial.policy import Policy
@@ -198,6 +199,7 @@ def body() -> None:
         policy,
         silence_timeout=params.silence_timeout,
         limits=params.limits,
+        tap=SerialTap() if params.record_bytes else None,
     )
     ros_side.server = server
     if policy.restricted:

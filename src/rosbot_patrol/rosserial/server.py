@@ -20,6 +20,7 @@ from rosbot_patrol.rosserial.journal import Journal
 from rosbot_patrol.rosserial.policy import Policy
 from rosbot_patrol.rosserial.serial_port import SerialPort
 from rosbot_patrol.rosserial.session import Session
+from rosbot_patrol.rosserial.tap import Tap
 from rosbot_patrol.rosserial.topics import TX_STOP
 
 log = logging.getLogger(__name__)
@@ -50,6 +51,7 @@ class SerialServer:
         silence_timeout: hang up on a TCP client not heard of for that long [s].
         limits: how many TCP clients may come.
         clock: monotonic time [s].
+        tap: told of every byte that comes.
     """
 
     def __init__(
@@ -60,7 +62,9 @@ class SerialServer:
         silence_timeout: float = 15.0,
         limits: Limits = NO_LIMITS,
         clock: Callable[[], float] = time.monotonic,
+        tap: Tap | None = None,
     ) -> None:
+        self._tap = tap
         self.clients: dict[Link, Client] = {}
         self.journal = Journal()
         self._handler = handler
@@ -245,6 +249,8 @@ class SerialServer:
     def _add(self, client: Client, now: float) -> None:
         self.clients[client.link] = client
         self.door.enter(client, now)
+        if self._tap is not None:
+            self._tap.opened(client)
         self._watch(client, selectors.EVENT_READ)
         self._flush(client)
 
@@ -263,6 +269,8 @@ class SerialServer:
         if not data:
             self._lose(client, "it closed the connection")
             return
+        if self._tap is not None:
+            self._tap.data(client, data)
         self._dispatcher.take(client, client.session.receive(data, now), now)
         self._handler.flush()
         if not client.closed:
@@ -303,6 +311,8 @@ class SerialServer:
 
     def _drop(self, client: Client) -> None:
         client.closed = True
+        if self._tap is not None:
+            self._tap.closed(client)
         self._watch(client, 0)
         self.clients.pop(client.link, None)
         self.door.leave(client)

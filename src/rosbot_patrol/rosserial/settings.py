@@ -61,6 +61,7 @@ class SerialNodeParams:
     sensor_timeout: float = param(
         10.0, lo=1.0, unit="s", doc="a motion sensor without a heartbeat for that long is silent"
     )
+    record_bytes: bool = param(False, doc="publish what devices send, byte for byte, on ~bytes, for bags to replay")
 
     @property
     def is_tcp(self) -> bool:
