@@ -1,4 +1,13 @@
-"""Our own bags as tests, by the plugin that users have; `pytest test/replay --replay-record` refreshes them."""
+"""Our own bags as tests, by the plugin that users have. To refresh what is expected:
 
-from rosbot_patrol.replay.pytest_plugin import pytest_addoption as pytest_addoption
-from rosbot_patrol.replay.pytest_plugin import pytest_collect_file as pytest_collect_file
+pytest -p rosbot_patrol.replay.pytest_plugin test/replay --replay-record
+"""
+
+import pytest
+
+PLUGIN = "rosbot_patrol.replay.pytest_plugin"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if not config.pluginmanager.has_plugin(PLUGIN):
+        config.pluginmanager.import_plugin(PLUGIN)

@@ -1,4 +1,7 @@
-"""A patrol in the small world of the patrol's own tests, as messages of a bag."""
+"""A patrol in the small world of the patrol's own tests, as messages of a bag.
+
+PYTHONPATH=src .ws/venv/bin/python test/unit/replay/made_patrol.py test/replay/patrol.bag    # the bag of the repo
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from made_bag import NOETIC, Maker
+from made_bag import NOETIC, Maker, write_bag
 from rosbags.typesys import get_types_from_msg
 
 from rosbot_patrol import params
@@ -103,3 +106,19 @@ class RecordedWorld(World):
         result = make.new("move_base_msgs/msg/MoveBaseResult")
         ended = make.new(OUTCOME, make.header(now, ""), status, result)
         self.messages.append((now + 0.002, "/move_base/result", ended))
+
+
+if __name__ == "__main__":
+    house = RecordedWorld(person_when=lambda world: looking(world) and world.x > 19.0)
+    for _ in range(25):
+        house.step()
+    house.mission(2)
+    house.mission(1, count=2)
+    for _ in range(25):
+        house.step()
+    path = Path(sys.argv[1])
+    path.unlink(missing_ok=True)
+    messages = sorted(house.messages, key=lambda each: each[0])
+    write_bag(path, messages, compression="BZ2", latching=["/tf_static"])
+    path.with_name(f"{path.stem}_rooms.yaml").write_text(POINTS)
+    print(path, path.stat().st_size, "bytes", [mission.verdict for mission in house.ended])
