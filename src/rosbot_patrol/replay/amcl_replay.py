@@ -112,7 +112,7 @@ class AmclReplay:
     def finish(self) -> Result:
         """Poses that were given out, health each second, counts."""
         tables = {"poses": self._poses.table(), "health": self._health.table()}
-        return Result("amcl", counts=self._feed.counts() | self._counts, tables=tables)
+        return Result("amcl", self._feed.facts(), counts=self._feed.counts() | self._counts, tables=tables)
 
     def _hear_map(self, record: MapRecord) -> None:
         is_wanted = self._params.use_map_topic and not self._params.first_map_only

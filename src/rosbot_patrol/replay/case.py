@@ -113,7 +113,8 @@ def run_case(case: Case, *, told: Callable[[float], None] = lambda _share: None)
     with Bag(case.bag) as bag:
         result = run_replay(bag, replay, remaps=case.remaps, told=told)
         _check_names(case.named, result)
-        return replace(result, facts={"bag": case.bag.name, "duration": f"{bag.duration:.3f} s"})
+        own = {"bag": case.bag.name, "duration": f"{bag.duration:.3f} s"}
+        return replace(result, facts={**own, **result.facts})
 
 
 def _tree(path: Path, loaded: CaseParams) -> Mapping[str, Any] | None:

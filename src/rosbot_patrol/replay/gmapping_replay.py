@@ -91,7 +91,8 @@ class GmappingReplay:
         """The best pose at each update, the maps on the way, the best particle's whole way and its map."""
         tables = {"poses": self._poses.table(), "maps": self._maps.table(), "trajectory": self._trajectory()}
         counts = self._feed.counts() | self._counts
-        return Result("slam_gmapping", counts=counts, tables=tables, grids={"map": known_part(self._slam.grid())})
+        maps = {"map": known_part(self._slam.grid())}
+        return Result("slam_gmapping", self._feed.facts(), counts, tables, maps)
 
     def _step(self, placed: PlacedScan) -> None:
         outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.mount)

@@ -136,7 +136,8 @@ def _replayed(case: Case, *, is_quiet: bool) -> Result:
     if not is_quiet:
         counts = ", ".join(f"{name} {value}" for name, value in result.counts.items())
         sys.stdout.write(f"{result.node} over {case.bag}: {result.facts['duration']} of bag in {bar.elapsed:.2f} s\n")
-        sys.stdout.write(f"  {counts}\n  result {result.digest}\n")
+        left_out = f"  left out: {result.facts['left out']}\n" if "left out" in result.facts else ""
+        sys.stdout.write(f"  {counts}\n{left_out}  result {result.digest}\n")
     return result
 
 

@@ -64,6 +64,10 @@ class ScanFeed:
         """How many scans came, and what became of those that were not taken in."""
         return {"scans": self.heard, "refused": self.refused, "dropped": self.dropped, "waiting": self.waiting}
 
+    def facts(self) -> dict[str, str]:
+        """Why the last scan was left out, where one was."""
+        return {"left out": self.problem} if self.problem else {}
+
     def _place(self, scan: LaserScan) -> PlacedScan:
         mount = self._mounts.get(scan.frame_id)
         if mount is None:

@@ -9,16 +9,21 @@ import pytest
 from made_bag import Maker, write_bag
 
 from rosbot_patrol.detection import detector as darknet
+from rosbot_patrol.detection.choice import make_detector
+from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.detection.detector import Detection
 from rosbot_patrol.images.encodings import Picture
+from rosbot_patrol.params import load
 from rosbot_patrol.replay.bag import Bag
 from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.detector_replay import FIELDS, DetectorReplay
 from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.runner import Replay, run_replay
 from rosbot_patrol.replay.setup import Setup, build_replay
+from rosbot_patrol.yaml_files import read_mapping
 
 ROOT = Path(__file__).resolve().parents[3]
+MODELS = ROOT / "models"
 PICTURE = ROOT / "docs" / "images" / "detection.jpg"
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 
@@ -71,10 +76,11 @@ def test_our_network_on_a_compressed_picture_and_a_planted_fault(
     message = maker.new(COMPRESSED, maker.header(3.0, "camera"), "rgb8; jpeg compressed bgr8", data)
     path = write_bag(tmp_path / "a.bag", [(3.1, "/camera/rgb/image_raw", message)])
     stored = replayed(path, build_replay(Setup(node="darknet_ros")))
+    network = make_detector(load(DarknetParams, read_mapping(ROOT / "models" / "house.yaml", keys="")), str(MODELS))
     assert "person" in stored.tables["boxes"]["label"].tolist()
-    again = replayed(path, build_replay(Setup(node="darknet_ros")))
+    again = replayed(path, DetectorReplay(network))
     assert again.digest == stored.digest
     assert compare(stored, again, FIELDS) == []
     monkeypatch.setattr(darknet, "SMALLEST_SHARE", 0.9)  # what is smaller than the picture is dropped
-    differences = compare(stored, replayed(path, build_replay(Setup(node="darknet_ros"))), FIELDS)
+    differences = compare(stored, replayed(path, DetectorReplay(network)), FIELDS)
     assert any(each.name == "boxes.rows" and "stored rows are missing" in each.text for each in differences)

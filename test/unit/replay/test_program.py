@@ -15,6 +15,7 @@ from rosbot_patrol.kernels import cache_dir
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.replay import program
 from rosbot_patrol.replay.case import read_case
+from rosbot_patrol.replay.package_files import package_file
 from rosbot_patrol.replay.results import load_result, save_result
 from rosbot_patrol.replay.setup import parse_transform
 
@@ -120,6 +121,27 @@ def test_bad_input_is_a_sentence_and_2(run, drive: Path, words: tuple[str, ...],
     assert status == 2
     assert sentence in said
     assert "Traceback" not in said
+
+
+def test_why_scans_were_left_out_is_told(run, tmp_path: Path) -> None:
+    messages = [each for each in drive_messages(3.0) if each[1] != "/tf_static"]
+    path = write_bag(tmp_path / "a.bag", messages)
+    status, said = run(path, "--node", "slam_gmapping")
+    assert status == 0
+    assert "left out: no transform from 'laser' to 'base_link': nothing was told of the frame 'laser'" in said
+
+
+def test_a_bag_without_messages(run, tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "empty.bag", [])
+    assert run(path)[0] == 0
+    status, said = run(path, "--node", "slam_gmapping")
+    assert status == 2
+    assert "has no topic '/scan' (sensor_msgs/LaserScan) and no other of that type; it has no topics" in said
+
+
+def test_a_file_of_the_package_that_is_nowhere() -> None:
+    with pytest.raises(ParamError, match=r"config/none\.yaml: is in none of"):
+        package_file("config/none.yaml")
 
 
 def test_a_tolerance_of_what_is_not_there(run, drive: Path, tmp_path: Path) -> None:
