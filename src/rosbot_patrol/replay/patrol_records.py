@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 from rosbot_patrol.patrol.inputs import Battery, Box
 from rosbot_patrol.patrol.person_place import Lens
+from rosbot_patrol.replay import raw_ros1
 from rosbot_patrol.replay.definitions import STAMP
 from rosbot_patrol.replay.records import ANY, Kind, Refused, stamp_of
+from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5
 
 CHARGING = 1  # sensor_msgs/BatteryState.POWER_SUPPLY_STATUS_CHARGING
 LOOK = "look"  # rosbot_patrol/SensorEvent.LOOK
@@ -125,7 +127,20 @@ def _alive(_raw: bytes) -> AliveRecord:
     return AliveRecord()
 
 
-_TRIGGER = Kind(lambda message: TriggerRecord(int(message.id), bool(message.move)), {"id": "int", "move": "bool"})
+def _trigger(raw: bytes) -> TriggerRecord:
+    return TriggerRecord(raw[0], bool(raw[1]))
+
+
+def _count(raw: bytes) -> CountRecord:
+    return CountRecord(*raw_ros1.read_count(raw))
+
+
+_TRIGGER = Kind(
+    lambda message: TriggerRecord(int(message.id), bool(message.move)),
+    {"id": "int", "move": "bool"},
+    _trigger,
+    ESP_TRIGGER_MD5,
+)
 _ALIVE = Kind(lambda _message: AliveRecord(), {}, _alive, ANY)
 _CORNERS = {f"bounding_boxes[].{name}": "int" for name in ("xmin", "ymin", "xmax", "ymax")}
 
@@ -139,7 +154,10 @@ KINDS: dict[str, Kind] = {
         | _CORNERS,
     ),
     "darknet_ros_msgs/msg/ObjectCount": Kind(
-        lambda message: CountRecord(stamp_of(message.header.stamp), int(message.count)), STAMP | {"count": "int"}
+        lambda message: CountRecord(stamp_of(message.header.stamp), int(message.count)),
+        STAMP | {"count": "int"},
+        _count,
+        raw_ros1.COUNT_MD5,
     ),
     "sensor_msgs/msg/CameraInfo": Kind(_lens, STAMP | {"width": "int", "height": "int"}),
     "sensor_msgs/msg/BatteryState": Kind(

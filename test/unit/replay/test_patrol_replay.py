@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import made_patrol
 import numpy as np
 import pytest
-from made_bag import write_bag
+from made_bag import Maker, write_bag
 from made_patrol import POINTS, RecordedWorld, looking
 
 from rosbot_patrol.errors import BagError
@@ -15,6 +16,7 @@ from rosbot_patrol.patrol.watch import Watch
 from rosbot_patrol.replay.bag import Bag
 from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.patrol_log import FIELDS
+from rosbot_patrol.replay.patrol_records import KINDS
 from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.runner import run_replay
 from rosbot_patrol.replay.setup import Setup, build_replay
@@ -105,3 +107,16 @@ def test_events_of_times_of_their_own_are_compared_in_their_order(tmp_path: Path
     stamps[-1] += 3.0
     assert [each.name for each in compare(stored, found, FIELDS)] == ["reports.stamp"]
     assert np.all(np.diff(stamps) >= 0.0)
+
+
+@pytest.mark.parametrize(("moves", "count"), [(True, 0), (False, 3)])
+def test_fast_parsers_give_what_rosbags_gives(moves: bool, count: int) -> None:
+    maker, store = Maker(), made_patrol.NOETIC
+    trigger = maker.new(made_patrol.TRIGGER, 7, moves)
+    seen = maker.new(made_patrol.COUNT, maker.header(12.345678901, "camera"), count)
+    for message in (trigger, seen):
+        name, raw = message.__msgtype__, maker.bytes(message)
+        kind = KINDS[name]
+        assert kind.fast is not None
+        assert kind.fast(raw) == kind.convert(store.deserialize_ros1(raw, name))
+        assert kind.md5 == store.generate_msgdef(name, ros_version=1)[1]
