@@ -23,6 +23,7 @@ import rosgraph
 HEARD = (
     "/clock", "/tf", "/tf_static", "/scan", "/odom", "/map", "/initialpose", "/motion_trigger", "/battery",
     "/range/fl", "/range/fr", "/range/rl", "/range/rr", "/darknet_ros/bounding_boxes", "/darknet_ros/found_object",
+    "/patrol/arming", "/sensors/events", "/e_stop", "/esp_client1/bytes", "/esp_client2/bytes", "/esp_client3/bytes",
 )  # fmt: skip
 CAMERA = ("/camera/rgb/camera_info", "/rgb_republish/compressed", "/camera/depth/camera_info")
 DID = (
