@@ -349,7 +349,9 @@ def test_the_narrator_tells_and_ends_with_the_mission(house, person, verdict, st
         f"Turning once to look around in {room}.",
         f"Home again. Verdict for {room}: {ends}.",
     ]
-    assert [line for line in told if line in steps] == steps
+    told_steps = [line for line in told if line in steps]
+    assert sorted(told_steps[1:3]) == sorted(steps[1:3])  # of two topics: either may be heard first
+    assert told_steps[:1] + told_steps[3:] == steps[:1] + steps[3:]
     assert any(line.startswith("INTRUDER: a person") for line in told) == person
     (mission,) = json.loads(summary.read_text())["missions"]
     assert mission["verdict"] == ends

@@ -1,5 +1,6 @@
 """record: a bag by rosbag, of what there is, ended by Ctrl-C or the time."""
 
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -25,6 +26,11 @@ def ros():
     ros.stop()
 
 
+def heard(ros):
+    """What is known of the topic, with its subscribers."""
+    return subprocess.run(["rostopic", "info", "/motion_trigger"], env=ros.env, capture_output=True, text=True).stdout
+
+
 def record(ros, *arguments):
     return Process([sys.executable, "-m", "rosbot_patrol.ros.record_node", *map(str, arguments)], ros.env)
 
@@ -35,8 +41,8 @@ def test_a_bag_until_it_is_ended(ros, tmp_path: Path):
     process.says("nobody publishes yet: ")
     assert "/scan" in process.output
     assert "rgb_republish" not in process.output
-    wait_for(lambda: list(tmp_path.glob("*.active")) and "/motion_trigger" in process.output, what="the recording")
-    time.sleep(1.0)  # a chunk is written at the end
+    wait_for(lambda: "/record_" in heard(ros), what="the recording")
+    time.sleep(1.0)
     assert process.stop() == 0
     assert f"{file}: 0.0 MB" in process.output
     with AnyReader([file]) as reader:

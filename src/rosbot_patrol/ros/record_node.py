@@ -41,7 +41,7 @@ def topics(also: Sequence[str] = (), *, camera: bool = True) -> list[str]:
 def command(file: Path, wanted: Sequence[str], *, duration: float = 0.0) -> list[str]:
     """The command line of rosbag."""
     lasting = [f"--duration={duration:g}"] if duration > 0.0 else []
-    return ["rosbag", "record", "--lz4", "--buffsize=256", *lasting, "-O", str(file), *wanted]
+    return ["rosrun", "rosbag", "record", "--lz4", "--buffsize=256", *lasting, "-O", str(file), *wanted]
 
 
 def _options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -89,8 +89,10 @@ def record(given: argparse.Namespace) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: process.send_signal(signal.SIGINT))
     status = process.wait()
-    if file.exists():
-        print(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
+    if not file.exists():
+        print(f"record: {file} was not written, it ended before anything came", file=sys.stderr)
+        return status or 1
+    print(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
     return status
 
 
