@@ -285,7 +285,10 @@ def test_in_lockstep_a_dead_consumer_is_named(ros):
     node = ros.node("simulator", URDF, WORLD, "_rate:=0", "_lockstep/topics:=['/looks']", "_lockstep/slack:=0.1")
     node.says("motion sensors", 20.0)
     probe.tell(advertise=["/looks", "std_msgs/String"])
-    time.sleep(0.5)
-    probe.tell(publish=["/looks", {"data": "one look"}])
+    for _ in range(10):  # until the simulator has heard one
+        time.sleep(1.0)
+        probe.tell(publish=["/looks", {"data": "one look"}])
+        if "the clock waited" in node.output:
+            break
     node.says("the clock waited 0.4 s for /looks of /probe", 10.0)
     probe.expect(lambda s: s.get("topic") == "/diagnostics" and "goes on without /looks of /probe" in s["status"])
