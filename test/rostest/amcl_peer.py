@@ -3,40 +3,18 @@
 Reads commands as lines, answers each with a line of JSON: what came since the last one.
 """
 
-import json
 import math
-import signal
-import sys
 import time
 
 import rospy
 import tf2_ros
 from dynamic_reconfigure.client import Client
-from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, TransformStamped, Twist
+from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped, Twist
+from room_peer import ranges_at, serve, transform
 from rosbot_patrol.msg import LocalizationHealth
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
-
-HALF = 2.0  # of the room's edge [m]
-
-
-def transform(parent, child, x, y, yaw, stamp):
-    message = TransformStamped()
-    message.header.frame_id, message.child_frame_id, message.header.stamp = parent, child, stamp
-    message.transform.translation.x, message.transform.translation.y = x, y
-    message.transform.rotation.z, message.transform.rotation.w = math.sin(yaw / 2), math.cos(yaw / 2)
-    return message
-
-
-def ranges_at(x, y, count=180):
-    found = []
-    for k in range(count):
-        c, s = math.cos(-math.pi + 2 * math.pi * k / (count - 1)), math.sin(-math.pi + 2 * math.pi * k / (count - 1))
-        wall_x = ((HALF - x) / c) if c > 1e-9 else ((-HALF - x) / c if c < -1e-9 else math.inf)
-        wall_y = ((HALF - y) / s) if s > 1e-9 else ((-HALF - y) / s if s < -1e-9 else math.inf)
-        found.append(min(wall_x, wall_y))
-    return found
 
 
 class Peer:
@@ -144,16 +122,5 @@ class Peer:
         return said
 
 
-def main():
-    rospy.init_node("peer", disable_signals=True)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # a read of stdin does not hold up the end
-    peer = Peer()
-    print(json.dumps({"ready": True}), flush=True)
-    for line in sys.stdin:
-        order = json.loads(line)
-        getattr(peer, order.pop("do"))(**order)
-        print(json.dumps(peer.report()), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    serve("peer", Peer)

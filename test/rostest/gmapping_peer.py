@@ -3,18 +3,15 @@
 Reads commands as lines, answers each with a line of JSON: what came since the last one.
 """
 
-import json
 import math
-import signal
-import sys
 import time
 
 import numpy as np
 import rospy
 import tf2_ros
-from amcl_peer import ranges_at, transform
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap
+from room_peer import ranges_at, serve, transform
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
@@ -85,16 +82,5 @@ class Peer:
         return said
 
 
-def main():
-    rospy.init_node("peer", disable_signals=True)
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # a read of stdin does not hold up the end
-    peer = Peer()
-    print(json.dumps({"ready": True}), flush=True)
-    for line in sys.stdin:
-        order = json.loads(line)
-        getattr(peer, order.pop("do"))(**order)
-        print(json.dumps(peer.report()), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    serve("peer", Peer)

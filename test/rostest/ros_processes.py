@@ -114,6 +114,28 @@ class Ros:
         self.core.stop()
 
 
+class Peer:
+    """A program of the test's own that does what it is told and answers in JSON; see `room_peer.serve`."""
+
+    def __init__(self, ros, script):
+        self.process = Process([sys.executable, str(HERE / script)], ros.env, stdin=subprocess.PIPE)
+        ros.processes.append(self.process)
+        self.answers = 0
+        self.process.says("ready", 20.0)
+
+    def do(self, what, **options):
+        """Let it do something and hear what the node said meanwhile."""
+        self.process.popen.stdin.write(json.dumps({"do": what, **options}) + "\n")
+        self.process.popen.stdin.flush()
+        self.answers += 1
+        lines = wait_for(self._answered, 20.0, "the peer's answer")
+        return json.loads(lines[self.answers])
+
+    def _answered(self):
+        lines = [line for line in self.process.lines if line.startswith("{")]
+        return lines if len(lines) > self.answers else None
+
+
 class Teller:
     """A process that says what it hears in lines of JSON, `{"ready": true}` first."""
 

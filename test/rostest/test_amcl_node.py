@@ -1,41 +1,16 @@
 """amcl as a process before a real master, with a made-up room; needs the built workspace."""
 
-import json
 import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, wait_for
+from ros_processes import Peer, wait_for
 
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import write_map
-
-HERE = Path(__file__).resolve().parent
-
-
-class Peer:
-    def __init__(self, ros):
-        self.process = Process([sys.executable, str(HERE / "amcl_peer.py")], ros.env, stdin=subprocess.PIPE)
-        ros.processes.append(self.process)
-        self.answers = 0
-        self.process.says("ready", 20.0)
-
-    def do(self, what, **options):
-        """Let it do something and hear what amcl said meanwhile."""
-        self.process.popen.stdin.write(json.dumps({"do": what, **options}) + "\n")
-        self.process.popen.stdin.flush()
-        self.answers += 1
-        lines = wait_for(self._answered, 20.0, "the peer's answer")
-        return json.loads(lines[self.answers])
-
-    def _answered(self):
-        lines = [line for line in self.process.lines if line.startswith("{")]
-        return lines if len(lines) > self.answers else None
 
 
 @pytest.fixture
@@ -53,7 +28,7 @@ def started(ros, room, *arguments):
     ros.node("map_server", str(room))
     node = ros.node("amcl", "_update_min_d:=0.1", "_initial_cov_xx:=0.01", "_initial_cov_yy:=0.01", *arguments)
     node.says("Received a 100 X 100 map", 20.0)
-    return node, Peer(ros)
+    return node, Peer(ros, "amcl_peer.py")
 
 
 def test_it_localises_and_sends_a_correction_with_every_scan(ros, room):
@@ -157,7 +132,7 @@ def test_a_bad_parameter_is_named(ros):
 
 def test_the_map_may_come_late_and_by_topic(ros, room):
     node = ros.node("amcl", "_use_map_topic:=true", "__name:=amcl_topic")
-    peer = Peer(ros)
+    peer = Peer(ros, "amcl_peer.py")
     assert peer.do("drive", scans=3)["tf"] == 0
     ros.node("map_server", str(room))
     node.says("Received a 100 X 100 map", 20.0)

@@ -1,58 +1,34 @@
 """slam_gmapping as a process before a real master, with a made-up room; needs the built workspace."""
 
-import json
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, wait_for
+from ros_processes import Peer, wait_for
 
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import write_map
 
-HERE = Path(__file__).resolve().parent
 SMALL = ("_xmin:=-8", "_ymin:=-8", "_xmax:=8", "_ymax:=8", "_particles:=5", "_linearUpdate:=0.08")
 
 
-class Peer:
-    def __init__(self, ros):
-        self.process = Process([sys.executable, str(HERE / "gmapping_peer.py")], ros.env, stdin=subprocess.PIPE)
-        ros.processes.append(self.process)
-        self.answers = 0
-        self.process.says("ready", 20.0)
-
-    def do(self, what, **options):
-        """Let it do something and hear what slam_gmapping said meanwhile."""
-        self.process.popen.stdin.write(json.dumps({"do": what, **options}) + "\n")
-        self.process.popen.stdin.flush()
-        self.answers += 1
-        lines = wait_for(self._answered, 20.0, "the peer's answer")
-        return json.loads(lines[self.answers])
-
-    def _answered(self):
-        lines = [line for line in self.process.lines if line.startswith("{")]
-        return lines if len(lines) > self.answers else None
-
-    def until_map(self):
-        """Scans from one place until the first map is there, and what was said then."""
-        return wait_for(lambda: (said := self.do("drive", scans=2))["maps"] and said, 30.0, "the first map")
+def until_map(peer):
+    """Scans from one place until the first map is there, and what was said then."""
+    return wait_for(lambda: (said := peer.do("drive", scans=2))["maps"] and said, 30.0, "the first map")
 
 
 def started(ros, *arguments):
     node = ros.node("slam_gmapping", *SMALL, *arguments)
     node.says("Mapping 320 X 320 cells @ 0.050 m with 5 particles")
-    return node, Peer(ros)
+    return node, Peer(ros, "gmapping_peer.py")
 
 
 def test_it_maps_and_corrects_the_odometry(ros):
     node, peer = started(ros, "_map_update_interval:=0.2", "_transform_publish_period:=0.02")
-    first = peer.until_map()
+    first = until_map(peer)
     assert first["frame"] == "map"
     assert first["size"] == [320, 320]
     assert first["origin"] == [-8.0, -8.0]
@@ -73,7 +49,7 @@ def test_it_maps_and_corrects_the_odometry(ros):
 def test_bad_scans_are_named_and_survived(ros):
     node, peer = started(ros, "__name:=slam_gmapping")
     assert "there is no map yet" in peer.do("call")["answer"]
-    peer.until_map()
+    until_map(peer)
     peer.do("drive", scans=2, broken="none")
     node.says("it has no beams; it is left out")
     peer.do("drive", scans=3, step=0.12, broken="nan")
@@ -94,7 +70,7 @@ def test_a_saved_map_is_gone_on_with(ros, tmp_path):
     write_map(str(tmp_path / "room"), Grid(info, cells))  # the room stands half a metre off
     node, peer = started(ros, f"_map_file:={tmp_path}/room.yaml", "_initial_pose_x:=0.45")
     node.says("Going on with the map", 20.0)
-    peer.until_map()
+    until_map(peer)
     said = peer.do("drive", scans=4)
     assert abs(said["odom"] - 0.5) < 0.06
 

@@ -34,8 +34,8 @@ _LATE = 0.15  # a turn that would have begun so far back is begun where the robo
 
 
 @dataclass(frozen=True, kw_only=True)
-class EyesParams:
-    """How thoroughly a room is looked at."""
+class SightParams:
+    """How thoroughly a room is looked at; the patrol's node has these as its own."""
 
     look_around: str = param(
         "full", choices=("full", "spin"), doc="full: from further viewpoints, too; spin: one turn at the room's point"
@@ -58,8 +58,8 @@ class Eyes:
         params: how thoroughly to look.
     """
 
-    def __init__(self, params: EyesParams | None = None) -> None:
-        self.params = params or EyesParams()
+    def __init__(self, params: SightParams | None = None) -> None:
+        self.params = params or SightParams()
         self.coverage: Coverage | None = None
         self._witness = Witness(self.params.witness)
         self._harmless = Harmless()

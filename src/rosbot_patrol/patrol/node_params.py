@@ -8,9 +8,8 @@ from typing import Any
 
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.battery import BatteryParams, check_battery
-from rosbot_patrol.patrol.coverage import CoverageParams
 from rosbot_patrol.patrol.drive import DriveParams
-from rosbot_patrol.patrol.eyes import EyesParams
+from rosbot_patrol.patrol.eyes import SightParams
 from rosbot_patrol.patrol.judge import JudgeParams
 from rosbot_patrol.patrol.look import LookParams
 from rosbot_patrol.patrol.people import PeopleParams
@@ -19,9 +18,7 @@ from rosbot_patrol.patrol.settings import BehaviourParams, ManagerParams
 from rosbot_patrol.patrol.spin import SpinParams
 from rosbot_patrol.patrol.suspects import SuspectParams
 from rosbot_patrol.patrol.track import TrackParams
-from rosbot_patrol.patrol.viewpoints import ViewpointParams
 from rosbot_patrol.patrol.watch import WatchParams
-from rosbot_patrol.patrol.witness import WitnessParams
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +62,7 @@ class InputParams:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NodeParams(BehaviourParams):
+class NodeParams(BehaviourParams, SightParams):
     """The node's own parameters; those of mail, drive, look, turn and watch come beside them."""
 
     path_to_params: str = param(doc="points file (the tutorial's name)")
@@ -75,19 +72,10 @@ class NodeParams(BehaviourParams):
     rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
     schedule: str = param("", doc="file of the rounds; empty: none")
     arming: str = param("", doc="file of the modes; empty: all rooms in each mode, without delays")
-    look_around: str = param(
-        "full", choices=("full", "spin"), doc="full: from further viewpoints, too; spin: one turn at the room's point"
-    )
-    clear_share: float = param(
-        0.5, lo=0.0, hi=1.0, doc="with less of the floor seen a room is not clear but unverified"
-    )
     known_objects: str = param("", doc="file of things that look like somebody (patrol/known_objects); empty: none")
     watch: WatchParams = WatchParams()
     suspects: SuspectParams = SuspectParams()
     judge: JudgeParams = JudgeParams()
-    coverage: CoverageParams = CoverageParams()
-    viewpoints: ViewpointParams = ViewpointParams()
-    witness: WitnessParams = WitnessParams()
     track: TrackParams = TrackParams()
     people: PeopleParams = PeopleParams()
     eyes: EyesTopics = EyesTopics()
@@ -120,15 +108,4 @@ def manager_params(node: NodeParams, load: Callable[[type[Any]], Any], prefix: s
         suspects=node.suspects,
         people=node.people,
         track=node.track,
-    )
-
-
-def eyes_params(node: NodeParams) -> EyesParams:
-    """What counts as seen."""
-    return EyesParams(
-        look_around=node.look_around,
-        clear_share=node.clear_share,
-        coverage=node.coverage,
-        viewpoints=node.viewpoints,
-        witness=node.witness,
     )

@@ -25,15 +25,15 @@ from rosbot_patrol.control.movers import MoverParams, MoverWatch
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.obstacle import observe
 from rosbot_patrol.costmap.params import read_costmap
-from rosbot_patrol.errors import PlanningError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome, PlanResult
+from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome
 from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
-from rosbot_patrol.planning.interfaces import Array, GlobalPlanner, LocalView, RecoveryView
+from rosbot_patrol.planning.interfaces import Array, LocalView, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
+from rosbot_patrol.replay.delayed_plans import DelayedPlans
 from rosbot_patrol.replay.low_sight import LowSight
 from rosbot_patrol.replay.profile_files import read_move_base
 from rosbot_patrol.simulation.engine import STEP, Engine
@@ -69,36 +69,6 @@ def read_profile(folder: Path) -> StackParams:
     known = read_mapping(folder / "amcl.yaml", keys="of amcl")
     amcl = {k: v for k, v in known.items() if not k.endswith("_frame_id")}
     return StackParams(move_base=tree, amcl=load(AmclParams, amcl, name="amcl/"))
-
-
-class _DelayedPlans:
-    """A PlanSource whose plans are made at once and come later."""
-
-    def __init__(self, stack: ClosedLoop, planner: GlobalPlanner, delay: float) -> None:
-        self._stack, self._planner, self._delay = stack, planner, delay
-        self._result: tuple[float, PlanResult] | None = None
-
-    def request(self, goal: Pose2D) -> None:
-        costmap = self._stack.global_costmap
-        try:
-            grid = Grid(costmap.info, costmap.cells.copy())
-            result = PlanResult(poses=self._planner.plan(grid, self._stack.map_pose, goal))
-        except PlanningError as err:
-            result = PlanResult(error=err)
-        self._result = (self._stack.now + self._delay, result)
-
-    def poll(self) -> PlanResult | None:
-        if self._result is None or self._stack.now < self._result[0]:
-            return None
-        (_, result), self._result = self._result, None
-        return result
-
-    @property
-    def is_busy(self) -> bool:
-        return self._result is not None
-
-    def drop(self) -> None:
-        self._result = None
 
 
 @dataclass
@@ -148,8 +118,8 @@ class ClosedLoop:
         self.local_costmap = LayeredCostmap(read_costmap(tree["local_costmap"], name="local_costmap/"))
         for layer in self.global_costmap.static_layers:
             layer.set_map(known)
-        planner = make_global_planner(self._params.base_global_planner, tree)
-        self._plans = _DelayedPlans(self, planner, self._delays.plan)
+        self._planner = make_global_planner(self._params.base_global_planner, tree)
+        self._plans = DelayedPlans(self._plan, lambda: self.now, self._delays.plan)
         self.controller = make_local_planner(
             self._params.base_local_planner,
             tree,
@@ -197,6 +167,10 @@ class ClosedLoop:
     def map_pose(self) -> Pose2D:
         """map_from_base, as amcl believes."""
         return compose(self._map_from_odom, self.odom_pose)
+
+    def _plan(self, goal: Pose2D) -> Array:
+        grid = Grid(self.global_costmap.info, self.global_costmap.cells.copy())
+        return self._planner.plan(grid, self.map_pose, goal)
 
     def drive_to(self, goal: Pose2D, timeout: float, *, each_step: Callable[[], None] = lambda: None) -> Drive:
         """Drive to a goal in the frame of the map, for at most a time [s]; `each_step` is called after each."""

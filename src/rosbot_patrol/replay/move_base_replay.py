@@ -15,17 +15,18 @@ import numpy as np
 
 from rosbot_patrol.control.give_way import GiveWay
 from rosbot_patrol.control.movers import MoverWatch
-from rosbot_patrol.errors import MapError, PlanningError, TransformError
+from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.navigation.interfaces import Command, NavigatorView, PlanResult, State
+from rosbot_patrol.navigation.interfaces import Command, NavigatorView, State
 from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
-from rosbot_patrol.planning.interfaces import GlobalPlanner, LocalView, RecoveryView
+from rosbot_patrol.planning.interfaces import Array, LocalView, RecoveryView
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
 from rosbot_patrol.replay import move_base_records as heard
 from rosbot_patrol.replay.bag_costmap import BagCostmap
+from rosbot_patrol.replay.delayed_plans import DelayedPlans
 from rosbot_patrol.replay.records import MapRecord
 from rosbot_patrol.replay.results import STAMP, Result, Rows
 from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
@@ -53,38 +54,6 @@ FIELDS = {
     "plans.length": Field(tolerance=0.2, unit="m"),
     "commands.reason": Field(tolerance=math.inf),  # holds figures; shown where velocities differ
 }
-
-
-class _Plans:
-    """A PlanSource whose plans are made at once and come later, on the clock of the replay."""
-
-    def __init__(self, planner: GlobalPlanner, costmap: BagCostmap) -> None:
-        self._planner, self._costmap = planner, costmap
-        self._result: tuple[float, PlanResult] | None = None
-        self.now = 0.0
-
-    def request(self, goal: Pose2D) -> None:
-        try:
-            start = self._costmap.robot_pose(self.now)
-            result = PlanResult(poses=self._planner.plan(self._costmap.last, start, goal))
-        except PlanningError as err:
-            result = PlanResult(error=err)
-        except TransformError as err:
-            result = PlanResult(error=PlanningError(str(err)))
-        self._result = self.now + PLAN_S, result
-
-    def poll(self) -> PlanResult | None:
-        if self._result is None or self.now < self._result[0]:
-            return None
-        (_, result), self._result = self._result, None
-        return result
-
-    @property
-    def is_busy(self) -> bool:
-        return self._result is not None
-
-    def drop(self) -> None:
-        self._result = None
 
 
 class MoveBaseReplay:
@@ -117,7 +86,9 @@ class MoveBaseReplay:
         self._has_own_map = grid is not None
         if grid is not None:
             self._take_map(grid)
-        self._plans = _Plans(make_global_planner(p.base_global_planner, dict(tree)), self._global)
+        self._now = 0.0
+        self._planner = make_global_planner(p.base_global_planner, dict(tree))
+        self._plans = DelayedPlans(self._plan, lambda: self._now, PLAN_S)
         controller = make_local_planner(
             p.base_local_planner, dict(tree), self._local.costmap, controller_frequency=p.controller_frequency
         )
@@ -208,7 +179,7 @@ class MoveBaseReplay:
             self._counts["refused"] += 1
             return
         self._counts["goals"] += 1
-        self._goal, self._plans.now = record.goal, now
+        self._goal, self._now = record.goal, now
         self._navigator.set_goal(pose, now)
         self._step(now)  # the node is waked, too
 
@@ -232,11 +203,14 @@ class MoveBaseReplay:
 
     def _step(self, now: float) -> None:
         self._look()
-        self._plans.now = now
+        self._now = now
         if self._navigator.state is State.IDLE:
             return
         self._counts["cycles"] += 1
         self._note(now, self._navigator.step(now, self._view(now)))
+
+    def _plan(self, goal: Pose2D) -> Array:
+        return self._planner.plan(self._global.last, self._global.robot_pose(self._now), goal)
 
     def _look(self) -> None:
         """Show the newest scan to the watch for people, once its place is known."""

@@ -20,7 +20,7 @@ from rosbot_patrol.patrol.eyes import Eyes
 from rosbot_patrol.patrol.inputs import Battery, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.manager import PatrolManager
-from rosbot_patrol.patrol.node_params import InputParams, NodeParams, eyes_params
+from rosbot_patrol.patrol.node_params import InputParams, NodeParams
 from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.settings import ManagerParams
@@ -109,7 +109,7 @@ class PatrolReplay:
 
     def begin(self, names: Collection[str]) -> None:
         """Which inputs will be heard; without pictures nobody waits for a camera."""
-        views = Eyes(eyes_params(self._node))
+        views = Eyes(self._node)
         self._manager = PatrolManager(
             self._rooms,
             self._params,

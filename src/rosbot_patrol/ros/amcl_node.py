@@ -52,11 +52,10 @@ from rosbot_patrol.ros.node import Loop, load_params, now, run_node
 from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.saved_pose import SavedPose
 from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
+from rosbot_patrol.ros.scan_watch import ScanWatch
 from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
-
-SILENT_S = 15.0  # as upstream: a lidar that says nothing for so long is warned of
 
 
 class AmclNode:
@@ -75,8 +74,7 @@ class AmclNode:
         self._localizer = Localizer(params, np.random.default_rng())
         self._transforms = Transforms()
         self._scans = ScanQueue(self._transforms, self._odom, self._base)
-        self._last_scan = now()
-        self._last_time = now()
+        self._watch = ScanWatch(self._transforms, "no pose is published")
         self._odom_from_base: Pose2D | None = None
         self._stamp = -math.inf  # of the newest scan taken in
         self._was_placed = False  # by initialpose, set_map or global_localization
@@ -117,7 +115,7 @@ class AmclNode:
 
     def _scan(self, message: LaserScanMsg) -> None:
         scan = scan_from_msg(message)
-        self._last_scan = now()
+        self._watch.hear()
         problem = scan_problem(scan)
         if problem:
             rospy.logwarn_throttle(10.0, f"scan of frame '{scan.frame_id}': {problem}; it is left out")
@@ -253,13 +251,8 @@ class AmclNode:
             rospy.logwarn_throttle(30.0, f"the pose cannot be saved on the parameter server: {err}")
 
     def _tell_health(self, current: float) -> None:
-        if current < self._last_time - 1.0:
-            log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
-            self._transforms.buffer.clear()
-        if abs(current - self._last_time) > SILENT_S:  # the clock was set, nobody was silent for so long
-            self._last_scan = current
-        self._last_time = current
-        level, message = self._state(current)
+        silence = self._watch.tend(current)
+        level, message = (WARN, silence) if silence else self._state()
         trust, estimate, seeking = self._localizer.trust, self._localizer.estimate, self._localizer.is_seeking
         values: dict[str, object] = {"scans dropped": self._scans.dropped, "scans late": self._late}
         if estimate is not None:
@@ -272,13 +265,7 @@ class AmclNode:
         self._health.set("Standard deviation", level, message, values)
         self._outputs.send_health(trust, estimate, max(self._stamp, 0.0), seeking=seeking)
 
-    def _state(self, current: float) -> tuple[int, str]:
-        silent = current - self._last_scan
-        if silent > SILENT_S:
-            topic = rospy.resolve_name("scan")
-            text = f"no laser scan received on {topic} for {silent:.0f} seconds: no pose is published"
-            rospy.logwarn_throttle(SILENT_S, text[0].upper() + text[1:])
-            return WARN, text
+    def _state(self) -> tuple[int, str]:
         if not self._localizer.has_map:
             return ERROR, "there is no map yet"
         if self._scans.problem:

@@ -34,14 +34,14 @@ from rosbot_patrol.gmapping.start import started
 from rosbot_patrol.ros.convert import grid_to_msg, scan_from_msg, transform_to_msg
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.grids import GetMapFast, GridMsg
-from rosbot_patrol.ros.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.node import Loop, load_params, run_node
 from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
+from rosbot_patrol.ros.scan_watch import ScanWatch
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.scan import LaserScan, scan_problem
 
 log = logging.getLogger(__name__)
 
-SILENT_S = 15.0  # a lidar that says nothing for so long is warned of
 WAITING = 50  # scans: more than a fast lidar sends before one that tf cannot place is given up and told of
 
 
@@ -62,11 +62,12 @@ class GmappingNode:
         self._slam = started(params)
         self._transforms = Transforms()
         self._scans = ScanQueue(self._transforms, self._odom, params.base_frame.lstrip("/"), WAITING)
-        self._last_scan = self._last_time = now()
+        self._watch = ScanWatch(self._transforms, "nothing is mapped")
         self._heard = self._beams = 0
         self._map_stamp = -math.inf  # of the scan that the map was last made after
         self._map: GridMsg | None = None
         self._correction = Pose2D()  # map_from_odom
+        self._sent_stamp = -math.inf  # of the transform last told
         self._note = ""  # what was wrong with the last update
         self._lock = threading.Lock()  # of the map's message
         self._health = Health()
@@ -94,7 +95,7 @@ class GmappingNode:
     # Inputs
 
     def _scan(self, message: LaserScanMsg) -> None:
-        self._last_scan = now()
+        self._watch.hear()
         self._heard += 1
         if (self._heard - 1) % self._params.throttle_scans:
             return
@@ -161,16 +162,14 @@ class GmappingNode:
     def _send_transform(self, current: float) -> None:
         delay = self._params.tf_delay
         stamp = current + (delay if delay >= 0.0 else self._params.transform_publish_period)
+        if stamp == self._sent_stamp:  # the clock stood, and tf warns of what it has heard
+            return
+        self._sent_stamp = stamp
         self._broadcaster.sendTransform(transform_to_msg(self._correction, self._map_frame, self._odom, stamp))
 
     def _tell_health(self, current: float) -> None:
-        if current < self._last_time - 1.0:
-            log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
-            self._transforms.buffer.clear()
-        if abs(current - self._last_time) > SILENT_S:  # the clock was set, nobody was silent for so long
-            self._last_scan = current
-        self._last_time = current
-        level, text = self._state(current)
+        silence = self._watch.tend(current)
+        level, text = (WARN, silence) if silence else self._state()
         maps = self._slam.maps
         values = {
             "updates": len(self._slam.stamps),
@@ -180,12 +179,7 @@ class GmappingNode:
         }
         self._health.set("", level, text, values)
 
-    def _state(self, current: float) -> tuple[int, str]:
-        silent = current - self._last_scan
-        if silent > SILENT_S:
-            text = f"no laser scan received on {rospy.resolve_name('scan')} for {silent:.0f} seconds: nothing is mapped"
-            rospy.logwarn_throttle(SILENT_S, text)
-            return WARN, text
+    def _state(self) -> tuple[int, str]:
         if self._scans.problem:
             rospy.logwarn_throttle(10.0, f"scans are dropped: {self._scans.problem}")
             return ERROR, f"scans are dropped: {self._scans.problem}"

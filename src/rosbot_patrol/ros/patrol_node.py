@@ -42,7 +42,6 @@ from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.known_objects import load_known
 from rosbot_patrol.patrol.manager import PatrolManager
 from rosbot_patrol.patrol.mission import Phase
-from rosbot_patrol.patrol.node_params import eyes_params
 from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.schedule import Schedule, load_schedule
@@ -105,7 +104,7 @@ class PatrolNode:
         rounds, zone = load_or_say(load_schedule, self.params.schedule, rooms, NO_ROUNDS, self.health)
         self.schedule = Schedule(rounds, zone, self.store.schedule)
         params = load_manager_params(self.params, tree, rospy.get_name() + "/")
-        views = Eyes(eyes_params(self.params))
+        views = Eyes(self.params)
         self.manager = PatrolManager(
             rooms,
             params,

@@ -11,7 +11,7 @@ from floors import drawn_floor, points, scan_over
 
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.patrol.coverage import sight_on_map
-from rosbot_patrol.patrol.eyes import Eyes, EyesParams
+from rosbot_patrol.patrol.eyes import Eyes, SightParams
 from rosbot_patrol.patrol.inputs import Box, Eye, Frame, GoalLink, GoalState, Inputs, Measured, ScanView
 from rosbot_patrol.patrol.judge import Judge, Known
 from rosbot_patrol.patrol.manager import ManagerParams, PatrolManager
@@ -57,7 +57,7 @@ class World:
         people: Callable[[float], list[Place]] = lambda now: [],
         *,
         params: ManagerParams | None = None,
-        eyes: EyesParams | None = None,
+        eyes: SightParams | None = None,
         judge: Judge | None = None,
         memory: dict | None = None,
         camera: bool = True,
@@ -191,7 +191,7 @@ def test_a_room_is_looked_at_from_further_viewpoints_until_enough_is_seen() -> N
 
 
 def test_a_spin_leaves_it_at_the_turn_and_says_what_it_saw() -> None:
-    world = World(eyes=EyesParams(look_around="spin"))
+    world = World(eyes=SightParams(look_around="spin"))
     mission = world.mission()
     assert len(world.goals) == 2
     assert 0.7 < mission.share_seen < 0.95
@@ -199,7 +199,7 @@ def test_a_spin_leaves_it_at_the_turn_and_says_what_it_saw() -> None:
 
 def test_viewpoints_are_bounded_in_number_and_time() -> None:
     for bound in (ViewpointParams(viewpoints_most=0), ViewpointParams(viewpoints_time=0.0, viewpoints_most=9)):
-        world = World(eyes=EyesParams(viewpoints=bound))
+        world = World(eyes=SightParams(viewpoints=bound))
         assert len(world.mission().views_done) <= 2
         assert len(world.goals) <= 3
 
@@ -218,7 +218,7 @@ def test_at_a_further_viewpoint_only_what_is_unseen_is_turned_over() -> None:
 
 
 def test_too_little_seen_is_unverified() -> None:
-    world = World(eyes=EyesParams(look_around="spin", clear_share=0.97))
+    world = World(eyes=SightParams(look_around="spin", clear_share=0.97))
     mission = world.mission()
     assert mission.verdict.value == "unverified"
     assert "of its floor could be seen" in mission.reason
@@ -313,7 +313,7 @@ def test_one_who_walks_in_the_room_is_kept_in_view() -> None:
 
 @pytest.mark.parametrize("distance", [2.0, 0.0])
 def test_no_viewpoint_and_no_way_to_one_leads_close_by_whom_it_has_met(distance: float) -> None:
-    world = World(lambda now: [(3.4, 1.0)], eyes=EyesParams(person_distance=distance))  # before the corner
+    world = World(lambda now: [(3.4, 1.0)], eyes=SightParams(person_distance=distance))  # before the corner
     mission = world.mission()
     assert mission.verdict.value == "confirmed"
     nearest = min(math.dist(goal[:2], (3.4, 1.0)) for goal in world.goals)
@@ -347,7 +347,7 @@ def test_what_is_too_far_off_to_be_measured_is_looked_at_from_near(flat: bool, v
 
 
 def test_what_nobody_could_look_at_from_near_is_unverified() -> None:
-    world = World(lambda now: [(3.2, 0.8)], eyes=EyesParams(look_around="spin"))
+    world = World(lambda now: [(3.2, 0.8)], eyes=SightParams(look_around="spin"))
     world.measures_to = 4.0
     mission = world.mission()
     assert mission.verdict.value == "unverified"
@@ -381,7 +381,7 @@ def test_what_looks_like_somebody_from_one_side_only_is_nobody() -> None:
 
 @pytest.mark.parametrize(("score", "verdict"), [(0.55, "unverified"), (0.42, "clear")])
 def test_what_could_be_looked_at_from_one_side_only_is_unverified(score: float, verdict: str) -> None:
-    world = World(lambda now: [(7.0, 1.0)], eyes=EyesParams(look_around="spin"))
+    world = World(lambda now: [(7.0, 1.0)], eyes=SightParams(look_around="spin"))
     world.score = lambda pose: score if math.dist(pose[:2], POINT[:2]) < 0.3 else 0.0
     mission = world.mission()
     assert mission.verdict.value == verdict
@@ -428,7 +428,7 @@ def test_what_moves_and_is_shown_whole_without_a_person_is_a_pet(sees_to: float,
 
 
 def test_what_is_too_near_and_seen_from_nowhere_else_is_unverified() -> None:
-    world = World(eyes=EyesParams(look_around="spin"))
+    world = World(eyes=SightParams(look_around="spin"))
     world.triggers = (1,)
     world.until(lambda w: w.phase is Phase.LOOKING)
     world.people = lambda now: [(10.5, 2.2)] if world.phase is Phase.LOOKING else []

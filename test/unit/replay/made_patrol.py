@@ -18,7 +18,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.eyes import Eyes
 from rosbot_patrol.patrol.inputs import GoalState
 from rosbot_patrol.patrol.manager import PatrolManager
-from rosbot_patrol.patrol.node_params import NodeParams, eyes_params
+from rosbot_patrol.patrol.node_params import NodeParams
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "test" / "unit" / "patrol"))
@@ -56,7 +56,7 @@ class RecordedWorld(World):
     """The world, and what rosbag would have written of it."""
 
     def __init__(self, **given: Any) -> None:
-        views = Eyes(eyes_params(NODE))
+        views = Eyes(NODE)
         super().__init__(PatrolManager(ROOMS, views=views, viewpoints=views.instead), **given)
         self._make = Maker()
         self.messages: list[tuple[float, str, Any]] = []

@@ -1,0 +1,53 @@
+"""Whether the lidar still speaks, and whether the clock went back: what amcl and slam_gmapping watch alike."""
+
+from __future__ import annotations
+
+import logging
+
+import rospy
+
+from rosbot_patrol.ros.node import now
+from rosbot_patrol.ros.transforms import Transforms
+
+log = logging.getLogger(__name__)
+
+SILENT_S = 15.0  # as upstream's amcl: a lidar that says nothing for so long is warned of
+
+
+class ScanWatch:
+    """Watches the topic `scan` of a node that lives on it.
+
+    Args:
+        transforms: forgotten when time goes back.
+        lost: what does not happen while no scan comes, such as "nothing is mapped".
+    """
+
+    def __init__(self, transforms: Transforms, lost: str) -> None:
+        self._transforms, self._lost = transforms, lost
+        self._last_scan = self._last_time = now()
+
+    def hear(self) -> None:
+        """A scan came."""
+        self._last_scan = now()
+
+    def tend(self, current: float) -> str:
+        """Look at the clock and the lidar; to be called each second or so.
+
+        Args:
+            current: time now [s].
+
+        Returns:
+            What is wrong with the lidar, empty where it speaks.
+        """
+        if current < self._last_time - 1.0:
+            log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
+            self._transforms.buffer.clear()
+        if abs(current - self._last_time) > SILENT_S:  # the clock was set, nobody was silent for so long
+            self._last_scan = current
+        self._last_time = current
+        silent = current - self._last_scan
+        if silent <= SILENT_S:
+            return ""
+        text = f"no laser scan received on {rospy.resolve_name('scan')} for {silent:.0f} seconds: {self._lost}"
+        rospy.logwarn_throttle(SILENT_S, text[0].upper() + text[1:])
+        return text
