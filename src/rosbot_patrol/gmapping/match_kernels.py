@@ -23,7 +23,11 @@ Cells = NDArray[np.uint16]
 FREE_RATIO = 1.4143  # cells before a beam's end where the cell must be free
 NULL = 0.5  # squared distance [m2] that a beam which found no wall counts as
 MOST_MOVES = 200
-LONELY = 0.5  # what a beam counts in both directions whose wall's direction is not known
+LONELY = 0.5  # what a beam counts in both directions whose wall's direction is not known, however good the lidar is
+FIRST_BEAMS = 120  # about so many beams begin a refinement
+NEAR, NEAR_TURN = 0.05, 5e-4  # steps of a refinement [cells, rad] from which on all of them take part
+DONE, DONE_TURN = 0.01, 1e-4  # and those at which it ends
+WIDEST = 1.0  # variance of the beams' distances from the walls, at most [cells2]
 LOSS = 0.8  # a refinement that brings less than this share of the score before is not taken
 
 
@@ -88,19 +92,35 @@ def score_of(
 
 
 @kernel()
-def log_likelihood_of(
-    table: Table, cells: Cells, pose: Array, beams: Array, every: int, reach: int, sigma: float, null: float
-) -> float:
-    """Sum of -d2 / sigma over every so many-th beam, `null` / sigma for each that finds no wall."""
+def fit_of(
+    table: Table,
+    cells: Cells,
+    pose: Array,
+    beams: Array,
+    skip: int,
+    reach: int,
+    sigma: float,
+    lsigma: float,
+    null: float,
+) -> tuple[float, float]:
+    """Score and log-likelihood of a pose, from one look at the beams.
+
+    Returns:
+        Sum of exp(-d2 / sigma) over the beams; sum of -d2 / lsigma over every `skip`-th, `null` / lsigma for each that
+        finds no wall.
+    """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    total = 0.0
-    for k in range(0, beams.shape[0], every):
+    score, likelihood = 0.0, 0.0
+    for k in range(beams.shape[0]):
         bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
         d2, _, _ = nearest_wall(
             table, cells, pose[0] + c * bx - s * by, pose[1] + s * bx + c * by, c * ux - s * uy, s * ux + c * uy, reach
         )
-        total -= (d2 if d2 >= 0.0 else null) / sigma
-    return total
+        if d2 >= 0.0:
+            score += math.exp(-d2 / sigma)
+        if k % skip == 0:
+            likelihood -= (d2 if d2 >= 0.0 else null) / lsigma
+    return score, likelihood
 
 
 @kernel()
@@ -203,12 +223,30 @@ def solve(lower: Array, v: Array) -> None:
 
 @kernel()
 def add_beams(
-    table: Table, cells: Cells, pose: Array, beams: Array, reach: int, weight: float, information: Array, slope: Array
-) -> None:
-    """Add what the beams say to the normal equations of a pose: information (3, 3) and slope (3,)."""
+    table: Table,
+    cells: Cells,
+    pose: Array,
+    beams: Array,
+    every: int,
+    reach: int,
+    weight: float,
+    lonely: float,
+    information: Array,
+    slope: Array,
+) -> float:
+    """Add what every so many-th beam says to the normal equations of a pose: information (3, 3) and slope (3,).
+
+    It counts for those left out, too.
+
+    Returns:
+        Variance [cells2] of the distances to the walls, as of a Gaussian: what lies far off hardly counts. At most
+        `WIDEST`, which is also where no beam found a wall.
+    """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     a00, a01, a02, a11, a12, a22, g0, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(beams.shape[0]):
+    count, squares = 0.0, 0.0  # of the beams whose wall's direction is known
+    weight *= every
+    for k in range(0, beams.shape[0], every):
         bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
         rx, ry = c * bx - s * by, s * bx + c * by
         d2, dx, dy = nearest_wall(table, cells, pose[0] + rx, pose[1] + ry, c * ux - s * uy, s * ux + c * uy, reach)
@@ -219,9 +257,13 @@ def add_beams(
             n00, n01, n11 = nx * nx, nx * ny, ny * ny
             across = nx * dx + ny * dy
             d2 = across * across
+            believed = math.exp(-0.5 * d2)
+            count += believed
+            squares += believed * d2
         else:
-            n00, n01, n11 = LONELY, 0.0, LONELY
-        w = weight * math.exp(-0.5 * d2)
+            n00, n01, n11 = lonely, 0.0, lonely
+            believed = math.exp(-0.5 * d2)
+        w = weight * believed
         tx, ty = n00 * -ry + n01 * rx, n01 * -ry + n11 * rx  # N times the derivative by the turn
         ex, ey = n00 * dx + n01 * dy, n01 * dx + n11 * dy
         a00 += w * n00
@@ -245,6 +287,10 @@ def add_beams(
     slope[0] += g0
     slope[1] += g1
     slope[2] += g2
+    if count == 0.0:
+        return WIDEST
+    mean = squares / count  # v / (1 + v) of a Gaussian's variance v, by the weights
+    return min(mean / max(1.0 - mean, 1e-9), WIDEST)
 
 
 @kernel()
@@ -256,10 +302,12 @@ def refine(
     beams: Array,
     prior: Array,
     rounds: int,
+    every: int,
     reach: int,
     weight: float,
+    lonely: float,
     lower: Array,
-) -> None:
+) -> float:
     """Gauss-Newton on the distances to the walls and the prior about `guess`.
 
     Args:
@@ -270,25 +318,33 @@ def refine(
         beams: see `match_particles`.
         prior: information of the guess, shape (3, 3).
         rounds: most steps.
+        every: begin with every so many-th beam, and take all of them near the end.
         reach: of `nearest_wall`.
         weight: information of one beam [1/cells2].
+        lonely: share of it that a beam has in both directions whose wall's direction is not known.
         lower: becomes the Cholesky factor of the information at the last step, shape (3, 3).
+
+    Returns:
+        Variance of the distances at the last step, see `add_beams`.
     """
-    information, slope = np.empty((3, 3)), np.empty(3)
+    information, slope, variance = np.empty((3, 3)), np.empty(3), WIDEST
     for _ in range(rounds):
         information[:] = prior
         off_x, off_y, turn = pose[0] - guess[0], pose[1] - guess[1], pose[2] - guess[2]
         for i in range(3):
             slope[i] = prior[i, 0] * off_x + prior[i, 1] * off_y + prior[i, 2] * turn
-        add_beams(table, cells, pose, beams, reach, weight, information, slope)
+        variance = add_beams(table, cells, pose, beams, every, reach, weight, lonely, information, slope)
         factorise(information, lower)
         solve(lower, slope)
         way = math.hypot(slope[0], slope[1])
         shrink = min(1.0, 1.0 / max(way, 1e-9), 0.05 / max(abs(slope[2]), 1e-9))
         for i in range(3):
             pose[i] -= shrink * slope[i]
-        if way < 2e-3 and abs(slope[2]) < 2e-5:
-            return
+        if every > 1 and way < NEAR and abs(slope[2]) < NEAR_TURN:
+            every = 1
+        elif way < DONE and abs(slope[2]) < DONE_TURN:
+            break
+    return variance
 
 
 @kernel(
@@ -319,13 +375,14 @@ def match_particles(
         deviation: of the odometry's move ahead, to the left [cells] and in turning, shape (3,).
         noise: standard normal numbers, shape (N, 3).
         tuning: lstep [cells], astep, halvings, rounds, beams to skip in the search, reach, sigma, lsigma [cells2],
-            null [cells2], beams to skip in the likelihood, information of a beam [1/cells2], least score, shape (12,).
+            null [cells2], beams to skip in the likelihood, information of a beam [1/cells2], share of it for a
+            beam without a line, least score, shape (13,).
         poses: becomes the drawn poses, shape (N, 3).
-        fits: becomes score (0 where the match failed), logarithm of the likelihood at the match and the match's x, y
-            [cells], yaw, shape (N, 5).
+        fits: becomes score (0 where the match failed), logarithm of the likelihood at the match, the match's x, y
+            [cells], yaw and the variance of the beams' distances from the walls there [cells2], shape (N, 6).
     """
-    lstep, astep, halvings, rounds, every, reach_, sigma, lsigma, null, lskip, weight, least = tuning
-    reach = int(reach_)
+    lstep, astep, halvings, rounds, every, reach_, sigma, lsigma, null, lskip, weight, lonely, least = tuning
+    reach, fine = int(reach_), max(beams.shape[0] // FIRST_BEAMS, 1)
     gain = 0.5 * sigma * weight
     lower, prior, pose, climbed, drawn = np.empty((3, 3)), np.zeros((3, 3)), np.empty(3), np.empty(3), np.empty(3)
     for i in range(guesses.shape[0]):
@@ -338,17 +395,19 @@ def match_particles(
         pose[:] = guesses[i]
         climb(table, cells, pose, beams, prior, lstep, astep, int(halvings), int(every), reach, sigma, gain)
         climbed[:] = pose
-        refine(table, cells, pose, guesses[i], beams, prior, int(rounds), reach, weight, lower)
-        before = score_of(table, cells, climbed[0], climbed[1], climbed[2], beams, 1, reach, sigma)
-        score = score_of(table, cells, pose[0], pose[1], pose[2], beams, 1, reach, sigma)
-        if score < LOSS * before:
-            pose[:], score = climbed, before
-        if score <= least:
-            pose[:], score = guesses[i], 0.0
+        fits[i, 5] = refine(
+            table, cells, pose, guesses[i], beams, prior, int(rounds), fine, reach, weight, lonely, lower
+        )
+        before = score_of(table, cells, climbed[0], climbed[1], climbed[2], beams, fine, reach, sigma)
+        if score_of(table, cells, pose[0], pose[1], pose[2], beams, fine, reach, sigma) < LOSS * before:
+            pose[:], fits[i, 5] = climbed, WIDEST
+        fits[i, 0], fits[i, 1] = fit_of(table, cells, pose, beams, int(lskip), reach, sigma, lsigma, null)
+        if fits[i, 0] <= least:
+            pose[:], fits[i, 5] = guesses[i], WIDEST
             factorise(prior, lower)
-        fits[i, 0] = score
-        fits[i, 1] = log_likelihood_of(table, cells, pose, beams, int(lskip), reach, lsigma, null)
-        fits[i, 2:] = pose
+            _, fits[i, 1] = fit_of(table, cells, pose, beams, int(lskip), reach, sigma, lsigma, null)
+            fits[i, 0] = 0.0
+        fits[i, 2:5] = pose
         drawn[:] = noise[i]
         solve_upper(lower, drawn)
         poses[i] = pose + drawn

@@ -2,6 +2,8 @@
 
 Grisetti, Stachniss, Burgard: Improved techniques for grid mapping with Rao-Blackwellized particle filters (2007). The
 Gaussian of the proposal is taken from the curvature at the match and the odometry's prior, not from samples about it.
+How much a beam says is learned from how far the matched beams ended from the walls: the better lidar and map are, the
+narrower the poses are drawn.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ Array = NDArray[np.float64]
 SEARCH_BEAMS = 90  # about so many beams take part in the search
 HALVINGS = 2  # of the search's steps; the refinement does the rest
 INDEPENDENT = 90  # beams beyond these say nothing new about the pose: their errors hang together
+LEARNING = 0.05  # what a match counts for the variance of the beams
+NARROWEST = 0.04  # of that variance [cells2]: a fifth of a cell
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ class ScanMatcher:
 
     def __init__(self, params: GmappingParams) -> None:
         self._params = params
+        self.variance = kernels.WIDEST  # of the beams' distances from the walls, so far [cells2]
+        self._matched = 0
 
     def match(
         self, maps: ParticleMaps, guesses: Array, headings: Array, beams: Beams, deviation: Array, noise: Array
@@ -66,20 +72,21 @@ class ScanMatcher:
         hits = beams.hits
         hits[:, :2] /= maps.resolution
         sigmas = deviation / np.array([maps.resolution, maps.resolution, 1.0])
-        poses, fits = np.empty_like(guesses), np.empty((len(guesses), 5))
-        kernels.match_particles(
-            maps.tables,
-            maps.cells,
-            maps.to_cells(guesses),
-            hits,
-            np.ascontiguousarray(headings),
-            sigmas,
-            noise,
-            self._tuning(len(hits), maps.resolution),
-            poses,
-            fits,
-        )
-        return Matches(maps.from_cells(poses), maps.from_cells(fits[:, 2:]), fits[:, 0], fits[:, 1])
+        places = maps.to_cells(guesses), hits, np.ascontiguousarray(headings), sigmas, noise
+        if self._matched == 0:  # once to learn how good the beams are: the first draws turn the whole map
+            self._match(maps, *places)
+        poses, fits = self._match(maps, *places)
+        return Matches(maps.from_cells(poses), maps.from_cells(fits[:, 2:5]), fits[:, 0], fits[:, 1])
+
+    def _match(self, maps: ParticleMaps, guesses: Array, hits: Array, *given: Array) -> tuple[Array, Array]:
+        """Poses and fits of `match_particles`, and what the variance of the beams is after it."""
+        poses, fits = np.empty_like(guesses), np.empty((len(guesses), 6))
+        tuning = self._tuning(len(hits), maps.resolution)
+        kernels.match_particles(maps.tables, maps.cells, guesses, hits, *given, tuning, poses, fits)
+        self._matched += 1
+        share = max(LEARNING, 1.0 / self._matched)
+        self.variance += share * (max(float(np.median(fits[:, 5])), NARROWEST) - self.variance)
+        return poses, fits
 
     def _tuning(self, beams: int, resolution: float) -> Array:
         p, area = self._params, resolution * resolution
@@ -95,7 +102,8 @@ class ScanMatcher:
                 p.lsigma / area,
                 kernels.NULL / area,
                 p.lskip + 1,
-                1.0 / max(1.0, beams / INDEPENDENT),
+                1.0 / (self.variance * max(1.0, beams / INDEPENDENT)),
+                kernels.LONELY * self.variance,
                 p.minimumScore,
             ]
         )
