@@ -72,17 +72,19 @@ class ScanMatcher:
         hits = beams.hits
         hits[:, :2] /= maps.resolution
         sigmas = deviation / np.array([maps.resolution, maps.resolution, 1.0])
-        places = maps.to_cells(guesses), hits, np.ascontiguousarray(headings), sigmas, noise
+        given = maps.to_cells(guesses), hits, np.ascontiguousarray(headings), sigmas, noise
         if self._matched == 0:  # once to learn how good the beams are: the first draws turn the whole map
-            self._match(maps, *places)
-        poses, fits = self._match(maps, *places)
+            self._match(maps, *given)
+        poses, fits = self._match(maps, *given)
         return Matches(maps.from_cells(poses), maps.from_cells(fits[:, 2:5]), fits[:, 0], fits[:, 1])
 
-    def _match(self, maps: ParticleMaps, guesses: Array, hits: Array, *given: Array) -> tuple[Array, Array]:
+    def _match(
+        self, maps: ParticleMaps, guesses: Array, hits: Array, headings: Array, sigmas: Array, noise: Array
+    ) -> tuple[Array, Array]:
         """Poses and fits of `match_particles`, and what the variance of the beams is after it."""
         poses, fits = np.empty_like(guesses), np.empty((len(guesses), 6))
         tuning = self._tuning(len(hits), maps.resolution)
-        kernels.match_particles(maps.tables, maps.cells, guesses, hits, *given, tuning, poses, fits)
+        kernels.match_particles(maps.tables, maps.cells, guesses, hits, headings, sigmas, noise, tuning, poses, fits)
         self._matched += 1
         share = max(LEARNING, 1.0 / self._matched)
         self.variance += share * (max(float(np.median(fits[:, 5])), NARROWEST) - self.variance)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from mapped_room import CORRIDOR, scan_at, small
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.gmapping.beams import pick_beams
+from rosbot_patrol.gmapping.beams import Beams, pick_beams
 from rosbot_patrol.gmapping.motion_model import move_deviation, move_poses
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.gmapping.particle_map import ParticleMaps
@@ -66,6 +67,27 @@ def test_the_proposal_is_wide_along_a_corridor_and_narrow_across(corridor: Parti
     assert 0.03 < abs(drawn(1.0, 0.0, 0.0)[0]) < 0.11  # a few lone far ends hold it, too
     assert abs(drawn(0.0, 1.0, 0.0)[1]) < 0.01
     assert abs(drawn(0.0, 0.0, 1.0)[2]) < 0.02
+
+
+@pytest.mark.parametrize(("noise", "low", "high"), [(0.0, 0.2, 0.2), (0.02, 0.3, 0.5), (0.05, 0.5, 1.0)])
+def test_the_better_the_beams_the_narrower_the_proposal(noise: float, low: float, high: float) -> None:
+    """`low` and `high`: of what it learns of the beams [cells], 0.05 m each."""
+    rng = np.random.default_rng(3)
+    params = small()
+    maps = ParticleMaps((-8.0, -8.0), (8.0, 8.0), 0.05, 1)
+    matcher, still = ScanMatcher(params), np.zeros((1, 3))
+
+    def seen() -> Beams:
+        scan = scan_at(Pose2D(), beams=360)
+        return pick_beams(replace(scan, ranges=scan.ranges + rng.normal(0.0, noise, 360)), Mount(), params)
+
+    for _ in range(20):
+        maps.register(still, seen())
+    drawn = [matcher.match(maps, still, np.zeros(1), seen(), SIGMAS, np.array([(0.0, 0.0, 1.0)])) for _ in range(30)]
+    learned = math.sqrt(matcher.variance)
+    assert low - 1e-9 <= learned <= high
+    turned = abs(drawn[-1].poses[0] - drawn[-1].modes[0])[2]
+    assert turned == pytest.approx(0.003 * learned, rel=0.4)  # of 90 beams with arms of 2 m
 
 
 def test_a_match_that_is_not_believed_follows_the_odometry() -> None:
