@@ -47,6 +47,13 @@ def test_a_drive_is_followed_better_than_by_the_wheels() -> None:
     assert math.hypot(last.x - WAY[-1].x, last.y - WAY[-1].y) > 0.15
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_good_lidar_is_followed_as_exactly_as_it_measures(seed: int) -> None:
+    errors = driven(Slam(small(seed=seed)), beams=720)
+    assert errors[:, 0].max() < 0.012  # a quarter of a cell
+    assert errors[:, 1].max() < math.radians(0.2)
+
+
 def test_the_map_has_the_rooms_walls() -> None:
     slam = Slam(small())
     driven(slam, beams=720)
