@@ -51,7 +51,7 @@ def messages() -> Iterator[tuple[float, str, Any]]:
     rooms = [(room.pose.x, room.pose.y) for room in load_rooms(ROOT / "params" / "room_points.yaml")]
     poses = mapping_house.drive(mapping_house.waypoints([*rooms[:4], rooms[0]]))
     odometry = noisy_odometry(poses, np.random.default_rng(1))
-    field = blocked_distances(mapping_house.plan(0.02), 3.0)
+    field = blocked_distances(mapping_house.plan(mapping_house.WORLD, mapping_house.BOUNDS, 0.02), 3.0)
     mount = mapping_house.MOUNT.pose
     laser = maker.transform("base_link", "laser", BEGIN, (mount.x, mount.y, 0.1), (0.0, 0.0, 1.0, 0.0))
     yield BEGIN, "/tf_static", maker.tf(laser)
