@@ -137,6 +137,28 @@ def test_killed_in_mission_goes_on_after_respawn_with_one_mail(house):
     assert len(house.mails()) == 1
 
 
+def test_killed_right_after_the_notice_it_stays_confirmed(house):
+    """What the patrol remembers is then older than the notice, and nobody may be in view any more."""
+    house.start_move_base()
+    house.start_patrol()
+    house.send(2)
+    memory = house.folder / "state" / "patrol.json"
+    wait_until(lambda: memory.exists() and '"phase": "looking"' in memory.read_text(), 20, "the look")
+    old = memory.read_bytes()
+    house.person = True
+    wait_until(lambda: any(a.delivered for a in house.alerts), 20, "the delivery")
+    os.killpg(house.patrol.pid, signal.SIGKILL)
+    house.patrol.wait()
+    memory.write_bytes(old)
+    house.person = False
+    house.start_patrol(wait=False)
+    assert house.wait_for_mission().last_verdict == "confirmed"
+    assert len(house.mails()) == 1
+    wait_until(lambda: "is on record: confirmed" in house.log(house.patrol), 20, "the record")
+    (incident,) = [p for p in (house.folder / "state" / "incidents").iterdir() if p.is_dir()]
+    assert any(p.name == "seen.jpg" for p in incident.iterdir())
+
+
 def test_latched_trigger_makes_no_second_mission_after_respawn(house):
     house.start_move_base()
     house.start_patrol()

@@ -70,6 +70,22 @@ class Outbox:
         """Whether a notice of this id waits or was delivered."""
         return any(found["id"] == notice_id for found in self._all_names())
 
+    def find(self, notice_id: str) -> Notice | None:
+        """The notice of this id, waiting or delivered; None where there is none.
+
+        Raises:
+            OSError: its file cannot be read.
+            ValueError: its file is no notice.
+        """
+        for found in self._all_names():
+            if found["id"] == notice_id:
+                for folder in (self.folder, self.sent):  # it may have moved meanwhile
+                    try:
+                        return Notice.from_bytes((folder / found[0]).read_bytes())
+                    except FileNotFoundError:
+                        continue
+        return None
+
     def put(self, notice: Notice) -> bool:
         """Keep a notice until it is delivered; returns False where one of its id is known already.
 

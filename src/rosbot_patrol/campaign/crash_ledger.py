@@ -174,10 +174,10 @@ def balance(
         for record in confirmed
         if len(by_incident.get(record.id, ())) != 1
     ]
-    known = {record.id for record in confirmed}
-    strangers += [
-        f"a mail tells of the incident {name}, which is not kept" for name in by_incident if name not in known
-    ]
+    verdicts = {record.id: record.verdict for record in records}
+    for name in sorted(by_incident.keys() - {record.id for record in confirmed}):
+        kept = f"is on record as {verdicts[name] or 'open'}" if name in verdicts else "is not kept"
+        strangers.append(f"a mail tells of the incident {name}, which {kept}")
     copies = Counter(mail.message_id for mail in mails)
     return Books(
         kills=Counter(str(kill["victim"]) for kill in kills),

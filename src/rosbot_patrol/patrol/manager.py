@@ -69,8 +69,21 @@ class PatrolManager(Ordered):
         self._homes_tried = 0
         self._is_first = True
         self._is_stopped = False
+        self._told: dict[str, str] = {}  # by the id of a call that waits
         if memory:
             recall.recall(self, self._intake, memory)
+
+    def note_told(self, mission_id: str, reason: str) -> None:
+        """The notice of a mission is on disk from before the program's start; the memory may be older than that.
+
+        Args:
+            mission_id: of the mission that runs or of a call that waits.
+            reason: what the notice says, one sentence.
+        """
+        if self.mission is not None and self.mission.id == mission_id:
+            recall.confirm(self.mission, reason)
+        else:
+            self._told[mission_id] = reason
 
     def snapshot(self) -> dict[str, Any]:
         """What has to outlive the program, for JSON."""
@@ -199,6 +212,8 @@ class PatrolManager(Ordered):
 
     def _begin(self, inputs: Inputs, out: Commands) -> None:
         self.mission = recall.begin(self.queue.pop(), self.rooms, inputs.wall)
+        if self.mission.id in self._told:
+            recall.confirm(self.mission, self._told.pop(self.mission.id))
         self._home = None
         out.changed = True
         self._start(inputs, Phase.DRIVING)

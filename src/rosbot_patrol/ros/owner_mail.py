@@ -78,6 +78,10 @@ class OwnerPost:
         """Whether a notice of this id waits or was delivered."""
         return self._outbox.has(notice_id)
 
+    def find(self, notice_id: str) -> Notice | None:
+        """A notice that waits or was delivered, None where there is none. Raises OSError, ValueError."""
+        return self._outbox.find(notice_id)
+
     def put(self, notice: Notice) -> None:
         """Keep a notice until it is delivered.
 

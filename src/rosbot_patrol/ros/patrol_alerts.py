@@ -73,6 +73,27 @@ class AlertDesk:
         """Whether every notice and memory taken is on disk."""
         return not self._jobs and self._memory is None
 
+    def is_held(self, incident: str) -> bool:
+        """Whether the notice of this incident waits for the entry delay."""
+        return self._held.has(token(incident))
+
+    def told(self, incident: str) -> PostNotice | None:
+        """The notice of an incident from before the program's start, None where there is none."""
+        try:
+            return self._held.get(token(incident)) or self._post.find(token(incident))
+        except (OSError, ValueError) as err:
+            log.error("the notice about %s cannot be read: %s", incident, err)
+            return None
+
+    def recall(self, incident: str, notice: PostNotice) -> None:
+        """Complete the record of a mission whose notice is older than what the patrol remembers."""
+        event = Event(wall=notice.wall, kind="seen", text="somebody was seen, and the program was killed right after")
+        self._keeper.put([Entry(incident=incident, changes={"confirmed": notice.wall}, events=(event,))])
+        if notice.picture is not None:
+            caption = "sent with the notice"
+            file = NewFile(name="seen.jpg", role="detection", data=notice.picture, stamp=notice.wall, caption=caption)
+            self._keeper.put_picture(incident, file)
+
     def take(self, notice: Notice, ros_time: float) -> None:
         """Take an intruder's notice; returns at once."""
         mission, seen, pose = notice.mission, notice.seen, notice.pose

@@ -28,6 +28,7 @@ from rosbot_patrol.alerts.album import Sighting
 from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.alerts.evidence import EvidenceParams
 from rosbot_patrol.alerts.mail import one_line
+from rosbot_patrol.alerts.notice import Notice as PostNotice
 from rosbot_patrol.alerts.picture import LabelledBox
 from rosbot_patrol.alerts.retention import RetentionParams
 from rosbot_patrol.geometry import Pose2D
@@ -71,6 +72,8 @@ from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.sensors.sensor_file import load_sensors
 
 log = logging.getLogger(__name__)
+
+HELD_MOST = 86400.0  # [s] no entry delay is longer; when one is over arming says
 
 
 class PatrolNode:
@@ -139,6 +142,7 @@ class PatrolNode:
         self.markers = PeopleMarkers(inputs.map_frame)
         self._shown = ""
         self._is_over = False
+        self._older: dict[str, PostNotice] = {}  # by incident: from before the start, and of which the memory knows not
         self._is_signalled = False
         self._round_at = -math.inf
         self._schedule_changed = False
@@ -156,13 +160,28 @@ class PatrolNode:
             self._note_signal(number)
         rospy.on_shutdown(self._stop)
         mission = [self.manager.mission.id] if self.manager.mission is not None else []
-        self.keeper.start([*mission, *(request.id for request in self.manager.queue)])
+        running = [*mission, *(request.id for request in self.manager.queue)]
+        self.keeper.start(running)
+        for mission_id in running:
+            self._recall_notice(mission_id)
         self.desk.start()
         self.inputs.start()
         self.missed.start()
         self._actions.start()
         self._loop.start()
         rospy.spin()
+
+    def _recall_notice(self, mission_id: str) -> None:
+        """The program may have been killed after a notice was written and before the rest knew of it."""
+        notice = self.desk.told(mission_id)
+        mission = self.manager.mission
+        if notice is None or (mission is not None and mission.id == mission_id and mission.notified):
+            return
+        why = dict(notice.facts).get("Why", "somebody was seen")
+        self.manager.note_told(mission_id, why)
+        self._older[mission_id] = notice
+        if self.desk.is_held(mission_id):
+            self.manager.held.setdefault(mission_id, notice.wall + HELD_MOST)
 
     # -- step
 
@@ -248,6 +267,8 @@ class PatrolNode:
             heard=self.inputs.take_heard(),
         )
         self.keeper.put(entries)
+        if mission is not None and mission.id in self._older:
+            self.desk.recall(mission.id, self._older.pop(mission.id))
         self.keeper.look(mission.id if mission is not None and mission.phase is Phase.LOOKING else "")
 
     def _show_people(self, time_now: float, commands: Commands) -> None:

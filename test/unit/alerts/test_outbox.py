@@ -47,6 +47,16 @@ def test_order_goes_on_after_all_were_delivered(tmp_path):
     assert Outbox(tmp_path).waiting()[0].name == "000000000002-b.notice"
 
 
+def test_a_notice_is_found_while_it_waits_and_when_it_was_delivered(tmp_path):
+    box = Outbox(tmp_path)
+    assert box.find("one") is None
+    box.put(make("one"))
+    assert box.find("one") == make("one")
+    box.finish(box.waiting()[0])
+    assert box.find("one") == make("one")
+    assert box.find("on") is None
+
+
 def test_what_a_lane_has_to_know_is_known_without_the_text(tmp_path):
     outbox = Outbox(tmp_path)
     outbox.put(make("a", kind="sensor", channels=("phone",)))

@@ -77,6 +77,14 @@ def test_mails_that_do_not_add_up(mails: list[KeptMail], told: str) -> None:
     assert told in books.text()
 
 
+def test_a_mail_about_what_is_on_record_as_clear_is_told() -> None:
+    records = [record("a", 10.4, "clear"), record("b", 20.0, "")]
+    mails = [MAIL, KeptMail(message_id="<2@x>", incident="b")]
+    told = balance([call("p0", 10.0), VERDICT], records, mails, verified="", waiting=0).text()
+    assert "a mail tells of the incident a, which is on record as clear" in told
+    assert "a mail tells of the incident b, which is on record as open" in told
+
+
 def test_a_call_is_answered_by_what_the_patrol_kept_of_it_alone() -> None:
     journal = [call("p0", 100.0), kill("p0", ALL), {**VERDICT, "verdict": "clear"}, call("p1", 200.0, 1)]
     answers = [record("a", 100.3, "unverified"), record("b", 201.0, "clear")]

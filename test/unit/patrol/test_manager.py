@@ -260,6 +260,24 @@ def test_a_killed_patrol_goes_on_with_mission_and_queue(moment):
     assert again.goals[0].pose.x == (0.0 if moment is Phase.RETURNING else 20.0)
 
 
+@pytest.mark.parametrize("is_running", [True, False])
+def test_a_notice_that_is_newer_than_the_memory_confirms_its_mission(is_running):
+    world = World()
+    world.triggers = [2]
+    world.run(looking)
+    memory = world.manager.snapshot()
+    if not is_running:  # killed before the memory knew that the mission had begun
+        plain = memory["mission"]
+        request = Request(room_id=2, id=plain["id"], wall=plain["called"])
+        memory |= {"mission": None, "queue": [request_to_plain(request)]}
+    again = World(PatrolManager(ROOMS, memory=memory), x=world.x)
+    again.manager.note_told(world.manager.mission.id, "a person was seen in room 2")
+    again.run(lambda w: w.ended)
+    assert (again.ended[0].verdict.value, again.ended[0].reason) == ("confirmed", "a person was seen in room 2")
+    assert again.ended[0].sightings == 1
+    assert again.notices == []
+
+
 @pytest.mark.parametrize("memory", [{"count": "x"}, {"count": 1}, {"count": 1, "queue": 5, "mission": 3}, {"a": None}])
 def test_memory_that_makes_no_sense_is_said_and_dropped(memory, caplog):
     manager = PatrolManager(ROOMS, memory=memory)
