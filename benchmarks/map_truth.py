@@ -17,6 +17,7 @@ import numpy as np
 
 from rosbot_patrol.amcl.field_kernels import cast_ray
 from rosbot_patrol.amcl.likelihood_field import blocked_distances
+from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.distance_kernels import bounded_distances
 from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
@@ -96,6 +97,8 @@ def _seen_walls(fine: Grid, info: GridInfo) -> np.ndarray:
     room = (bounded_distances(fine.cells != FREE, round(RADIUS / FINE) + 1) * FINE > RADIUS).astype(np.uint8)
     _, parts = cv2.connectedComponents(room, connectivity=4)
     ix, iy = fine.info.cell_of(0.0, 0.0)
+    if not room[iy, ix]:
+        raise MapError("floor plan", f"the robot has no room at (0, 0): something is within {RADIUS} m")
     step = round(EACH / FINE)
     rows, columns = np.nonzero(parts[::step, ::step] == parts[iy, ix])
     field = blocked_distances(fine, 3.0)

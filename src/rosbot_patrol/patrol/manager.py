@@ -73,17 +73,26 @@ class PatrolManager(Ordered):
         if memory:
             recall.recall(self, self._intake, memory)
 
-    def note_told(self, mission_id: str, reason: str) -> None:
+    def note_told(self, mission_id: str, reason: str, *, held_until: float | None = None) -> bool:
         """The notice of a mission is on disk from before the program's start; the memory may be older than that.
 
         Args:
             mission_id: of the mission that runs or of a call that waits.
             reason: what the notice says, one sentence.
+            held_until: where it waits for the entry delay: at the latest until then, in seconds since 1970.
+
+        Returns:
+            Whether it was news: then the mission is confirmed.
         """
-        if self.mission is not None and self.mission.id == mission_id:
-            recall.confirm(self.mission, reason)
-        else:
+        if self.mission is None or self.mission.id != mission_id:
             self._told[mission_id] = reason
+        elif self.mission.notified:
+            return False
+        else:
+            recall.confirm(self.mission, reason)
+        if held_until is not None:
+            self.held.setdefault(mission_id, held_until)
+        return True
 
     def snapshot(self) -> dict[str, Any]:
         """What has to outlive the program, for JSON."""

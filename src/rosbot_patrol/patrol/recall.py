@@ -65,18 +65,11 @@ def recall(manager: PatrolManager, intake: Intake, memory: Mapping[str, Any]) ->
         log.info("going on with the mission to %s where the last run stopped", mission.room.title)
 
 
-def confirm(mission: Mission, reason: str) -> bool:
-    """Its notice is on disk, and yet the memory knows of nobody: the program was killed between the two.
-
-    Returns:
-        Whether that is so; then the mission's verdict is `confirmed`.
-    """
-    if mission.verdict is Verdict.CONFIRMED:
-        return False
+def confirm(mission: Mission, reason: str) -> None:
+    """Its notice is on disk, and yet the memory knows of nobody: the program was killed between the two."""
     mission.verdict, mission.reason, mission.notified = Verdict.CONFIRMED, reason, True
     mission.sightings = max(mission.sightings, 1)
     log.warning("%s", reason)
-    return True
 
 
 def _queue(queue: MissionQueue, requests: list[Request], rooms: Rooms) -> None:

@@ -73,7 +73,7 @@ from rosbot_patrol.sensors.sensor_file import load_sensors
 
 log = logging.getLogger(__name__)
 
-HELD_MOST = 86400.0  # [s] no entry delay is longer; when one is over arming says
+HELD_MOST = 600.0  # [s] no entry delay is longer; when one is over arming says
 
 
 class PatrolNode:
@@ -174,14 +174,12 @@ class PatrolNode:
     def _recall_notice(self, mission_id: str) -> None:
         """The program may have been killed after a notice was written and before the rest knew of it."""
         notice = self.desk.told(mission_id)
-        mission = self.manager.mission
-        if notice is None or (mission is not None and mission.id == mission_id and mission.notified):
+        if notice is None:
             return
         why = dict(notice.facts).get("Why", "somebody was seen")
-        self.manager.note_told(mission_id, why)
-        self._older[mission_id] = notice
-        if self.desk.is_held(mission_id):
-            self.manager.held.setdefault(mission_id, notice.wall + HELD_MOST)
+        until = notice.wall + HELD_MOST if self.desk.is_held(mission_id) else None
+        if self.manager.note_told(mission_id, why, held_until=until):
+            self._older[mission_id] = notice
 
     # -- step
 

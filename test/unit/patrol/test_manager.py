@@ -5,7 +5,7 @@ import math
 import pytest
 from patrol_world import ROOMS, World, looking, phase
 
-from rosbot_patrol.patrol.inputs import GoalLink, GoalState
+from rosbot_patrol.patrol.inputs import GoalLink, GoalState, Guarded
 from rosbot_patrol.patrol.manager import PatrolManager
 from rosbot_patrol.patrol.mission import Phase
 from rosbot_patrol.patrol.queueing import MissionQueue
@@ -271,11 +271,28 @@ def test_a_notice_that_is_newer_than_the_memory_confirms_its_mission(is_running)
         request = Request(room_id=2, id=plain["id"], wall=plain["called"])
         memory |= {"mission": None, "queue": [request_to_plain(request)]}
     again = World(PatrolManager(ROOMS, memory=memory), x=world.x)
-    again.manager.note_told(world.manager.mission.id, "a person was seen in room 2")
+    assert again.manager.note_told(world.manager.mission.id, "a person was seen in room 2")
     again.run(lambda w: w.ended)
     assert (again.ended[0].verdict.value, again.ended[0].reason) == ("confirmed", "a person was seen in room 2")
     assert again.ended[0].sightings == 1
     assert again.notices == []
+
+
+@pytest.mark.parametrize("is_running", [True, False])
+def test_a_held_notice_that_is_newer_than_the_memory_waits_for_the_entry_delay_only(is_running):
+    world = World()
+    world.triggers = [2]
+    world.run(looking)
+    mission, wall = world.manager.mission.id, world.wall + 100.0
+    guarded = Guarded(holds_until=wall + 5.0) if is_running else Guarded()
+    again = World(PatrolManager(ROOMS, memory=world.manager.snapshot()), x=world.x, guarded=guarded)
+    assert again.manager.note_told(mission, "a person was seen", held_until=wall + 5.0)
+    assert not again.manager.note_told(mission, "a person was seen")
+    began = again.now
+    again.run(lambda w: any(out.releases for out in w.all))
+    (release,) = [release for out in again.all for release in out.releases]
+    assert (release.mission, release.is_dropped) == (mission, False)
+    assert (again.now - began > 4.9) == is_running
 
 
 @pytest.mark.parametrize("memory", [{"count": "x"}, {"count": 1}, {"count": 1, "queue": 5, "mission": 3}, {"a": None}])
