@@ -1,8 +1,9 @@
 """What looked like a person and was not told surely: places that are worth another look, and whether they had it.
 
 Three kinds. What was too far off to be measured is looked at from nearer. What looks like a person from one side only
-is looked at from another. What was too near to be told from a pet is looked at from farther off, again where it has
-moved meanwhile, and is nothing only where its place was seen from there and nothing moves in the room.
+is looked at from another, and is nothing only where pictures from there showed its place. What was too near to be told
+from a pet is looked at from farther off, again where it has moved meanwhile, and is nothing only where its place was
+seen from there and nothing moves in the room.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ _CLOSE = 1.0  # so near one may come to what is half hidden [m]
 _BACK = 2.0, 4.5  # from there a person shows whole [m]
 _WHOLE = 1.7  # from so far off one who stands cannot be taken for a pet [m]
 _INSIDE = 0.1  # of the picture's edges a place must lie [rad]
+_ASIDE = 0.6  # from so far aside a place shows another side [rad]
+_NEARER = 0.8  # of the least distance so far: that is another look, too
 _BODY = 0.4  # in front of a place its own body may end a beam [m]
 
 
@@ -41,8 +44,10 @@ class Doubt:
         is_grave: without a second look nobody can say that nobody is there.
         is_near: too near to be told from a pet.
         is_visited: it had its look, or needs none.
-        visits: viewpoints that it was looked at from.
-        looks: pictures that showed its place from farther off.
+        visits: viewpoints that it was to be looked at from.
+        tried: those viewpoints.
+        known_from: the sides that were known when the last of them was chosen.
+        looks: pictures that showed its place from there: from farther off, or from another side.
     """
 
     x: float
@@ -54,6 +59,8 @@ class Doubt:
     is_near: bool = False
     is_visited: bool = False
     visits: int = 0
+    tried: tuple[tuple[float, float], ...] = ()
+    known_from: tuple[Pose2D, ...] = ()
     looks: int = 0
 
     @property
@@ -71,10 +78,18 @@ class Doubt:
             return {"nearest": _BACK[0], "most": _BACK[1]}
         return {"nearest": _CLOSE} if self.seen_from else {}
 
-    def visit(self) -> None:
-        """Take it that the robot goes and looks."""
+    def visit(self, at: Pose2D) -> None:
+        """Take it that the robot goes somewhere and looks."""
         self.is_visited = True
         self.visits += 1
+        self.tried += ((at.x, at.y),)
+        self.known_from = self.seen_from
+
+    def shows(self, eye: Eye, sight: Sight) -> bool:
+        """Whether a picture is the second look that this place wants."""
+        if self.is_near:
+            return shows_whole(eye, sight, self.x, self.y)
+        return self.is_visited and bool(self.known_from) and shows_anew(eye, sight, self)
 
 
 class Doubts:
@@ -111,7 +126,7 @@ class Doubts:
             known.seen_from = tuple(side.eye for side in suspect.sides)
         for doubt in self._all:
             if doubt.seen_from and not any(s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in doubtful):
-                doubt.is_visited = True  # told, or no longer like one
+                doubt.is_visited, doubt.is_grave = True, False  # told, or no longer like one
 
     def near(self, doubtful: Sequence[Sighting]) -> None:
         """Take in what is too near to be told from a pet, all that is so by now."""
@@ -129,13 +144,28 @@ class Doubts:
         self._too_near = tuple(doubtful)
 
     def look(self, eye: Eye, sight: Sight) -> None:
-        """Count a picture for the places of what was too near that it shows from farther off."""
+        """Count a picture for the places that it gives a second look at."""
         for doubt in self._all:
-            doubt.looks += doubt.is_near and shows_whole(eye, sight, doubt.x, doubt.y)
+            doubt.looks += doubt.shows(eye, sight)
 
     def open(self) -> list[Doubt]:
-        """Those seen in some pictures and not looked at again."""
-        return [doubt for doubt in self._all if not doubt.is_visited and doubt.pictures >= self._seen_in]
+        """Those seen in some pictures and not looked at again, or in vain: the way or the view was blocked."""
+        return [
+            doubt
+            for doubt in self._all
+            if doubt.pictures >= self._seen_in
+            and (not doubt.is_visited or (self._is_grave(doubt) and doubt.visits < _VISITS))
+        ]
+
+    def grave(self) -> list[Doubt]:
+        """Those without whose second look nobody can say that nobody is there."""
+        return [doubt for doubt in self.open() if doubt.is_grave and not doubt.is_visited] + [
+            doubt for doubt in self._all if self._is_grave(doubt)
+        ]
+
+    def _is_grave(self, doubt: Doubt) -> bool:
+        """Looks like a person from one side, and no picture from the other side showed the place."""
+        return doubt.is_visited and doubt.is_grave and bool(doubt.seen_from) and doubt.looks < self._seen_in
 
     def unsure(self, is_moving: bool) -> str:
         """What is still too near to be told, "" where there is nothing.
@@ -158,9 +188,27 @@ def _apart(doubt: Doubt, thing: Sighting) -> float:
     return math.hypot(doubt.x - thing.x, doubt.y - thing.y)
 
 
+def shows_anew(eye: Eye, sight: Sight, doubt: Doubt) -> bool:
+    """Whether a picture shows a place from another side than those known, or from nearer than any of them."""
+    away, bearing = math.hypot(doubt.x - eye.pose.x, doubt.y - eye.pose.y), _bearing(eye.pose, doubt)
+    aside = min(abs(angle_difference(_bearing(known, doubt), bearing)) for known in doubt.known_from)
+    before = min(math.hypot(doubt.x - known.x, doubt.y - known.y) for known in doubt.known_from)
+    if aside < _ASIDE and away > _NEARER * before:
+        return False
+    return _is_in_view(eye, sight, away, bearing)
+
+
 def shows_whole(eye: Eye, sight: Sight, x: float, y: float) -> bool:
     """Whether a picture shows a place in map [m] from as far off as a person shows whole."""
     away, bearing = math.hypot(x - eye.pose.x, y - eye.pose.y), math.atan2(y - eye.pose.y, x - eye.pose.x)
-    if not _WHOLE <= away <= _BACK[1] + 0.5 or abs(angle_difference(bearing, eye.pose.yaw)) > 0.5 * eye.width - _INSIDE:
+    return _WHOLE <= away <= _BACK[1] + 0.5 and _is_in_view(eye, sight, away, bearing)
+
+
+def _bearing(eye: Pose2D, doubt: Doubt) -> float:
+    return math.atan2(doubt.y - eye.y, doubt.x - eye.x)
+
+
+def _is_in_view(eye: Eye, sight: Sight, away: float, bearing: float) -> bool:
+    if abs(angle_difference(bearing, eye.pose.yaw)) > 0.5 * eye.width - _INSIDE:
         return False
     return bool(sight.reaches(np.array([bearing]), np.array([away - _BODY]))[0])

@@ -132,7 +132,7 @@ class Eyes:
         if self.coverage.share >= p.viewpoints.coverage_goal:
             wanted, least = self._hideouts(wanted), math.pi * p.viewpoints.hideout**2
         is_late = self._now - self._began > p.viewpoints.viewpoints_time
-        doubts = self._open_doubts()
+        doubts = self._of_here(self._doubts.open())
         if doubts and not is_late and self._second_looks < p.viewpoints.second_looks_most:
             nearer = self._nearer(doubts, inputs.pose, inputs)
             if nearer is not None:
@@ -182,7 +182,7 @@ class Eyes:
 
     def blind(self) -> str:
         """Why what was seen is too little."""
-        doubts = [doubt for doubt in self._open_doubts() if doubt.is_grave]
+        doubts = self._of_here(self._doubts.grave())
         if doubts:
             return doubts[0].text
         unsure = self._doubts.unsure(bool(self._witness.text()))
@@ -221,12 +221,12 @@ class Eyes:
 
     # -- doubts
 
-    def _open_doubts(self) -> list[Doubt]:
-        """Those seen in some pictures and not looked at again: of the mission's room, or right before the robot."""
+    def _of_here(self, doubts: Sequence[Doubt]) -> list[Doubt]:
+        """Those in the mission's room, or right before the robot."""
         house, mission = self._house, self._mission
         if house is None or mission is None:
             return []
-        return [d for d in self._doubts.open() if d.is_near or house.room_at(d.x, d.y) == mission.room.id]
+        return [d for d in doubts if d.is_near or house.room_at(d.x, d.y) == mission.room.id]
 
     def _nearer(self, doubts: Sequence[Doubt], pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the first doubt that has one."""
@@ -234,12 +234,18 @@ class Eyes:
         for doubt in doubts:
             for stands in (self._stands(inputs), None):  # by the map alone: move_base gets through where we see no way
                 found = self._planner.near(
-                    pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, **doubt.span
+                    pose,
+                    doubt.x,
+                    doubt.y,
+                    stands=stands,
+                    seen_from=doubt.seen_from,
+                    tried=doubt.tried if doubt.seen_from else (),
+                    **doubt.span,
                 )
                 if found is not None:
                     break
             if found is not None:
-                doubt.visit()
+                doubt.visit(found.pose)
                 log.info(
                     "something like a %s at (%.1f, %.1f) is to be looked at from (%.1f, %.1f)",
                     doubt.label,

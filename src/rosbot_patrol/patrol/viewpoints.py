@@ -48,6 +48,12 @@ class ViewpointParams:
     viewpoint_clearance: float = param(
         0.35, unit="m", lo=0.1, doc="from a viewpoint to the nearest thing, so that the robot can turn there"
     )
+    tight_clearance: float = param(
+        0.28,
+        unit="m",
+        lo=0.1,
+        doc="the same for a second look at something like a person that nothing roomier gives",
+    )
     passage_clearance: float = param(
         0.22, unit="m", lo=0.05, doc="half the narrowest gap that a viewpoint is reached through"
     )
@@ -147,6 +153,7 @@ class ViewpointPlanner:
         *,
         stands: Mask | None = None,
         seen_from: Sequence[Pose2D] = (),
+        tried: Sequence[tuple[float, float]] = (),
         nearest: float = 1.5,
         most: float = 3.5,
     ) -> Viewpoint | None:
@@ -158,6 +165,7 @@ class ViewpointPlanner:
             y: of what is to be looked at [m].
             stands: as for `next`.
             seen_from: from there it was seen: the place is to show another side, or at least more of it.
+            tried: looking from there was in vain.
             nearest: no place nearer than that [m].
             most: none farther [m].
         """
@@ -166,15 +174,19 @@ class ViewpointPlanner:
         there = np.ones(floor.info.shape, bool)
         bearings, distances, _ = visible(floor, there, sight, self._coverage)
         open_ = (sight.reaches(bearings, distances) & (distances >= nearest) & (distances <= most)).reshape(there.shape)
-        good = open_ & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
+        good = open_ & (ways < _FAR)
         if stands is not None:
             good &= ~stands
+        for place in tried:
+            good &= ~floor.mark_near(np.array([place]), self.params.viewpoint_spacing)
+        standing = good & (floor.clearance >= self.params.viewpoint_clearance)
         if seen_from:
-            aside = good.copy()
-            for eye in seen_from:
-                aside &= self._is_aside(math.atan2(eye.y - y, eye.x - x), x, y)
+            aside = good & self._is_aside_of_all(seen_from, x, y)
+            roomy, tight = aside & standing, aside & (floor.clearance >= self.params.tight_clearance)
             before = min(math.hypot(eye.x - x, eye.y - y) for eye in seen_from)
-            good = aside if aside.any() else good & (distances.reshape(good.shape) <= _NEARER * before)
+            nearer = standing & (distances.reshape(good.shape) <= _NEARER * before)
+            standing = next((found for found in (roomy, tight) if found.any()), nearer)
+        good = standing
         roomy = good & (floor.clearance >= _ROOMY)
         good = roomy if roomy.any() else good
         if not good.any():
@@ -187,6 +199,12 @@ class ViewpointPlanner:
     def _is_tight(self, x: float, y: float) -> bool:
         ix, iy = self.floor.info.cell_of(x, y)
         return bool(self.floor.clearance[iy, ix] < _ROOMY)
+
+    def _is_aside_of_all(self, eyes: Sequence[Pose2D], x: float, y: float) -> Mask:
+        """The floor from which a place shows another side than from any of some poses."""
+        sides = [self._is_aside(math.atan2(eye.y - y, eye.x - x), x, y) for eye in eyes]
+        mask: Mask = np.logical_and.reduce(sides)
+        return mask
 
     def _is_aside(self, bearing: float, x: float, y: float) -> Mask:
         """The floor that lies in another direction from a place than a bearing in map [rad]."""

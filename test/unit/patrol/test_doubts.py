@@ -3,12 +3,14 @@
 import math
 
 import numpy as np
+import pytest
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.close_ups import Sighting
 from rosbot_patrol.patrol.coverage import Sight
 from rosbot_patrol.patrol.doubts import Doubts
-from rosbot_patrol.patrol.inputs import Eye
+from rosbot_patrol.patrol.inputs import Box, Eye, Measured
+from rosbot_patrol.patrol.suspects import Suspect, Suspects
 
 SEEN_IN = 3
 ALL_AROUND = Sight(x=3.0, y=0.0, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 5.0))
@@ -23,7 +25,7 @@ def test_what_was_too_near_wants_one_look():
     doubts.near([near(1.0, 0.0)])
     (doubt,) = doubts.open()
     assert doubt.span == {"nearest": 2.0, "most": 4.5}
-    doubt.visit()
+    doubt.visit(Pose2D(0.0, 0.0, 0.0))
     doubts.near([near(1.2, 0.1)])
     assert doubts.open() == []
 
@@ -34,7 +36,7 @@ def test_what_was_too_near_and_came_along_is_looked_at_again_but_not_for_ever():
     visits = 0
     for k in range(10):
         for doubt in doubts.open():
-            doubt.visit()
+            doubt.visit(Pose2D(0.0, 0.0, 0.0))
             visits += 1
         doubts.near([near(0.9 * ((k + 1) % 2), 0.0, at=float(k))])
     assert visits == 3
@@ -43,13 +45,56 @@ def test_what_was_too_near_and_came_along_is_looked_at_again_but_not_for_ever():
 def test_a_look_counts_for_the_place_it_showed_only():
     doubts = Doubts(SEEN_IN)
     doubts.near([near(0.0, 0.0)])
-    doubts.open()[0].visit()
+    doubts.open()[0].visit(Pose2D(0.0, 0.0, 0.0))
     for _ in range(SEEN_IN):
         doubts.look(Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
     assert doubts.unsure(is_moving=False) == ""
     doubts.near([near(0.0, 1.0)])
     assert "(0.0, 1.0) was too near to be told from a pet" in doubts.unsure(is_moving=False)
     assert [(d.x, d.y) for d in doubts.open()] == [(0.0, 1.0)]
+
+
+def suspects(*eyes: Pose2D) -> list[Suspect]:
+    """Something at (0, 0) that looks like a person from some places for long."""
+    measured = Measured(x=0.0, y=0.0, error=0.2, away=3.0, top=1.0, height=0.7, width=0.5)
+    box = Box(label="person", probability=0.6, xmin=100, ymin=50, xmax=200, ymax=250, measured=measured)
+    seen, now = Suspects(), 1.0
+    for eye in eyes:
+        for _ in range(9):
+            now += 0.1
+            seen.add(now, eye, (box,))
+    return seen.doubtful()
+
+
+@pytest.mark.parametrize(
+    ("eye", "is_told"),
+    [
+        (Pose2D(3.0, 0.0, math.pi), False),  # the same side
+        (Pose2D(3.0, 0.0, 0.0), False),
+        (Pose2D(1.5, 0.0, math.pi), True),  # much nearer
+        (Pose2D(0.0, 3.0, -math.pi / 2.0), True),
+        (Pose2D(0.0, 3.0, 0.0), False),  # looks elsewhere
+        (Pose2D(0.0, 7.0, -math.pi / 2.0), False),  # the wall in between
+    ],
+)
+def test_one_side_is_not_all_until_pictures_of_another_showed_the_place(eye: Pose2D, is_told: bool) -> None:
+    doubts, way = Doubts(SEEN_IN), Pose2D(0.0, 2.0, 0.0)
+    sight = Sight(x=eye.x, y=eye.y, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 5.0))
+    doubts.suspect(suspects(Pose2D(3.0, 0.0, math.pi)))
+    for visit in range(3):
+        (doubt,) = doubts.open()
+        assert doubts.grave() == [doubt]
+        doubt.visit(way)
+        assert len(doubt.tried) == visit + 1
+        if visit == 1:
+            for _ in range(SEEN_IN):
+                doubts.look(Eye(pose=eye, width=1.0), sight)
+            if is_told:
+                break
+    assert doubts.open() == []
+    assert [d.text for d in doubts.grave()] == ([] if is_told else [doubt.text])
+    doubts.suspect([])  # somebody was confirmed there
+    assert doubts.grave() == []
 
 
 def test_where_something_moves_what_was_too_near_may_have_gone():

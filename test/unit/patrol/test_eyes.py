@@ -388,6 +388,23 @@ def test_what_could_be_looked_at_from_one_side_only_is_unverified(score: float, 
     assert ("was seen from one side only" in mission.reason) == (verdict == "unverified")
 
 
+@pytest.mark.parametrize("way", ["none", "one of them"])
+def test_a_second_look_that_no_way_leads_to_proves_nothing_and_another_is_tried(way: str) -> None:
+    asked: list[Pose2D] = []
+
+    def refused(goal: Pose2D) -> bool:
+        is_aside = math.dist(goal[:2], POINT[:2]) > 0.3 and goal != ROOMS.base.pose
+        asked.extend([goal] if is_aside else [])
+        return is_aside and (way == "none" or len(asked) == 1)
+
+    world = World(lambda now: [(7.0, 1.0)], refused=refused)
+    world.score = lambda pose: 0.55 if abs(side(pose) - side(POINT)) < 0.6 else 0.0
+    mission = world.mission()
+    assert mission.verdict.value == ("unverified" if way == "none" else "clear")
+    assert ("was seen from one side only" in mission.reason) == (way == "none")
+    assert min(math.dist(a[:2], b[:2]) for k, a in enumerate(asked) for b in asked[:k]) > 0.3
+
+
 @pytest.mark.parametrize(("top", "verdict"), [(1.7, "confirmed"), (0.7, "clear")])
 def test_what_is_too_near_to_be_told_from_a_pet_is_looked_at_from_farther_off(top: float, verdict: str) -> None:
     world = World()

@@ -165,3 +165,26 @@ def test_a_second_look_is_from_where_there_is_room_to_turn() -> None:
         assert floor.clearance[iy, ix] >= 0.6
     narrow = drawn_floor("#" * 12, "#..........#", "#..........#", "#" * 12)
     assert ViewpointPlanner(narrow).near(Pose2D(0.9, 1.0, 0.0), 4.0, 1.0) is not None
+
+
+def test_a_second_look_from_another_side_may_be_from_a_tight_place() -> None:
+    floor = drawn_floor(
+        "##############",
+        "#............#",
+        "#............#",
+        "#..########..#",
+        "#..########..#",
+        "#............#",
+        "#............#",
+        "#............#",
+        "##############",
+    )  # one who stands in the middle of the upper passage, seen from its left end
+    start, eye, place = Pose2D(1.0, 1.0, 0.0), Pose2D(1.0, 3.5, 0.0), (3.2, 3.5)
+    roomy = ViewpointParams(viewpoint_clearance=0.7, tight_clearance=0.7)
+    assert ViewpointPlanner(floor, roomy).near(start, *place, seen_from=(eye,), nearest=1.0) is None
+    planner = ViewpointPlanner(floor, ViewpointParams(viewpoint_clearance=0.7, tight_clearance=0.3))
+    view = planner.near(start, *place, seen_from=(eye,), nearest=1.0)
+    assert view is not None
+    assert view.pose.x > 4.2  # the right end
+    again = planner.near(start, *place, seen_from=(eye,), nearest=1.0, tried=(view.pose[:2],))
+    assert again is None or math.dist(again.pose[:2], view.pose[:2]) > 0.35
