@@ -94,6 +94,12 @@ class PatrolManager(Ordered):
             self.held.setdefault(mission_id, held_until)
         return True
 
+    @property
+    def is_resting(self) -> bool:
+        """Whether only what it hears sets it in motion: nothing is under way, and nothing waits for a moment."""
+        is_free = self.mission is None and self._home is None and not self.queue and not self.held
+        return is_free and self._ready.is_ready and not self._is_stopped
+
     def snapshot(self) -> dict[str, Any]:
         """What has to outlive the program, for JSON."""
         return recall.snapshot(self, self._intake)

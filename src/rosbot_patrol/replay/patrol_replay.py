@@ -1,5 +1,8 @@
 """The patrol over a bag: its manager, stepped at the node's rate on the bag's clock, and at once by a sensor's call.
 
+While it rests on guard, only every tenth of those steps is taken, and the next one after what may end the rest: what
+comes of silence alone, as a dead detector, is told up to 0.4 s later than the node tells it.
+
 The way is the bag's: where the robot was, what its sensors and the detector said, when move_base was done. So a replay
 shows what this patrol decides from the same senses; where it would have driven elsewhere, the goals differ, and what
 comes after means little. Not replayed: depth pictures (places are told by lidar and floor), whether pictures are black
@@ -36,7 +39,8 @@ from rosbot_patrol.scan import LaserScan, scan_points, scan_problem
 from rosbot_patrol.sensors.sensor_file import SensorList
 
 STOPPED = "the emergency stop was pressed (topic /e_stop)"
-CAMERA, PICTURES = "camera", "camera/rgb/image_raw"  # the input that only says that pictures come
+AT_REST = 10  # steps of which one is taken
+CAMERA = "camera"  # the input that only says that pictures come
 
 INPUTS = (
     Input(name="motion_trigger", types=("rosbot_patrol/EspTrigger", "rosbot_patrol_simulation/EspTrigger")),
@@ -104,7 +108,7 @@ class PatrolReplay:
         self._guarded, self._stop = Guarded(), ""
         self._detector_at = self._camera_at = -math.inf
         self._next: float | None = None
-        self._steps = 0
+        self._steps, self._left_out, self._is_awake = 0, 0, True
         self.begin(())
 
     def begin(self, names: Collection[str]) -> None:
@@ -160,6 +164,7 @@ class PatrolReplay:
             self._sight.hear_frame(Frame(stamp=stamp, boxes=record.boxes), stamp, now)
 
     def _hear_state(self, name: str, content: Any, now: float) -> None:
+        self._is_awake |= not isinstance(content, heard.AliveRecord)
         match content:
             case heard.AliveRecord():
                 if name == CAMERA:
@@ -198,12 +203,15 @@ class PatrolReplay:
         period = 1.0 / self._node.rate
         due = now if self._next is None else self._next
         while due <= now:
-            self._step(due)
+            if self._left_out < AT_REST - 1 and not self._is_awake and self._manager.is_resting:
+                self._left_out += 1
+            else:
+                self._step(due)
             due += period
         self._next = due
 
     def _step(self, now: float) -> None:
-        self._steps += 1
+        self._steps, self._left_out, self._is_awake = self._steps + 1, 0, False
         commands = self._manager.step(now, self._inputs(now))
         if commands.goal is not None:
             self._link.send(commands.goal)

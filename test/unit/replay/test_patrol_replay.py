@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import made_patrol
@@ -13,6 +14,7 @@ from made_patrol import POINTS, RecordedWorld, looking
 
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.patrol.watch import Watch
+from rosbot_patrol.replay import patrol_replay
 from rosbot_patrol.replay.bag import Bag
 from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.patrol_log import FIELDS
@@ -72,6 +74,21 @@ def test_an_intruder_is_confirmed_at_the_same_moment(tmp_path: Path) -> None:
 def test_the_same_bit_for_bit(tmp_path: Path) -> None:
     path, _ = recorded(tmp_path, lambda w: w.mission(2), person_when=in_room_2)
     assert replayed(path).digest == replayed(path).digest
+
+
+def test_steps_left_out_at_rest_change_nothing_of_a_mission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def drive(world: RecordedWorld) -> None:
+        world.mission(2)
+        for _ in range(100):
+            world.step()
+        world.mission(2)
+
+    path, _ = recorded(tmp_path, drive, person_when=in_room_2)
+    sparing = replayed(path)
+    monkeypatch.setattr(patrol_replay, "AT_REST", 1)
+    whole = replayed(path)
+    assert sparing.counts.pop("steps") < whole.counts.pop("steps") - 80
+    assert compare(whole, sparing, {name: replace(field, tolerance=0.0) for name, field in FIELDS.items()}) == []
 
 
 def test_a_room_that_cannot_be_reached_is_told_as_move_base_told_it(tmp_path: Path) -> None:
