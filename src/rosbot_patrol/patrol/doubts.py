@@ -23,7 +23,9 @@ from rosbot_patrol.patrol.suspects import Suspect
 _SAME_FAR = 1.5  # boxes too far off to be measured that are nearer are of one thing, and so are those too near [m]
 _SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
 _MOVED = 0.6  # what was too near and stands so much farther on has to be looked for again [m]
-_VISITS = 3  # of what is too near wherever the robot goes: it comes along
+_VISITS = 3  # of what is too near wherever the robot goes: it comes along; and of what looks much like a person
+_VISITS_UNSURE = 2  # of what looks little like one
+_LOOKS = 5  # pictures of another side that tell
 _CLOSE = 1.0  # so near one may come to what is half hidden [m]
 _BACK = 2.0, 4.5  # from there a person shows whole [m]
 _WHOLE = 1.7  # from so far off one who stands cannot be taken for a pet [m]
@@ -44,6 +46,7 @@ class Doubt:
         is_grave: without a second look nobody can say that nobody is there.
         is_near: too near to be told from a pet.
         is_visited: it had its look, or needs none.
+        is_over: somebody was confirmed there, or it no longer looks like anybody.
         visits: viewpoints that it was to be looked at from.
         tried: those viewpoints.
         known_from: the sides that were known when the last of them was chosen.
@@ -58,6 +61,7 @@ class Doubt:
     is_grave: bool = True
     is_near: bool = False
     is_visited: bool = False
+    is_over: bool = False
     visits: int = 0
     tried: tuple[tuple[float, float], ...] = ()
     known_from: tuple[Pose2D, ...] = ()
@@ -77,6 +81,11 @@ class Doubt:
         if self.is_near:
             return {"nearest": _BACK[0], "most": _BACK[1]}
         return {"nearest": _CLOSE} if self.seen_from else {}
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether another viewpoint is worth its time where one was in vain."""
+        return self.visits < (_VISITS if self.is_grave else _VISITS_UNSURE)
 
     def visit(self, at: Pose2D) -> None:
         """Take it that the robot goes somewhere and looks."""
@@ -126,7 +135,7 @@ class Doubts:
             known.seen_from = tuple(side.eye for side in suspect.sides)
         for doubt in self._all:
             if doubt.seen_from and not any(s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in doubtful):
-                doubt.is_visited, doubt.is_grave = True, False  # told, or no longer like one
+                doubt.is_visited = doubt.is_over = True
 
     def near(self, doubtful: Sequence[Sighting]) -> None:
         """Take in what is too near to be told from a pet, all that is so by now."""
@@ -149,23 +158,19 @@ class Doubts:
             doubt.looks += doubt.shows(eye, sight)
 
     def open(self) -> list[Doubt]:
-        """Those seen in some pictures and not looked at again, or in vain: the way or the view was blocked."""
-        return [
-            doubt
-            for doubt in self._all
-            if doubt.pictures >= self._seen_in
-            and (not doubt.is_visited or (self._is_grave(doubt) and doubt.visits < _VISITS))
-        ]
+        """Those seen in some pictures and not looked at again, or in vain: the way was blocked, or the view."""
+        known = [doubt for doubt in self._all if doubt.pictures >= self._seen_in]
+        return [doubt for doubt in known if not doubt.is_visited or (self._is_in_vain(doubt) and doubt.goes_on)]
 
     def grave(self) -> list[Doubt]:
         """Those without whose second look nobody can say that nobody is there."""
         return [doubt for doubt in self.open() if doubt.is_grave and not doubt.is_visited] + [
-            doubt for doubt in self._all if self._is_grave(doubt)
+            doubt for doubt in self._all if doubt.is_grave and self._is_in_vain(doubt)
         ]
 
-    def _is_grave(self, doubt: Doubt) -> bool:
-        """Looks like a person from one side, and no picture from the other side showed the place."""
-        return doubt.is_visited and doubt.is_grave and bool(doubt.seen_from) and doubt.looks < self._seen_in
+    def _is_in_vain(self, doubt: Doubt) -> bool:
+        """It looks like a person from one side, and the pictures from elsewhere did not show its place."""
+        return doubt.is_visited and not doubt.is_over and bool(doubt.seen_from) and doubt.looks < _LOOKS
 
     def unsure(self, is_moving: bool) -> str:
         """What is still too near to be told, "" where there is nothing.

@@ -29,7 +29,8 @@ log = logging.getLogger(__name__)
 
 VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
-_STAY = 3.0  # a pet rests for some seconds before it goes on [s]
+_STAY = 1.5  # somebody half hidden shows surely in one picture and hardly in the next [s]
+_STAY_NEAR = 3.0  # a pet rests for some seconds before it goes on [s]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -254,7 +255,7 @@ class Eyes:
                     found.pose.x,
                     found.pose.y,
                 )
-                return replace(found, stay=_STAY) if doubt.is_near else found
+                return replace(found, stay=_STAY_NEAR if doubt.is_near else _STAY if doubt.seen_from else 0.0)
         return None
 
     # -- parts

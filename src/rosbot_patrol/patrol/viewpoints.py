@@ -21,6 +21,7 @@ from rosbot_patrol.patrol.floor import Array, Floor, Mask
 _FAR = math.inf
 _ROOMY = 0.6  # so far from all that the map shows nothing low that it does not show is met: the feet of a chair [m]
 _TIGHT = 0.8  # what a viewpoint nearer to things is worth against one that is not
+_IN_VAIN = 2  # viewpoints on another side that showed nothing are enough
 _NEARER = 0.7  # where there is no other side, so much nearer than before is a second look
 
 
@@ -47,12 +48,6 @@ class ViewpointParams:
     )
     viewpoint_clearance: float = param(
         0.35, unit="m", lo=0.1, doc="from a viewpoint to the nearest thing, so that the robot can turn there"
-    )
-    tight_clearance: float = param(
-        0.28,
-        unit="m",
-        lo=0.1,
-        doc="the same for a second look at something like a person that nothing roomier gives",
     )
     passage_clearance: float = param(
         0.22, unit="m", lo=0.05, doc="half the narrowest gap that a viewpoint is reached through"
@@ -164,8 +159,8 @@ class ViewpointPlanner:
             x: of what is to be looked at [m].
             y: of what is to be looked at [m].
             stands: as for `next`.
-            seen_from: from there it was seen: the place is to show another side, or at least more of it.
-            tried: looking from there was in vain.
+            seen_from: from there it was seen: the place is to show another side, or at least more, or from a step away.
+            tried: looking from there was in vain; after two of them a step aside has to do.
             nearest: no place nearer than that [m].
             most: none farther [m].
         """
@@ -174,19 +169,13 @@ class ViewpointPlanner:
         there = np.ones(floor.info.shape, bool)
         bearings, distances, _ = visible(floor, there, sight, self._coverage)
         open_ = (sight.reaches(bearings, distances) & (distances >= nearest) & (distances <= most)).reshape(there.shape)
-        good = open_ & (ways < _FAR)
+        good = open_ & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
         if stands is not None:
             good &= ~stands
-        for place in tried:
-            good &= ~floor.mark_near(np.array([place]), self.params.viewpoint_spacing)
-        standing = good & (floor.clearance >= self.params.viewpoint_clearance)
+        if tried:
+            good &= ~floor.mark_near(np.array(tried), self.params.viewpoint_spacing)
         if seen_from:
-            aside = good & self._is_aside_of_all(seen_from, x, y)
-            roomy, tight = aside & standing, aside & (floor.clearance >= self.params.tight_clearance)
-            before = min(math.hypot(eye.x - x, eye.y - y) for eye in seen_from)
-            nearer = standing & (distances.reshape(good.shape) <= _NEARER * before)
-            standing = next((found for found in (roomy, tight) if found.any()), nearer)
-        good = standing
+            good = self._anew(good, distances.reshape(good.shape), seen_from, x, y, is_step=len(tried) >= _IN_VAIN)
         roomy = good & (floor.clearance >= _ROOMY)
         good = roomy if roomy.any() else good
         if not good.any():
@@ -199,6 +188,16 @@ class ViewpointPlanner:
     def _is_tight(self, x: float, y: float) -> bool:
         ix, iy = self.floor.info.cell_of(x, y)
         return bool(self.floor.clearance[iy, ix] < _ROOMY)
+
+    def _anew(self, good: Mask, distances: Array, eyes: Sequence[Pose2D], x: float, y: float, *, is_step: bool) -> Mask:
+        """Of some floor what shows another side of a place than some poses; else more of it; else from a step away.
+
+        A detector that is unsure of one picture is often sure of the next, taken from a step away.
+        """
+        before = min(math.hypot(eye.x - x, eye.y - y) for eye in eyes)
+        near_eyes = self.floor.mark_near(np.array([eye[:2] for eye in eyes]), self.params.viewpoint_spacing)
+        choices = good & self._is_aside_of_all(eyes, x, y), good & (distances <= _NEARER * before)
+        return next((found for found in choices if found.any() and not is_step), good & ~near_eyes)
 
     def _is_aside_of_all(self, eyes: Sequence[Pose2D], x: float, y: float) -> Mask:
         """The floor from which a place shows another side than from any of some poses."""

@@ -405,6 +405,23 @@ def test_a_second_look_that_no_way_leads_to_proves_nothing_and_another_is_tried(
     assert min(math.dist(a[:2], b[:2]) for k, a in enumerate(asked) for b in asked[:k]) > 0.3
 
 
+def test_one_who_is_hardly_seen_from_one_side_is_looked_at_from_a_step_away() -> None:
+    def refused(goal: Pose2D) -> bool:
+        return abs(side(goal) - side(POINT)) > 0.6 and goal != ROOMS.base.pose
+
+    world = World(lambda now: [(7.0, 1.0)], refused=refused)
+
+    def score(pose: Pose2D) -> float:
+        if abs(side(pose) - side(POINT)) > 0.6:
+            return 0.0
+        return 0.9 if math.dist(pose[:2], POINT[:2]) > 0.3 else 0.55
+
+    world.score = score
+    mission = world.mission()
+    assert mission.verdict.value == "confirmed"
+    assert "probability 0.90" in mission.reason
+
+
 @pytest.mark.parametrize(("top", "verdict"), [(1.7, "confirmed"), (0.7, "clear")])
 def test_what_is_too_near_to_be_told_from_a_pet_is_looked_at_from_farther_off(top: float, verdict: str) -> None:
     world = World()

@@ -167,24 +167,27 @@ def test_a_second_look_is_from_where_there_is_room_to_turn() -> None:
     assert ViewpointPlanner(narrow).near(Pose2D(0.9, 1.0, 0.0), 4.0, 1.0) is not None
 
 
-def test_a_second_look_from_another_side_may_be_from_a_tight_place() -> None:
+def test_a_second_look_that_no_other_side_allows_is_from_nearer_or_from_a_step_away() -> None:
     floor = drawn_floor(
         "##############",
-        "#............#",
-        "#............#",
-        "#..########..#",
-        "#..########..#",
-        "#............#",
+        "#.........####",
+        "#.........####",
+        "#..###########",
         "#............#",
         "#............#",
         "##############",
-    )  # one who stands in the middle of the upper passage, seen from its left end
-    start, eye, place = Pose2D(1.0, 1.0, 0.0), Pose2D(1.0, 3.5, 0.0), (3.2, 3.5)
-    roomy = ViewpointParams(viewpoint_clearance=0.7, tight_clearance=0.7)
-    assert ViewpointPlanner(floor, roomy).near(start, *place, seen_from=(eye,), nearest=1.0) is None
-    planner = ViewpointPlanner(floor, ViewpointParams(viewpoint_clearance=0.7, tight_clearance=0.3))
-    view = planner.near(start, *place, seen_from=(eye,), nearest=1.0)
-    assert view is not None
-    assert view.pose.x > 4.2  # the right end
-    again = planner.near(start, *place, seen_from=(eye,), nearest=1.0, tried=(view.pose[:2],))
-    assert again is None or math.dist(again.pose[:2], view.pose[:2]) > 0.35
+    )  # somebody at the end of the upper dead end
+    start, eye, place = Pose2D(1.0, 2.2, 0.0), Pose2D(1.2, 2.5, 0.0), (4.3, 2.5)
+
+    def seen(nearest: float, **given: object) -> Pose2D:
+        found = ViewpointPlanner(floor).near(start, *place, seen_from=(eye,), nearest=nearest, **given)
+        assert found is not None
+        assert abs(found.pose.yaw) < 0.5
+        return found.pose
+
+    assert math.dist(seen(1.0)[:2], place) <= 0.7 * 3.1
+    away = seen(2.5)  # no nearer: a step aside
+    assert 0.35 < math.dist(away[:2], eye[:2]) < 1.0
+    again = seen(2.5, tried=(away[:2],))
+    assert math.dist(again[:2], away[:2]) > 0.35
+    assert math.dist(again[:2], eye[:2]) > 0.35
