@@ -26,6 +26,7 @@ _MOVED = 0.6  # what was too near and stands so much farther on has to be looked
 _VISITS = 3  # of what is too near wherever the robot goes: it comes along; and of what looks much like a person
 _VISITS_UNSURE = 2  # of what looks little like one
 _LOOKS = 5  # pictures of another side that tell
+_WELL = 1.6  # from so far off what is half hidden is seen well; nearer it is hardly told from a pet [m]
 _CLOSE = 1.0  # so near one may come to what is half hidden [m]
 _BACK = 2.0, 4.5  # from there a person shows whole [m]
 _WHOLE = 1.7  # from so far off one who stands cannot be taken for a pet [m]
@@ -76,11 +77,11 @@ class Doubt:
         return f"something like a {self.label} at about ({self.x:.1f}, {self.y:.1f}) {looked}"
 
     @property
-    def span(self) -> dict[str, float]:
-        """From how near and how far it is to be looked at, as far as that matters [m]."""
+    def spans(self) -> Sequence[dict[str, float]]:
+        """From how near and how far it is to be looked at, as far as that matters, the best first [m]."""
         if self.is_near:
-            return {"nearest": _BACK[0], "most": _BACK[1]}
-        return {"nearest": _CLOSE} if self.seen_from else {}
+            return ({"nearest": _BACK[0], "most": _BACK[1]},)
+        return ({"nearest": _WELL}, {"nearest": _CLOSE}) if self.seen_from else ({},)
 
     @property
     def goes_on(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -232,19 +232,11 @@ class Eyes:
     def _nearer(self, doubts: Sequence[Doubt], pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the first doubt that has one."""
         assert self._planner is not None
+        # Last by the map alone: move_base gets through where we see no way.
+        stood = self._stands(inputs), None
         for doubt in doubts:
-            for stands in (self._stands(inputs), None):  # by the map alone: move_base gets through where we see no way
-                found = self._planner.near(
-                    pose,
-                    doubt.x,
-                    doubt.y,
-                    stands=stands,
-                    seen_from=doubt.seen_from,
-                    tried=doubt.tried if doubt.seen_from else (),
-                    **doubt.span,
-                )
-                if found is not None:
-                    break
+            manners = [(stands, span) for stands in stood for span in doubt.spans]
+            found = next(filter(None, (self._view_of(doubt, pose, *manner) for manner in manners)), None)
             if found is not None:
                 doubt.visit(found.pose)
                 log.info(
@@ -257,6 +249,18 @@ class Eyes:
                 )
                 return replace(found, stay=_STAY_NEAR if doubt.is_near else _STAY if doubt.seen_from else 0.0)
         return None
+
+    def _view_of(self, doubt: Doubt, pose: Pose2D, stands: Mask | None, span: Mapping[str, float]) -> Viewpoint | None:
+        assert self._planner is not None
+        return self._planner.near(
+            pose,
+            doubt.x,
+            doubt.y,
+            stands=stands,
+            seen_from=doubt.seen_from,
+            tried=doubt.tried if doubt.seen_from else (),
+            **span,
+        )
 
     # -- parts
 

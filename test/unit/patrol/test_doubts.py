@@ -24,7 +24,7 @@ def test_what_was_too_near_wants_one_look():
     doubts = Doubts(SEEN_IN)
     doubts.near([near(1.0, 0.0)])
     (doubt,) = doubts.open()
-    assert doubt.span == {"nearest": 2.0, "most": 4.5}
+    assert doubt.spans == ({"nearest": 2.0, "most": 4.5},)
     doubt.visit(Pose2D(0.0, 0.0, 0.0))
     doubts.near([near(1.2, 0.1)])
     assert doubts.open() == []
