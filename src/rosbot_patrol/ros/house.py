@@ -12,7 +12,7 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -36,12 +36,17 @@ class HouseError(PatrolError):
 
 
 class Master:
-    """A roscore of one's own, and this process as a node of it on wall time."""
+    """A roscore of one's own, and this process as a node of it on wall time.
 
-    def __init__(self, log: Path) -> None:
+    Args:
+        log: of the roscore.
+        host: name of this machine, or its address, for those on others.
+    """
+
+    def __init__(self, log: Path, host: str = "localhost") -> None:
         self.port = free_port()
-        os.environ["ROS_MASTER_URI"] = f"http://localhost:{self.port}"
-        os.environ["ROS_HOSTNAME"] = "localhost"
+        os.environ["ROS_MASTER_URI"] = f"http://{host}:{self.port}"
+        os.environ["ROS_HOSTNAME"] = host
         with log.open("wb") as out:
             self._core = subprocess.Popen(
                 ["roscore", "-p", str(self.port)], stdout=out, stderr=subprocess.STDOUT, start_new_session=True
@@ -113,10 +118,13 @@ class House:
         folder: where logs, mails and state go.
         launch: package and file for roslaunch.
         plain: give the launch file no argument but those named here.
+        before: command that starts roslaunch, as one that enters another host.
         arguments: arguments of the launch file.
     """
 
-    def __init__(self, folder: Path, *launch: str, plain: bool = False, **arguments: Any) -> None:
+    def __init__(
+        self, folder: Path, *launch: str, plain: bool = False, before: Sequence[str] = (), **arguments: Any
+    ) -> None:
         self.folder = folder
         self.maildir = folder / "mail"
         self.log = folder / "roslaunch.log"
@@ -133,7 +141,8 @@ class House:
             }
         )
         given.update(arguments)
-        self._command = ["roslaunch", "--skip-log-check", *command, *(f"{k}:={v}" for k, v in given.items())]
+        options = [f"{k}:={v}" for k, v in given.items()]
+        self._command = [*before, "roslaunch", "--skip-log-check", *command, *options]
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
         self._subscribers: list[rospy.Subscriber] = []

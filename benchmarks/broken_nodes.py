@@ -1,0 +1,190 @@
+#!/usr/bin/env python3
+"""Each node of the house killed, and hung and then restarted, in mid-patrol: what the owner is told, when all is well.
+
+    . scripts/env; .ws/venv/bin/python benchmarks/broken_nodes.py [--json FILE] [--nodes amcl ...] [--hung 15]
+
+Somebody stands in the room; a call starts a mission. In mid-drive (the detector, the camera's republish and the
+sensors' bridge: as the robot begins to look) the node gets SIGKILL, or SIGSTOP and `--hung` seconds later, by the
+wall's clock, SIGKILL; roslaunch starts it again after `--respawn-delay`. Told: what /diagnostics warned of that it
+did not before, mails, the mission's sentence. Well: on guard again, and /diagnostics as before. Times are simulated
+seconds from the fault on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import email
+import email.policy
+import json
+import os
+import signal
+import tempfile
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from rosbot_patrol.msg import PatrolState
+
+from rosbot_patrol.ros.house import House, HouseError, Master
+
+ROOM, INTRUDER = 5, (4.8, 7.8)
+LOOKING = ("darknet_ros", "rgb_compress", "esp_client1", "esp_client2", "esp_client3")
+LEFT_OUT = ("rosout", "simulator")  # the log, and the world itself
+NOT_ROS = ("house_watch",)
+
+
+@dataclass
+class Row:
+    """What came of one fault.
+
+    Attributes:
+        node: which; how: "killed" or "hung".
+        verdict: of the mission, "" where it did not end; sentence: its last.
+        told: parts of /diagnostics that got worse, with what they said first, and after how many seconds.
+        mails: their subjects.
+        over: the mission's end [s]; well: on guard and all parts as before [s]; None: not within the time.
+        touched: what the robot met.
+    """
+
+    node: str
+    how: str
+    verdict: str = ""
+    sentence: str = ""
+    told: dict[str, tuple[float, str]] = field(default_factory=dict)
+    mails: list[str] = field(default_factory=list)
+    over: float | None = None
+    well: float | None = None
+    touched: list[str] = field(default_factory=list)
+
+
+class Diagnostics:
+    """The newest level and message of each part."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, tuple[int, str]] = {}
+        self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._hear, queue_size=100)
+
+    def bad(self) -> dict[str, tuple[int, str]]:
+        """Parts that are not well."""
+        return {name: value for name, value in list(self.parts.items()) if value[0] > 0}
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        self.parts.update({status.name: (int(status.level), status.message) for status in message.status})
+
+
+def subjects(house: House) -> list[str]:
+    """Of the mails so far."""
+    messages = [email.message_from_bytes(p.read_bytes(), policy=email.policy.default) for p in house.mails()]
+    return [f"{m['Subject']}: {(m.get_body(('plain',)).get_content().splitlines() or [''])[0]}" for m in messages]
+
+
+def until(condition, seconds: float, each=lambda: None) -> bool:
+    end = time.monotonic() + seconds
+    while not condition():
+        each()
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def break_node(house: House, diagnostics: Diagnostics, node: str, how: str, hung: float) -> Row:
+    """One mission with one fault."""
+    row = Row(node, how)
+    before, mails, met = set(diagnostics.bad()), len(subjects(house)), len(house.contacts)
+    house.spawn("burglar", *INTRUDER)
+    house.trigger(ROOM)
+    phase = PatrolState.LOOKING if node in LOOKING else PatrolState.DRIVING
+    house.wait(lambda: house.state.state == phase, 120.0, phase)
+    if phase == PatrolState.DRIVING:
+        start = house.pose
+        house.wait(lambda: abs(house.pose.x - start.x) + abs(house.pose.y - start.y) > 1.0, 60.0, "the drive")
+    pid = house.pids()[f"/{node}"]
+    began, wall = house.pose_stamp, time.monotonic()
+    os.kill(pid, signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+
+    def watch() -> None:
+        for name, (_, message) in diagnostics.bad().items():
+            if name not in before and name not in row.told:
+                row.told[name] = round(house.pose_stamp - began, 1), message
+        if how == "hung" and time.monotonic() - wall > hung:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        if row.over is None and house.state.state == PatrolState.IDLE:
+            row.over = round(house.pose_stamp - began, 1)
+
+    is_over = until(lambda: row.over is not None, 240.0, watch)
+    is_well = until(lambda: time.monotonic() - wall > hung + 3.0 and set(diagnostics.bad()) <= before, 90.0, watch)
+    row.well = round(house.pose_stamp - began, 1) if is_over and is_well else None
+    row.verdict, row.sentence = house.state.last_verdict, house.state.why
+    row.mails = subjects(house)[mails:]
+    row.touched = sorted({other for kind, other in house.contacts[met:] if kind != "floor"})
+    house.remove("burglar")
+    return row
+
+
+def table(rows: list[Row]) -> str:
+    """Markdown."""
+    lines = [
+        "| node | | verdict | told | mails | mission over [s] | well [s] | met |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        told = "; ".join(f"{at:.0f} s {name}: {text}" for name, (at, text) in row.told.items()) or "-"
+        times = " | ".join("not" if value is None else f"{value:.0f}" for value in (row.over, row.well))
+        mails = "; ".join(row.mails) or "-"
+        lines.append(
+            f"| {row.node} | {row.how} | {row.verdict} | {told} | {mails} | {times} | {', '.join(row.touched) or '-'} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    parser.add_argument("--nodes", nargs="+", default=[], help="these only")
+    parser.add_argument("--how", nargs="+", default=["killed", "hung"])
+    parser.add_argument("--hung", type=float, default=15.0)
+    parser.add_argument("--rate", type=float, default=2.0)
+    parser.add_argument("--respawn-delay", type=float, default=5.0)
+    options = parser.parse_args()
+    folder = Path(tempfile.mkdtemp(prefix="broken_nodes_"))
+    print(f"logs in {folder}; {os.cpu_count()} cores")
+    master = Master(folder / "roscore.log")
+    rows: list[Row] = []
+    try:
+        diagnostics = Diagnostics()
+        given = {"rate": options.rate, "respawn_delay": options.respawn_delay}
+        house = House(folder / "house", **given)
+        house.start()
+        house.wait_ready(90.0)
+        time.sleep(5.0)
+        names = sorted(name.lstrip("/") for name in house.pids())
+        names = [n for n in names if n not in LEFT_OUT and not n.startswith(NOT_ROS)]
+        for node in options.nodes or names:
+            for how in options.how:
+                try:
+                    rows.append(break_node(house, diagnostics, node, how, options.hung))
+                except HouseError as err:
+                    rows.append(Row(node, how, sentence=str(err).splitlines()[0]))
+                print(table(rows[-1:]).splitlines()[-1], flush=True)
+                if not house.is_running or house.state.state != PatrolState.IDLE:
+                    house.stop()
+                    house = House(folder / f"house{len(rows)}", **given)
+                    house.start()
+                    house.wait_ready(90.0)
+                    time.sleep(5.0)
+        house.stop()
+    finally:
+        master.stop()
+    print(f"\n{table(rows)}")
+    if options.json:
+        figures = {f"{row.node} {row.how}": asdict(row) for row in rows}
+        options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
