@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rosbot_patrol.patrol.inputs import Box
+from rosbot_patrol.patrol.inputs import Box, Eye, Measured
 from rosbot_patrol.patrol.judge import PET, Judge
 
 _SAME = 1.0  # so near to each other two sightings are of one [m]
@@ -20,16 +20,23 @@ _SPEED = 1.0  # it may have walked so fast since [m/s]
 _WALKED = 4.0  # but no farther [m]
 _SURE = 0.7  # probability of a sighting that speaks for a person: a dog far off is taken for one now and then
 _TALL = 1.1  # and its top above the floor [m]
+_BEYOND = 0.8  # so much beyond a wall that it stands before may it be measured [m]
+_SHORTLY = 2.0  # [s]
 _OFTEN = 3  # such sightings, at least
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """Where something was, in map [m], and when [s]."""
+    """Where something was, in map [m], and when [s].
+
+    Attributes:
+        is_part: only a part of it showed, at the picture's edge.
+    """
 
     x: float
     y: float
     at: float
+    is_part: bool = False
 
     def may_be(self, other: Sighting) -> bool:
         """Whether both may be of one."""
@@ -68,12 +75,13 @@ class CloseUps:
         if new:
             self._open = [s for s in self._open if not self._is_told(s)]
 
-    def sort(self, stamp: float, boxes: Iterable[Box]) -> tuple[tuple[Box, ...], bool]:
+    def sort(self, stamp: float, boxes: Iterable[Box], eye: Eye | None = None) -> tuple[tuple[Box, ...], bool]:
         """The boxes of a picture that can be judged, and whether one was left out that may be a person.
 
         Args:
             stamp: of the picture [s].
             boxes: all of them.
+            eye: the camera then, where that is known.
         """
         kept, near = [], []
         for box in boxes:
@@ -81,7 +89,7 @@ class CloseUps:
             if m is None or box.label != "person":
                 kept.append(box)
                 continue
-            place = Sighting(m.x, m.y, stamp)
+            place = Sighting(*self._before_walls(m, eye), stamp, m.is_cut_aside)
             if self._judge.is_too_near(box) and not m.has_legs:
                 near.append((box, place))
                 continue
@@ -98,8 +106,20 @@ class CloseUps:
                 kept.append(box)
             elif not self._judge.refusal(box) and not any(place.may_be(pet) for pet in self._pets):
                 is_left = True
-                self._open = [s for s in self._open if not s.may_be(place)] + [place]
+                self._note(place)
         return tuple(kept), is_left
+
+    def _note(self, place: Sighting) -> None:
+        """The newest place of one counts, but that of a part of it for no place of the whole shortly before."""
+        before = [s for s in self._open if s.may_be(place)]
+        kept = [s for s in before if place.is_part and not s.is_part and place.at - s.at <= _SHORTLY]
+        self._open = [s for s in self._open if s not in before] + (kept[-1:] or [place])
+
+    def _before_walls(self, m: Measured, eye: Eye | None) -> tuple[float, float]:
+        """The place of something, on the near side of the wall that it stands before."""
+        if eye is None or self._judge.floor is None:
+            return m.x, m.y
+        return self._judge.floor.before((eye.pose.x, eye.pose.y), m.x, m.y, _BEYOND)
 
     def _is_person(self, place: Sighting) -> bool:
         return sum(place.may_be(person) for person in self._people) >= _OFTEN

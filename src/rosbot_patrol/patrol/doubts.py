@@ -147,10 +147,10 @@ class Doubts:
             elif not known.is_visited:
                 known.x, known.y = thing.x, thing.y
             elif _apart(known, thing) > _MOVED and known.visits < _VISITS:
-                known.x, known.y, known.is_visited, known.looks = thing.x, thing.y, False, 0
+                known.x, known.y, known.is_visited, known.looks, known.tried = thing.x, thing.y, False, 0, ()
         for doubt in self._all:
             if doubt.is_near and not any(_apart(doubt, thing) < _SAME_FAR for thing in doubtful):
-                doubt.is_visited = True
+                doubt.is_visited = doubt.is_over = True
         self._too_near = tuple(doubtful)
 
     def look(self, eye: Eye, sight: Sight) -> None:
@@ -166,12 +166,13 @@ class Doubts:
     def grave(self) -> list[Doubt]:
         """Those without whose second look nobody can say that nobody is there."""
         return [doubt for doubt in self.open() if doubt.is_grave and not doubt.is_visited] + [
-            doubt for doubt in self._all if doubt.is_grave and self._is_in_vain(doubt)
+            doubt for doubt in self._all if doubt.seen_from and doubt.is_grave and self._is_in_vain(doubt)
         ]
 
     def _is_in_vain(self, doubt: Doubt) -> bool:
-        """It looks like a person from one side, and the pictures from elsewhere did not show its place."""
-        return doubt.is_visited and not doubt.is_over and bool(doubt.seen_from) and doubt.looks < _LOOKS
+        """It was seen from one side, or too near, and the pictures from elsewhere did not show its place."""
+        wanted = self._seen_in if doubt.is_near else _LOOKS if doubt.seen_from else 0
+        return doubt.is_visited and not doubt.is_over and doubt.looks < wanted
 
     def unsure(self, is_moving: bool) -> str:
         """What is still too near to be told, "" where there is nothing.

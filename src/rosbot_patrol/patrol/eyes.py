@@ -258,7 +258,7 @@ class Eyes:
             doubt.y,
             stands=stands,
             seen_from=doubt.seen_from,
-            tried=doubt.tried if doubt.seen_from else (),
+            tried=doubt.tried,
             **span,
         )
 

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 EDGE = 0.1  # of a cell of the floor [m]
 CLEARANCE_MOST = 1.0  # clearances are exact up to here [m]
+_SKIPPED = 0.2  # of a line of sight, at the eye: the robot itself stands there [m]
 _MARGIN = 0.3  # around the known part of the map [m]
 
 
@@ -69,6 +70,26 @@ class Floor:
         iy = np.floor((ys - i.origin_y) / i.resolution).astype(np.int64)
         inside = (ix >= 0) & (iy >= 0) & (ix < i.width) & (iy < i.height)
         return ix.clip(0, i.width - 1), iy.clip(0, i.height - 1), inside
+
+    def before(self, eye: tuple[float, float], x: float, y: float, most: float) -> tuple[float, float]:
+        """The last free place on the line from an eye to a place, where that is at most so much before it; else it.
+
+        Args:
+            eye: from where it was seen [m].
+            x: of the place [m].
+            y: of the place [m].
+            most: by how much the place may have been measured too far off [m].
+        """
+        away = math.hypot(x - eye[0], y - eye[1])
+        along = np.arange(_SKIPPED, away, EDGE / 2.0)
+        if not len(along):
+            return x, y
+        xs, ys = (a + (b - a) / away * along for a, b in ((eye[0], x), (eye[1], y)))
+        stopped = ~self.are_free(xs, ys)
+        k = int(stopped.argmax()) - 1
+        if not stopped.any() or k < 0 or away - along[k] > most:
+            return x, y
+        return float(xs[k]), float(ys[k])
 
     def are_free(self, xs: Array, ys: Array) -> Mask:
         """Whether points lie on the floor."""

@@ -59,6 +59,7 @@ class Measured:
         top: of the object over the floor [m]; height, width: of what shows of it [m].
         is_cut: the box ends about the picture's upper edge, or at its lower one: there may be more of it.
         is_cut_above: there may be more of it above the picture.
+        is_cut_aside: the box ends at the picture's left or right edge: the place is of the part that shows.
         is_flat: all of it lies in one plane, None where no depth tells.
         has_legs: of what goes on above the picture: it stands as a person does, where the map shows nothing; None where
             that is not known.
@@ -74,6 +75,7 @@ class Measured:
     width: float
     is_cut: bool = False
     is_cut_above: bool = False
+    is_cut_aside: bool = False
     is_flat: bool | None = None
     has_legs: bool | None = None
     source: str = "depth"

@@ -40,7 +40,7 @@ class Lookout(Conduct):
         """What is too near to be told from a pet proves nothing, but the robot stops for it."""
         if not frame.counts or frame.stamp is None:
             return frame
-        boxes, is_left = self._close_ups.sort(frame.stamp, frame.boxes)
+        boxes, is_left = self._close_ups.sort(frame.stamp, frame.boxes, frame.eye)
         if is_left:
             self._watch.glimpse(self._now)
         return dataclasses.replace(frame, boxes=boxes)

@@ -24,7 +24,7 @@ from rosbot_patrol.patrol.legs import go_straight_up
 
 Array = NDArray[np.float64]
 
-_EDGE = 3  # a box that ends so near to the picture's lower edge may go on beyond it [px]
+_EDGE = 3  # a box that ends so near to the picture's lower or outer edges may go on beyond them [px]
 _HEADROOM = 0.06  # with less between a box and the picture's upper edge there may be more above it [m]
 _THICK = 0.12  # from the front of a person to the middle [m]
 _DEEP = 0.35  # what is so much farther than the nearest part is not of the person [m]
@@ -150,6 +150,7 @@ def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: 
         width=box.width / lens.fx * along,
         is_cut=is_cut_above or box.ymax >= lens.height - _EDGE,
         is_cut_above=is_cut_above,
+        is_cut_aside=box.xmin <= _EDGE or box.xmax >= lens.width - _EDGE,
         is_flat=flat,
         source=source,
     )

@@ -21,6 +21,7 @@ from rosbot_patrol.patrol.inputs import Box, Measured
 from rosbot_patrol.patrol.watch import Confirmation
 
 _PICTURES = 100  # of a side that are kept
+_PART = 0.25  # what the place of a part of it is worth, at the picture's edge
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +145,7 @@ class Suspects:
 
     def _take(self, box: Box, m: Measured, stamp: float, boxes: tuple[Box, ...]) -> Suspect:
         near = [s for s in self.all if s.label == box.label and s.apart(m.x, m.y) <= self.params.weak_apart]
-        weight = 1.0 / max(m.error, 0.05) ** 2
+        weight = (_PART if m.is_cut_aside else 1.0) / max(m.error, 0.05) ** 2
         if not near:
             self.all.append(Suspect(box.label, m.x, m.y, weight, box, stamp, boxes))
             return self.all[-1]

@@ -184,8 +184,9 @@ def _score(box: Box) -> float:
 
 
 def _newest(measured: list[Measured]) -> Measured | None:
-    """The last of those that are about as exact as the best: who walks is no longer where they were."""
+    """The last of those that are whole and about as exact as the best: who walks is no longer where they were."""
     if not measured:
         return None
+    measured = [m for m in measured if not m.is_cut_aside] or measured
     best = min(m.error for m in measured)
     return [m for m in measured if m.error <= _AS_GOOD * best][-1]

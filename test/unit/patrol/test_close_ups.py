@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
+from floors import drawn_floor
 
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.close_ups import CloseUps
-from rosbot_patrol.patrol.inputs import Box, Measured
+from rosbot_patrol.patrol.inputs import Box, Eye, Measured
 from rosbot_patrol.patrol.judge import Judge
 
 
@@ -40,6 +42,30 @@ def test_a_box_that_begins_a_little_below_the_pictures_edge_is_of_legs_too(close
     begun = dataclasses.replace(box(), ymin=14)
     assert close_ups.sort(1.0, (begun,)) == ((), True)
     assert not close_ups.sort(1.1, (dataclasses.replace(begun, ymin=16),))[1]  # a pet's back
+
+
+def test_a_part_at_the_pictures_edge_tells_no_better_place_than_the_whole_shortly_before(close_ups: CloseUps) -> None:
+    def places() -> list[float]:
+        return [s.x for s in close_ups.doubtful]
+
+    close_ups.sort(1.0, (box(0.0),))
+    close_ups.sort(1.5, (box(0.6, is_cut_aside=True),))
+    assert places() == [0.0]
+    close_ups.sort(2.0, (box(0.7),))
+    assert places() == [0.7]
+    close_ups.sort(5.0, (box(0.2, is_cut_aside=True),))  # long after: it may have walked
+    assert places() == [0.2]
+
+
+def test_what_is_measured_beyond_a_wall_stands_before_it() -> None:
+    floor = drawn_floor("#######", "#.....#", "#.....#", "#######", "#.....#", "#######")  # 0.5 m a cell
+    close_ups, eye = CloseUps(Judge(floor=floor)), Eye(pose=Pose2D(1.0, 1.7, 1.57), width=1.0)
+    for y, seen in ((1.9, 1.9), (2.7, 2.45), (3.35, 3.35)):  # the last is too far beyond to be a poor measurement
+        close_ups.start()
+        close_ups.sort(1.0, (box(1.0, y=y),), eye)
+        ((x, there),) = [(s.x, s.y) for s in close_ups.doubtful]
+        assert x == pytest.approx(1.0)
+        assert there == pytest.approx(seen, abs=0.11)
 
 
 @pytest.mark.parametrize(

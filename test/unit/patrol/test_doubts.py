@@ -27,6 +27,9 @@ def test_what_was_too_near_wants_one_look():
     assert doubt.spans == ({"nearest": 2.0, "most": 4.5},)
     doubt.visit(Pose2D(0.0, 0.0, 0.0))
     doubts.near([near(1.2, 0.1)])
+    assert doubts.open() == [doubt]  # which it has not had yet
+    for _ in range(SEEN_IN):
+        doubts.look(Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
     assert doubts.open() == []
 
 

@@ -211,6 +211,14 @@ def test_a_poster_behind_a_sofas_arm_is_flat_and_somebody_there_is_not() -> None
     assert measure(box, view, Depth(somebody, LENS)).measured.is_flat is False
 
 
+@pytest.mark.parametrize(("xmin", "xmax", "is_part"), [(0, 90, True), (550, 638, True), (10, 600, False)])
+def test_a_box_at_the_pictures_edge_is_of_a_part(xmin: int, xmax: int, is_part: bool) -> None:
+    box = Box(label="person", probability=0.9, xmin=xmin, xmax=xmax, ymin=60, ymax=400)
+    measured = measure(box, view_from(), depth_of(box, 2.0)).measured
+    assert measured is not None
+    assert measured.is_cut_aside == is_part
+
+
 def test_a_box_without_width_is_left_alone() -> None:
     box = Box(label="person", probability=0.9, xmin=200, ymin=20, xmax=200, ymax=20)
     assert measure(box, view_from(), Depth(np.ones((480, 640), np.float32), LENS)) == box

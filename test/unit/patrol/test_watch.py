@@ -158,6 +158,12 @@ def test_the_surest_place_of_the_last_pictures_is_told(watch):
     assert found[0].measured.x == 1.0
 
 
+def test_a_place_of_the_whole_is_told_rather_than_one_of_a_part(watch):
+    parts = (False, False, True)
+    found = feed(watch, frames(*[[placed(1.0 + 0.2 * i, 1.0, is_cut_aside=part)] for i, part in enumerate(parts)]))
+    assert found[0].measured.x == pytest.approx(1.2)
+
+
 def test_of_places_about_as_sure_the_newest_is_told(watch):
     errors = (0.10, 0.11, 0.12)
     found = feed(watch, frames(*[[placed(1.0 + 0.2 * i, 1.0, error=e)] for i, e in enumerate(errors)]))
