@@ -21,6 +21,7 @@ from rosbot_patrol.patrol.floor import Array, Floor, Mask
 _FAR = math.inf
 _ROOMY = 0.6  # so far from all that the map shows nothing low that it does not show is met: the feet of a chair [m]
 _TIGHT = 0.8  # what a viewpoint nearer to things is worth against one that is not
+_STEP = 0.2  # from so far aside a picture differs [m]
 _IN_VAIN = 2  # viewpoints on another side that showed nothing are enough
 _NEARER = 0.7  # where there is no other side, so much nearer than before is a second look
 
@@ -195,9 +196,16 @@ class ViewpointPlanner:
         A detector that is unsure of one picture is often sure of the next, taken from a step away.
         """
         before = min(math.hypot(eye.x - x, eye.y - y) for eye in eyes)
-        near_eyes = self.floor.mark_near(np.array([eye[:2] for eye in eyes]), self.params.viewpoint_spacing)
         choices = good & self._is_aside_of_all(eyes, x, y), good & (distances <= _NEARER * before)
-        return next((found for found in choices if found.any() and not is_step), good & ~near_eyes)
+        return next((found for found in choices if found.any() and not is_step), self._a_step_from(eyes, good))
+
+    def _a_step_from(self, eyes: Sequence[Pose2D], good: Mask) -> Mask:
+        """Of some floor what lies the spacing away from some poses, or as far as there is, which may be too little."""
+        xs, ys = self.floor.centres(*np.meshgrid(np.arange(good.shape[1]), np.arange(good.shape[0])))
+        off = np.min([np.hypot(xs - eye.x, ys - eye.y) for eye in eyes], axis=0)
+        farthest = float(off[good].max(initial=0.0))
+        step = min(self.params.viewpoint_spacing, farthest)
+        return good & (off >= step) if step >= _STEP else np.zeros_like(good)
 
     def _is_aside_of_all(self, eyes: Sequence[Pose2D], x: float, y: float) -> Mask:
         """The floor from which a place shows another side than from any of some poses."""

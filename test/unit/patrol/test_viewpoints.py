@@ -191,3 +191,14 @@ def test_a_second_look_that_no_other_side_allows_is_from_nearer_or_from_a_step_a
     again = seen(2.5, tried=(away[:2],))
     assert math.dist(again[:2], away[:2]) > 0.35
     assert math.dist(again[:2], eye[:2]) > 0.35
+
+
+def test_a_step_away_is_as_far_as_there_is_room() -> None:
+    floor = drawn_floor("#########", "#.......#", "#.......#", "#..######", "#########")
+    planner, eye, place = ViewpointPlanner(floor), Pose2D(1.0, 1.5, 0.0), (3.6, 1.5)
+    for room, has_one in ((0.3, True), (0.1, False)):
+        stands = ~floor.mark_near(np.array([eye[:2]]), room)
+        view = planner.near(eye, *place, seen_from=(eye,), nearest=2.0, stands=stands)
+        assert (view is not None) == has_one
+        if view is not None:
+            assert 0.2 <= math.dist(view.pose[:2], eye[:2]) <= 0.45
