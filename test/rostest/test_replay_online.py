@@ -25,7 +25,8 @@ from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.setup import node_of, read_parameters
 
 BAGS = HERE.parent / "replay"
-RATE = 4.0  # times real time
+FIRST = 131.53  # the end of the first mission in patrol.bag [s]; the next begins within a tenth of a second
+LATE = 3.0  # a node of a busy machine may say a thing so much later than its replay [s]
 
 
 class Online:
@@ -33,13 +34,13 @@ class Online:
 
     Args:
         ros: a master in simulated time.
-        bag: of `test/replay`.
+        bag: that is played.
         heard: topics of the bag that are played.
         said: topics that are recorded.
     """
 
-    def __init__(self, ros: Ros, bag: str, folder: Path, *, heard: list[str], said: list[str]) -> None:
-        self.ros, self.bag, self.heard, self.out = ros, BAGS / bag, heard, folder / "said.bag"
+    def __init__(self, ros: Ros, bag: Path, folder: Path, *, heard: list[str], said: list[str]) -> None:
+        self.ros, self.bag, self.heard, self.out = ros, bag, heard, folder / "said.bag"
         self.recorder = self._start("rosbag", "record", "--quiet", "-O", str(self.out), *said)
 
     def _start(self, *command: str) -> Process:
@@ -47,12 +48,12 @@ class Online:
         self.ros.processes.append(process)
         return process
 
-    def play(self, *remaps: str, linger: float = 2.0) -> Bag:
+    def play(self, *remaps: str, rate: float = 4.0, linger: float = 2.0) -> Bag:
         """Play it, all who hear it being there; what was said, with the bag's clock."""
-        arguments = ["--clock", "--hz", "200", "--quiet", "-r", str(RATE), "--wait-for-subscribers"]
+        arguments = ["--clock", "--hz", "200", "--quiet", "-r", str(rate), "--wait-for-subscribers"]
         play = self._start("rosbag", "play", str(self.bag), *arguments, "--topics", *self.heard, *remaps)
         with Bag(self.bag) as bag:
-            seconds = bag.duration / RATE + 60.0
+            seconds = bag.duration / rate + 60.0
         wait_for(lambda: play.popen.poll() is not None, seconds, "the end of the bag")
         assert play.popen.returncode == 0, play.output
         time.sleep(linger)
@@ -81,7 +82,7 @@ def test_amcl_goes_the_same_way(sim_ros: Ros, tmp_path: Path) -> None:
     parameters(sim_ros, "room_amcl", "amcl", use_map_topic=True)
     node = sim_ros.node("amcl", "__name:=amcl")
     topics = ["/scan", "/tf", "/tf_static", "/map", "/initialpose"]
-    with Online(sim_ros, "room.bag", tmp_path, heard=topics, said=["/amcl_pose"]).play() as said:
+    with Online(sim_ros, BAGS / "room.bag", tmp_path, heard=topics, said=["/amcl_pose"]).play() as said:
         records = [record.content for record in said.records(["/amcl_pose"])]
     assert node.popen.poll() is None
     expected = offline("room_amcl").tables["poses"]
@@ -102,7 +103,7 @@ def test_slam_gmapping_makes_the_same_map(sim_ros: Ros, tmp_path: Path) -> None:
     parameters(sim_ros, "room_slam", "slam_gmapping")
     node = sim_ros.node("slam_gmapping", "__name:=slam_gmapping")
     topics = ["/scan", "/tf", "/tf_static"]
-    with Online(sim_ros, "room.bag", tmp_path, heard=topics, said=["/map"]).play() as said:
+    with Online(sim_ros, BAGS / "room.bag", tmp_path, heard=topics, said=["/map"]).play() as said:
         last = [record.content.grid for record in said.records(["/map"])][-1]
     assert node.popen.poll() is None
     expected = offline("room_slam").grids["map"]
@@ -119,6 +120,9 @@ def walls(grid: Any) -> np.ndarray:
 
 
 def test_the_patrol_decides_the_same(sim_ros: Ros, tmp_path: Path) -> None:
+    first = tmp_path / "first.bag"
+    which = f"topic != '/motion_trigger' or t.to_sec() < {FIRST}"
+    subprocess.run(["rosbag", "filter", str(BAGS / "patrol.bag"), str(first), which], check=True, capture_output=True)
     mine = {"path_to_params": str(BAGS / "patrol_rooms.yaml"), "state_dir": str(tmp_path / "state"), "image_topic": ""}
     mail = {"maildir": str(tmp_path / "mail"), "transport": "maildir"}
     parameters(sim_ros, "patrol", "patrolling_node", **mine, **mail)
@@ -128,21 +132,21 @@ def test_the_patrol_decides_the_same(sim_ros: Ros, tmp_path: Path) -> None:
     node = sim_ros.node("patrol_robot", "__name:=patrolling_node")
     topics = ["/tf", "/tf_static", "/motion_trigger", "/move_base/result"]
     topics += ["/darknet_ros/bounding_boxes", "/darknet_ros/found_object"]
-    online = Online(sim_ros, "patrol.bag", tmp_path, heard=topics, said=["/patrol/state", "/move_base/goal"])
-    with online.play("/move_base/result:=/recorded/result") as said:
+    online = Online(sim_ros, first, tmp_path, heard=topics, said=["/patrol/state", "/move_base/goal"])
+    with online.play("/move_base/result:=/recorded/result", rate=2.0) as said:
         heard = list(raw(said.path))
     assert node.popen.poll() is None, node.output
     expected = offline("patrol").tables
     goals = [message.goal.target_pose.pose.position for _, topic, message in heard if topic == "/move_base/goal"]
-    places = list(zip(expected["goals"]["x"].tolist(), expected["goals"]["y"].tolist(), strict=True))
-    assert [(round(goal.x, 3), round(goal.y, 3)) for goal in goals] == places
+    sent = [expected["goals"][name][expected["goals"]["stamp"] < FIRST].tolist() for name in ("x", "y")]
+    assert [(round(goal.x, 3), round(goal.y, 3)) for goal in goals] == list(zip(*sent, strict=True))
     states = [(at, m.state, m.room_id, m.last_verdict) for at, topic, m in heard if topic == "/patrol/state"]
     rows = expected["reports"]
-    columns = [rows[name].tolist() for name in ("stamp", "state", "room", "last_verdict")]
+    columns = [rows[name][rows["stamp"] < FIRST].tolist() for name in ("stamp", "state", "room", "last_verdict")]
     found, wanted = turns_of_events(states), turns_of_events(list(zip(*columns, strict=True)))
     assert [what for _, *what in found] == [what for _, *what in wanted]
     late = [at - when for (at, *_), (when, *_) in zip(found, wanted, strict=True)]
-    assert max(map(abs, late[1:])) < 2.0, late  # its first word is said when it begins
+    assert max(map(abs, late[1:])) < LATE, late  # its first word is said when it begins
 
 
 def turns_of_events(states: list[tuple[float, str, int, str]]) -> list[tuple[float, str, int, str]]:
