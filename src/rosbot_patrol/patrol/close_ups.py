@@ -1,8 +1,9 @@
 """What is so near that the picture shows its legs only: a pet and a person look alike there.
 
 A low camera sees up to 0.9 m at a metre and a half. What is nearer than that, and goes on above the picture, counts as
-a person only where depth shows a person's legs, or somebody of a person's height was seen about there shortly before or
-after; where a pet was, it is the pet; else it is a doubt, and worth a look from farther off.
+a person only where depth shows a person's legs, or where somebody was seen about there shortly before or after: of a
+person's height, or going on above a picture that ends higher up than any pet. Where a pet was, it is the pet; else it
+is a doubt, and worth a look from farther off.
 """
 
 from __future__ import annotations
@@ -13,14 +14,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.patrol.inputs import Box, Eye, Measured
-from rosbot_patrol.patrol.judge import PET, Judge
+from rosbot_patrol.patrol.judge import PET, Judge, goes_on
 
 _SAME = 1.0  # so near to each other two sightings are of one [m]
 _SPEED = 1.0  # it may have walked so fast since [m/s]
 _WALKED = 4.0  # but no farther [m]
 _SURE = 0.7  # probability of a sighting that speaks for a person: a dog far off is taken for one now and then
 _TALL = 1.1  # and its top above the floor [m]
-_BEYOND = 0.8  # so much beyond a wall that it stands before may it be measured [m]
+BEYOND = 0.8  # so much beyond a wall that it stands before may it be measured [m]
 _SHORTLY = 2.0  # [s]
 _OFTEN = 3  # such sightings, at least
 
@@ -97,7 +98,7 @@ class CloseUps:
             refusal = self._judge.refusal(box)
             if refusal == PET:
                 self._pets.append(place)
-            elif not refusal and box.probability >= _SURE and (m.has_legs or m.top >= _TALL):
+            elif not refusal and box.probability >= _SURE and (m.has_legs or self._is_tall(box, m)):
                 self._people.append(place)
         self._open = [s for s in self._open if not self._is_told(s)]
         is_left = False
@@ -109,6 +110,10 @@ class CloseUps:
                 self._note(place)
         return tuple(kept), is_left
 
+    def _is_tall(self, box: Box, m: Measured) -> bool:
+        """Taller than any pet, by a margin where the picture shows all of it."""
+        return m.top >= (self._judge.params.person_top_min if goes_on(box, m) else _TALL)
+
     def _note(self, place: Sighting) -> None:
         """The newest place of one counts, but that of a part of it for no place of the whole shortly before."""
         before = [s for s in self._open if s.may_be(place)]
@@ -119,7 +124,7 @@ class CloseUps:
         """The place of something, on the near side of the wall that it stands before."""
         if eye is None or self._judge.floor is None:
             return m.x, m.y
-        return self._judge.floor.before((eye.pose.x, eye.pose.y), m.x, m.y, _BEYOND)
+        return self._judge.floor.before((eye.pose.x, eye.pose.y), m.x, m.y, BEYOND)
 
     def _is_person(self, place: Sighting) -> bool:
         return sum(place.may_be(person) for person in self._people) >= _OFTEN

@@ -23,7 +23,8 @@ from rosbot_patrol.patrol.suspects import Suspect
 _SAME_FAR = 1.5  # boxes too far off to be measured that are nearer are of one thing, and so are those too near [m]
 _SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
 _MOVED = 0.6  # what was too near and stands so much farther on has to be looked for again [m]
-_VISITS = 3  # of what is too near wherever the robot goes: it comes along; and of what looks much like a person
+_VISITS = 3  # of what is too near wherever the robot goes: it comes along
+_VISITS_GRAVE = 4  # of what looks much like a person
 _VISITS_UNSURE = 2  # of what looks little like one
 _LOOKS = 5  # pictures of another side that tell
 _WELL = 1.6  # from so far off what is half hidden is seen well; nearer it is hardly told from a pet [m]
@@ -86,7 +87,9 @@ class Doubt:
     @property
     def goes_on(self) -> bool:
         """Whether another viewpoint is worth its time where one was in vain."""
-        return self.visits < (_VISITS if self.is_grave else _VISITS_UNSURE)
+        if self.is_near:
+            return self.visits < _VISITS
+        return self.visits < (_VISITS_GRAVE if self.is_grave else _VISITS_UNSURE)
 
     def visit(self, at: Pose2D) -> None:
         """Take it that the robot goes somewhere and looks."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rosbot_patrol.geometry import Pose2D, angle_difference, transform_points
+from rosbot_patrol.geometry import Pose2D, angle_difference, transform_points, wrap_angle
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.close_ups import Sighting
+from rosbot_patrol.patrol.close_ups import BEYOND, Sighting
 from rosbot_patrol.patrol.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
 from rosbot_patrol.patrol.doubts import Doubt, Doubts
 from rosbot_patrol.patrol.floor import Mask
@@ -31,6 +31,7 @@ VIEW_WIDTH = 1.047  # where no camera has told its own [rad]
 _ROBOT = 0.25  # so near to what stands off the map no viewpoint lies [m]
 _STAY = 1.5  # somebody half hidden shows surely in one picture and hardly in the next [s]
 _STAY_NEAR = 3.0  # a pet rests for some seconds before it goes on [s]
+_SWEEP = 0.5  # past what looks a little like a person [rad]
 _LATE = 0.15  # a turn that would have begun so far back is begun where the robot stands [rad]
 
 
@@ -227,7 +228,15 @@ class Eyes:
         house, mission = self._house, self._mission
         if house is None or mission is None:
             return []
-        return [d for d in doubts if d.is_near or house.room_at(d.x, d.y) == mission.room.id]
+        return [d for d in doubts if d.is_near or house.room_at(*self._before_walls(d, house)) == mission.room.id]
+
+    @staticmethod
+    def _before_walls(doubt: Doubt, house: RoomRegions) -> tuple[float, float]:
+        """What is measured beyond a wall stands before it."""
+        if not doubt.seen_from:
+            return doubt.x, doubt.y
+        eye = doubt.seen_from[-1]
+        return house.floor.before((eye.x, eye.y), doubt.x, doubt.y, BEYOND)
 
     def _nearer(self, doubts: Sequence[Doubt], pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the first doubt that has one."""
@@ -247,8 +256,18 @@ class Eyes:
                     found.pose.x,
                     found.pose.y,
                 )
-                return replace(found, stay=_STAY_NEAR if doubt.is_near else _STAY if doubt.seen_from else 0.0)
+                return self._second_look(doubt, found)
         return None
+
+    @staticmethod
+    def _second_look(doubt: Doubt, view: Viewpoint) -> Viewpoint:
+        """For how long, and what looks a little like a person is turned over: each picture shows it otherwise."""
+        if doubt.is_near:
+            return replace(view, stay=_STAY_NEAR)
+        if not doubt.seen_from:
+            return view
+        first = view.pose._replace(yaw=wrap_angle(view.pose.yaw - _SWEEP / 2.0))
+        return replace(view, pose=first, turn=_SWEEP, stay=_STAY)
 
     def _view_of(self, doubt: Doubt, pose: Pose2D, stands: Mask | None, span: Mapping[str, float]) -> Viewpoint | None:
         assert self._planner is not None

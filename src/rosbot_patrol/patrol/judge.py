@@ -70,7 +70,7 @@ class Judge:
     def is_too_near(self, box: Box) -> bool:
         """Whether the picture ends so low above the floor that a person and a pet look alike in it."""
         m = box.measured
-        if m is None or box.label != "person" or not _has_size(m) or not _goes_on(box, m):
+        if m is None or box.label != "person" or not _has_size(m) or not goes_on(box, m):
             return False
         return m.top < self.params.person_top_min and m.width < self.params.lying_length
 
@@ -98,7 +98,7 @@ class Judge:
             return "it is too large for a person"
         if m.width >= p.lying_length * sure:
             return ""
-        if _goes_on(box, m):  # the picture ends before it does
+        if goes_on(box, m):  # the picture ends before it does
             return ""
         if m.top < p.person_top_min * sure:
             return PET
@@ -110,6 +110,6 @@ def _has_size(m: Measured) -> bool:
     return m.source != "floor" or m.error <= _NEAR_ERROR
 
 
-def _goes_on(box: Box, m: Measured) -> bool:
-    """Whether there may be more of it above the picture."""
+def goes_on(box: Box, m: Measured) -> bool:
+    """Whether there may be more of what a box shows above the picture."""
     return m.is_cut_above or (m.is_cut and box.ymin <= box.slack)

@@ -33,6 +33,10 @@ class SuspectParams:
     doubt_pictures: int = param(
         2, lo=1, hi=100, doc="pictures from one side, however unsure, that make a place worth a look from elsewhere"
     )
+    grave_score: float = param(0.4, lo=0.0, hi=1.0, doc="least median of a side that shows it for long")
+    grave_pictures: int = param(
+        20, lo=1, hi=_PICTURES, doc="from one side, with that median, and without a second look the room is not clear"
+    )
     weak_sides: int = param(2, lo=1, hi=10, doc="sides from which it has to look like a person")
     side_angle: float = param(0.6, unit="rad", lo=0.05, hi=3.1, doc="seen from so far aside is another side")
     weak_error: float = param(0.6, unit="m", lo=0.05, doc="what is not known better than that has no place")
@@ -67,7 +71,7 @@ class Suspect:
         label: class of object; x, y: place in map [m]; weight: of all that told it.
         sides: from where it was seen.
         best: the surest box; stamp: of its picture [s]; boxes: all of that picture.
-        is_told: it was confirmed; is_grave: from one side it looks like a person for long.
+        is_told: it was confirmed; is_grave: from one side it looks like a person, or a little so for long.
     """
 
     label: str
@@ -126,7 +130,7 @@ class Suspects:
             suspect = self._take(box, m, stamp, boxes)
             self._side(suspect, eye).scores.append(box.probability)
             witnesses = self._witnesses(suspect)
-            suspect.is_grave = bool(witnesses)
+            suspect.is_grave = bool(witnesses) or any(self._lasts(side) for side in suspect.sides)
             if not suspect.is_told and len(witnesses) >= self.params.weak_sides:
                 suspect.is_told = True
                 found.append(self._confirmation(suspect))
@@ -169,6 +173,9 @@ class Suspects:
     def _witnesses(self, suspect: Suspect) -> list[Side]:
         p = self.params
         return [s for s in suspect.sides if len(s.scores) >= p.weak_pictures and s.score >= p.weak_score]
+
+    def _lasts(self, side: Side) -> bool:
+        return len(side.scores) >= self.params.grave_pictures and side.score >= self.params.grave_score
 
     def _confirmation(self, suspect: Suspect) -> Confirmation:
         others = tuple(box for box in suspect.boxes if box is not suspect.best)

@@ -22,6 +22,7 @@ _FAR = math.inf
 _ROOMY = 0.6  # so far from all that the map shows nothing low that it does not show is met: the feet of a chair [m]
 _TIGHT = 0.8  # what a viewpoint nearer to things is worth against one that is not
 _STEP = 0.2  # from so far aside a picture differs [m]
+_STEPS = 2.0  # from so many times the spacing of the viewpoints it differs well
 _IN_VAIN = 2  # viewpoints on another side that showed nothing are enough
 _NEARER = 0.7  # where there is no other side, so much nearer than before is a second look
 
@@ -176,7 +177,8 @@ class ViewpointPlanner:
         if tried:
             good &= ~floor.mark_near(np.array(tried), self.params.viewpoint_spacing)
         if seen_from:
-            good = self._anew(good, distances.reshape(good.shape), seen_from, x, y, is_step=len(tried) >= _IN_VAIN)
+            ranges = distances.reshape(good.shape)
+            good = self._anew(good, ranges, seen_from, x, y, tried=tried if len(tried) >= _IN_VAIN else None)
         roomy = good & (floor.clearance >= _ROOMY)
         good = roomy if roomy.any() else good
         if not good.any():
@@ -190,21 +192,34 @@ class ViewpointPlanner:
         ix, iy = self.floor.info.cell_of(x, y)
         return bool(self.floor.clearance[iy, ix] < _ROOMY)
 
-    def _anew(self, good: Mask, distances: Array, eyes: Sequence[Pose2D], x: float, y: float, *, is_step: bool) -> Mask:
+    def _anew(
+        self,
+        good: Mask,
+        distances: Array,
+        eyes: Sequence[Pose2D],
+        x: float,
+        y: float,
+        *,
+        tried: Sequence[tuple[float, float]] | None,
+    ) -> Mask:
         """Of some floor what shows another side of a place than some poses; else more of it; else from a step away.
 
         A detector that is unsure of one picture is often sure of the next, taken from a step away.
         """
         before = min(math.hypot(eye.x - x, eye.y - y) for eye in eyes)
         choices = good & self._is_aside_of_all(eyes, x, y), good & (distances <= _NEARER * before)
-        return next((found for found in choices if found.any() and not is_step), self._a_step_from(eyes, good))
+        if tried is None:
+            for found in choices:
+                if found.any():
+                    return found
+        return self._a_step_from([*(eye[:2] for eye in eyes), *(tried or ())], good)
 
-    def _a_step_from(self, eyes: Sequence[Pose2D], good: Mask) -> Mask:
-        """Of some floor what lies the spacing away from some poses, or as far as there is, which may be too little."""
+    def _a_step_from(self, places: Sequence[tuple[float, float]], good: Mask) -> Mask:
+        """Of some floor what lies well away from some places, or as far as there is, which may be too little."""
         xs, ys = self.floor.centres(*np.meshgrid(np.arange(good.shape[1]), np.arange(good.shape[0])))
-        off = np.min([np.hypot(xs - eye.x, ys - eye.y) for eye in eyes], axis=0)
+        off = np.min([np.hypot(xs - from_x, ys - from_y) for from_x, from_y in places], axis=0)
         farthest = float(off[good].max(initial=0.0))
-        step = min(self.params.viewpoint_spacing, farthest)
+        step = min(_STEPS * self.params.viewpoint_spacing, farthest)
         return good & (off >= step) if step >= _STEP else np.zeros_like(good)
 
     def _is_aside_of_all(self, eyes: Sequence[Pose2D], x: float, y: float) -> Mask:

@@ -94,6 +94,15 @@ def test_legs_of_somebody_who_was_seen_whole_are_theirs(close_ups: CloseUps) -> 
     assert close_ups.sort(3.1, (box(-9.0),)) == ((), True)  # nobody walks that fast
 
 
+@pytest.mark.parametrize(("top", "is_person"), [(0.95, True), (0.85, False)])
+def test_what_goes_on_higher_up_than_any_pet_speaks_for_what_is_below(
+    close_ups: CloseUps, top: float, is_person: bool
+) -> None:
+    for k in range(3):
+        close_ups.sort(1.0 + 0.1 * k, (box(0.3, top=top),))
+    assert close_ups.sort(1.4, (box(),))[1] != is_person
+
+
 @pytest.mark.parametrize("given", [box(2.0, top=1.6, cut=False, score=0.5), box(2.0, top=0.95, cut=False)])
 def test_a_dog_far_off_that_passes_for_a_person_does_not_speak_for_its_legs(close_ups: CloseUps, given: Box) -> None:
     for k in range(20):

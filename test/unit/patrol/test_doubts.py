@@ -84,7 +84,7 @@ def test_one_side_is_not_all_until_pictures_of_another_showed_the_place(eye: Pos
     doubts, way = Doubts(SEEN_IN), Pose2D(0.0, 2.0, 0.0)
     sight = Sight(x=eye.x, y=eye.y, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 5.0))
     doubts.suspect(suspects(Pose2D(3.0, 0.0, math.pi)))
-    for visit in range(3):
+    for visit in range(4):
         (doubt,) = doubts.open()
         assert doubts.grave() == [doubt]
         doubt.visit(way)

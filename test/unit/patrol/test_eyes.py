@@ -75,7 +75,7 @@ class World:
         self.triggers: tuple[int, ...] = ()
         self.goals, self.notices, self.ended, self.reports, self.tracked = [], [], [], [], []
         self.cancels, self.flat, self.count, self.measures_to, self.sees_to = 0, False, 0, 99.0, 7.0
-        self.top = 1.7  # height of people
+        self.top, self.beyond = 1.7, 0.0  # height of people, and how much farther off they are measured
         self.score: Callable[[Pose2D], float] = lambda pose: 0.9
 
     def frame(self) -> Frame:
@@ -94,6 +94,7 @@ class World:
         middle = 320 - 554 * math.tan(bearing)
         most = 0.2 + 0.43 * away  # the picture ends there
         top, is_cut = min(self.top, most), most < self.top
+        x, y = x + self.beyond * (x - self.pose.x) / away, y + self.beyond * (y - self.pose.y) / away
         measured = Measured(
             x=x, y=y, error=0.15, away=away, top=top, height=top, width=0.5, is_cut=is_cut, is_flat=self.flat
         )
@@ -379,13 +380,21 @@ def test_what_looks_like_somebody_from_one_side_only_is_nobody() -> None:
     assert world.notices == []
 
 
-@pytest.mark.parametrize(("score", "verdict"), [(0.55, "unverified"), (0.42, "clear")])
+@pytest.mark.parametrize(("score", "verdict"), [(0.55, "unverified"), (0.42, "unverified"), (0.37, "clear")])
 def test_what_could_be_looked_at_from_one_side_only_is_unverified(score: float, verdict: str) -> None:
     world = World(lambda now: [(7.0, 1.0)], eyes=SightParams(look_around="spin"))
     world.score = lambda pose: score if math.dist(pose[:2], POINT[:2]) < 0.3 else 0.0
     mission = world.mission()
     assert mission.verdict.value == verdict
     assert ("was seen from one side only" in mission.reason) == (verdict == "unverified")
+
+
+def test_what_is_measured_beyond_the_rooms_wall_is_of_the_room() -> None:
+    world = World(lambda now: [(8.6, 0.55)], eyes=SightParams(look_around="spin"))
+    world.score = lambda pose: 0.55
+    world.sees_to = 2.0
+    world.beyond = 0.75  # right behind them is the wall
+    assert world.mission().verdict.value == "unverified"
 
 
 @pytest.mark.parametrize("way", ["none", "one of them"])

@@ -66,6 +66,16 @@ def test_two_pictures_are_a_doubt_and_few_are_no_side() -> None:
     assert seen.see(SOUTH, box(), pictures=9) == []
 
 
+@pytest.mark.parametrize(
+    ("score", "pictures", "is_grave"),
+    [(0.5, 4, False), (0.5, 5, True), (0.4, 19, False), (0.4, 20, True), (0.39, 90, False)],
+)
+def test_what_looks_a_little_like_a_person_for_long_is_grave(score: float, pictures: int, is_grave: bool) -> None:
+    seen = Seen()
+    seen.see(WEST, box(score=score), pictures=pictures)
+    assert [suspect.is_grave for suspect in seen.suspects.doubtful()] == [is_grave]
+
+
 def test_the_same_picture_again_and_one_of_before_do_not_count() -> None:
     seen = Seen()
     for _ in range(20):
