@@ -1,9 +1,9 @@
 """What looked like a person and was not told surely: places that are worth another look, and whether they had it.
 
 Three kinds. What was too far off to be measured is looked at from nearer. What looks like a person from one side only
-is looked at from another, and is nothing only where pictures from there showed its place. What was too near to be told
-from a pet is looked at from farther off, again where it has moved meanwhile, and is nothing only where its place was
-seen from there and nothing moves in the room.
+is looked at from another, and is nothing only where most pictures from there showed its place, and nobody. What was too
+near to be told from a pet is looked at from farther off, again where it has moved meanwhile, and is nothing only where
+its place was seen from there and nothing moves in the room.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ class Doubt:
         visits: viewpoints that it was to be looked at from.
         tried: those viewpoints.
         known_from: the sides that were known when the last of them was chosen.
-        looks: pictures that showed its place from there: from farther off, or from another side.
+        looks: pictures that showed its place from there: from farther off, or from another side, and nobody.
+        again: pictures that showed it, from there, too.
     """
 
     x: float
@@ -68,6 +69,7 @@ class Doubt:
     tried: tuple[tuple[float, float], ...] = ()
     known_from: tuple[Pose2D, ...] = ()
     looks: int = 0
+    again: int = 0
 
     @property
     def text(self) -> str:
@@ -116,6 +118,7 @@ class Doubts:
         self._seen_in = seen_in
         self._all: list[Doubt] = []
         self._too_near: Sequence[Sighting] = ()  # what nobody has told from a pet yet
+        self._suspects: Sequence[Suspect] = ()
 
     def __iter__(self) -> Iterator[Doubt]:
         return iter(self._all)
@@ -140,6 +143,7 @@ class Doubts:
         for doubt in self._all:
             if doubt.seen_from and not any(s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in doubtful):
                 doubt.is_visited = doubt.is_over = True
+        self._suspects = tuple(doubtful)
 
     def near(self, doubtful: Sequence[Sighting]) -> None:
         """Take in what is too near to be told from a pet, all that is so by now."""
@@ -156,10 +160,27 @@ class Doubts:
                 doubt.is_visited = doubt.is_over = True
         self._too_near = tuple(doubtful)
 
-    def look(self, eye: Eye, sight: Sight) -> None:
-        """Count a picture for the places that it gives a second look at."""
+    def look(self, stamp: float | None, eye: Eye, sight: Sight) -> None:
+        """Count a picture for the places that it gives a second look at.
+
+        Args:
+            stamp: of the picture [s], None where it showed nothing.
+            eye: the camera then.
+            sight: how far one could look from there.
+        """
         for doubt in self._all:
-            doubt.looks += doubt.shows(eye, sight)
+            if not doubt.shows(eye, sight):
+                continue
+            if stamp is not None and not doubt.is_near and self._was_seen(doubt, stamp):
+                doubt.again += 1
+            else:
+                doubt.looks += 1
+
+    def _was_seen(self, doubt: Doubt, stamp: float) -> bool:
+        """Whether a picture, or one after it, shows something like a person at a place."""
+        return any(s.seen_at >= stamp and s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in self._suspects) or any(
+            thing.at >= stamp and _apart(doubt, thing) < _SAME_SUSPECT for thing in self._too_near
+        )
 
     def open(self) -> list[Doubt]:
         """Those seen in some pictures and not looked at again, or in vain: the way was blocked, or the view."""
@@ -173,8 +194,8 @@ class Doubts:
         ]
 
     def _is_in_vain(self, doubt: Doubt) -> bool:
-        """It was seen from one side, or too near, and the pictures from elsewhere did not show its place."""
-        wanted = self._seen_in if doubt.is_near else _LOOKS if doubt.seen_from else 0
+        """It was seen from one side, or too near, and pictures from elsewhere did not show its place, or it again."""
+        wanted = self._seen_in if doubt.is_near else max(_LOOKS, doubt.again) if doubt.seen_from else 0
         return doubt.is_visited and not doubt.is_over and doubt.looks < wanted
 
     def unsure(self, is_moving: bool) -> str:

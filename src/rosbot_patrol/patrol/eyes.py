@@ -106,7 +106,7 @@ class Eyes:
             for box in frame.boxes:
                 if box.doubt is not None:
                     self._doubts.far(box.label, *box.doubt)
-            self._doubts.look(frame.eye, sight)
+            self._doubts.look(frame.stamp, frame.eye, sight)
             if view is not None:
                 self._harmless.look(view.scan.stamp, frame.eye, sight, frame.boxes, self._witness.things)
 

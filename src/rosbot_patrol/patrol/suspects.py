@@ -71,6 +71,7 @@ class Suspect:
         label: class of object; x, y: place in map [m]; weight: of all that told it.
         sides: from where it was seen.
         best: the surest box; stamp: of its picture [s]; boxes: all of that picture.
+        seen_at: stamp of the last picture that showed it [s].
         is_told: it was confirmed; is_grave: from one side it looks like a person, or a little so for long.
     """
 
@@ -81,6 +82,7 @@ class Suspect:
     best: Box
     stamp: float
     boxes: tuple[Box, ...]
+    seen_at: float = -math.inf
     sides: list[Side] = field(default_factory=list)
     is_told: bool = False
     is_grave: bool = False
@@ -128,6 +130,7 @@ class Suspects:
             if m is None or m.error > self.params.weak_error:
                 continue
             suspect = self._take(box, m, stamp, boxes)
+            suspect.seen_at = stamp
             self._side(suspect, eye).scores.append(box.probability)
             witnesses = self._witnesses(suspect)
             suspect.is_grave = bool(witnesses) or any(self._lasts(side) for side in suspect.sides)

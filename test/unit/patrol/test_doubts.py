@@ -29,7 +29,7 @@ def test_what_was_too_near_wants_one_look():
     doubts.near([near(1.2, 0.1)])
     assert doubts.open() == [doubt]  # which it has not had yet
     for _ in range(SEEN_IN):
-        doubts.look(Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
+        doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
     assert doubts.open() == []
 
 
@@ -50,7 +50,7 @@ def test_a_look_counts_for_the_place_it_showed_only():
     doubts.near([near(0.0, 0.0)])
     doubts.open()[0].visit(Pose2D(0.0, 0.0, 0.0))
     for _ in range(SEEN_IN):
-        doubts.look(Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
+        doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
     assert doubts.unsure(is_moving=False) == ""
     doubts.near([near(0.0, 1.0)])
     assert "(0.0, 1.0) was too near to be told from a pet" in doubts.unsure(is_moving=False)
@@ -91,13 +91,28 @@ def test_one_side_is_not_all_until_pictures_of_another_showed_the_place(eye: Pos
         assert len(doubt.tried) == visit + 1
         if visit == 1:
             for _ in range(5):
-                doubts.look(Eye(pose=eye, width=1.0), sight)
+                doubts.look(None, Eye(pose=eye, width=1.0), sight)
             if is_told:
                 break
     assert doubts.open() == []
     assert [d.text for d in doubts.grave()] == ([] if is_told else [doubt.text])
     doubts.suspect([])  # somebody was confirmed there
     assert doubts.grave() == []
+
+
+@pytest.mark.parametrize(("seen", "empty", "is_told"), [(9, 5, False), (9, 9, True), (3, 5, True), (0, 5, True)])
+def test_a_second_look_that_shows_somebody_again_tells_nothing(seen: int, empty: int, is_told: bool) -> None:
+    doubts, first, second = Doubts(SEEN_IN), Pose2D(3.0, 0.0, math.pi), Pose2D(1.5, 0.0, math.pi)
+    doubts.suspect(suspects(first))
+    (doubt,) = doubts.open()
+    doubt.visit(second)
+    (suspect,) = suspects(first)
+    for k in range(seen + empty):
+        stamp = 10.0 + 0.1 * k
+        suspect.seen_at = stamp if k < seen else suspect.seen_at
+        doubts.suspect([suspect])
+        doubts.look(stamp, Eye(pose=second, width=1.0), ALL_AROUND)
+    assert (doubts.grave() == []) == is_told
 
 
 def test_what_looks_little_like_a_person_gets_two_looks_at_most_and_is_not_grave() -> None:
@@ -114,7 +129,7 @@ def test_where_something_moves_what_was_too_near_may_have_gone():
     doubts = Doubts(SEEN_IN)
     doubts.near([near(0.0, 0.0)])
     for _ in range(SEEN_IN):
-        doubts.look(Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
+        doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
     assert doubts.unsure(is_moving=True)
     doubts.near([])
     assert doubts.unsure(is_moving=True) == ""
