@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.campaign.cast import Person
 from rosbot_patrol.campaign.floor import RECOGNISED, Floor
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, angle_difference
 
 ENOUGH = 1.5  # in view for so long, somebody has to be found [s]
 _ONE_TOUCH = 1.0  # a pause in a touch that makes it two [s]
@@ -32,6 +32,11 @@ class Track:
         """How fast it moved over a span up to a time [m/s], None before the first pose."""
         before, after = self.at(time - span), self.at(time)
         return None if before is None or after is None else math.dist(before[:2], after[:2]) / span
+
+    def turning(self, time: float, span: float = 0.4) -> float | None:
+        """How fast it turned over a span up to a time, either way [rad/s], None before the first pose."""
+        before, after = self.at(time - span), self.at(time)
+        return None if before is None or after is None else abs(angle_difference(after.yaw, before.yaw)) / span
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +130,11 @@ def touches(contacts: Sequence[tuple[float, str]], robot: Track, tracks: dict[st
         pose = robot.at(time)
         if not is_new or pose is None:
             continue
-        own, other = robot.speed(time) or 0.0, tracks[name].speed(time) if name in tracks else None
-        whose = f", {name} at {other:.2f} m/s" if other is not None else ""
-        told.append(f"{name} at {time:.1f} s, the robot at ({pose.x:.2f}, {pose.y:.2f}) and {own:.2f} m/s{whose}")
+        whose = f", {name} {_motion(tracks[name], time)}" if name in tracks else ""
+        told.append(f"{name} at {time:.1f} s, the robot at ({pose.x:.2f}, {pose.y:.2f}), {_motion(robot, time)}{whose}")
     return told
+
+
+def _motion(track: Track, time: float) -> str:
+    turning = track.turning(time) or 0.0
+    return f"at {track.speed(time) or 0.0:.2f} m/s" + (f" and turning at {turning:.1f} rad/s" if turning > 0.05 else "")

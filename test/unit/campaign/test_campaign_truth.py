@@ -10,7 +10,7 @@ import pytest
 from rosbot_patrol.campaign.cast import Person
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.share import true_share
-from rosbot_patrol.campaign.truth import Track, place_error, presence
+from rosbot_patrol.campaign.truth import Track, place_error, presence, touches
 from rosbot_patrol.geometry import Pose2D
 
 ROOM, POINT = 1, (3.10, 3.15)  # the flat's living room
@@ -53,6 +53,17 @@ def test_the_place_that_was_told_is_held_against_the_nearest() -> None:
     tracks = {"a": still(1.0, 1.0), "b": still(4.0, 1.0)}
     assert place_error(tracks, [Person(name="a"), Person(name="b")], 5.0, 4.0, 1.3) == pytest.approx(0.3)
     assert place_error(tracks, [], 5.0, 4.0, 1.3) is None
+
+
+def test_a_touch_is_told_once_with_who_moved_and_who_turned() -> None:
+    times = list(np.arange(0.0, 5.0, 0.1))
+    robot = Track(times, [Pose2D(0.3 * time, 0.0, 0.0) for time in times])
+    dog = Track(times, [Pose2D(1.0, 0.2, 2.0 * time) for time in times])
+    contacts = [(2.0, "rex"), (2.1, "rex"), (2.2, "sofa"), (4.0, "rex")]
+    first, sofa, again = touches(contacts, robot, {"rex": dog})
+    assert first == "rex at 2.0 s, the robot at (0.60, 0.00), at 0.30 m/s, rex at 0.00 m/s and turning at 2.0 rad/s"
+    assert sofa == "sofa at 2.2 s, the robot at (0.66, 0.00), at 0.30 m/s"
+    assert again.startswith("rex at 4.0 s")
 
 
 def test_a_full_turn_shows_the_room_but_what_furniture_hides(flat_floor: Floor) -> None:
