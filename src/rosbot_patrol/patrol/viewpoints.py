@@ -174,11 +174,11 @@ class ViewpointPlanner:
         good = open_ & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
         if stands is not None:
             good &= ~stands
-        if tried:
-            good &= ~floor.mark_near(np.array(tried), self.params.viewpoint_spacing)
+        untried = good & ~floor.mark_near(np.array(tried), self.params.viewpoint_spacing) if tried else good
         if seen_from:
-            ranges = distances.reshape(good.shape)
-            good = self._anew(good, ranges, seen_from, x, y, tried=tried if len(tried) >= _IN_VAIN else None)
+            good = self._anew(good, untried, distances.reshape(good.shape), seen_from, x, y, tried)
+        else:
+            good = untried
         roomy = good & (floor.clearance >= _ROOMY)
         good = roomy if roomy.any() else good
         if not good.any():
@@ -195,24 +195,24 @@ class ViewpointPlanner:
     def _anew(
         self,
         good: Mask,
+        untried: Mask,
         distances: Array,
         eyes: Sequence[Pose2D],
         x: float,
         y: float,
-        *,
-        tried: Sequence[tuple[float, float]] | None,
+        tried: Sequence[tuple[float, float]],
     ) -> Mask:
         """Of some floor what shows another side of a place than some poses; else more of it; else from a step away.
 
         A detector that is unsure of one picture is often sure of the next, taken from a step away.
         """
         before = min(math.hypot(eye.x - x, eye.y - y) for eye in eyes)
-        choices = good & self._is_aside_of_all(eyes, x, y), good & (distances <= _NEARER * before)
-        if tried is None:
+        choices = untried & self._is_aside_of_all(eyes, x, y), untried & (distances <= _NEARER * before)
+        if len(tried) < _IN_VAIN:
             for found in choices:
                 if found.any():
                     return found
-        return self._a_step_from([*(eye[:2] for eye in eyes), *(tried or ())], good)
+        return self._a_step_from([*(eye[:2] for eye in eyes), *tried], good)
 
     def _a_step_from(self, places: Sequence[tuple[float, float]], good: Mask) -> Mask:
         """Of some floor what lies well away from some places, or as far as there is, which may be too little."""
