@@ -6,6 +6,9 @@ legs. Where neither tells, the lower edge of the box is taken for the feet, whic
 the camera and to some tens of per cent farther off, as low as the camera is; a box that ends at the picture's lower
 edge has no feet.
 
+A depth camera that knows the depth of little of a box sees furniture before one who stands beyond its range, where the
+lidar sees legs farther off.
+
 Nothing in a box is farther off than the floor beneath its lower edge. Depth that says so is of what shows between the
 legs or beside them, as of dark clothes or of one nearer than a depth camera can measure, and is not taken.
 """
@@ -29,6 +32,8 @@ _HEADROOM = 0.06  # with less between a box and the picture's upper edge there m
 _THICK = 0.12  # from the front of a person to the middle [m]
 _DEEP = 0.35  # what is so much farther than the nearest part is not of the person [m]
 _FEW = 40  # depths, at least, to say anything
+_KNOWN = 0.2  # of the middle of a box has depth; with less, that is of something else
+_ABOUT = 1.25  # so far off a row of the picture tells the floor's distance to within that
 _LEGS = 2  # beams, at least
 _GRID = 48  # samples along each side of a box, at most
 _FLAT_SHARE = 0.92  # of the samples lie in a picture's plane
@@ -111,6 +116,8 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
     if depth is not None:
         samples = _samples(box, view.lens, depth)
         along = _nearest(samples)
+        if found is not None and (along or 0.0) < found <= _ABOUT * most and _is_beyond(samples):
+            return replace(box, measured=_at(box, view, found, source="lidar", error=0.15 + 0.02 * found, flat=None))
         is_behind = along is not None and along > most
         leg = _upright(samples, *_about_floor(box, view)) if along is not None else None
         if leg is not None and along is not None and leg < along - _DEEP:
@@ -173,10 +180,20 @@ def _middles(first: float, last: float) -> Array:
     return np.linspace(first, last, _GRID + 1)[:-1] + (last - first) / _GRID / 2.0
 
 
+def _middle(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The middle of a box, and above."""
+    rows, columns = samples.shape
+    return samples[rows // 8 : rows * 3 // 4, columns // 4 : columns * 3 // 4]
+
+
+def _is_beyond(samples: NDArray[np.float64]) -> bool:
+    """Whether most of a box may lie beyond what the depth camera measures: what it knows is of a thing before that."""
+    return bool(np.isfinite(_middle(samples)).mean() < _KNOWN)
+
+
 def _nearest(samples: NDArray[np.float64]) -> float | None:
     """How far the nearest thing of some size in the middle of a box is [m]."""
-    rows, columns = samples.shape
-    middle = samples[rows // 8 : rows * 3 // 4, columns // 4 : columns * 3 // 4]
+    middle = _middle(samples)
     known = middle[np.isfinite(middle)]
     if known.size < _FEW:
         return None

@@ -108,6 +108,20 @@ def test_the_lidar_tells_where_depth_does_not() -> None:
     assert math.dist((m.x, m.y), (x, y)) < 0.3
 
 
+@pytest.mark.parametrize(("known", "source"), [(0.08, "lidar"), (0.5, "depth")])
+def test_furniture_before_one_beyond_the_depth_cameras_range_is_not_them(known: float, source: str) -> None:
+    view = view_from()
+    box = box_of(view, 7.0, 0.0)
+    metres = np.full((480, 640), np.nan, np.float32)
+    metres[:, round(box.xmax - (0.25 + 0.5 * known) * box.width) :] = 3.6
+    legs = np.array([[6.9, -0.1], [6.9, -0.08], [6.95, 0.1], [6.9, 0.12]])
+    m = measure(box, view, Depth(metres, LENS), legs).measured
+    assert m is not None
+    assert m.source == source
+    assert m.x == pytest.approx(7.0 if source == "lidar" else 3.7, abs=0.1)
+    assert measure(box, view, Depth(metres, LENS)).measured.source == "depth"  # nothing tells more
+
+
 def test_the_floor_tells_last_and_says_that_it_is_less_sure() -> None:
     view = view_from()
     box = box_of(view, 3.0, 0.2)
