@@ -22,7 +22,8 @@ _WALKED = 4.0  # but no farther [m]
 _SURE = 0.7  # probability of a sighting that speaks for a person: a dog far off is taken for one now and then
 _TALL = 1.1  # and its top above the floor [m]
 BEYOND = 0.8  # so much beyond a wall that it stands before may it be measured [m]
-_SHORTLY = 2.0  # [s]
+_SHORTLY = 3.0  # [s]
+_SURER = 0.25  # by so much surer a sighting tells more
 _OFTEN = 3  # such sightings, at least
 
 
@@ -32,17 +33,25 @@ class Sighting:
 
     Attributes:
         is_part: only a part of it showed, at the picture's edge.
+        score: how sure the detector was.
     """
 
     x: float
     y: float
     at: float
     is_part: bool = False
+    score: float = 1.0
 
     def may_be(self, other: Sighting) -> bool:
         """Whether both may be of one."""
         walked = min(_SPEED * abs(self.at - other.at), _WALKED)
         return math.hypot(self.x - other.x, self.y - other.y) <= _SAME + walked
+
+    def tells_more(self, other: Sighting) -> bool:
+        """Whether its place is to be believed rather than that of another of the same, a little later."""
+        if self.is_part != other.is_part:
+            return other.is_part
+        return self.score > other.score + _SURER
 
 
 class CloseUps:
@@ -90,7 +99,7 @@ class CloseUps:
             if m is None or box.label != "person":
                 kept.append(box)
                 continue
-            place = Sighting(*self._before_walls(m, eye), stamp, m.is_cut_aside)
+            place = Sighting(*self._before_walls(m, eye), stamp, m.is_cut_aside, box.probability)
             if self._judge.is_too_near(box) and not m.has_legs:
                 near.append((box, place))
                 continue
@@ -115,9 +124,9 @@ class CloseUps:
         return m.top >= (self._judge.params.person_top_min if goes_on(box, m) else _TALL)
 
     def _note(self, place: Sighting) -> None:
-        """The newest place of one counts, but that of a part of it for no place of the whole shortly before."""
+        """The newest place of one counts, unless one shortly before tells more."""
         before = [s for s in self._open if s.may_be(place)]
-        kept = [s for s in before if place.is_part and not s.is_part and place.at - s.at <= _SHORTLY]
+        kept = [s for s in before if s.tells_more(place) and place.at - s.at <= _SHORTLY]
         self._open = [s for s in self._open if s not in before] + (kept[-1:] or [place])
 
     def _before_walls(self, m: Measured, eye: Eye | None) -> tuple[float, float]:

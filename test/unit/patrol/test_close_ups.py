@@ -53,8 +53,17 @@ def test_a_part_at_the_pictures_edge_tells_no_better_place_than_the_whole_shortl
     assert places() == [0.0]
     close_ups.sort(2.0, (box(0.7),))
     assert places() == [0.7]
-    close_ups.sort(5.0, (box(0.2, is_cut_aside=True),))  # long after: it may have walked
+    close_ups.sort(6.0, (box(0.2, is_cut_aside=True),))  # long after: it may have walked
     assert places() == [0.2]
+
+
+@pytest.mark.parametrize(("score", "later", "x"), [(0.3, 1.0, 0.0), (0.3, 5.0, 0.6), (0.8, 1.0, 0.6)])
+def test_an_unsure_sighting_tells_no_better_place_than_a_sure_one_shortly_before(
+    close_ups: CloseUps, score: float, later: float, x: float
+) -> None:
+    close_ups.sort(1.0, (box(score=0.9),))
+    close_ups.sort(1.0 + later, (box(0.6, score=score),))
+    assert [s.x for s in close_ups.doubtful] == [x]
 
 
 def test_what_is_measured_beyond_a_wall_stands_before_it() -> None:
