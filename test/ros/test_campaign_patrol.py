@@ -104,6 +104,6 @@ def test_a_touch_is_told_with_who_moved(patrol: Patrol, tmp_path: Path) -> None:
     heard.contacts = [(35.0, "bob"), (35.1, "bob"), (40.0, "bob")]
     result = judged(patrol, heard, tmp_path, contacts=["bob", "bob", "bob"])
     first, second = result.touches
-    assert first == "bob at 35.0 s, the robot at (3.10, 3.15) and 0.00 m/s, bob at 0.00 m/s"
+    assert first == "bob at 35.0 s, the robot at (3.10, 3.15), at 0.00 m/s, bob at 0.00 m/s"
     assert second.startswith("bob at 40.0 s")
     assert result.failures == (f"touched {first}; {second}",)
