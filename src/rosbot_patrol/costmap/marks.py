@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 from rosbot_patrol.costmap.costs import LETHAL, CostCells
 from rosbot_patrol.costmap.observation import Observation
 from rosbot_patrol.costmap.params import SourceParams
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import GridInfo
 
 _PERIOD = 0.2  # between two looks at all marks [s]
 _LONGEST = 1.0  # most that one look adds to the time in view [s]
 _ROW = 1 << 31  # keys are (iy + half a row) * _ROW + ix + half a row
 _HALF = 1 << 30
+_BESIDE = 0.6  # what is nearer to the robot's middle may stand where it cannot look again [m]
 _MARGIN = 1.5  # a beam passes a cell if it goes on this much behind its centre [cells]
 
 Seen = list[tuple[SourceParams, Observation]]
@@ -28,10 +30,12 @@ class MarkMemory:
     Args:
         in_view: a mark is forgotten after so long in view and empty [s], 0 is never.
         out_of_view: a mark is forgotten after so long neither seen nor in view [s], 0 is never.
+        beside: the same for a mark right beside the robot [s], 0 is as elsewhere.
     """
 
-    def __init__(self, in_view: float, out_of_view: float) -> None:
+    def __init__(self, in_view: float, out_of_view: float, beside: float = 0.0) -> None:
         self._in_view, self._out_of_view = in_view, out_of_view
+        self._beside = max(beside, out_of_view)
         self._shift = (0, 0)
         self._next = float("-inf")
         self.clear()
@@ -64,7 +68,9 @@ class MarkMemory:
             self._empty_for = np.insert(self._empty_for, where, 0.0)
             self._last_view = np.insert(self._last_view, where, now)
 
-    def expired(self, now: float, cells: CostCells, info: GridInfo, seen: Seen) -> NDArray[np.int64]:
+    def expired(
+        self, now: float, cells: CostCells, info: GridInfo, seen: Seen, robot: Pose2D | None = None
+    ) -> NDArray[np.int64]:
         """Cells (ix, iy) of the window to be forgotten, shape (N, 2).
 
         Args:
@@ -72,6 +78,7 @@ class MarkMemory:
             cells: the layer's costs; what is not lethal any more is dropped.
             info: the window's place.
             seen: the observations of this update.
+            robot: where it stands, in the window's frame, where that matters.
         """
         none = np.empty((0, 2), np.int64)
         if now < self._next - 2.0 * _PERIOD:
@@ -95,7 +102,11 @@ class MarkMemory:
         if self._in_view > 0.0:
             old |= empty & (self._empty_for >= self._in_view)
         if self._out_of_view > 0.0:
-            old |= now - self._last_view >= self._out_of_view
+            longest = np.full(len(at), self._out_of_view)
+            if robot is not None:
+                x, y = (at + 0.5).T * info.resolution + [[info.origin_x], [info.origin_y]]
+                longest[np.hypot(x - robot.x, y - robot.y) < _BESIDE] = self._beside
+            old |= now - self._last_view >= longest
         self._keep(~old)
         return at[old]
 

@@ -36,8 +36,8 @@ class ObstacleLayer(Layer):
     - Only the robot itself is cleared, without its padding; upstream clears the padding too, so that a slow robot
       eats its way into an obstacle. It is cleared of what the layers before wrote as well, such as a map's wall that
       the robot stands in by an error of its pose: upstream's robot cannot plan its way out there.
-    - `forget_unseen_after` and `forget_out_of_view_after` (both 0 by default, as upstream, which forgets nothing that
-      no beam clears) let marks go that have not been seen again: see `marks`.
+    - `forget_unseen_after`, `forget_out_of_view_after` and `forget_beside_after` (0 by default, as upstream, which
+      forgets nothing that no beam clears) let marks go that have not been seen again: see `marks`.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class ObstacleLayer(Layer):
         self._dirty = NOTHING
         self._outline: NDArray[np.float64] | None = None
         self._cleared = np.empty(_CLEARED, np.int32)
-        ages = params.forget_unseen_after, params.forget_out_of_view_after
+        ages = params.forget_unseen_after, params.forget_out_of_view_after, params.forget_beside_after
         self._marks = MarkMemory(*ages) if max(ages) > 0.0 else None
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
@@ -95,7 +95,7 @@ class ObstacleLayer(Layer):
         seen = [(b.params, o) for b in self.buffers.values() for o in b.all()]
         self._clear_and_mark(info, seen, changes)
         if self._marks is not None:
-            self._forget(now, info, seen, changes)
+            self._forget(now, info, pose, seen, changes)
         touched, self._dirty = self._dirty.union(self._free_robot(info, pose, changes)), NOTHING
         return bounds.union(touched.union(_area(changes)).clipped(info.width, info.height))
 
@@ -121,7 +121,7 @@ class ObstacleLayer(Layer):
                 return False
         return height <= p.max_obstacle_height
 
-    def _forget(self, now: float, info: GridInfo, seen: Seen, changes: NDArray[np.int64]) -> None:
+    def _forget(self, now: float, info: GridInfo, pose: Pose2D, seen: Seen, changes: NDArray[np.int64]) -> None:
         assert self._marks is not None
         for source, o in seen:
             if source.marking and self._is_marked_at(o.height):
@@ -129,7 +129,7 @@ class ObstacleLayer(Layer):
                 at = np.floor((o.hits[near] - (info.origin_x, info.origin_y)) / info.resolution).astype(np.int64)
                 at = at[((at >= 0) & (at < (info.width, info.height))).all(axis=1)]
                 self._marks.note(now, at[:, 0], at[:, 1])
-        old = self._marks.expired(now, self._window.cells, info, seen)
+        old = self._marks.expired(now, self._window.cells, info, seen, pose)
         if len(old):
             self._window.cells[old[:, 1], old[:, 0]] = FREE
             changes[:2] = np.minimum(changes[:2], old.min(axis=0))

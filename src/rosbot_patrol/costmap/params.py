@@ -69,6 +69,12 @@ class ObstacleParams:
     forget_out_of_view_after: float = param(
         0.0, unit="s", lo=0.0, doc="ours: a mark goes that was neither hit nor in view for so long; 0 never"
     )
+    forget_beside_after: float = param(
+        0.0,
+        unit="s",
+        lo=0.0,
+        doc="ours: the same within 0.6 m of the robot's middle, where it cannot look again; 0: as elsewhere",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

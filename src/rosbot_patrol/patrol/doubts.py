@@ -3,13 +3,13 @@
 Three kinds. What was too far off to be measured is looked at from nearer. What looks like a person from one side only
 is looked at from another, and is nothing only where most pictures from there showed its place, and nobody. What was too
 near to be told from a pet is looked at from farther off, again where it has moved meanwhile, and is nothing only where
-its place was seen from there and nothing moves in the room.
+its place was seen from there and nothing moves in the room; what moves there is looked at, too, as it may be that.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,7 @@ from rosbot_patrol.patrol.suspects import Suspect
 _SAME_FAR = 1.5  # boxes too far off to be measured that are nearer are of one thing, and so are those too near [m]
 _SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]
 _MOVED = 0.6  # what was too near and stands so much farther on has to be looked for again [m]
+_FOLLOWED = 5.0  # what moves and is farther from there is another [m]
 _VISITS = 3  # of what is too near wherever the robot goes: it comes along
 _VISITS_GRAVE = 4  # of what looks much like a person
 _VISITS_UNSURE = 2  # of what looks little like one
@@ -54,6 +55,7 @@ class Doubt:
         known_from: the sides that were known when the last of them was chosen.
         looks: pictures that showed its place from there: from farther off, or from another side, and nobody.
         again: pictures that showed it, from there, too.
+        was_at: where it was too near, since what moves elsewhere is looked at for it.
     """
 
     x: float
@@ -70,6 +72,7 @@ class Doubt:
     known_from: tuple[Pose2D, ...] = ()
     looks: int = 0
     again: int = 0
+    was_at: tuple[float, float] | None = None
 
     @property
     def text(self) -> str:
@@ -99,6 +102,11 @@ class Doubt:
         self.visits += 1
         self.tried += ((at.x, at.y),)
         self.known_from = self.seen_from
+
+    def again_at(self, x: float, y: float) -> None:
+        """Take it that it has moved to another place [m], and had no look there."""
+        self.x, self.y, self.was_at = x, y, None
+        self.is_visited, self.looks, self.tried = False, 0, ()
 
     def shows(self, eye: Eye, sight: Sight) -> bool:
         """Whether a picture is the second look that this place wants."""
@@ -151,14 +159,33 @@ class Doubts:
             known = next((d for d in self._all if d.is_near and _apart(d, thing) < _SAME_FAR), None)
             if known is None:
                 self._all.append(Doubt(thing.x, thing.y, pictures=self._seen_in, is_near=True))
+            elif known.was_at == (thing.x, thing.y):
+                continue
             elif not known.is_visited:
-                known.x, known.y = thing.x, thing.y
+                known.x, known.y, known.was_at = thing.x, thing.y, None
             elif _apart(known, thing) > _MOVED and known.visits < _VISITS:
-                known.x, known.y, known.is_visited, known.looks, known.tried = thing.x, thing.y, False, 0, ()
+                known.again_at(thing.x, thing.y)
         for doubt in self._all:
             if doubt.is_near and not any(_apart(doubt, thing) < _SAME_FAR for thing in doubtful):
                 doubt.is_visited = doubt.is_over = True
         self._too_near = tuple(doubtful)
+
+    def follow(self, moving: Iterable[tuple[float, float]]) -> None:
+        """Look at what moves, too, where it may be what was too near and is not there any more.
+
+        Args:
+            moving: where something moves, in map [m].
+        """
+        places = tuple(moving)
+        for doubt in self._all:
+            if not doubt.is_near or not doubt.is_visited or doubt.is_over or doubt.looks < self._seen_in:
+                continue
+            apart = {place: math.dist(place, (doubt.x, doubt.y)) for place in places}
+            place = min(apart, key=apart.__getitem__, default=None)
+            if place is not None and _MOVED < apart[place] < _FOLLOWED and doubt.visits < _VISITS:
+                was_at = doubt.was_at or (doubt.x, doubt.y)
+                doubt.again_at(*place)
+                doubt.was_at = was_at
 
     def look(self, stamp: float | None, eye: Eye, sight: Sight) -> None:
         """Count a picture for the places that it gives a second look at.
@@ -216,7 +243,7 @@ class Doubts:
 
 
 def _apart(doubt: Doubt, thing: Sighting) -> float:
-    return math.hypot(doubt.x - thing.x, doubt.y - thing.y)
+    return math.dist(doubt.was_at or (doubt.x, doubt.y), (thing.x, thing.y))
 
 
 def shows_anew(eye: Eye, sight: Sight, doubt: Doubt) -> bool:

@@ -140,6 +140,27 @@ def test_what_is_hidden_for_long_is_forgotten_where_asked():
     assert lethal(costmap) > 0  # the person
 
 
+def test_what_is_right_beside_the_robot_is_kept_longer():
+    """A robot that waits beside something that it cannot see any more would turn into it."""
+    costmap = make(forget_out_of_view_after=5.0, forget_beside_after=60.0)
+    blind = np.full(BEAMS, np.nan)
+    stand(costmap, 0.0, 1.0, world(box=(0.5, 0.0, 0.1)))
+    beside = costmap.cells == 254
+    assert beside.any()
+    stand(costmap, 1.0, 50.0, blind)
+    assert np.array_equal(costmap.cells == 254, beside)
+    stand(costmap, 51.0, 12.0, blind)
+    assert lethal(costmap) == 0
+
+
+def test_what_the_robot_leaves_behind_is_not_kept_longer():
+    costmap = make(forget_out_of_view_after=5.0, forget_beside_after=60.0)
+    stand(costmap, 0.0, 1.0, world(box=(0.5, 0.0, 0.1)))
+    for i in range(40):
+        look(costmap, np.full(BEAMS, np.nan), 1.0 + PERIOD * i, Pose2D(HERE.x - 0.5, HERE.y))
+    assert lethal(costmap) == 0
+
+
 def test_the_time_in_view_counts_and_not_the_time_before():
     """What was hidden long ago is not forgotten at the first glimpse, which may be a lost beam."""
     costmap = make(forget_unseen_after=1.0)

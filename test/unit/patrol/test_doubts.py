@@ -125,6 +125,49 @@ def test_what_looks_little_like_a_person_gets_two_looks_at_most_and_is_not_grave
     assert doubts.grave() == []
 
 
+def looked_at() -> Doubts:
+    """Something too near was at (0, 0), whose place was seen from farther off since."""
+    doubts = Doubts(SEEN_IN)
+    doubts.near([near(0.0, 0.0)])
+    doubts.open()[0].visit(Pose2D(3.0, 0.0, math.pi))
+    for _ in range(SEEN_IN):
+        doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
+    assert doubts.open() == []
+    return doubts
+
+
+def test_what_moves_is_looked_at_for_what_was_too_near_and_has_gone():
+    doubts = looked_at()
+    doubts.follow([(9.0, 0.0), (1.0, 2.0)])
+    doubts.near([near(0.0, 0.0)])
+    (doubt,) = doubts.open()
+    assert (doubt.x, doubt.y) == (1.0, 2.0)
+    assert "(0.0, 0.0) was too near to be told from a pet" in doubts.unsure(is_moving=True)
+    doubts.near([])  # it was told: a pet
+    assert doubts.open() == []
+    assert doubts.unsure(is_moving=True) == ""
+
+
+def test_what_moves_is_not_followed_for_ever():
+    doubts = looked_at()
+    visits = 1
+    for k in range(10):
+        doubts.follow([(float(k % 2), 2.0)])
+        for doubt in doubts.open():
+            doubt.visit(Pose2D(3.0, 0.0, math.pi))
+            visits += 1
+            doubt.looks = SEEN_IN
+        doubts.near([near(0.0, 0.0)])
+    assert visits == 3
+
+
+@pytest.mark.parametrize("place", [(0.3, 0.2), (9.0, 0.0)])
+def test_what_moves_where_it_was_seen_or_far_away_is_not_followed(place: tuple[float, float]):
+    doubts = looked_at()
+    doubts.follow([place])
+    assert doubts.open() == []
+
+
 def test_where_something_moves_what_was_too_near_may_have_gone():
     doubts = Doubts(SEEN_IN)
     doubts.near([near(0.0, 0.0)])
