@@ -80,7 +80,8 @@ class Doubt:
         looked = "was seen from one side only" if self.seen_from else "was not seen from near"
         if self.is_near:
             looked = "was too near to be told from a pet"
-        return f"something like a {self.label} at about ({self.x:.1f}, {self.y:.1f}) {looked}"
+        x, y = self.was_at or (self.x, self.y)
+        return f"something like a {self.label} at about ({x:.1f}, {y:.1f}) {looked}"
 
     @property
     def spans(self) -> Sequence[dict[str, float]]:
