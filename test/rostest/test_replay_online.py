@@ -58,6 +58,7 @@ class Online:
         assert play.popen.returncode == 0, play.output
         time.sleep(linger)
         self.recorder.stop()
+        wait_for(self.out.exists, 30.0, "the recorder's bag")  # rosbag does not wait for its child, which writes it
         return Bag(self.out)
 
 
