@@ -20,7 +20,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from rosbot_patrol.errors import BagError
-from rosbot_patrol.replay.definitions import definition_problem
+from rosbot_patrol.replay.definitions import definition_problem, know_headers
 from rosbot_patrol.replay.records import ANY, KINDS, Kind
 
 # What rosbags and the decompressors raise where bytes make no sense.
@@ -68,6 +68,7 @@ class Bag:
         try:
             self._reader = AnyReader([self.path], default_typestore=get_typestore(Stores.ROS2_FOXY))
             self._reader.open()
+            know_headers(self._reader.typestore)
         except BROKEN as err:
             raise BagError(self.path, _open_problem(self.path, err)) from err
         self.done = 0.0  # share of the bag's time that is read

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rosbags.interfaces import Nodetype
+from rosbags.typesys.store import Typestore
 
 STAMP = {"header.stamp.sec": "int", "header.stamp.nanosec": "int", "header.frame_id": "string"}
 _POSE = {"position.x": "float", "position.y": "float"} | {f"orientation.{key}": "float" for key in "xyzw"}
@@ -35,6 +36,18 @@ GRID = (
 )
 TRANSFORMS = _below("transforms[]", TRANSFORM)
 POSE_ESTIMATE = STAMP | _below("pose.pose", _POSE) | {"pose.covariance": "float[]"}
+
+
+def know_headers(store: Typestore) -> None:
+    """Let a plain `Header` be that of std_msgs wherever it stands in a message, as in ROS 1.
+
+    rosbags takes it so for a message's first field alone; darknet_ros_msgs/BoundingBoxes has another one.
+    """
+    header = store.fielddefs.get("std_msgs/msg/Header")
+    named = {detail for _, fields in store.fielddefs.values() for _, (node, detail) in fields if node == Nodetype.NAME}
+    missing = {str(name) for name in named if str(name).endswith("/msg/Header") and name not in store.fielddefs}
+    if header is not None and missing:
+        store.register(dict.fromkeys(missing, header))
 
 
 def definition_problem(fielddefs: Mapping[str, Any], message_type: str, needed: Mapping[str, str]) -> str:

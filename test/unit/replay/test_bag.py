@@ -16,7 +16,7 @@ from rosbags.rosbag1 import Writer
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.replay import records
+from rosbot_patrol.replay import patrol_records, records
 from rosbot_patrol.replay.bag import Bag
 from rosbot_patrol.replay.raw_ros1 import read_scan, read_transforms
 from rosbot_patrol.scan import LaserScan
@@ -203,6 +203,28 @@ def test_another_definition_that_has_all_fields_is_read(tmp_path: Path) -> None:
         connection = writer.add_connection("/scan", made_bag.SCAN, msgdef=changed, md5sum="2" * 32)
         writer.write(connection, 10**9, maker.bytes(maker.scan(scan_at(1.0))) + b"\x07")
     assert read(path, "/scan")[0].content.ranges.tolist() == [1.0, 2.0, math.inf, math.inf]
+
+
+def test_a_second_plain_header_is_that_of_std_msgs(tmp_path: Path) -> None:
+    """As in darknet_ros_msgs/BoundingBoxes, recorded by rosbag itself."""
+    path = tmp_path / "made.bag"
+    with Writer(path) as writer:
+        connection = writer.add_connection(
+            "/darknet_ros/bounding_boxes",
+            "darknet_ros_msgs/msg/BoundingBoxes",
+            msgdef="Header header\nHeader image_header\nBoundingBox[] bounding_boxes\n"
+            + "=" * 80
+            + "\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+            + "=" * 80
+            + "\nMSG: darknet_ros_msgs/BoundingBox\nfloat64 probability\nint64 xmin\nint64 ymin\nint64 xmax\n"
+            "int64 ymax\nint16 id\nstring Class\n",
+            md5sum="3" * 32,
+        )
+        header = struct.pack("<IIII", 1, 5, 10**8, 0)
+        writer.write(connection, 10**9, header + struct.pack("<IIII", 1, 4, 9 * 10**8, 0) + bytes(4))
+    with Bag(path) as bag:
+        (record,) = bag.records(["/darknet_ros/bounding_boxes"], patrol_records.KINDS)
+    assert record.content.stamp == pytest.approx(4.9)
 
 
 def test_a_message_that_is_shorter_than_it_says(tmp_path: Path) -> None:
