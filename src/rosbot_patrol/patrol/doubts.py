@@ -104,9 +104,9 @@ class Doubt:
         self.tried += ((at.x, at.y),)
         self.known_from = self.seen_from
 
-    def again_at(self, x: float, y: float) -> None:
+    def again_at(self, x: float, y: float, was_at: tuple[float, float] | None = None) -> None:
         """Take it that it has moved to another place [m], and had no look there."""
-        self.x, self.y, self.was_at = x, y, None
+        self.x, self.y, self.was_at = x, y, was_at
         self.is_visited, self.looks, self.tried = False, 0, ()
 
     def shows(self, eye: Eye, sight: Sight) -> bool:
@@ -181,12 +181,10 @@ class Doubts:
         for doubt in self._all:
             if not doubt.is_near or not doubt.is_visited or doubt.is_over or doubt.looks < self._seen_in:
                 continue
-            apart = {place: math.dist(place, (doubt.x, doubt.y)) for place in places}
-            place = min(apart, key=apart.__getitem__, default=None)
-            if place is not None and _MOVED < apart[place] < _FOLLOWED and doubt.visits < _VISITS:
-                was_at = doubt.was_at or (doubt.x, doubt.y)
-                doubt.again_at(*place)
-                doubt.was_at = was_at
+            here = doubt.x, doubt.y
+            apart, place = min(((math.dist(here, place), place) for place in places), default=(0.0, here))
+            if _MOVED < apart < _FOLLOWED and doubt.visits < _VISITS:
+                doubt.again_at(*place, was_at=doubt.was_at or here)
 
     def look(self, stamp: float | None, eye: Eye, sight: Sight) -> None:
         """Count a picture for the places that it gives a second look at.

@@ -134,10 +134,10 @@ class Eyes:
         if self.coverage.share >= p.viewpoints.coverage_goal:
             wanted, least = self._hideouts(wanted), math.pi * p.viewpoints.hideout**2
         is_late = self._now - self._began > p.viewpoints.viewpoints_time
-        self._doubts.follow((thing.x, thing.y) for thing in self._witness.things if thing.has_moved)
-        doubts = self._of_here(self._doubts.open())
-        if doubts and not is_late and self._second_looks < p.viewpoints.second_looks_most:
-            nearer = self._nearer(doubts, inputs.pose, inputs)
+        if not is_late and self._second_looks < p.viewpoints.second_looks_most:
+            self._doubts.follow((thing.x, thing.y) for thing in self._witness.things if thing.has_moved)
+            doubts = self._of_here(self._doubts.open())
+            nearer = self._nearer(doubts, inputs.pose, inputs) if doubts else None
             if nearer is not None:
                 self._second_looks += 1
                 return nearer
