@@ -18,6 +18,7 @@ program took in all.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import hashlib
 import json
 import math
@@ -26,21 +27,26 @@ import statistics
 import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
 
+from map_truth import known_part  # noqa: E402
 from mapping_house import measure_house  # noqa: E402
 
 from rosbot_patrol import params  # noqa: E402
 from rosbot_patrol.files import write_atomic  # noqa: E402
+from rosbot_patrol.geometry import Pose2D, compose, invert, transform_points  # noqa: E402
 from rosbot_patrol.gmapping.parameters import GmappingParams  # noqa: E402
 from rosbot_patrol.grid import Grid  # noqa: E402
 from rosbot_patrol.maps.map_io import write_map  # noqa: E402
 from rosbot_patrol.replay.carmen import CarmenLog, noisy_odometry, read_log  # noqa: E402
 from rosbot_patrol.replay.mapping import map_log  # noqa: E402
+from rosbot_patrol.replay.plots import map_picture  # noqa: E402
 from rosbot_patrol.replay.relations import consecutive_pairs, relation_errors, revisit_pairs  # noqa: E402
 
 LOGS = {"intel": "intel-corrected", "fhw": "fhw-corrected", "fr079": "freiburg-079-corrected"}
@@ -75,6 +81,9 @@ AIMS = {
     "house_wall_error_m": 0.02,
 }
 AT_LEAST = {"gmapping_rtf", "house_wall_f1"}
+ZOOM = 3  # pixels of a cell in pictures
+
+Poses = NDArray[np.float64]
 
 
 def tutorial(seed: int) -> GmappingParams:
@@ -110,12 +119,21 @@ class Kept:
         write_atomic(self._path, (json.dumps(self._runs, indent=1) + "\n").encode())
 
 
-def picture(grid: Grid, folder: Path | None, name: str) -> None:
-    """The known part of a map as pgm and yaml."""
+def picture(grid: Grid, folder: Path | None, name: str, found: Poses, reference: Poses) -> None:
+    """The known part of a map with both ways on it, green the reference, red what was found; and pgm and yaml."""
     if folder is None:
         return
     folder.mkdir(parents=True, exist_ok=True)
-    write_map(str(folder / name), grid)
+    with contextlib.chdir(folder):
+        write_map(name, grid)
+    known = known_part(grid)
+    drawing = np.repeat(np.repeat(map_picture(known), ZOOM, axis=0), ZOOM, axis=1)
+    turned = transform_points(compose(Pose2D(*found[0]), invert(Pose2D(*reference[0]))), reference[:, :2])
+    for way, colour in ((turned, (0, 160, 0)), (found[:, :2], (220, 0, 0))):
+        places = (way - (known.info.origin_x, known.info.origin_y)) / known.info.resolution * ZOOM
+        places[:, 1] = len(drawing) - places[:, 1]
+        cv2.polylines(drawing, [np.round(places).astype(np.int32)], isClosed=False, color=colour, lineType=cv2.LINE_AA)
+    cv2.imwrite(str(folder / f"{name}.png"), drawing[:, :, ::-1])
 
 
 def run_log(log: CarmenLog, seed: int, folder: Path | None, name: str) -> dict[str, float]:
@@ -128,7 +146,7 @@ def run_log(log: CarmenLog, seed: int, folder: Path | None, name: str) -> dict[s
     if len(pairs):
         revisits = relation_errors(found.poses, log.poses, pairs)
         errors |= {"revisit_m": revisits.shift, "revisit_deg": math.degrees(revisits.turn)}
-    picture(found.slam.grid(), folder, f"{name}_{seed}")
+    picture(found.slam.grid(), folder, f"{name}_{seed}", found.poses, log.poses)
     if folder is not None:
         np.savetxt(folder / f"{name}_{seed}_trajectory.txt", np.hstack((found.poses, log.poses)), fmt="%.4f")
     return errors
@@ -183,9 +201,9 @@ def main() -> None:
     print(f"1 core of {os.cpu_count()}")
     figures: dict[str, float] = {}
     if options.only != "logs":
-        house, grid = measure_house(tutorial(1), quick=options.quick)
+        house, grid, found, true = measure_house(tutorial(1), quick=options.quick)
         figures |= house
-        picture(grid, options.pictures, "house")
+        picture(grid, options.pictures, "house", found, true)
     if options.only != "house":
         figures |= measure_logs(options)
     show(figures)

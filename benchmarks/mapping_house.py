@@ -39,6 +39,8 @@ CLEARANCE = 0.4  # m from walls that the ways keep
 BOUNDS = (-9.0, -4.0), (19.0, 17.0)
 WORLD = ROOT / "worlds" / "house.world"
 
+Poses = NDArray[np.float64]
+
 
 def way_between(clear: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]) -> list[tuple[int, int]]:
     """The shortest way over clear cells (Dijkstra, eight neighbours)."""
@@ -71,7 +73,7 @@ def waypoints(rooms: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return points
 
 
-def drive(points: list[tuple[float, float]]) -> NDArray[np.float64]:
+def drive(points: list[tuple[float, float]]) -> Poses:
     """The robot's true pose at each scan, shape (N, 3)."""
     pose, rows = Pose2D(), [Pose2D()]
     for goal in points:
@@ -83,7 +85,7 @@ def drive(points: list[tuple[float, float]]) -> NDArray[np.float64]:
     return np.array(rows)
 
 
-def scans(poses: NDArray[np.float64], field: Field, rng: np.random.Generator) -> Iterator[LaserScan]:
+def scans(poses: Poses, field: Field, rng: np.random.Generator) -> Iterator[LaserScan]:
     """What the lidar sees at each pose."""
     angles = np.linspace(-math.pi, math.pi, BEAMS)
     for i, row in enumerate(poses):
@@ -113,8 +115,8 @@ def wall_figures(found: Grid) -> dict[str, float]:
     }
 
 
-def measure_house(params: GmappingParams, *, quick: bool) -> tuple[dict[str, float], Grid]:
-    """The figures of the drive, and the map that came of it."""
+def measure_house(params: GmappingParams, *, quick: bool) -> tuple[dict[str, float], Grid, Poses, Poses]:
+    """The figures of the drive, the map that came of it, the way as found at each update and as it was."""
     rooms = [(room.pose.x, room.pose.y) for room in load_rooms(ROOT / "params" / "room_points.yaml")]
     poses = drive(waypoints([rooms[0], *([rooms[1]] if quick else rooms[1:]), rooms[0]]))
     field = blocked_distances(plan(WORLD, BOUNDS, 0.02), 3.0)
@@ -133,4 +135,4 @@ def measure_house(params: GmappingParams, *, quick: bool) -> tuple[dict[str, flo
         "gmapping_rtf": round(len(poses) / RATE / spent, 2),
         "gmapping_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, 1),
     }
-    return figures | wall_figures(grid), grid
+    return figures | wall_figures(grid), grid, slam.trajectory, poses

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,17 +64,10 @@ def map_picture(grid: Grid) -> NDArray[np.uint8]:
 
 
 def png_bytes(picture: NDArray[np.uint8]) -> bytes:
-    """A colour picture, shape (rows, columns, 3), as a png; small ones are enlarged to 400 pixels or more."""
+    """A colour picture, RGB, shape (rows, columns, 3), as a png; small ones are enlarged to 400 pixels or more."""
     scale = max(1, -(-400 // max(picture.shape[:2])))
-    large = np.repeat(np.repeat(picture, scale, axis=0), scale, axis=1)
-    rows = np.hstack((np.zeros((len(large), 1), np.uint8), large.reshape(len(large), -1)))  # 0: no filter
-    head = struct.pack(">IIBBBBB", large.shape[1], large.shape[0], 8, 2, 0, 0, 0)
-    body = _chunk(b"IHDR", head) + _chunk(b"IDAT", zlib.compress(rows.tobytes(), 9)) + _chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + body
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    large = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+    return cv2.imencode(".png", large[:, :, ::-1])[1].tobytes()
 
 
 def table_drawing(name: str, found: Table, stored: Table | None, fields: Mapping[str, Field]) -> str:

@@ -15,7 +15,6 @@ from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances
 from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.floor_plan import floor_plan
 from rosbot_patrol.simulation.world import load_world
@@ -26,28 +25,23 @@ START = Pose2D()
 ROUND = [(-0.6, 2.5), (-1.2, 4.8), (2.7, 7.35), (-2.5, 6.5), (-4.0, 4.0), (-1.0, 4.5), (-0.4, 2.5), (0.0, 0.0)]
 
 
+def plan(resolution: float) -> Grid:
+    """The house at the lidar's height."""
+    size = {"width": round(28.0 / resolution), "height": round(21.0 / resolution)}
+    info = GridInfo(resolution=resolution, origin_x=-9.0, origin_y=-4.0, **size)
+    return floor_plan(load_world(ROOT / "worlds" / "house.world").bodies, info, height=0.158, start=(0.0, 0.0))
+
+
 @lru_cache(maxsize=1)
 def house_map() -> Grid:
-    """The map we ship, cut to the house to be quick."""
-    whole = read_map(ROOT / "maps" / "rosbot_map.yaml")
-    x0, y0 = whole.info.cell_of(-9.0, -4.0)
-    x1, y1 = whole.info.cell_of(19.0, 17.0)
-    info = GridInfo(
-        resolution=whole.info.resolution,
-        width=x1 - x0,
-        height=y1 - y0,
-        origin_x=whole.info.origin_x + x0 * whole.info.resolution,
-        origin_y=whole.info.origin_y + y0 * whole.info.resolution,
-    )
-    return Grid(info, np.ascontiguousarray(whole.cells[y0:y1, x0:x1]))
+    """A map without a fault, in the cells of the maps that we ship."""
+    return plan(0.05)
 
 
 @lru_cache(maxsize=1)
 def truth_field() -> Field:
     """Where rays end: the house on a grid of 2 cm."""
-    info = GridInfo(resolution=0.02, width=1400, height=1050, origin_x=-9.0, origin_y=-4.0)
-    bodies = load_world(ROOT / "worlds" / "house.world").bodies
-    return blocked_distances(floor_plan(bodies, info, height=0.158, start=(0.0, 0.0)), 3.0)
+    return blocked_distances(plan(0.02), 3.0)
 
 
 def scan_at(
