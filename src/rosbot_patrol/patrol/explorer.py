@@ -94,9 +94,9 @@ class Explorer:
         if state is GoalState.SUCCEEDED:
             return self._look(now, grid, maps, pose)
         if state is GoalState.FAILED or self._stalls(now, pose):
-            log.warning(
-                "no way to the border at (%.1f, %.1f): %s", self._target.x, self._target.y, link.text or "no progress"
-            )
+            stalled = f"no progress for {self.params.progress_timeout:.0f} s"
+            reason = link.text or "move_base gave up" if state is GoalState.FAILED else stalled
+            log.warning("no way to the border at (%.1f, %.1f): %s", self._target.x, self._target.y, reason)
             return self._leave_out(now, grid, pose)
         if now - self._looked < self.params.look_again:
             return Step(text=self._about)

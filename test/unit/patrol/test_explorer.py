@@ -103,7 +103,7 @@ def test_a_border_that_cannot_be_reached_is_left_out_and_the_rest_explored() -> 
     assert (house.cells[80:][HOUSE.cells[80:] == 0] == 0).mean() > 0.98
 
 
-def test_a_robot_that_comes_no_nearer_gives_a_goal_up() -> None:
+def test_a_robot_that_comes_no_nearer_gives_a_goal_up(caplog: pytest.LogCaptureFixture) -> None:
     house = House(Explorer(ExplorerParams(progress_timeout=5.0)))
     house.step()
     first = house.goals[0]
@@ -114,6 +114,7 @@ def test_a_robot_that_comes_no_nearer_gives_a_goal_up() -> None:
     assert 5.0 < house.now < 6.5
     assert house.explorer.left_out
     assert house.goals[1].tag != first.tag
+    assert "no progress for 5 s" in caplog.text
 
 
 def test_what_is_missing_is_told() -> None:
