@@ -6,7 +6,9 @@
 
 The logs run with the tutorial's parameters (config/gmapping.yaml), odometry made from the reference's increments with
 noise by seed; errors are those of relations (Kuemmerle et al. 2009), between consecutive scans and between revisits
-(within 3 m and more than 100 scans apart), their mean over the seeds. A run that is done is kept in `--keep` and not
+(within 3 m and more than 100 scans apart), their mean over the seeds. The references are not the truth: walls_deg and
+walls_reference_deg are the mean errors of the headings against the right angles of the building (right_angles.py), the
+reference's beside ours. A run that is done is kept in `--keep` and not
 done again while the sources of gmapping, the parameters and the log are the same. `x C++` is how many times smaller the
 error is than that of the C++ original (one seed).
 
@@ -37,6 +39,7 @@ sys.path.insert(0, str(ROOT / "src"))
 
 from map_truth import known_part  # noqa: E402
 from mapping_house import measure_house  # noqa: E402
+from right_angles import heading_errors  # noqa: E402
 
 from rosbot_patrol import params  # noqa: E402
 from rosbot_patrol.files import write_atomic  # noqa: E402
@@ -146,6 +149,8 @@ def run_log(log: CarmenLog, seed: int, folder: Path | None, name: str) -> dict[s
     if len(pairs):
         revisits = relation_errors(found.poses, log.poses, pairs)
         errors |= {"revisit_m": revisits.shift, "revisit_deg": math.degrees(revisits.turn)}
+    ours, theirs = heading_errors(log.scans, (found.poses, log.poses))
+    errors |= {"walls_deg": ours, "walls_reference_deg": theirs}
     picture(found.slam.grid(), folder, f"{name}_{seed}", found.poses, log.poses)
     if folder is not None:
         np.savetxt(folder / f"{name}_{seed}_trajectory.txt", np.hstack((found.poses, log.poses)), fmt="%.4f")
