@@ -53,6 +53,7 @@ def test_bad_scans_are_named_and_survived(ros, room):
     peer.do("drive", scans=6, step=0.12, broken="nan")
     node.says("no beam of the scan of frame 'laser' measured anything")
     peer.do("drive", scans=2, broken="few")
+    node.says("it has 20 beams, 180 before; it is taken as it is")
     peer.do("drive", scans=2, frame="nowhere")
     after = peer.do("drive", scans=10)
     assert after["tf"] >= 10

@@ -25,7 +25,6 @@ from rosbot_patrol.amcl.trust import State, Trust, Witness, agreement
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.scan import LaserScan
-from rosbot_patrol.scan import scan_problem as scan_problem
 
 Array = NDArray[np.float64]
 

@@ -36,7 +36,7 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 from std_srvs.srv import Empty, EmptyResponse, Trigger, TriggerResponse
 
 from rosbot_patrol.amcl.initial_pose import taken_pose
-from rosbot_patrol.amcl.localizer import Localizer, Outcome, scan_problem, start_of
+from rosbot_patrol.amcl.localizer import Localizer, Outcome, start_of
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.trust import State
 from rosbot_patrol.geometry import Pose2D, compose
@@ -116,11 +116,8 @@ class AmclNode:
     def _scan(self, message: LaserScanMsg) -> None:
         scan = scan_from_msg(message)
         self._watch.hear()
-        problem = scan_problem(scan)
-        if problem:
-            rospy.logwarn_throttle(10.0, f"scan of frame '{scan.frame_id}': {problem}; it is left out")
-            return
-        self._scans.put(scan)
+        if self._watch.is_usable(scan):
+            self._scans.put(scan)
 
     def _take_map(self, grid: Grid) -> None:
         with self._lock:

@@ -38,7 +38,7 @@ from rosbot_patrol.ros.node import Loop, load_params, run_node
 from rosbot_patrol.ros.scan_queue import PlacedScan, ScanQueue
 from rosbot_patrol.ros.scan_watch import ScanWatch
 from rosbot_patrol.ros.transforms import Transforms
-from rosbot_patrol.scan import LaserScan, scan_problem
+from rosbot_patrol.scan import LaserScan
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +63,7 @@ class GmappingNode:
         self._transforms = Transforms()
         self._scans = ScanQueue(self._transforms, self._odom, params.base_frame.lstrip("/"), WAITING)
         self._watch = ScanWatch(self._transforms, "nothing is mapped")
-        self._heard = self._beams = 0
+        self._heard = 0
         self._map_stamp = -math.inf  # of the scan that the map was last made after
         self._map: GridMsg | None = None
         self._correction = Pose2D()  # map_from_odom
@@ -100,20 +100,8 @@ class GmappingNode:
         if (self._heard - 1) % self._params.throttle_scans:
             return
         scan = scan_from_msg(message)
-        problem = scan_problem(scan)
-        if problem:
-            rospy.logwarn_throttle(10.0, f"scan of frame '{scan.frame_id}': {problem}; it is left out")
-            return
-        self._compare(scan)
-        self._scans.put(scan)
-
-    def _compare(self, scan: LaserScan) -> None:
-        beams, before = len(scan.ranges), self._beams
-        self._beams = beams
-        if before and beams != before:
-            rospy.logwarn_throttle(
-                10.0, f"scan of frame '{scan.frame_id}': it has {beams} beams, {before} before; it is taken as it is"
-            )
+        if self._watch.is_usable(scan):
+            self._scans.put(scan)
 
     def _get_map(self, _request: object) -> GetMapResponse:
         with self._lock:

@@ -1,4 +1,4 @@
-"""Whether the lidar still speaks, and whether the clock went back: what amcl and slam_gmapping watch alike."""
+"""What amcl and slam_gmapping watch alike: whether the lidar speaks and makes sense, whether the clock went back."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import rospy
 
 from rosbot_patrol.ros.node import now
 from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.scan import LaserScan, scan_problem
 
 log = logging.getLogger(__name__)
 
@@ -25,10 +26,23 @@ class ScanWatch:
     def __init__(self, transforms: Transforms, lost: str) -> None:
         self._transforms, self._lost = transforms, lost
         self._last_scan = self._last_time = now()
+        self._beams: dict[str, int] = {}  # of the last scan of each frame
 
     def hear(self) -> None:
         """A scan came."""
         self._last_scan = now()
+
+    def is_usable(self, scan: LaserScan) -> bool:
+        """Whether a scan can be used; a warning says why not, and where the number of its beams has changed."""
+        name, beams = f"scan of frame '{scan.frame_id}'", len(scan.ranges)
+        problem = scan_problem(scan)
+        if problem:
+            rospy.logwarn_throttle(10.0, f"{name}: {problem}; it is left out")
+            return False
+        before, self._beams[scan.frame_id] = self._beams.get(scan.frame_id, beams), beams
+        if beams != before:
+            rospy.logwarn_throttle(10.0, f"{name}: it has {beams} beams, {before} before; it is taken as it is")
+        return True
 
     def tend(self, current: float) -> str:
         """Look at the clock and the lidar; to be called each second or so.

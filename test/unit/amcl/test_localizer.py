@@ -12,12 +12,13 @@ import yaml
 from house_run import MOUNT, ROOT, drive, error, house_map, scan_at
 
 from rosbot_patrol import params
-from rosbot_patrol.amcl.localizer import Localizer, scan_problem
+from rosbot_patrol.amcl.localizer import Localizer
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.scan import scan_problem
 
 CORRIDOR = [(-0.6, 2.5), (-1.2, 4.8)]
 
