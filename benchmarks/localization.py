@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """amcl: how long an update takes, and how well it knows where the robot is.
 
-    PYTHONPATH=src .ws/venv/bin/python benchmarks/localization.py [--json FILE] [--quick] [--parts NAME ...]
+    . scripts/env; .ws/venv/bin/python benchmarks/localization.py [--json FILE] [--quick] [--parts NAME ...]
         [--seeds 3] [--starts 100] [--carried 30] [--seconds 120]
 
 update: amcl_update_NxK_ms: motion, sensor model and resampling together for N particles and K beams of the likelihood
@@ -14,8 +14,8 @@ accuracy: patrols of the three houses (each room, a full turn in each) with enco
 starts: global localisation at random places, driving to random places for 60 s; right is within 0.3 m and 15 degrees,
 and until the end. carried: a robot that drives is put down elsewhere, and has 60 s. Drives: `localization_drives.py`.
 
-node: what amcl takes of a core while the robot patrols the whole house at real time, and its memory; `. scripts/env`
-first. Where the package path has the original amcl, it is the one that is measured, and said so.
+node: what amcl takes of a core while the robot patrols the whole house at real time, and its memory. Where the package
+path has the original amcl, it is the one that is measured, and said so.
 """
 
 from __future__ import annotations
@@ -25,25 +25,22 @@ import json
 import math
 import os
 import statistics
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from localization_quality import accuracy, global_starts, kidnappings
+from node_cost import PROFILES, measure_profiles, original
+
+from rosbot_patrol.amcl.localizer import Localizer
+from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.amcl.sensor_model import Mount
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.scan import LaserScan
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "src"))
-
-from localization_quality import accuracy, global_starts, kidnappings  # noqa: E402
-from node_cost import PROFILES, measure_profiles, original  # noqa: E402
-
-from rosbot_patrol.amcl.localizer import Localizer  # noqa: E402
-from rosbot_patrol.amcl.parameters import AmclParams  # noqa: E402
-from rosbot_patrol.amcl.sensor_model import Mount  # noqa: E402
-from rosbot_patrol.geometry import Pose2D  # noqa: E402
-from rosbot_patrol.maps.map_io import read_map  # noqa: E402
-from rosbot_patrol.scan import LaserScan  # noqa: E402
 
 AIMS = {
     "amcl_update_2000x60_ms": "<= 0.8",

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.gmapping.tile_kernels import BITS, FULL, MASK, MEAN_X, MEAN_Y, is_wall, wall_at
+from rosbot_patrol.gmapping.tile_kernels import BITS, FULL, MASK, MEAN_X, MEAN_Y, walls_from
 from rosbot_patrol.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -52,23 +52,23 @@ def nearest_wall(
     ix, iy = math.floor(gx), math.floor(gy)
     free_x, free_y = math.floor(gx + back_x) - ix, math.floor(gy + back_y) - iy
     best, best_x, best_y = 1e300, 0.0, 0.0
-    height, width = table.shape
+    first, count = ix - reach, 2 * reach + 1
     for y in range(iy - reach, iy + reach + 1):
-        ty = y >> BITS
-        if ty < 0 or ty >= height:
+        walls = walls_from(table, cells, first, y, count)
+        if walls == 0:
             continue
-        for x in range(ix - reach, ix + reach + 1):
-            tx = x >> BITS
-            if tx < 0 or tx >= width or table[ty, tx] < 0:
-                continue
-            tile, cell = table[ty, tx], ((y & MASK) << BITS) + (x & MASK)
-            if not is_wall(cells, tile, cell):
-                continue
-            dx = gx - x - cells[tile, cell, MEAN_X] / FULL
-            dy = gy - y - cells[tile, cell, MEAN_Y] / FULL
-            d2 = dx * dx + dy * dy
-            if d2 < best and not wall_at(table, cells, x + free_x, y + free_y):
-                best, best_x, best_y = d2, dx, dy
+        walls &= ~walls_from(table, cells, first + free_x, y + free_y, count)
+        x = first
+        while walls:
+            if walls & 1:
+                tile, cell = table[y >> BITS, x >> BITS], ((y & MASK) << BITS) + (x & MASK)
+                dx = gx - x - cells[tile, cell, MEAN_X] / FULL
+                dy = gy - y - cells[tile, cell, MEAN_Y] / FULL
+                d2 = dx * dx + dy * dy
+                if d2 < best:
+                    best, best_x, best_y = d2, dx, dy
+            walls >>= 1
+            x += 1
     if best == 1e300:
         return -1.0, 0.0, 0.0
     return best, best_x, best_y

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.gmapping import tile_kernels as kernels
 from rosbot_patrol.gmapping.beams import Beams
-from rosbot_patrol.gmapping.tile_kernels import AREA, FIELDS, FULL, HITS, MEAN_X, MEAN_Y, TILE, VISITS
+from rosbot_patrol.gmapping.tile_kernels import AREA, FIELDS, FULL, HITS, MEAN_X, MEAN_Y, ROWS, TILE, VISITS, WALLS
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.occupancy import FREE, OCCUPIED, UNKNOWN
 
@@ -47,7 +47,7 @@ class ParticleMaps:
         self.origin = np.array(lows, dtype=np.float64)
         columns, rows = (max(int(size) // PATCH, 1) * PATCH // TILE for size in sizes)
         self.tables = np.full((count, rows, columns), -1, dtype=np.int32)
-        self.cells = np.zeros((0, AREA, FIELDS), dtype=np.uint16)
+        self.cells = np.zeros((0, ROWS, FIELDS), dtype=np.uint16)
         self.refs = np.zeros(0, dtype=np.int32)
         self.free = np.zeros(1, dtype=np.int32)
         self._scans = 0  # number of the last one, 1 to 65535
@@ -123,7 +123,7 @@ class ParticleMaps:
         """More unused tiles."""
         old, unused = len(self.refs), int(self.free[0])
         new = int(old * GROWTH) + max(least, 256)
-        self.cells.resize((new, AREA, FIELDS), refcheck=False)  # in place where the system can
+        self.cells.resize((new, ROWS, FIELDS), refcheck=False)  # in place where the system can
         self.refs.resize(new, refcheck=False)
         self.free.resize(new + 1, refcheck=False)
         self.free[1 + unused : 1 + unused + new - old] = np.arange(new - 1, old - 1, -1)
@@ -185,7 +185,9 @@ class ParticleMaps:
         self.tables[:, ty + ys, tx + xs] = tiles
         known = blocks[shown]
         self.cells[tiles] = 0
-        self.cells[tiles, :, VISITS] = np.where((known == FREE) | (known == OCCUPIED), SEED_BEAMS, 0)
-        self.cells[tiles, :, HITS] = np.where(known == OCCUPIED, SEED_BEAMS, 0)
-        self.cells[tiles, :, MEAN_X] = self.cells[tiles, :, MEAN_Y] = FULL // 2
+        self.cells[tiles, :AREA, VISITS] = np.where((known == FREE) | (known == OCCUPIED), SEED_BEAMS, 0)
+        self.cells[tiles, :AREA, HITS] = np.where(known == OCCUPIED, SEED_BEAMS, 0)
+        self.cells[tiles, :AREA, MEAN_X] = self.cells[tiles, :AREA, MEAN_Y] = FULL // 2
+        walls = (known == OCCUPIED).reshape(-1, TILE, TILE)
+        self.cells[tiles, AREA:, WALLS] = walls @ (1 << np.arange(TILE))
         kernels.count_references(self.tables, self.refs, self.free)

@@ -1,13 +1,17 @@
 """Cells of many maps in tiles of 16 x 16 that the maps share until one of them writes.
 
 A map is a table of tile numbers, shape (TY, TX), -1 where nothing was seen yet. All maps take their tiles from one
-array `cells` of shape (T, 256, 5). Of each cell it keeps
+array `cells` of shape (T, 272, 5). Of each cell it keeps
 
     HITS     beams that ended here
     VISITS   beams that ended here or went through
     MEAN_X   mean place of the ends within the cell, in 1/65535 of its edge
     MEAN_Y   likewise
     STAMP    number of the scan that hit it last
+
+and of each of its 16 rows, from number 256 on,
+
+    WALLS    which of its cells are walls, as bits from the lowest column
 
 `refs` counts the maps that use a tile, shape (T,). `free` is a stack of unused tiles: free[0] of them, their numbers
 follow, shape (T + 1,). Coordinates are in cells from the lower left corner of the table.
@@ -28,25 +32,31 @@ Cells = NDArray[np.uint16]
 
 BITS, TILE, MASK, AREA = 4, 16, 15, 256
 HITS, VISITS, MEAN_X, MEAN_Y, STAMP, FIELDS = 0, 1, 2, 3, 4, 5
+WALLS, ROWS = 4, AREA + TILE
 FULL = 65535
 FULL_SHARE = 10  # a cell is taken for a wall where more than one in so many beams ended in it
 
 
 @kernel()
-def is_wall(cells: Cells, tile: int, cell: int) -> bool:
-    """Whether a cell counts as a wall for the matching of scans."""
-    hits = int(cells[tile, cell, HITS])
-    return hits > 0 and hits * FULL_SHARE > int(cells[tile, cell, VISITS])
+def walls_from(table: Table, cells: Cells, x: int, y: int, count: int) -> int:
+    """Which of the `count` cells (48 at most) from column x on in row y are walls, as bits; they may lie anywhere."""
+    ty, bits = y >> BITS, np.int64(0)
+    if ty < 0 or ty >= table.shape[0]:
+        return 0
+    first = x >> BITS
+    for tx in range(first, ((x + count - 1) >> BITS) + 1):
+        if tx >= 0 and tx < table.shape[1] and table[ty, tx] >= 0:
+            bits |= np.int64(cells[table[ty, tx], AREA + (y & MASK), WALLS]) << np.int64((tx - first) << BITS)
+    return (bits >> np.int64(x & MASK)) & ((np.int64(1) << np.int64(count)) - 1)
 
 
 @kernel()
-def wall_at(table: Table, cells: Cells, x: int, y: int) -> bool:
-    """The same for the cell of column x and row y, which may lie anywhere."""
-    tx, ty = x >> BITS, y >> BITS
-    if tx < 0 or ty < 0 or ty >= table.shape[0] or tx >= table.shape[1]:
-        return False
-    tile = table[ty, tx]
-    return tile >= 0 and is_wall(cells, tile, ((y & MASK) << BITS) + (x & MASK))
+def _tell_wall(cells: Cells, tile: int, cell: int) -> None:
+    """Keep whether a cell counts as a wall for the matching of scans."""
+    row, bit = AREA + (cell >> BITS), np.int64(1) << np.int64(cell & MASK)
+    before = np.int64(cells[tile, row, WALLS])
+    is_wall = np.int64(cells[tile, cell, HITS]) * FULL_SHARE > np.int64(cells[tile, cell, VISITS])
+    cells[tile, row, WALLS] = before | bit if is_wall else before & ~bit
 
 
 @kernel()
@@ -75,6 +85,7 @@ def _count_hit(cells: Cells, tile: int, cell: int, x: float, y: float) -> None:
     for field, at in ((MEAN_X, x), (MEAN_Y, y)):
         old = float(cells[tile, cell, field])
         cells[tile, cell, field] = int(old + (at * FULL - old) / n + 0.5)
+    _tell_wall(cells, tile, cell)
 
 
 @kernel()
@@ -85,6 +96,8 @@ def _count_visit(cells: Cells, tile: int, cell: int) -> None:
         visits >>= 1
         cells[tile, cell, HITS] = int(cells[tile, cell, HITS]) >> 1
     cells[tile, cell, VISITS] = visits + 1
+    if cells[tile, cell, HITS] > 0:
+        _tell_wall(cells, tile, cell)
 
 
 @kernel("int64(int32[:, ::1], uint16[:, :, ::1], int32[::1], int32[::1], float64[:, ::1], boolean[::1], int64, int64)")
@@ -148,6 +161,13 @@ def register_rays(
         The beam before which the unused tiles might run out, K where all are written.
     """
     x0, y0 = start[0], start[1]
+    low_x, high_x, low_y, high_y = x0, x0, y0, y0
+    for k in range(first, ends.shape[0]):
+        low_x, high_x = min(low_x, ends[k, 0]), max(high_x, ends[k, 0])
+        low_y, high_y = min(low_y, ends[k, 1]), max(high_y, ends[k, 1])
+    low_tx, low_ty = (math.floor(low_x) >> BITS) - 1, (math.floor(low_y) >> BITS) - 1
+    shape = (math.floor(high_y) >> BITS) - low_ty + 2, (math.floor(high_x) >> BITS) - low_tx + 2
+    owned = np.full(shape, -1, dtype=np.int32)  # tiles about the rays that are this map's own by now
     for k in range(first, ends.shape[0]):
         dx, dy = ends[k, 0] - x0, ends[k, 1] - y0
         if free[0] < int(abs(dx) + abs(dy)) // TILE + 4:
@@ -158,11 +178,12 @@ def register_rays(
         each_y = 1.0 / abs(dy) if dy != 0.0 else 1e300
         next_x = (ix + 1.0 - x0 if dx > 0.0 else x0 - ix) * each_x
         next_y = (iy + 1.0 - y0 if dy > 0.0 else y0 - iy) * each_y
-        tx, ty, tile = -1, -1, -1
         for _ in range(abs(math.floor(ends[k, 0]) - ix) + abs(math.floor(ends[k, 1]) - iy)):
-            if ix >> BITS != tx or iy >> BITS != ty:
-                tx, ty = ix >> BITS, iy >> BITS
-                tile = own_tile(table, cells, refs, free, ty, tx)
+            tx, ty = ix >> BITS, iy >> BITS
+            tile = owned[ty - low_ty, tx - low_tx]
+            if tile < 0:
+                tile = np.int32(own_tile(table, cells, refs, free, ty, tx))
+                owned[ty - low_ty, tx - low_tx] = tile
             cell = ((iy & MASK) << BITS) + (ix & MASK)
             if cells[tile, cell, STAMP] != stamp:
                 _count_visit(cells, tile, cell)
