@@ -47,7 +47,7 @@ def walls_from(table: Table, cells: Cells, x: int, y: int, count: int) -> int:
     for tx in range(first, ((x + count - 1) >> BITS) + 1):
         if tx >= 0 and tx < table.shape[1] and table[ty, tx] >= 0:
             bits |= np.int64(cells[table[ty, tx], AREA + (y & MASK), WALLS]) << np.int64((tx - first) << BITS)
-    return (bits >> np.int64(x & MASK)) & ((np.int64(1) << np.int64(count)) - 1)
+    return int((bits >> np.int64(x & MASK)) & ((np.int64(1) << np.int64(count)) - 1))
 
 
 @kernel()
