@@ -85,6 +85,43 @@ def test_a_cell_keeps_the_mean_place_of_its_hits() -> None:
     assert record[kernels.MEAN_X] / kernels.FULL * 0.05 == pytest.approx(0.02, abs=1e-5)
 
 
+def walls_of(made: ParticleMaps) -> tuple[np.ndarray, np.ndarray]:
+    """Of the first map, asked for seven cells at a time, and as hits and visits say."""
+    info = made.info
+    told, true = np.zeros(info.shape, dtype=bool), np.zeros(info.shape, dtype=bool)
+    for iy in range(info.height):
+        for ix in range(0, info.width, 7):
+            bits = kernels.walls_from(made.tables[0], made.cells, ix, iy, 7)
+            told[iy, ix : ix + 7] = [(bits >> k) & 1 for k in range(min(7, info.width - ix))]
+    for ty, tx in np.argwhere(made.tables[0] >= 0):
+        cells = made.cells[made.tables[0, ty, tx], : kernels.AREA].astype(int).reshape(16, 16, -1)
+        walls = cells[..., kernels.HITS] * kernels.FULL_SHARE > cells[..., kernels.VISITS]
+        true[ty * 16 : ty * 16 + 16, tx * 16 : tx * 16 + 16] = walls
+    return told, true
+
+
+def test_walls_are_told_from_hits_and_visits() -> None:
+    made = maps(2, half=4.0)
+    rng = np.random.default_rng(3)
+    for _ in range(12):
+        made.register(rng.normal(0.0, [0.3, 0.3, 0.5], (2, 3)), room_beams())  # far apart: some walls are worn away
+        made.select(np.array([1, 0]))
+    told, true = walls_of(made)
+    assert 100 < true.sum() < 5000
+    assert (told == true).all()
+
+
+def test_walls_of_a_saved_map_and_beyond_its_edge() -> None:
+    made = maps(half=4.0)
+    cells = np.where(np.random.default_rng(4).random((50, 70)) < 0.3, 100, 0).astype(np.int8)
+    made.seed(Grid(GridInfo(resolution=0.05, width=70, height=50, origin_x=-1.0, origin_y=-1.0), cells))
+    told, true = walls_of(made)
+    assert true.sum() == (cells == 100).sum()
+    assert (told == true).all()
+    assert kernels.walls_from(made.tables[0], made.cells, -30, -1, 21) == 0
+    assert kernels.walls_from(made.tables[0], made.cells, 10**6, 5, 21) == 0
+
+
 def test_counts_that_would_overflow_are_halved() -> None:
     made = maps()
     made.register(STILL, beam_to(1.02, 0.02))
