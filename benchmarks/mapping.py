@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """slam_gmapping: real robots' logs against their references, the house against its walls, speed and memory.
 
-    PYTHONPATH=src .ws/venv/bin/python benchmarks/mapping.py [--json FILE] [--only logs|house] [--seeds 5] [--quick]
-        [--datasets FOLDER] [--log FILE ...] [--pictures FOLDER] [--keep FILE] [--anew]
+    . scripts/env; .ws/venv/bin/python benchmarks/mapping.py [--json FILE] [--only logs|house|nodes] [--seeds 5]
+        [--quick] [--datasets FOLDER] [--log FILE ...] [--pictures FOLDER] [--keep FILE] [--anew]
 
 The logs run with the tutorial's parameters (config/gmapping.yaml), odometry made from the reference's increments with
 noise by seed; errors are those of relations (Kuemmerle et al. 2009), between consecutive scans and between revisits
@@ -15,6 +15,10 @@ error is than that of the C++ original (one seed).
 The house is driven through at 0.3 m/s with 720 beams at 10 Hz (mapping_house.py): gmapping_update_ms is the median of
 the updates on one core, gmapping_rtf the drive's seconds by those of the mapping, gmapping_mb the most memory that the
 program took in all.
+
+Where the package path has the C++ original, the logs go by topics through it and through our node, one seed each
+(mapping_node.py); NAME_node_* are our errors and costs, NAME_original_* the original's. `--only nodes` does so with
+ours alone where there is no original.
 """
 
 from __future__ import annotations
@@ -26,31 +30,30 @@ import json
 import math
 import os
 import statistics
-import sys
+import tempfile
 from pathlib import Path
 
 import cv2
 import numpy as np
 import yaml
+from map_truth import known_part
+from mapping_house import measure_house
+from node_cost import original
 from numpy.typing import NDArray
+from right_angles import heading_errors
+
+from rosbot_patrol import params
+from rosbot_patrol.files import write_atomic
+from rosbot_patrol.geometry import Pose2D, compose, invert, transform_points
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.maps.map_io import write_map
+from rosbot_patrol.replay.carmen import CarmenLog, noisy_odometry, read_log
+from rosbot_patrol.replay.mapping import map_log
+from rosbot_patrol.replay.plots import map_picture
+from rosbot_patrol.replay.relations import consecutive_pairs, relation_errors, revisit_pairs
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "src"))
-
-from map_truth import known_part  # noqa: E402
-from mapping_house import measure_house  # noqa: E402
-from right_angles import heading_errors  # noqa: E402
-
-from rosbot_patrol import params  # noqa: E402
-from rosbot_patrol.files import write_atomic  # noqa: E402
-from rosbot_patrol.geometry import Pose2D, compose, invert, transform_points  # noqa: E402
-from rosbot_patrol.gmapping.parameters import GmappingParams  # noqa: E402
-from rosbot_patrol.grid import Grid  # noqa: E402
-from rosbot_patrol.maps.map_io import write_map  # noqa: E402
-from rosbot_patrol.replay.carmen import CarmenLog, noisy_odometry, read_log  # noqa: E402
-from rosbot_patrol.replay.mapping import map_log  # noqa: E402
-from rosbot_patrol.replay.plots import map_picture  # noqa: E402
-from rosbot_patrol.replay.relations import consecutive_pairs, relation_errors, revisit_pairs  # noqa: E402
 
 LOGS = {"intel": "intel-corrected", "fhw": "fhw-corrected", "fr079": "freiburg-079-corrected"}
 CPP = {
@@ -139,16 +142,22 @@ def picture(grid: Grid, folder: Path | None, name: str, found: Poses, reference:
     cv2.imwrite(str(folder / f"{name}.png"), drawing[:, :, ::-1])
 
 
+def errors_of(found: Poses, reference: Poses) -> dict[str, float]:
+    """Of the relations between consecutive scans and, where there are any, between revisits."""
+    consecutive = relation_errors(found, reference, consecutive_pairs(len(reference)))
+    errors = {"consecutive_m": consecutive.shift, "consecutive_deg": math.degrees(consecutive.turn)}
+    pairs = revisit_pairs(reference)
+    if len(pairs):
+        revisits = relation_errors(found, reference, pairs)
+        errors |= {"revisit_m": revisits.shift, "revisit_deg": math.degrees(revisits.turn)}
+    return errors
+
+
 def run_log(log: CarmenLog, seed: int, folder: Path | None, name: str) -> dict[str, float]:
     """Errors of one seed."""
     odometry = noisy_odometry(log.poses, np.random.default_rng(seed))
     found = map_log(log.scans, odometry, tutorial(seed))
-    consecutive = relation_errors(found.poses, log.poses, consecutive_pairs(len(log.poses)))
-    errors = {"consecutive_m": consecutive.shift, "consecutive_deg": math.degrees(consecutive.turn)}
-    pairs = revisit_pairs(log.poses)
-    if len(pairs):
-        revisits = relation_errors(found.poses, log.poses, pairs)
-        errors |= {"revisit_m": revisits.shift, "revisit_deg": math.degrees(revisits.turn)}
+    errors = errors_of(found.poses, log.poses)
     ours, theirs = heading_errors(log.scans, (found.poses, log.poses))
     errors |= {"walls_deg": ours, "walls_reference_deg": theirs}
     picture(found.slam.grid(), folder, f"{name}_{seed}", found.poses, log.poses)
@@ -157,15 +166,20 @@ def run_log(log: CarmenLog, seed: int, folder: Path | None, name: str) -> dict[s
     return errors
 
 
-def measure_logs(options: argparse.Namespace) -> dict[str, float]:
-    """Means over the seeds, each run printed as it comes."""
+def logs_of(options: argparse.Namespace) -> dict[str, Path]:
+    """The logs that are there."""
     logs = {name: options.datasets / f"{file}.log.gz" for name, file in LOGS.items()}
     logs |= {path.name.split(".")[0]: path for path in options.log}
-    kept, figures = Kept(options.keep, anew=options.anew), {}
     for name, path in logs.items():
         if not path.exists():
             print(f"{name}: {path} is not there, it is left out")
-            continue
+    return {name: path for name, path in logs.items() if path.exists()}
+
+
+def measure_logs(options: argparse.Namespace) -> dict[str, float]:
+    """Means over the seeds, each run printed as it comes."""
+    kept, figures = Kept(options.keep, anew=options.anew), {}
+    for name, path in logs_of(options).items():
         log, digest, runs = read_log(path), digest_of(path), []
         for seed in range(1, (1 if options.quick else options.seeds) + 1):
             run = kept.get(f"{digest}-{seed}")
@@ -176,6 +190,33 @@ def measure_logs(options: argparse.Namespace) -> dict[str, float]:
             print(f"{name} seed {seed}: " + ", ".join(f"{key} {value:.4f}" for key, value in run.items()), flush=True)
         for key in runs[0]:
             figures[f"{name}_{key}"] = round(statistics.mean(run[key] for run in runs), 4)
+    return figures
+
+
+def measure_nodes(options: argparse.Namespace) -> dict[str, float]:
+    """The logs through our node and the original."""
+    from mapping_node import through_node
+
+    from rosbot_patrol.ros.house import Master
+
+    elf, figures = original("gmapping", "slam_gmapping"), {}
+    print(f"original: {elf or 'not on the package path'}")
+    nodes = {"node": ["rosrun", "rosbot_patrol", "slam_gmapping"]} | ({"original": [elf]} if elf else {})
+    tree = yaml.safe_load((ROOT / "config" / "gmapping.yaml").read_text(encoding="utf-8"))
+    with tempfile.TemporaryDirectory(prefix="mapping-node-") as folder:
+        master = Master(Path(folder) / "roscore.log")
+        try:
+            for name, path in logs_of(options).items():
+                log = read_log(path)
+                odometry = noisy_odometry(log.poses, np.random.default_rng(1))
+                for which, command in nodes.items():
+                    run = through_node(command, log, odometry, tree)
+                    errors = {k: round(v, 4) for k, v in errors_of(run.poses, log.poses).items()}
+                    costs = {"cpu_s": round(run.cpu_s, 1), "mb": round(run.mb, 1)}
+                    print(f"{name}, {' '.join(command)}: {errors} {costs}", flush=True)
+                    figures |= {f"{name}_{which}_{key}": value for key, value in (errors | costs).items()}
+        finally:
+            master.stop()
     return figures
 
 
@@ -193,7 +234,7 @@ def show(figures: dict[str, float]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--only", choices=("logs", "house"))
+    parser.add_argument("--only", choices=("logs", "house", "nodes"))
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--quick", action="store_true", help="one seed, one room")
     parser.add_argument("--datasets", type=Path, default=ROOT.parent / "shared" / "datasets", metavar="FOLDER")
@@ -205,12 +246,14 @@ def main() -> None:
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     print(f"1 core of {os.cpu_count()}")
     figures: dict[str, float] = {}
-    if options.only != "logs":
+    if options.only in (None, "house"):
         house, grid, found, true = measure_house(tutorial(1), quick=options.quick)
         figures |= house
         picture(grid, options.pictures, "house", found, true)
-    if options.only != "house":
+    if options.only in (None, "logs"):
         figures |= measure_logs(options)
+    if options.only == "nodes" or (options.only is None and original("gmapping", "slam_gmapping")):
+        figures |= measure_nodes(options)
     show(figures)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")

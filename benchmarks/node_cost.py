@@ -51,11 +51,11 @@ def megabytes(pid: int, key: str) -> float:
     raise OSError(f"/proc/{pid}/status has no {key}")
 
 
-def original(package: str) -> str:
-    """Path of a node, named as its package, that is not ours, "" where it is ours."""
+def original(package: str, name: str = "") -> str:
+    """Path of a package's node, by default of its name, that is not ours, "" where it is ours."""
     found = subprocess.run(["catkin_find", "--libexec", package], capture_output=True, text=True, check=False)
     for folder in found.stdout.split():
-        program = Path(folder) / package
+        program = Path(folder) / (name or package)
         if program.is_file() and program.read_bytes()[:4] == b"\x7fELF":
             return str(program)
     return ""

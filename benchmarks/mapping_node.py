@@ -1,0 +1,130 @@
+"""CARMEN logs through the node slam_gmapping, by topics: ours, and the C++ original where the package path has it.
+
+Each scan waits until the node is done with the one before, so that neither loses any, however fast it is. A pose is
+what the node's map -> odom said right after its scan: that of the best particle by then, not of the way in the end.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rospy
+from node_cost import megabytes
+from numpy.typing import NDArray
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan as LaserScanMsg
+from tf2_msgs.msg import TFMessage
+
+from rosbot_patrol.geometry import Pose2D, compose, yaw_from_quaternion
+from rosbot_patrol.replay.carmen import CarmenLog
+from rosbot_patrol.ros.convert import transform_to_msg
+from rosbot_patrol.ros.house import end_group
+
+Poses = NDArray[np.float64]
+
+EPOCH = 100.0  # the first scan's time [s]
+QUIET_S, BUSY_NS = 0.03, 5_000_000  # a node that takes less of a core in so long is done
+STEP_S, STEPS = 0.06, 3  # of the clock after a scan, so that the node tells its transform
+PATIENCE_S = 120.0  # for the node to begin, and for one scan
+
+
+@dataclass(frozen=True)
+class Run:
+    """A log through a node: the poses, shape (N, 3), seconds of a core, most memory [MB]."""
+
+    poses: Poses
+    cpu_s: float
+    mb: float
+
+
+def cpu_ns(pid: int) -> int:
+    """What all threads of a process took of a core."""
+    tasks = Path(f"/proc/{pid}/task").glob("*/schedstat")
+    return sum(int(task.read_text().split()[0]) for task in tasks)
+
+
+class Feeder:
+    """Clock, odometry and scans for one node, and an ear for its transform."""
+
+    def __init__(self, frame: str) -> None:
+        self._frame = frame
+        self._clock = rospy.Publisher("/clock", Clock, queue_size=10)
+        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=10)
+        self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        self._scan = rospy.Publisher("/scan", LaserScanMsg, queue_size=10)
+        self._listener = rospy.Subscriber("/tf", TFMessage, self._hear)
+        self.correction = Pose2D()
+        self._static.publish([transform_to_msg(Pose2D(), "base_link", frame, 0.0)])
+
+    def close(self) -> None:
+        """Leave all topics."""
+        for each in (self._listener, self._clock, self._tf, self._static, self._scan):
+            each.unregister()
+
+    def is_heard(self) -> bool:
+        """Whether the node is there."""
+        return self._scan.get_num_connections() > 0 and self._tf.get_num_connections() > 1
+
+    def _hear(self, message: Any) -> None:
+        for each in message.transforms:
+            if each.child_frame_id == "odom":
+                t, q = each.transform.translation, each.transform.rotation
+                self.correction = Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
+
+    def send(self, scan: Any, odometry: Pose2D, stamp: float, pid: int) -> None:
+        """One scan, until the node is done with it and has told its transform."""
+        now = rospy.Time.from_sec(stamp)
+        self._clock.publish(now)
+        self._tf.publish([transform_to_msg(odometry, "odom", "base_link", stamp)])
+        message = LaserScanMsg(angle_min=scan.angle_min, angle_increment=scan.angle_increment)
+        message.header.stamp, message.header.frame_id = now, self._frame
+        message.angle_max = scan.angle_min + scan.angle_increment * (len(scan.ranges) - 1)
+        message.range_min, message.range_max, message.ranges = scan.range_min, scan.range_max, scan.ranges.tolist()
+        self._scan.publish(message)
+        until_done(pid)
+        for k in range(STEPS):
+            self._clock.publish(rospy.Time.from_sec(stamp + (k + 1) * STEP_S))
+            until_done(pid)
+
+
+def until_done(pid: int) -> None:
+    """Wait until a node takes hardly any processor time."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        before = cpu_ns(pid)
+        time.sleep(QUIET_S)
+        if cpu_ns(pid) - before < BUSY_NS:
+            return
+    raise SystemExit(f"process {pid} is not done with a scan after {PATIENCE_S:.0f} s")
+
+
+def through_node(command: list[str], log: CarmenLog, odometry: Poses, params: dict[str, Any]) -> Run:
+    """A whole log through a node that is started for it; this process is one of a running master."""
+    rospy.set_param("/use_sim_time", True)
+    rospy.set_param("/slam_gmapping", params)
+    with tempfile.TemporaryFile() as out:
+        node = subprocess.Popen([*command, "__name:=slam_gmapping"], stdout=out, stderr=out, start_new_session=True)
+        feeder = Feeder(log.scans[0].frame_id or "laser")
+        try:
+            end = time.monotonic() + PATIENCE_S
+            while not feeder.is_heard():
+                if node.poll() is not None or time.monotonic() > end:
+                    out.seek(0)
+                    raise SystemExit(f"{' '.join(command)}: {out.read()[-500:].decode(errors='replace')}")
+                time.sleep(0.1)
+            until_done(node.pid)
+            began, rows, stamp, first = cpu_ns(node.pid), [], 0.0, log.scans[0].stamp
+            for scan, row in zip(log.scans, odometry, strict=True):
+                stamp = max(stamp + STEP_S * (STEPS + 1), EPOCH + scan.stamp - first)
+                feeder.send(scan, Pose2D(*row), stamp, node.pid)
+                rows.append(compose(feeder.correction, Pose2D(*row)))
+            return Run(np.array(rows), 1e-9 * (cpu_ns(node.pid) - began), megabytes(node.pid, "VmHWM"))
+        finally:
+            feeder.close()
+            end_group(node)
