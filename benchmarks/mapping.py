@@ -8,9 +8,9 @@ The logs run with the tutorial's parameters (config/gmapping.yaml), odometry mad
 noise by seed; errors are those of relations (Kuemmerle et al. 2009), between consecutive scans and between revisits
 (within 3 m and more than 100 scans apart), their mean over the seeds. The references are not the truth: walls_deg and
 walls_reference_deg are the mean errors of the headings against the right angles of the building (right_angles.py), the
-reference's beside ours. A run that is done is kept in `--keep` and not
-done again while the sources of gmapping, the parameters and the log are the same. `x C++` is how many times smaller the
-error is than that of the C++ original (one seed).
+reference's beside ours. A run that is done is kept in `--keep` and not done again while the sources of gmapping, the
+parameters and the log are the same. `x C++` is how many times smaller the error is than that of the C++ original (one
+seed).
 
 The house is driven through at 0.3 m/s with 720 beams at 10 Hz (mapping_house.py): gmapping_update_ms is the median of
 the updates on one core, gmapping_rtf the drive's seconds by those of the mapping, gmapping_mb the most memory that the
@@ -24,7 +24,6 @@ ours alone where there is no original.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import hashlib
 import json
 import math
@@ -130,8 +129,7 @@ def picture(grid: Grid, folder: Path | None, name: str, found: Poses, reference:
     if folder is None:
         return
     folder.mkdir(parents=True, exist_ok=True)
-    with contextlib.chdir(folder):
-        write_map(name, grid)
+    write_map(str(folder / name), grid)
     known = known_part(grid)
     drawing = np.repeat(np.repeat(map_picture(known), ZOOM, axis=0), ZOOM, axis=1)
     turned = transform_points(compose(Pose2D(*found[0]), invert(Pose2D(*reference[0]))), reference[:, :2])

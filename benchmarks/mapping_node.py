@@ -9,7 +9,7 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,9 @@ from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.geometry import Pose2D, compose, yaw_from_quaternion
 from rosbot_patrol.replay.carmen import CarmenLog
-from rosbot_patrol.ros.convert import transform_to_msg
+from rosbot_patrol.ros.convert import scan_to_msg, time_to_msg, transform_to_msg
 from rosbot_patrol.ros.house import end_group
+from rosbot_patrol.scan import LaserScan
 
 Poses = NDArray[np.float64]
 
@@ -77,19 +78,14 @@ class Feeder:
                 t, q = each.transform.translation, each.transform.rotation
                 self.correction = Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
-    def send(self, scan: Any, odometry: Pose2D, stamp: float, pid: int) -> None:
+    def send(self, scan: LaserScan, odometry: Pose2D, stamp: float, pid: int) -> None:
         """One scan, until the node is done with it and has told its transform."""
-        now = rospy.Time.from_sec(stamp)
-        self._clock.publish(now)
+        self._clock.publish(time_to_msg(stamp))
         self._tf.publish([transform_to_msg(odometry, "odom", "base_link", stamp)])
-        message = LaserScanMsg(angle_min=scan.angle_min, angle_increment=scan.angle_increment)
-        message.header.stamp, message.header.frame_id = now, self._frame
-        message.angle_max = scan.angle_min + scan.angle_increment * (len(scan.ranges) - 1)
-        message.range_min, message.range_max, message.ranges = scan.range_min, scan.range_max, scan.ranges.tolist()
-        self._scan.publish(message)
+        self._scan.publish(scan_to_msg(replace(scan, stamp=stamp, frame_id=self._frame)))
         until_done(pid)
         for k in range(STEPS):
-            self._clock.publish(rospy.Time.from_sec(stamp + (k + 1) * STEP_S))
+            self._clock.publish(time_to_msg(stamp + (k + 1) * STEP_S))
             until_done(pid)
 
 
