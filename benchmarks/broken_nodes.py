@@ -5,7 +5,7 @@
 
 Somebody stands in the room; a call starts a mission. In mid-drive (the detector, the camera's republish and the
 sensors' bridge: as the robot begins to look) the node gets SIGKILL, or SIGSTOP and `--hung` seconds later, by the
-wall's clock, SIGKILL; roslaunch starts it again after `--respawn-delay`. Told: what /diagnostics warned of that it
+wall's clock, SIGKILL; roslaunch starts it again after `--respawn-delay` (not the keyboard's node). Told: what /diagnostics warned of that it
 did not before, mails, the mission's sentence. Well: on guard again, and /diagnostics as before. Times are simulated
 seconds from the fault on.
 """
@@ -137,7 +137,7 @@ def table(rows: list[Row]) -> str:
         times = " | ".join("not" if value is None else f"{value:.0f}" for value in (row.over, row.well))
         mails = "; ".join(row.mails) or "-"
         lines.append(
-            f"| {row.node} | {row.how} | {row.verdict} | {told} | {mails} | {times} | {', '.join(row.touched) or '-'} |"
+            f"| {row.node} | {row.how} | {row.verdict or row.sentence} | {told} | {mails} | {times} | {', '.join(row.touched) or '-'} |"
         )
     return "\n".join(lines)
 
@@ -166,6 +166,9 @@ def main() -> None:
         names = [n for n in names if n not in LEFT_OUT and not n.startswith(NOT_ROS)]
         for node in options.nodes or names:
             for how in options.how:
+                if f"/{node}" not in house.pids():
+                    print(f"{node} is not there: roslaunch does not start it again", flush=True)
+                    continue
                 try:
                     rows.append(break_node(house, diagnostics, node, how, options.hung))
                 except HouseError as err:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import angle_difference, wrap_angles
+from rosbot_patrol.patrol.box_depth import ASIDE, DEEP, GRID, UP, is_beyond, is_flat, nearer, upright, whose
 from rosbot_patrol.patrol.inputs import Box, Measured
 from rosbot_patrol.patrol.legs import go_straight_up
 
@@ -30,18 +31,8 @@ Array = NDArray[np.float64]
 _EDGE = 3  # a box that ends so near to the picture's lower or outer edges may go on beyond them [px]
 _HEADROOM = 0.06  # with less between a box and the picture's upper edge there may be more above it [m]
 _THICK = 0.12  # from the front of a person to the middle [m]
-_DEEP = 0.35  # what is so much farther than the nearest part is not of the person [m]
-_FEW = 40  # depths, at least, to say anything
-_KNOWN = 0.2  # of the middle of a box has depth; with less, that is of something else
 _ABOUT = 1.25  # so far off a row of the picture tells the floor's distance to within that
 _LEGS = 2  # beams, at least
-_GRID = 48  # samples along each side of a box, at most
-_FLAT_SHARE = 0.92  # of the samples lie in a picture's plane
-_BELIEVED = 0.05  # of a box's samples speak for the nearer thing
-_UPRIGHT_ROWS = 0.5  # of the rows show one who stands
-_CHEST = 0.45  # of a box, from above, show head and chest
-_BEFORE_SHARE = 0.35  # of a picture on the wall may be hidden
-_NOISE = 0.003  # of a depth camera, at 1 m; it grows with the square [m]
 
 
 @dataclass(frozen=True)
@@ -115,20 +106,21 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
     found = _by_lidar(box, view, unmapped) if unmapped is not None else None
     if depth is not None:
         samples = _samples(box, view.lens, depth)
-        along = _nearest(samples)
-        if found is not None and (along or 0.0) < found <= _ABOUT * most and _is_beyond(samples):
+        along, is_before = whose(samples)
+        if found is not None and (along or 0.0) < found <= _ABOUT * most and is_beyond(samples):
             return replace(box, measured=_at(box, view, found, source="lidar", error=0.15 + 0.02 * found, flat=None))
         is_behind = along is not None and along > most
-        leg = _upright(samples, *_about_floor(box, view)) if along is not None else None
-        if leg is not None and along is not None and leg < along - _DEEP:
+        leg = upright(samples, *_about_floor(box, view)) if along is not None else None
+        if leg is not None and along is not None and leg < along - DEEP:
             along = leg
         elif is_behind:
-            along = _nearer(samples, most)
+            along = nearer(samples, most)
         else:
-            flat = _is_flat(samples)
+            around = _samples(box, view.lens, depth, ASIDE, UP) if is_before.any() else None
+            flat = is_flat(samples, is_before, around)
         if along is not None:
             measured = _at(box, view, along, source="depth", error=0.1 + 0.02 * along, flat=flat)
-            if measured.is_cut_above and found is not None and abs(found - along) < _DEEP:
+            if measured.is_cut_above and found is not None and abs(found - along) < DEEP:
                 measured = replace(measured, has_legs=_has_legs(samples, box, view, along))
             return replace(box, measured=measured)
     if found is not None and found <= most:
@@ -163,101 +155,39 @@ def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: 
     )
 
 
-def _samples(box: Box, lens: Lens, depth: Depth) -> NDArray[np.float64]:
-    """Depths over a box, on a grid of at most _GRID by _GRID, shape (rows, columns); both cameras look the same way."""
-    other = depth.lens
+def _samples(box: Box, lens: Lens, depth: Depth, aside: int = 0, up: int = 0) -> Array:
+    """Depths over a box, on a grid of GRID by GRID, shape (rows, columns); both cameras look the same way.
 
-    def along(first: float, last: float, middle: float, focal: float, centre: float, scale: float, most: int) -> Array:
-        return np.clip(np.rint((_middles(first, last) - middle) / focal * scale + centre), 0, most - 1)
-
-    columns = along(box.xmin, box.xmax, lens.cx, lens.fx, other.cx, other.fx, depth.metres.shape[1])
-    rows = along(box.ymin, box.ymax, lens.cy, lens.fy, other.cy, other.fy, depth.metres.shape[0])
-    return np.asarray(depth.metres[np.ix_(rows.astype(int), columns.astype(int))], np.float64)
-
-
-def _middles(first: float, last: float) -> Array:
-    """Middles of the rows or columns of the grid over a span."""
-    return np.linspace(first, last, _GRID + 1)[:-1] + (last - first) / _GRID / 2.0
-
-
-def _middle(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The middle of a box, and above."""
-    rows, columns = samples.shape
-    return samples[rows // 8 : rows * 3 // 4, columns // 4 : columns * 3 // 4]
-
-
-def _is_beyond(samples: NDArray[np.float64]) -> bool:
-    """Whether most of a box may lie beyond what the depth camera measures: what it knows is of a thing before that."""
-    return bool(np.isfinite(_middle(samples)).mean() < _KNOWN)
-
-
-def _nearest(samples: NDArray[np.float64]) -> float | None:
-    """How far the nearest thing of some size in the middle of a box is [m]."""
-    middle = _middle(samples)
-    known = middle[np.isfinite(middle)]
-    if known.size < _FEW:
-        return None
-    near = np.quantile(known, 0.2)
-    return float(np.median(known[known < near + _DEEP]))
-
-
-def _nearer(samples: NDArray[np.float64], most: float) -> float | None:
-    """How far the thing is that is no farther than `most` [m], None where next to nothing is."""
-    near = samples[samples <= most]  # NaN is not
-    return float(np.median(near)) if near.size >= max(_BELIEVED * samples.size, _FEW) else None
-
-
-def _upright(samples: NDArray[np.float64], least: float, most: float) -> float | None:
-    """How far the upright thing is that lies between two distances [m], None where there is none.
-
-    A leg at the edge of a box, before a wall that fills it: little of the box, but most of its rows, the upper ones
-    with them, where furniture that hides the feet has none.
+    Args:
+        box: in the colour picture.
+        lens: of that.
+        depth: the other picture.
+        aside: so many samples more to either side, NaN beyond the picture.
+        up: and above.
     """
-    is_between = (samples >= least) & (samples <= most)
-    rows = is_between.any(axis=1)
-    if is_between.mean() < _BELIEVED or rows.mean() < _UPRIGHT_ROWS or not rows[: len(rows) // 3].any():
-        return None
-    return float(np.median(samples[is_between]))
+    other, (high, wide) = depth.lens, depth.metres.shape
+    columns = (_middles(box.xmin, box.xmax, aside, aside) - lens.cx) / lens.fx * other.fx + other.cx
+    rows = (_middles(box.ymin, box.ymax, up) - lens.cy) / lens.fy * other.fy + other.cy
+    found = depth.metres[
+        np.ix_(np.clip(np.rint(rows), 0, high - 1).astype(int), np.clip(np.rint(columns), 0, wide - 1).astype(int))
+    ].astype(np.float64)
+    if aside or up:
+        found[(rows < 0) | (rows > high - 1)] = np.nan
+        found[:, (columns < 0) | (columns > wide - 1)] = np.nan
+    return np.asarray(found)
 
 
-def _is_flat(samples: NDArray[np.float64]) -> bool | None:
-    """Whether what a box shows lies in one plane, None where too little of it is known.
-
-    In a pinhole's picture the inverse of the depth of a plane is linear in row and column. The plane is that of the
-    upper middle, where a person's chest is, by least squares, again of what lies near the first. All of the box has to
-    lie in it but for what stands before it at the edges, as a sofa before a picture on the wall.
-    """
-    is_known = np.isfinite(samples) & (samples > 0.0)
-    high, wide = samples.shape
-    middle = is_known[high // 8 : high * 3 // 4, wide // 4 : wide * 3 // 4]
-    if is_known.mean() < 0.4 or middle.mean() < 0.7:  # dark clothes before a wall: only the wall is known
-        return None
-    rows, columns = np.nonzero(is_known)
-    metres = samples[rows, columns]
-    terms = np.column_stack((rows, columns, np.ones(len(rows)))).astype(np.float64)
-    is_chest = (rows < _CHEST * high) & (columns >= wide // 8) & (columns < wide - wide // 8)
-    kept: NDArray[np.bool_] = is_chest
-    fitted: Array = metres
-    bound = np.maximum(0.03, 3.0 * _NOISE * metres**2)
-    for _ in range(3):
-        if kept.sum() < max(is_chest.sum() // 3, 3):
-            return False
-        plane, *_ = np.linalg.lstsq(terms[kept], 1.0 / metres[kept], rcond=None)
-        inverse = terms @ plane
-        fitted = np.where(inverse > 1e-3, 1.0 / np.maximum(inverse, 1e-3), np.inf)
-        kept = is_chest & (np.abs(fitted - metres) < bound)
-    is_in = np.abs(fitted - metres) < bound
-    is_before = (metres < fitted - bound) & ~is_chest
-    if is_before.mean() > _BEFORE_SHARE or is_in[is_chest].mean() < _FLAT_SHARE:
-        return False
-    return bool(is_in[~is_before].mean() >= _FLAT_SHARE)
+def _middles(first: float, last: float, before: int = 0, after: int = 0) -> Array:
+    """Middles of the rows or columns of the grid over a span, and of so many more before and after it."""
+    step = (last - first) / GRID
+    return np.asarray(first + step * (np.arange(-before, GRID + after) + 0.5))
 
 
 def _has_legs(samples: Array, box: Box, view: View, along: float) -> bool | None:
     """Whether what is so far along the optical axis [m] stands as a person does."""
     lens, eye = view.lens, float(view.eye[2])
     heights = eye - (_middles(box.ymin, box.ymax) - lens.cy) / lens.fy * along
-    return go_straight_up(samples, along, heights, eye, box.width / _GRID / lens.fx * along)
+    return go_straight_up(samples, along, heights, eye, box.width / GRID / lens.fx * along)
 
 
 def _by_lidar(box: Box, view: View, unmapped: Array) -> float | None:
@@ -275,7 +205,7 @@ def _by_lidar(box: Box, view: View, unmapped: Array) -> float | None:
     if inside.sum() < _LEGS:
         return None
     near = np.sort(distances[inside])
-    legs = near[near < near[_LEGS - 1] + _DEEP]
+    legs = near[near < near[_LEGS - 1] + DEEP]
     ahead = math.cos(middle - view.yaw)
     return float(np.median(legs)) * ahead if ahead > 0.1 else None
 

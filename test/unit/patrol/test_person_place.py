@@ -225,6 +225,67 @@ def test_a_poster_behind_a_sofas_arm_is_flat_and_somebody_there_is_not() -> None
     assert measure(box, view, Depth(somebody, LENS)).measured.is_flat is False
 
 
+def scene(box: Box, wall: float, body: float = 0.0, chair: tuple[float, float, float] | None = None) -> Depth:
+    """A wall, where `body` is given somebody before it who fills the box, and a chair's back before a part of both.
+
+    Args:
+        box: of the person, or of their picture on the wall.
+        wall: [m]; body: [m].
+        chair: where in the box it begins and ends, from left to right, and how far it is [m].
+    """
+    rows, columns = np.mgrid[0:480, 0:640]
+    aside = (columns - (box.xmin + box.xmax) / 2) / (box.width / 2)
+    metres = wall + 0.01 * np.random.default_rng(1).standard_normal(rows.shape)
+    if body:
+        is_body = (np.abs(aside) < 0.9) & (rows >= box.ymin) & (rows <= box.ymax)
+        metres = np.where(is_body, body + 0.2 * aside**2, metres)
+    if chair:
+        along = (columns - box.xmin) / box.width
+        is_chair = (along > chair[0]) & (along < chair[1]) & (rows > 0.2 * box.height)
+        metres = np.where(is_chair, chair[2] + 0.3 * (along - chair[0]), metres)
+    return Depth(metres.astype(np.float32), LENS)
+
+
+@pytest.mark.parametrize("chair", [(0.6, 1.3, 1.8), (-0.5, 0.65, 1.5), (0.3, 0.65, 1.8)])
+def test_a_poster_half_behind_a_chair_is_flat_and_where_the_wall_is(chair: tuple[float, float, float]) -> None:
+    view = view_from()
+    for box in (box_of(view, 2.7, 0.3, low=0.4, high=1.2), box_of(view, 2.7, 0.3, low=0.4, high=1.0)):
+        m = measure(box, view, scene(box, 2.7, chair=chair)).measured
+        assert m is not None
+        assert m.is_flat is True
+        assert m.x == pytest.approx(2.82, abs=0.1)
+
+
+@pytest.mark.parametrize("chair", [(0.6, 1.3, 1.8), (-0.5, 0.4, 1.5)])
+def test_somebody_half_behind_a_chair_is_behind_it_and_no_poster(chair: tuple[float, float, float]) -> None:
+    view = view_from()
+    box = box_of(view, 3.0, 0.3, low=0.0, high=1.2)
+    m = measure(box, view, scene(box, 4.0, body=2.88, chair=chair)).measured
+    assert m is not None
+    assert m.is_flat is not True
+    assert m.x == pytest.approx(3.1, abs=0.2)
+
+
+def test_somebody_beside_whom_a_chair_stands_is_not_the_chair() -> None:
+    view = view_from()
+    box = box_of(view, 3.0, 0.3, low=0.0, high=1.2)
+    m = measure(box, view, scene(box, 4.0, body=2.88, chair=(0.8, 1.3, 1.8))).measured
+    assert m is not None
+    assert m.x == pytest.approx(3.1, abs=0.2)
+
+
+def test_somebody_before_what_cannot_be_measured_is_no_poster() -> None:
+    """As far off as 4.4 m a body's depths lie in one plane, within their noise."""
+    view = view_from()
+    box = box_of(view, 4.5, 0.0, high=1.2)
+    depth = depth_of(box, 4.4)
+    aside = np.abs(np.arange(640) - (box.xmin + box.xmax) / 2) / (box.width / 2)
+    depth.metres[:, aside > 0.7] = np.nan
+    m = measure(box, view, depth).measured
+    assert m is not None
+    assert m.is_flat is None
+
+
 @pytest.mark.parametrize(("xmin", "xmax", "is_part"), [(0, 90, True), (550, 638, True), (10, 600, False)])
 def test_a_box_at_the_pictures_edge_is_of_a_part(xmin: int, xmax: int, is_part: bool) -> None:
     box = Box(label="person", probability=0.9, xmin=xmin, xmax=xmax, ymin=60, ymax=400)
