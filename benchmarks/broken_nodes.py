@@ -5,9 +5,9 @@
 
 Somebody stands in the room; a call starts a mission. In mid-drive (the detector, the camera's republish and the
 sensors' bridge: as the robot begins to look) the node gets SIGKILL, or SIGSTOP and `--hung` seconds later, by the
-wall's clock, SIGKILL; roslaunch starts it again after `--respawn-delay` (not the keyboard's node). Told: what /diagnostics warned of that it
-did not before, mails, the mission's sentence. Well: on guard again, and /diagnostics as before. Times are simulated
-seconds from the fault on.
+wall's clock, SIGKILL; roslaunch starts it again after `--respawn-delay` (not the keyboard's node). Told: what
+/diagnostics warned of that it did not before, mails, the mission's sentence. Well: on guard again, and /diagnostics as
+before. Times are simulated seconds from the fault on.
 """
 
 from __future__ import annotations
@@ -136,9 +136,8 @@ def table(rows: list[Row]) -> str:
         told = "; ".join(f"{at:.0f} s {name}: {text}" for name, (at, text) in row.told.items()) or "-"
         times = " | ".join("not" if value is None else f"{value:.0f}" for value in (row.over, row.well))
         mails = "; ".join(row.mails) or "-"
-        lines.append(
-            f"| {row.node} | {row.how} | {row.verdict or row.sentence} | {told} | {mails} | {times} | {', '.join(row.touched) or '-'} |"
-        )
+        verdict, met = row.verdict or row.sentence, ", ".join(row.touched) or "-"
+        lines.append(f"| {row.node} | {row.how} | {verdict} | {told} | {mails} | {times} | {met} |")
     return "\n".join(lines)
 
 

@@ -141,6 +141,32 @@ def test_a_bridge_is_killed_and_its_sensors_are_told_as_one(ros, tmp_path):
         sensor.stop()
 
 
+def test_a_patrol_that_hangs_is_told(ros, tmp_path):
+    """A hung process cannot say so itself; it is stopped here, and goes on."""
+    probe = ros.probe()
+    for topic in (EVENTS, DIAGNOSTICS):
+        probe.tell(subscribe=topic)
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], patrol_after=3.0, start_grace=60.0)
+    patrol = ros.node(
+        "patrol_robot",
+        "__name:=patrolling_node",
+        f"_path_to_params:={ROOT / SHOWN['path_to_params']}",
+        f"_state_dir:={tmp_path / 'patrol'}",
+        f"_maildir:={tmp_path / 'patrol_mail'}",
+        "_transport:=maildir",
+    )
+    probe.expect(lambda said: "sensor_watch: patrol" in str(said) and "is heard" in str(said), 20.0)
+    patrol.popen.send_signal(signal.SIGSTOP)
+    gone = probe.expect(lambda said: said.get("kind") == "patrol_gone" and said.get("active"), 15.0)
+    assert gone["bridge"] == "/patrolling_node"
+    mail = plain_text(watch.mail("the patrol (patrolling_node) has gone, or hangs"))
+    assert "motion is not answered" in mail
+    assert "What to do: " in mail
+    patrol.popen.send_signal(signal.SIGCONT)
+    probe.expect(lambda said: said.get("kind") == "patrol_gone" and said.get("active") is False, 15.0)
+    watch.mail("the patrol (patrolling_node) is well again")
+
+
 def test_who_else_speaks(ros, tmp_path):
     """An id that is not in the file, a second peer with a sensor's id on another bridge, a stuck output, garbage."""
     ports, probe = (free_port(), free_port()), ros.probe()

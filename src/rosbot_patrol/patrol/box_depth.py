@@ -25,6 +25,7 @@ _UPRIGHT_ROWS = 0.5  # of the rows show one who stands
 _CHEST = 0.45  # of a box, from above, show head and chest
 _CHEST_SHARE = 0.1  # of that has to show, to tell a picture, and of what is around
 _ASIDE, _ABOVE = 0.25, 0.2  # so much of a box is free beside or above its object at most: 99 % of those measured
+_ROWS = 0.4  # of the rows of a box show its object, at least
 _ASIDE_UP = 0.4  # and beside its upper half
 _BEFORE_MOST = 0.7  # of a box may show what stands before its object
 _STRIP, _FREE = 0.1, 0.25  # of a row or column, to belong to it; so much of it has to lie beyond, to be free
@@ -61,6 +62,8 @@ def whose(samples: Array) -> tuple[float | None, Mask]:
     """
     first, along = _nearest(_middle(samples)), _nearest(samples)
     nothing = np.zeros(samples.shape, np.bool_)
+    if first is None:
+        return None, nothing
     is_before = nothing
     while along is not None:
         is_of_it, is_farther = samples < along + DEEP, samples >= along + DEEP  # NaN is neither
@@ -74,17 +77,21 @@ def whose(samples: Array) -> tuple[float | None, Mask]:
 
 
 def _fills(is_of_it: Mask, is_farther: Mask) -> bool:
-    """Whether something reaches the sides and the top of its box; where next to nothing is known, it may."""
+    """Whether something reaches the sides and the top of its box, and well down; unknown parts may be of it."""
 
-    def free(axis: int, rows: int) -> tuple[float, float]:
+    def takes(axis: int, rows: int) -> Mask:
         is_there = is_of_it[:rows].mean(axis=axis) > _STRIP
-        taken = np.flatnonzero(is_there | (is_farther[:rows].mean(axis=axis) < _FREE))
-        if not len(taken):
-            return 1.0, 1.0
-        return taken[0] / len(is_there), 1.0 - (taken[-1] + 1) / len(is_there)
+        return np.asarray(is_there | (is_farther[:rows].mean(axis=axis) < _FREE))
 
-    rows = len(is_of_it)
-    return max(free(0, rows)) <= _ASIDE and max(free(0, rows // 2)) <= _ASIDE_UP and free(1, rows)[0] <= _ABOVE
+    rows, columns, upper = takes(1, GRID), takes(0, GRID), takes(0, GRID // 2)
+    is_high = rows.any() and rows.argmax() <= _ABOVE * GRID and rows.mean() >= _ROWS
+    return bool(is_high and _aside(columns) <= _ASIDE and _aside(upper) <= _ASIDE_UP)
+
+
+def _aside(columns: Mask) -> float:
+    """What is free beside those that are taken, on the freer side."""
+    taken = np.flatnonzero(columns)
+    return max(taken[0], len(columns) - 1 - taken[-1]) / len(columns) if len(taken) else 1.0
 
 
 def nearer(samples: Array, most: float) -> float | None:

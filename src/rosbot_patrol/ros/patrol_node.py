@@ -59,7 +59,7 @@ from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.ros.patrol_images import PictureRing
 from rosbot_patrol.ros.patrol_inputs import InputParams, PatrolInputs
 from rosbot_patrol.ros.patrol_orders import ArmingDesk, Orders, StopSwitch
-from rosbot_patrol.ros.patrol_outputs import StatePublisher, Wheels
+from rosbot_patrol.ros.patrol_outputs import Pulse, StatePublisher, Wheels
 from rosbot_patrol.ros.patrol_settings import (
     NO_ROUNDS,
     NodeParams,
@@ -147,7 +147,7 @@ class PatrolNode:
         self._round_at = -math.inf
         self._schedule_changed = False
         self.move_base = MoveBase(inputs.map_frame)
-        self._wheels, self._state = Wheels(), StatePublisher(self.health)
+        self._wheels, self._state, self._pulse = Wheels(), StatePublisher(self.health), Pulse()
         self._stop_switch = StopSwitch(EmergencyStop(folder / "stop.json"), self.move_base, self._wheels.publisher)
         kept = folder / "arming.json"
         self._arming = ArmingDesk(Arming(self.rules, read_memory(kept)), kept)
@@ -193,6 +193,7 @@ class PatrolNode:
                 commands = self.manager.step(time_now, inputs)
                 self._publish(time_now, inputs, commands)
                 self._actions.follow(commands.ended, commands.report)
+                self._pulse.step()
 
     def _inputs(self, time_now: float) -> Inputs:
         guarded = self._arming.step(self.manager.calls())

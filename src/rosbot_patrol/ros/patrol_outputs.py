@@ -1,11 +1,14 @@
-"""What the patrol says and commands on topics: its state, and the wheels while it turns."""
+"""What the patrol says and commands on topics: that it lives, its state, and the wheels while it turns."""
 
 from __future__ import annotations
 
 import logging
+import math
+import time
 
 import rospy
 from geometry_msgs.msg import Twist
+from std_msgs.msg import Empty
 
 from rosbot_patrol.geometry import STOP, Twist2D
 from rosbot_patrol.msg import PatrolState
@@ -37,6 +40,21 @@ class Wheels:
         if self._turning:
             self.publisher.publish(convert.twist_to_msg(STOP))
         self._turning = False
+
+
+class Pulse:
+    """/patrol/alive: the patrol's own step runs; about once a second of the wall, whatever simulated time does."""
+
+    def __init__(self) -> None:
+        self._at = -math.inf
+        self._publisher = rospy.Publisher("/patrol/alive", Empty, queue_size=2)
+
+    def step(self) -> None:
+        """Call it in each step."""
+        if 0.0 <= time.monotonic() - self._at < 1.0:
+            return
+        self._at = time.monotonic()
+        self._publisher.publish(Empty())
 
 
 class StatePublisher:

@@ -7,7 +7,7 @@ import rospy
 from rosbot_patrol.msg import SensorEvent, SensorState, SensorStates
 from rosbot_patrol.ros.diagnostics import ERROR, OK, STALE, WARN, Health
 from rosbot_patrol.sensors.looks import Look
-from rosbot_patrol.sensors.problems import SERIOUS, Event, duration
+from rosbot_patrol.sensors.problems import SERIOUS, Event, Kind, duration
 from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
 
 
@@ -129,6 +129,9 @@ class Reports:
             part = f"bridge {name.strip('/')}"
             self._health.set(part, OK if is_there else ERROR, "is heard" if is_there else "has gone")
             parts.add(part)
+        if watch.patrol:
+            is_there = not any(key.kind is Kind.PATROL_GONE for key in watch.problems())
+            self._health.set("patrol", OK if is_there else ERROR, "is heard" if is_there else "has gone, or hangs")
         for part in self._parts - parts:
             self._health.drop(part)
         self._parts = parts

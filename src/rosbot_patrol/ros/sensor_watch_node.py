@@ -1,6 +1,7 @@
 """sensor_watch: knows which motion sensor is well, and tells who asks, and the owner, when one is not.
 
-Listens to /motion_trigger, whoever publishes there, and to the bridges' /sensors/links. Publishes /sensors/states
+Listens to /motion_trigger, whoever publishes there, to the bridges' /sensors/links and to the patrol's /patrol/alive: a
+patrol that is dead or hangs answers nobody, and cannot say so itself. Publishes /sensors/states
 (latched), /sensors/events and /diagnostics, and tells the owner through the outbox in ~state_dir, which it shares with
 the patrol but needs no other node to deliver.
 
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import rospy
+from std_msgs.msg import Empty
 
 from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.alerts.notice import Notice as PostNotice
@@ -102,10 +104,12 @@ class SensorWatch:
         """Watch until shutdown."""
         self._triggers: deque[tuple[int, bool, str, float]] = deque(maxlen=MAX_WAITING)
         self._links: deque[tuple[SensorLinks, float, float]] = deque(maxlen=1000)
+        self._patrol: deque[tuple[str, float]] = deque(maxlen=10)
         self._states = rospy.Publisher("/sensors/states", SensorStates, queue_size=5, latch=True)
         self._events = rospy.Publisher("/sensors/events", SensorEvent, queue_size=100)
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
         rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=1000)
+        rospy.Subscriber("/patrol/alive", Empty, self._on_patrol, queue_size=10)
         rospy.Subscriber("/sensors/links", SensorLinks, self._on_links, queue_size=100)
         self._post.start()
         Worker(self._work, name="watch").start()
@@ -116,6 +120,10 @@ class SensorWatch:
     def _on_trigger(self, message: EspTrigger) -> None:
         header = getattr(message, "_connection_header", None) or {}
         self._triggers.append((message.id, message.move, str(header.get("callerid", "")), time.monotonic()))
+
+    def _on_patrol(self, message: Empty) -> None:
+        header = getattr(message, "_connection_header", None) or {}
+        self._patrol.append((str(header.get("callerid", "")), time.monotonic()))
 
     def _on_links(self, message: SensorLinks) -> None:
         # in simulated time both stamps are of one clock
@@ -158,6 +166,8 @@ class SensorWatch:
         while self._triggers:
             sensor_id, move, sender, at = self._triggers.popleft()
             self._watch.heard(sensor_id, sender, at, move=move)
+        while self._patrol:
+            self._watch.patrol_heard(*self._patrol.popleft())
         while self._links:
             message, offset, at = self._links.popleft()
             self._watch.linked(message.bridge, links_from_msg(message), at, clock_offset=offset)

@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 ALONG = 5.0  # a problem that has lasted so long goes along with a notice that is due [s]
 PATIENCE = 900.0  # a problem told before a restart may need so long to show again [s]
-_SHOWN_BY_BEING_HEARD = (Kind.SILENT, Kind.BRIDGE_GONE)
+_SHOWN_BY_BEING_HEARD = (Kind.SILENT, Kind.BRIDGE_GONE, Kind.PATROL_GONE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,6 +141,8 @@ class Notices:
             return True
         if key.kind not in _SHOWN_BY_BEING_HEARD:
             return now - self._began > PATIENCE
+        if key.kind is Kind.PATROL_GONE:
+            return watch.patrol == key.bridge
         if key.sensor_id < 0:
             return bool(watch.bridges().get(key.bridge))
         status = statuses.get(key.sensor_id)

@@ -9,6 +9,7 @@ from enum import Enum
 class Kind(Enum):
     """Values are those of SensorEvent; the worst comes first."""
 
+    PATROL_GONE = "patrol_gone"
     SILENT = "silent"
     BRIDGE_GONE = "bridge_gone"
     DUPLICATE_ID = "duplicate_id"
@@ -20,12 +21,12 @@ class Kind(Enum):
     CLOCK_OFF = "clock_off"
 
 
-SERIOUS = frozenset({Kind.SILENT, Kind.BRIDGE_GONE, Kind.DUPLICATE_ID, Kind.WRONG_PEER})
+SERIOUS = frozenset({Kind.PATROL_GONE, Kind.SILENT, Kind.BRIDGE_GONE, Kind.DUPLICATE_ID, Kind.WRONG_PEER})
 
 
 @dataclass(frozen=True, order=True)
 class Key:
-    """What it is about: a kind, and a sensor's id, or -1 and a bridge."""
+    """What it is about: a kind, and a sensor's id, or -1 and a node: a bridge, the patrol."""
 
     kind_name: str
     sensor_id: int = -1

@@ -33,6 +33,9 @@ class WatchTimes:
         0.0, unit="s", lo=0.0, doc="a sensor that lives but saw nothing for so long is blind, or stuck; 0: never said"
     )
     bridge_after: float = param(5.0, unit="s", lo=2.0, doc="a bridge that says nothing for so long has gone")
+    patrol_after: float = param(
+        10.0, unit="s", lo=3.0, doc="a patrol that was there and says nothing for so long has gone, or hangs"
+    )
     clock_limit: float = param(10.0, unit="s", lo=0.1, doc="a clock off by more is far off")
     unknown_calm: float = param(600.0, unit="s", lo=1.0, doc="an unknown id is forgotten after so long")
 

@@ -31,6 +31,7 @@ MAX_BRIDGES = 64
 
 # A condition counts when it has held for the first time, and is over when it has not for the second [s].
 _DELAYS: dict[Kind, tuple[float, float]] = {
+    Kind.PATROL_GONE: (0.0, 3.0),
     Kind.SILENT: (0.0, 0.0),  # has its own
     Kind.FLAPPING: (0.0, 0.0),  # has its own, too
     Kind.STUCK_ON: (0.0, 0.0),
@@ -104,6 +105,7 @@ class Supervisor:
         self._now = self._last = now
         self._slept = 0.0
         self._bridges: dict[str, _Bridge] = {}
+        self._patrol: tuple[str, float] | None = None
         self._conditions: dict[Key, _Condition] = {}
         self._tracked = {spec.id: Tracked(spec, times, now, is_listed=True) for spec in sensors}
 
@@ -144,6 +146,10 @@ class Supervisor:
         for sensor_id, tracked in self._tracked.items():
             tracked.link(bridge, by_sensor.get(sensor_id, []), t, is_settled=settled)
 
+    def patrol_heard(self, node: str, now: float) -> None:
+        """The patrol's node gave a sign of life."""
+        self._patrol = node, self._own(now)
+
     def _own(self, now: float) -> float:
         """The supervisor's own clock; a message that waited in a queue may be a little late."""
         step = now - self._last
@@ -170,6 +176,10 @@ class Supervisor:
 
     def _present(self, t: float) -> Iterable[Problem]:
         gone = {name for name, b in self._bridges.items() if t - b.heard > self._times.bridge_after / 3.0}
+        if self._patrol is not None and t - self._patrol[1] > self._times.patrol_after:
+            node, heard = self._patrol
+            what = "has gone, or hangs: nothing is heard of it, and motion is not answered"
+            yield Problem(key=bridge_key(Kind.PATROL_GONE, node), since=heard, what=what)
         for name, bridge in self._bridges.items():
             yield from self._of_bridge(name, bridge, t)
         for sensor_id, tracked in list(self._tracked.items()):
@@ -241,6 +251,8 @@ class Supervisor:
 
     def title(self, key: Key) -> str:
         """Whom a problem is about, for people."""
+        if key.kind is Kind.PATROL_GONE:
+            return f"the patrol ({key.bridge.strip('/')})"
         return f"bridge {key.bridge}" if key.sensor_id < 0 else self.sensors.title(key.sensor_id)
 
     def problems(self) -> dict[Key, Problem]:
@@ -250,6 +262,11 @@ class Supervisor:
     def age(self, since: float) -> float:
         """How long ago a time of a problem was, on this clock [s]."""
         return max(self._now - since, 0.0)
+
+    @property
+    def patrol(self) -> str:
+        """The patrol's node, "" where it was never heard."""
+        return self._patrol[0] if self._patrol is not None else ""
 
     def bridges(self) -> Mapping[str, bool]:
         """Every bridge that was heard of, and whether it is there."""

@@ -11,6 +11,7 @@ from rosbot_patrol.sensors.problems import Kind, duration
 MAX_LISTED = 20  # of one kind in one notice
 
 _ONE_IS: dict[Kind, str] = {
+    Kind.PATROL_GONE: "has gone, or hangs",
     Kind.SILENT: "is silent",
     Kind.BRIDGE_GONE: "has gone",
     Kind.DUPLICATE_ID: "is reported by two at a time",
@@ -22,6 +23,8 @@ _ONE_IS: dict[Kind, str] = {
     Kind.CLOCK_OFF: "has a clock that is far off",
 }
 _TO_DO: dict[Kind, str] = {
+    Kind.PATROL_GONE: "where it has ended, it is started again by itself within seconds, and takes up what it was at."
+    " Where it has not come back by now, look at the robot, at its log and at its disk, and start it anew.",
     Kind.SILENT: "see that it has power and Wi-Fi, and switch it off and on. Until it is heard again, nobody notices"
     " motion in its room.",
     Kind.BRIDGE_GONE: "it is started again by itself within seconds. Where it is not, look at the machine that it runs"
@@ -72,6 +75,9 @@ def subject(items: Sequence[Item]) -> str:
         parts.append(f"{wrong[0].title} {_ONE_IS[wrong[0].kind]}")
     elif kinds == {Kind.SILENT}:
         parts.append(f"{len(wrong)} motion sensors are silent")
+    elif Kind.PATROL_GONE in kinds:
+        gone = next(item for item in wrong if item.kind is Kind.PATROL_GONE)
+        parts.append(f"{gone.title} {_ONE_IS[Kind.PATROL_GONE]}, and {len(wrong) - 1} more are not well")
     elif wrong:
         parts.append(f"{len(wrong)} things are wrong with the motion sensors")
     if len(well) == 1:
@@ -122,6 +128,7 @@ def _line(item: Item) -> str:
 def short(kinds: Sequence[Kind]) -> str:
     """Problems in a few words: "it was silent, it came and went"."""
     was = {
+        Kind.PATROL_GONE: "it was gone",
         Kind.SILENT: "it was silent",
         Kind.BRIDGE_GONE: "it was gone",
         Kind.DUPLICATE_ID: "two reported its id",

@@ -207,3 +207,19 @@ def test_the_robot_looks_once_for_each_silence():
     house.bridges.clear()
     assert run(300) == []
     assert Looks(LookTimes()).update(house.watch, house.watch.statuses(), house.now) == []
+
+
+def test_a_patrol_that_hangs_is_told_first_and_by_whom_it_was_heard():
+    owner = Owner(House(1, 2))
+    owner.house.watch.patrol_heard("/patrolling_node", owner.house.now)
+    owner.silence(1, 2)
+    (notice,) = owner.run(100.0)
+    assert notice.subject == "rosbot patrol: the patrol (patrolling_node) has gone, or hangs, and 2 more are not well"
+    assert notice.text.startswith("- The patrol (patrolling_node) has gone, or hangs: nothing is heard of it")
+    memory = owner.notices.snapshot()
+    again = Owner(House(1, 2), memory)  # the watch was restarted: what was told is not told again
+    assert not any("The patrol" in notice.text for notice in again.run(400.0))
+    for _ in range(100):
+        again.house.watch.patrol_heard("/patrolling_node", again.house.now)
+        again.run(1.0)
+    assert "the patrol (patrolling_node) is well again" in again.got[-1].text.lower()

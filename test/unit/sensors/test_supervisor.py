@@ -209,6 +209,23 @@ def test_clocks_of_a_device_and_of_a_bridges_machine():
     assert house.events[-1].text == "bridge /pc runs on a machine whose clock is 90 s ahead"
 
 
+def test_a_patrol_that_says_nothing_more():
+    house = House(1, patrol_after=10.0)
+    assert house.run(60.0) == []  # one that was never heard is not missed
+    for _ in range(5):
+        house.watch.patrol_heard("/patrolling_node", house.now)
+        assert house.run(5.0) == []
+    (gone,) = house.run(20.0)
+    assert gone == ("patrol_gone", "/patrolling_node", True)
+    text = "has gone, or hangs: nothing is heard of it, and motion is not answered"
+    assert house.events[-1].text == f"the patrol (patrolling_node) {text}"
+    for _ in range(5):
+        house.watch.patrol_heard("/patrolling_node", house.now)
+        house.run(1.0)
+    assert brief(house.events[-1]) == ("patrol_gone", "/patrolling_node", False)
+    assert house.wrong() == []
+
+
 def test_a_bridge_that_dies_and_comes_back():
     house = House(1, 2, 3)
     house.run(60.0)
