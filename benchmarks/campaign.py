@@ -1,0 +1,59 @@
+#!/usr/bin/env python3
+"""A campaign of 100 patrols in three houses, something broken in every other one: how many are as they should be.
+
+    . scripts/env; .ws/venv/bin/python benchmarks/campaign.py [FOLDER] [--patrols N] [--seed N] [--json FILE]
+
+Runs `rosrun rosbot_patrol campaign` and goes on where FOLDER has results already; the page is FOLDER/index.html.
+Minutes are those of the patrols, wherever they were played: the sum of their real times by those at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+AIMS = {
+    "detection_rate": ">= 1",
+    "false_alarms": "<= 0",
+    "contacts": "<= 0",
+    "home_rate": ">= 1",
+    "minutes": "<= 120",
+}
+
+
+def figures_of(folder: Path, jobs: int) -> dict[str, float]:
+    """What the campaign wrote, and how long its patrols took."""
+    figures: dict[str, float] = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    walls = [json.loads(path.read_text(encoding="utf-8"))["wall_s"] for path in folder.glob("*/result.json")]
+    return {**figures, "minutes": sum(walls) / jobs / 60.0}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, help="a new one under the temporary folder, if not given")
+    parser.add_argument("--patrols", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--json", type=Path, metavar="FILE")
+    given = parser.parse_args()
+    folder = given.folder or Path(tempfile.mkdtemp(prefix="campaign_"))
+    jobs = max((os.cpu_count() or 2) // 2, 1)
+    print(f"{folder}: {given.patrols} patrols, {jobs} at once on {os.cpu_count()} cores")
+    numbers = ["--patrols", str(given.patrols), "--seed", str(given.seed), "--jobs", str(jobs)]
+    status = subprocess.run(["rosrun", "rosbot_patrol", "campaign", str(folder), "--faults", *numbers]).returncode
+    if status not in (0, 1):  # 1: some patrol was not as it should be, which the figures say
+        sys.exit(status)
+    figures = figures_of(folder, jobs)
+    print(f"\n{'figure':24s} {'value':>9s} {'aim':>9s}")
+    for name, value in figures.items():
+        print(f"{name:24s} {value:9.3f} {AIMS.get(name, ''):>9s}")
+    if given.json:
+        given.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
