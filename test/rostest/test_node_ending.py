@@ -52,6 +52,25 @@ def test_a_node_ends_on_a_signal_while_it_talks_to_the_master(ros, number):
     assert "/busy" not in listed
 
 
+# rospy closes topics before it says that it is shut down; who publishes just then gets this.
+SPEAKING = """
+import rospy
+from rosbot_patrol.ros.node import run_node
+
+def body():
+    rospy.signal_shutdown("enough")
+    raise rospy.ROSException("publish() to a closed topic")
+
+run_node("speaking", body)
+"""
+
+
+def test_a_node_ends_in_peace_that_publishes_while_it_ends(ros):
+    node = Process([sys.executable, "-c", SPEAKING], ros.env, stdin=subprocess.DEVNULL)
+    assert node.popen.wait(20.0) == 0, node.output
+    assert "Traceback" not in node.output
+
+
 def test_a_node_that_ends_by_itself_needs_no_signal(ros):
     node = Process(
         [sys.executable, "-c", "from rosbot_patrol.ros.node import run_node; run_node('brief', lambda: None)"],

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import rospy
+from rospy.core import is_shutdown_requested
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import PatrolError
@@ -51,8 +52,10 @@ def run_node(
         rospy.signal_shutdown(str(err))
         sys.stdout.flush()
         os._exit(1)
-    except rospy.ROSInterruptException:
-        return
+    except rospy.ROSException:  # sleeping or publishing while the node ends; topics close before is_shutdown says so
+        if not is_shutdown_requested():
+            raise
+        ending.finish()
 
 
 class _Ending:
