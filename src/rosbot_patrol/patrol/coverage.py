@@ -116,6 +116,7 @@ class Coverage:
         self._iy, self._ix = np.nonzero(room)
         self._x, self._y = floor.centres(self._ix, self._iy)
         self._seen = np.zeros(len(self._x), np.int32)
+        self._seen_at = np.full(len(self._x), -math.inf)
         self._left = np.arange(len(self._x))
         self._gone = np.zeros(len(self._x), bool)
         self._whole = len(self._x)
@@ -131,12 +132,13 @@ class Coverage:
         """Of the room [m^2]."""
         return self._whole * self.floor.cell_area
 
-    def look(self, eye: Eye, sight: Sight) -> None:
+    def look(self, eye: Eye, sight: Sight, at: float = 0.0) -> None:
         """Take one picture that the detector looked at.
 
         Args:
             eye: the camera when it was taken.
             sight: how far one could look then, from about the same place.
+            at: when, of any clock [s]; what was seen often enough keeps the time at which it was.
         """
         p, left = self.params, self._left
         if not len(left):
@@ -145,11 +147,18 @@ class Coverage:
         away = np.hypot(dx, dy)
         aside = np.abs(wrap_angles(np.arctan2(dy, dx) - eye.pose.yaw))
         shows = (away <= p.view_range) & (aside <= eye.width / 2.0 - p.view_edge)
-        at = left[shows]
-        dx, dy = self._x[at] - sight.x, self._y[at] - sight.y
+        near = left[shows]
+        dx, dy = self._x[near] - sight.x, self._y[near] - sight.y
         shows[shows] = sight.reaches(np.arctan2(dy, dx), np.hypot(dx, dy) - p.view_slack)
-        self._seen[left[shows | (away < p.view_near)]] += 1
+        shown = left[shows | (away < p.view_near)]
+        self._seen[shown] += 1
+        self._seen_at[shown] = at
         self._left = left[self._seen[left] < p.seen_in]
+
+    def forget(self, before: float) -> None:
+        """What was seen before a time [s] is yet to be seen."""
+        self._seen[self._seen_at < before] = 0
+        self._left = np.flatnonzero(self._seen < self.params.seen_in)
 
     def stands(self, points: Array) -> None:
         """Leave out floor on which something stands that the map does not show.

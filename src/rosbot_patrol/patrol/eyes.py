@@ -75,6 +75,7 @@ class Eyes:
         self._views = self._second_looks = 0
         self._tried: list[tuple[float, float]] = []
         self._doubts = Doubts(self.params.coverage.seen_in)
+        self._calls, self._called_at, self._seen_before = 0, -math.inf, 0.0
 
     # -- Views
 
@@ -83,6 +84,7 @@ class Eyes:
         self._mission, self.coverage, self._began = mission, None, None
         self._views = self._second_looks = 0
         self._tried, self._has_eye = [], False
+        self._calls, self._called_at, self._seen_before = mission.triggers, -math.inf, 0.0
         self._doubts = Doubts(self.params.coverage.seen_in)
         self._witness.start()
         self._harmless = Harmless()
@@ -91,6 +93,8 @@ class Eyes:
         """Take in what detector and lidar saw since the last step."""
         self._now = now
         self._settle_in(inputs)
+        if self._mission is not None and self._mission.triggers > self._calls:
+            self._calls, self._called_at = self._mission.triggers, now
         if self._house is None:
             return
         view = inputs.scan
@@ -102,7 +106,7 @@ class Eyes:
                 continue
             self._has_eye, self._width = True, frame.eye.width
             sight = sight or self._sight(inputs, frame.eye)
-            self.coverage.look(frame.eye, sight)
+            self.coverage.look(frame.eye, sight, now)
             for box in frame.boxes:
                 if box.doubt is not None:
                     self._doubts.far(box.label, *box.doubt)
@@ -123,7 +127,26 @@ class Eyes:
         return self._harmless.sightings
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
-        """The best further viewpoint within the bounds."""
+        """The best further viewpoint within the bounds; where there is none, one for what may have changed."""
+        found = self._next(inputs)
+        return self._next(inputs) if found is None and self._looks_again() else found
+
+    def _looks_again(self) -> bool:
+        """Whether somebody may have come to where it was looked at before; once in a mission."""
+        mission = self._mission
+        if not self.params.viewpoints.look_again or self.coverage is None or mission is None or mission.sightings:
+            return False
+        if self._called_at == -math.inf or self._seen_before:
+            return False
+        self._seen_before = self.coverage.share
+        self.coverage.forget(self._called_at)
+        if self.coverage.share == self._seen_before:
+            return False
+        log.info("%s: its sensor called meanwhile: what was seen before that is looked at again", mission.room.title)
+        self._began, self._views, self._tried = self._now, 0, []
+        return True
+
+    def _next(self, inputs: Inputs) -> Viewpoint | None:
         p, mission = self.params, self._mission
         self._began = self._now if self._began is None else self._began
         if p.look_around == "spin" or mission is None or self.coverage is None or inputs.pose is None:
@@ -181,7 +204,9 @@ class Eyes:
 
     def share(self) -> float | None:
         """Of the room's floor that was seen, None where there is no map or no camera that tells what it sees."""
-        return self.coverage.share if self.coverage is not None and self._has_eye else None
+        if self.coverage is None or not self._has_eye:
+            return None
+        return max(self.coverage.share, self._seen_before)
 
     def blind(self) -> str:
         """Why what was seen is too little."""

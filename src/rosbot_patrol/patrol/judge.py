@@ -68,9 +68,9 @@ class Judge:
         return self._known(box, m) or self._outside(m) or self._picture(m) or self._size(box, m)
 
     def is_too_near(self, box: Box) -> bool:
-        """Whether the picture ends so low above the floor that a person and a pet look alike in it."""
+        """Whether so little of it is in the picture that a person and a pet look alike: legs, or a part at its side."""
         m = box.measured
-        if m is None or box.label != "person" or not _has_size(m) or not goes_on(box, m):
+        if m is None or box.label != "person" or not _has_size(m) or not (goes_on(box, m) or m.is_cut_aside):
             return False
         return m.top < self.params.person_top_min and m.width < self.params.lying_length
 
@@ -98,7 +98,7 @@ class Judge:
             return "it is too large for a person"
         if m.width >= p.lying_length * sure:
             return ""
-        if goes_on(box, m):  # the picture ends before it does
+        if goes_on(box, m) or m.is_cut_aside:  # the picture ends before it does
             return ""
         if m.top < p.person_top_min * sure:
             return PET

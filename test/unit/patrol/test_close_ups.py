@@ -44,6 +44,13 @@ def test_a_box_that_begins_a_little_below_the_pictures_edge_is_of_legs_too(close
     assert not close_ups.sort(1.1, (dataclasses.replace(begun, ymin=16),))[1]  # a pet's back
 
 
+def test_a_low_part_at_the_pictures_edge_is_a_doubt_and_no_pet(close_ups: CloseUps) -> None:
+    part = box(top=0.6, cut=False, is_cut_aside=True)
+    assert close_ups.sort(1.0, (part,)) == ((), True)
+    assert close_ups.sort(1.1, (box(),)) == ((), True)  # not taken for that pet's legs
+    assert close_ups.doubtful
+
+
 def test_a_part_at_the_pictures_edge_tells_no_better_place_than_the_whole_shortly_before(close_ups: CloseUps) -> None:
     def places() -> list[float]:
         return [s.x for s in close_ups.doubtful]

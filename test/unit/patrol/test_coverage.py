@@ -76,6 +76,21 @@ def test_a_place_counts_once_enough_pictures_had_it_in_view() -> None:
     assert shares[2] == shares[3] > 0.4
 
 
+def test_what_was_seen_before_a_time_can_be_forgotten() -> None:
+    coverage = Coverage(FLOOR, ROOMS.mask(0), ONCE)
+    sight = sight_on_map(FLOOR, 1.5, 2.0, 8.0)
+    coverage.look(Eye(pose=Pose2D(1.5, 2.0, 0.0), width=WIDTH), sight, 10.0)
+    first = coverage.share
+    coverage.look(Eye(pose=Pose2D(1.5, 2.0, math.pi), width=WIDTH), sight, 20.0)
+    both = coverage.share
+    coverage.forget(15.0)
+    assert coverage.share == pytest.approx(both - first, abs=0.02)
+    coverage.forget(30.0)
+    assert coverage.share == 0.0
+    coverage.look(Eye(pose=Pose2D(1.5, 2.0, 0.0), width=WIDTH), sight, 40.0)
+    assert coverage.share == first
+
+
 def test_beyond_the_detectors_range_nothing_is_seen() -> None:
     coverage = Coverage(FLOOR, ROOMS.mask(0), CoverageParams(seen_in=1, view_range=1.0, view_near=0.2))
     turn_at(coverage, 2.0, 2.0)

@@ -218,6 +218,31 @@ def test_at_a_further_viewpoint_only_what_is_unseen_is_turned_over() -> None:
     assert turned < 1.25 * math.pi  # of 2 pi
 
 
+@pytest.mark.parametrize(("looks", "verdict"), [(True, "confirmed"), (False, "clear")])
+def test_who_comes_in_behind_the_robot_and_is_told_by_the_sensor_is_found(looks: bool, verdict: str) -> None:
+    world = World(eyes=SightParams(viewpoints=ViewpointParams(look_again=looks)))
+    world.triggers = (1,)
+    world.until(lambda w: len(w.goals) == 2)  # the turn is over, and the robot on its way to the corner
+    world.people = lambda now: [(9.9, 1.0)]
+    world.triggers = (1,)
+    mission = world.until(lambda w: bool(w.ended)).ended[-1]
+    assert mission.verdict.value == verdict
+    assert mission.triggers == 2
+
+
+def test_a_sensor_that_goes_on_calling_has_the_robot_look_again_once() -> None:
+    world = World()
+    world.triggers = (1,)
+    while not world.ended:
+        world.step()
+        world.triggers = (1,) if world.count % 25 == 0 else ()
+        assert world.now < 400.0
+    mission = world.ended[-1]
+    assert mission.verdict.value == "clear"
+    assert mission.share_seen >= 0.95  # once it was, and nobody came
+    assert len(mission.views_done) <= 5
+
+
 def test_too_little_seen_is_unverified() -> None:
     world = World(eyes=SightParams(look_around="spin", clear_share=0.97))
     mission = world.mission()

@@ -49,6 +49,7 @@ def test_what_cannot_be_an_intruder_is_refused(fields: dict[str, float], why: st
         {"top": 0.5, "height": 0.45, "width": 1.6},  # lying
         {"top": 1.2, "height": 0.5},  # behind a sofa
         {"top": 0.8, "height": 0.6, "is_cut": True, "ymin": 0},  # near: the picture ends above the belt
+        {"top": 0.6, "height": 0.5, "is_cut_aside": True},  # a knee at the side of the picture
         {"top": 0.75, "height": 0.7, "is_cut": True, "ymin": 14},  # likewise, in a box that begins a little too low
         {"x": 2.0, "y": 0.2},  # in the bed along the wall, whose inside the map does not know
         {"source": "floor", "top": 0.5, "error": 1.5},  # too unsure to say
