@@ -8,7 +8,7 @@ from html import escape
 
 from rosbot_patrol.campaign.table import Share
 
-_LEFT, _WIDTH, _ROW = 250.0, 420.0, 30.0  # of a chart: room for the names, length of an axis, height of a line [px]
+_LEFT, _WIDTH, _ROW = 280.0, 420.0, 30.0  # of a chart: room for the names, length of an axis, height of a line [px]
 _RIGHT = 190.0
 
 

@@ -56,7 +56,7 @@ def test_a_page_of_no_patrols_is_a_page() -> None:
 
 def test_a_share_is_drawn_where_it_lies() -> None:
     drawn = share_chart([Share("half", 1, 2), Share("none asked", 0, 0)])
-    assert 'class="dot wrong" cx="460.0"' in drawn
+    assert 'class="dot wrong" cx="490.0"' in drawn
     assert "none asked" not in drawn
     assert 'class="dot well" cx="250.0"' in share_chart([Share("none", 0, 5)], good=0.0)
 
