@@ -58,7 +58,7 @@ def test_a_share_is_drawn_where_it_lies() -> None:
     drawn = share_chart([Share("half", 1, 2), Share("none asked", 0, 0)])
     assert 'class="dot wrong" cx="490.0"' in drawn
     assert "none asked" not in drawn
-    assert 'class="dot well" cx="250.0"' in share_chart([Share("none", 0, 5)], good=0.0)
+    assert 'class="dot well" cx="280.0"' in share_chart([Share("none", 0, 5)], good=0.0)
 
 
 def test_what_breaks_its_bound_is_marked() -> None:
