@@ -107,6 +107,12 @@ def ros_home() -> Path:
     return Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
 
 
+def sender_of(message: object) -> str:
+    """Name of the node that published a message, "" where it did not come by a topic."""
+    header = getattr(message, "_connection_header", None) or {}
+    return str(header.get("callerid", ""))
+
+
 def now() -> float:
     """ROS time [s]."""
     return float(rospy.get_time())

@@ -29,7 +29,7 @@ from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.ros.diagnostics import Health
-from rosbot_patrol.ros.node import Worker, load_params, ros_home, run_node
+from rosbot_patrol.ros.node import Worker, load_params, ros_home, run_node, sender_of
 from rosbot_patrol.ros.owner_mail import RETRY, OwnerPost, refuse_passwords
 from rosbot_patrol.ros.sensor_reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.ros.serial_links import links_from_msg
@@ -118,12 +118,10 @@ class SensorWatch:
     # -- callbacks store
 
     def _on_trigger(self, message: EspTrigger) -> None:
-        header = getattr(message, "_connection_header", None) or {}
-        self._triggers.append((message.id, message.move, str(header.get("callerid", "")), time.monotonic()))
+        self._triggers.append((message.id, message.move, sender_of(message), time.monotonic()))
 
     def _on_patrol(self, message: Empty) -> None:
-        header = getattr(message, "_connection_header", None) or {}
-        self._patrol.append((str(header.get("callerid", "")), time.monotonic()))
+        self._patrol.append((sender_of(message), time.monotonic()))
 
     def _on_links(self, message: SensorLinks) -> None:
         # in simulated time both stamps are of one clock

@@ -11,6 +11,7 @@ import rospy
 from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.params import param
+from rosbot_patrol.ros.node import sender_of
 
 log = logging.getLogger(__name__)
 
@@ -142,11 +143,11 @@ class Lockstep:
         return {self._name(topic): seconds for topic, seconds in waited.items()}
 
     def _hear(self, message: rospy.AnyMsg, topic: str) -> None:
-        self.note(topic, _sender(message))
+        self.note(topic, sender_of(message) or "an unknown node")
 
     def _hear_frame(self, message: TFMessage, topic: str) -> None:
         if any(t.child_frame_id.lstrip("/") == topic.removeprefix(_TF) for t in message.transforms):
-            self.note(topic, _sender(message))
+            self.note(topic, sender_of(message) or "an unknown node")
 
     def _late(self) -> list[str]:
         now = self._now()
@@ -164,8 +165,3 @@ class Lockstep:
                 self._said[topic] = wall
                 text = "the clock waited %.1f s for %s, and goes on without"
                 log.info(text, self._params.patience, self._name(topic))
-
-
-def _sender(message: object) -> str:
-    header = getattr(message, "_connection_header", None) or {}
-    return str(header.get("callerid", "an unknown node"))
