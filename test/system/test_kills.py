@@ -28,6 +28,7 @@ ROOM, ROOM_POINT = 5, (2.682, 7.352)
 INTRUDER_AT = (4.8, 7.8)
 VICTIMS = ("move_base", "amcl", "map_server")
 STANDS_WITHIN = 0.5  # [s] of simulated time, by ground truth at 20 Hz
+STANDS_FOR = 4  # so many messages of 20 Hz on end: after that the patrol may turn the camera, which is its own wish
 FAST, STANDING = 0.25, 0.01  # [m/s]
 RATE = 2.0
 FASTEST = 1.5 * RATE  # simulated seconds in one of the wall, when the clock catches up
@@ -49,13 +50,16 @@ class Speedometer:
         return len(self.heard) > 5 and min(speed for _, speed, _ in self.heard[-5:]) > FAST
 
     def stood_after(self, killed: float) -> float:
-        """How long after a time of the wall it came to stand for good, at most, in simulated time.
+        """How long after a time of the wall it had come to stand, at most, in simulated time; infinite if it never did.
 
         Messages may have waited: it was at least as late as one that came a little later says, by the fastest clock.
         """
         began = max(stamp - FASTEST * max(came - killed, 0.0) for stamp, _, came in self.heard)
-        moving = [stamp for stamp, speed, _ in self.heard if stamp > began and speed > STANDING]
-        return max(moving, default=began) - began
+        after = [(stamp, speed) for stamp, speed, _ in self.heard if stamp > began]
+        for first in range(len(after) - STANDS_FOR + 1):
+            if all(speed < STANDING for _, speed in after[first : first + STANDS_FOR]):
+                return after[first][0] - began
+        return math.inf
 
     def stop(self) -> None:
         self._subscriber.unregister()
