@@ -83,7 +83,7 @@ class SavedPose:
 
 
 def _read(tree: object) -> dict[str, float]:
-    if tree is None:
+    if tree is None or tree == {}:  # `rosparam delete` of each value leaves an empty namespace
         return {}
     wanted = (*NAMES, *ODOMETRY, "stamp")
     if isinstance(tree, dict) and all(isinstance(tree.get(name), int | float) for name in wanted):
