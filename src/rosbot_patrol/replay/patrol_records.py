@@ -164,10 +164,16 @@ KINDS: dict[str, Kind] = {
         _battery, {"percentage": "float", "voltage": "float", "power_supply_status": "int"}
     ),
     "move_base_msgs/msg/MoveBaseActionGoal": Kind(
-        lambda message: GoalRecord(message.goal_id.id), {"goal_id.id": "string"}
+        lambda message: GoalRecord(message.goal_id.id),
+        {"goal_id.id": "string"},
+        lambda raw: GoalRecord(raw_ros1.read_goal(raw)),
+        raw_ros1.GOAL_MD5,
     ),
     "move_base_msgs/msg/MoveBaseActionResult": Kind(
-        _outcome, {"status.goal_id.id": "string", "status.status": "int", "status.text": "string"}
+        _outcome,
+        {"status.goal_id.id": "string", "status.status": "int", "status.text": "string"},
+        lambda raw: OutcomeRecord(*raw_ros1.read_result(raw)),
+        raw_ros1.RESULT_MD5,
     ),
     "actionlib_msgs/msg/GoalStatusArray": _ALIVE,
     "sensor_msgs/msg/Image": _ALIVE,

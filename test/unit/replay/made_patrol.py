@@ -52,6 +52,22 @@ POINTS = "rooms_num: 4\nangle_unit: rad\nrooms:\n" + "".join(
 NODE = params.load(NodeParams, {"path_to_params": "rooms.yaml", "look_around": "spin"})
 
 
+def goal_message(make: Maker, stamp: float, name: str, pose: Pose2D) -> Any:
+    """A MoveBaseActionGoal."""
+    place = make.new("geometry_msgs/msg/PoseStamped", make.header(stamp, "map"), make.pose(pose))
+    goal = make.new("move_base_msgs/msg/MoveBaseGoal", place)
+    name_of = make.new("actionlib_msgs/msg/GoalID", make.stamp(stamp), name)
+    return make.new(GOAL, make.header(stamp, ""), name_of, goal)
+
+
+def result_message(make: Maker, stamp: float, name: str, status: int, text: str) -> Any:
+    """A MoveBaseActionResult."""
+    name_of = make.new("actionlib_msgs/msg/GoalID", make.stamp(stamp), name)
+    result = make.new("move_base_msgs/msg/MoveBaseResult")
+    told = make.new("actionlib_msgs/msg/GoalStatus", name_of, status, text)
+    return make.new(OUTCOME, make.header(stamp, ""), told, result)
+
+
 class RecordedWorld(World):
     """The world, and what rosbag would have written of it."""
 
@@ -80,10 +96,8 @@ class RecordedWorld(World):
         was = self.link.state
         out = super().step()
         if out.goal is not None:
-            name = make.new("actionlib_msgs/msg/GoalID", make.stamp(now), f"goal-{len(self.goals)}")
-            place = make.new("geometry_msgs/msg/PoseStamped", make.header(now, "map"), make.pose(out.goal.pose))
-            goal = make.new("move_base_msgs/msg/MoveBaseGoal", place)
-            self.messages.append((now + 0.001, "/move_base/goal", make.new(GOAL, make.header(now, ""), name, goal)))
+            goal = goal_message(make, now, f"goal-{len(self.goals)}", out.goal.pose)
+            self.messages.append((now + 0.001, "/move_base/goal", goal))
         has_ended = self.link.state in (GoalState.SUCCEEDED, GoalState.FAILED)
         if has_ended and (out.goal is not None or was is GoalState.ACTIVE):
             self._end(now)
@@ -99,12 +113,8 @@ class RecordedWorld(World):
         self._put(-0.002, "/darknet_ros/found_object", make.new(COUNT, picture, count))
 
     def _end(self, now: float) -> None:
-        make = self._make
-        name = make.new("actionlib_msgs/msg/GoalID", make.stamp(now), f"goal-{len(self.goals)}")
-        is_there = self.link.state is GoalState.SUCCEEDED
-        status = make.new("actionlib_msgs/msg/GoalStatus", name, 3 if is_there else 4, self.link.text)
-        result = make.new("move_base_msgs/msg/MoveBaseResult")
-        ended = make.new(OUTCOME, make.header(now, ""), status, result)
+        status = 3 if self.link.state is GoalState.SUCCEEDED else 4
+        ended = result_message(self._make, now, f"goal-{len(self.goals)}", status, self.link.text)
         self.messages.append((now + 0.002, "/move_base/result", ended))
 
 

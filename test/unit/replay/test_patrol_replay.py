@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +14,14 @@ from made_bag import Maker, write_bag
 from made_patrol import POINTS, RecordedWorld, looking
 
 from rosbot_patrol.errors import BagError
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.watch import Watch
 from rosbot_patrol.replay import patrol_replay
 from rosbot_patrol.replay.bag import Bag
 from rosbot_patrol.replay.comparison import compare
 from rosbot_patrol.replay.patrol_log import FIELDS
 from rosbot_patrol.replay.patrol_records import KINDS
+from rosbot_patrol.replay.raw_ros1 import read_goal, read_result
 from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.runner import run_replay
 from rosbot_patrol.replay.setup import Setup, build_replay
@@ -126,14 +129,24 @@ def test_events_of_times_of_their_own_are_compared_in_their_order(tmp_path: Path
     assert np.all(np.diff(stamps) >= 0.0)
 
 
-@pytest.mark.parametrize(("moves", "count"), [(True, 0), (False, 3)])
-def test_fast_parsers_give_what_rosbags_gives(moves: bool, count: int) -> None:
+@pytest.mark.parametrize(("moves", "count", "text"), [(True, 0, ""), (False, 3, "Zürich: no way there")])
+def test_fast_parsers_give_what_rosbags_gives(moves: bool, count: int, text: str) -> None:
     maker, store = Maker(), made_patrol.NOETIC
     trigger = maker.new(made_patrol.TRIGGER, 7, moves)
     seen = maker.new(made_patrol.COUNT, maker.header(12.345678901, "camera"), count)
-    for message in (trigger, seen):
+    called = made_patrol.goal_message(maker, 12.5, "/patrol-1-12.5", Pose2D(1.0, 2.0, 3.0))
+    ended = made_patrol.result_message(maker, 13.5, "", 3 + count, text)
+    for message in (trigger, seen, called, ended):
         name, raw = message.__msgtype__, maker.bytes(message)
         kind = KINDS[name]
         assert kind.fast is not None
         assert kind.fast(raw) == kind.convert(store.deserialize_ros1(raw, name))
         assert kind.md5 == store.generate_msgdef(name, ros_version=1)[1]
+
+
+@pytest.mark.parametrize("read", [read_goal, read_result])
+@pytest.mark.parametrize("length", [0, 15, 27, 60])
+def test_a_goal_or_result_that_ends_early_is_told(read: Callable[[bytes], object], length: int) -> None:
+    raw = struct.pack("<IIII3sIII10s", 0, 1, 2, 3, b"map", 3, 4, 4_000, b"a goal")
+    with pytest.raises(struct.error):
+        read(raw[:length])
