@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rosbot_patrol.msg", reason="the workspace is not on the path: `. scripts/env`")
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.ros import campaign_runner
 from rosbot_patrol.ros.campaign_runner import Job, Runner
 
@@ -48,3 +50,14 @@ def test_a_command_that_is_not_there_to_wrap_is_a_problem_and_no_end(tmp_path: P
     problems: list[str] = []
     Runner(1, [], ["/no/such/lock"], lambda job, problem: problems.append(problem)).run([job("a", "", tmp_path)])
     assert "could not be started" in problems[0]
+
+
+def test_what_goes_wrong_in_planning_ends_the_run_and_is_not_lost(tmp_path: Path) -> None:
+    def jobs() -> Iterator[Job]:
+        yield job("a", "", tmp_path)
+        raise WorldError("flat", "has no room")
+
+    done: list[str] = []
+    with pytest.raises(WorldError, match="has no room"):
+        Runner(2, ["env"], [], lambda job, problem: done.append(job.name)).run(jobs())
+    assert done in ([], ["a"])

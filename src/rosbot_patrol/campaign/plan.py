@@ -29,6 +29,7 @@ INTRUDERS = frozenset({"standing", "walking", "hidden", "late", "two"})
 CLEAR, CONFIRMED = "clear", "confirmed"
 TRIGGER_AT = 2.0  # [s] after the first guard
 WITHIN = 600.0  # simulated time for a patrol [s]
+PASSES = 8  # over all rooms: each draws some places and one posture only
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +104,7 @@ def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor, *, faul
     kind = kind_of(seed, number)
     rng = np.random.default_rng([seed, number, 2])
     rooms = [room.id for room in floor.rooms if room.id != floor.rooms.base.id]
-    for make in CASTS[kind]:
+    for make in CASTS[kind] * PASSES:
         for room in rng.permutation(rooms):
             cast = make(Stage(floor, int(room), rng))
             if cast is not None:

@@ -211,4 +211,5 @@ def main() -> None:
             sys.exit(CrashCampaign(given.folder, given.seed, given.crash, wrap).run())
         sys.exit(Campaign(given).run())
     except (PatrolError, OSError) as err:
-        sys.exit(f"campaign: {err}")
+        print(f"campaign: {err}", file=sys.stderr)
+        sys.exit(2)  # 1 says that a patrol was not as it should be

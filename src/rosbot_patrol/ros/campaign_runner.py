@@ -8,6 +8,7 @@ import signal
 import subprocess
 import threading
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,14 +52,19 @@ class Runner:
         self._running: set[subprocess.Popen[bytes]] = set()
 
     def run(self, jobs: Iterable[Job]) -> None:
-        """Run all; returns when the last has ended, or after `stop`."""
+        """Run all; returns when the last has ended, or after `stop`.
+
+        Raises what `jobs` or `done` raise; no further job is begun then.
+        """
         waiting = iter(jobs)
-        threads = [threading.Thread(target=self._work, args=(waiting,), daemon=True) for _ in range(self._count)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            while thread.is_alive():
-                thread.join(0.2)  # in pieces, so that Ctrl-C is heard
+        pool = ThreadPoolExecutor(self._count)
+        futures = [pool.submit(self._work, waiting) for _ in range(self._count)]
+        pool.shutdown(wait=False)
+        while wait(futures, 0.2).not_done:  # in pieces, so that Ctrl-C is heard
+            if any(future.done() and future.exception() for future in futures):
+                self._stopped.set()  # those that run may end
+        for future in futures:
+            future.result()
 
     def stop(self) -> None:
         """End those that run, and begin none."""

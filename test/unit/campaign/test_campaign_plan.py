@@ -144,3 +144,9 @@ def test_what_cannot_be_planned_is_a_sentence(flat: House, flat_floor: Floor) ->
     bare = Floor(flat.bodies, type(flat.rooms)((flat.rooms.base,)))
     with pytest.raises(WorldError, match="has no room with a place for a patrol of the kind"):
         plan_patrol(SEED, 0, flat.files, bare)
+
+
+def test_a_kind_that_has_a_place_is_found_one_however_the_draw_begins(flat: House, flat_floor: Floor) -> None:
+    """Seed 22: the first draw of patrol 41 in the flat found nowhere to hide."""
+    patrol = plan_patrol(22, 41, flat.files, flat_floor)
+    assert (patrol.kind, patrol.house) == ("hidden", "flat")
