@@ -1,8 +1,9 @@
 """Brings what waits in the outbox to its channels. Of all processes that could, one does at a time.
 
 Whoever holds the outbox's lock delivers for everybody; the system takes the lock back however that process ends, and
-the next that asks has it. A notice is crossed out for a channel once that took it: after a crash between the two it
-goes to that channel again, with the same id (as Message-ID, file name or idempotency key).
+the next that asks has it. One that hangs loses it to the next when it has given no sign of life for a while; if it goes
+on, it sees that before it sends anything more. A notice is crossed out for a channel once that took it: after a crash
+or a hang between the two it goes to that channel again, with the same id (as Message-ID, file name or idempotency key).
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.channel import Channel, DeliveryError
 from rosbot_patrol.alerts.digest import merge
-from rosbot_patrol.alerts.file_lock import FileLock
+from rosbot_patrol.alerts.file_lock import STALE, FileLock
 from rosbot_patrol.alerts.lane import Lane
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox, Waiting
@@ -86,6 +87,7 @@ class Postman:
         seed: for the jitter.
         legacy: folders of mails that the version before left.
         down_after: a channel that is down for so long is told on the others [s].
+        stale_after: who gave no sign of life for so long delivers no more [s].
     """
 
     def __init__(
@@ -98,14 +100,15 @@ class Postman:
         seed: int | None = None,
         legacy: Sequence[Path] = (),
         down_after: float = 1800.0,
+        stale_after: float = STALE,
     ) -> None:
         self.outbox = outbox
         self.channels = {channel.name: channel for channel in channels}
         self.receipts = Receipts(outbox.folder / "taken.jsonl")
-        self.lock = FileLock(outbox.folder / "lock", who)
         self._clocks = clocks or Clocks()
+        self.lock = FileLock(outbox.folder / "lock", who, stale_after=stale_after, clock=self._clocks.now)
         self._rng = random.Random(seed)
-        self._legacy, self._down_after = legacy, down_after
+        self._legacy, self._down_after, self._stale_after = legacy, down_after, stale_after
         self._lanes: dict[str, Lane] = {}
         self._unwritten: list[Receipt] = []
         self._waiting: list[Waiting] = []
@@ -123,12 +126,20 @@ class Postman:
             return any(lane.down_since is not None for lane in self._lanes.values())
 
     def take_over(self) -> bool:
-        """Become the one that delivers, where nobody is. Raises OSError."""
+        """Become the one that delivers, where nobody is, or who is hangs; else say that this one lives.
+
+        Call it again and again. Raises OSError.
+        """
         with self._guard:
+            self._mind_the_lock()
             if self.is_delivering:
+                self.lock.beat()
                 return True
             if not self.lock.take():
                 return False
+            if self.lock.seized_from:
+                who, silent = self.lock.seized_from, self._stale_after
+                log.error("%s, which delivered the notices, gave no sign of life for %.0f s: taking over", who, silent)
             adopt_mails(self.outbox, self._legacy)
             self.receipts.read_new()
             now, wall = self._clocks.now(), self._clocks.wall()
@@ -161,6 +172,7 @@ class Postman:
     def deliver(self, name: str) -> Delivery | None:
         """Send what is due on a channel, None where nothing is; waits for the transport. Raises OSError."""
         with self._guard:
+            self._mind_the_lock()
             lane = self._lanes.get(name)
             batch = lane.due(self._clocks.now()) if lane else []
             if not lane or not batch:
@@ -242,6 +254,12 @@ class Postman:
         write_atomic(self.outbox.folder / STATUS, json.dumps(tree, indent=1).encode())
 
     # -- inside
+
+    def _mind_the_lock(self) -> None:
+        """Deliver no more where another has taken over, as this process hung."""
+        if self.lock.is_lost:
+            log.error("this program hung: %s delivers now", self.lock.holder())
+            self.hand_over()
 
     def _is_open(self, entry: Waiting, name: str) -> bool:
         return self.channels[name].takes(entry) and name not in self.receipts.taken.get(entry.id, ())

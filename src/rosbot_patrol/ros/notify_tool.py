@@ -94,7 +94,8 @@ def flush(folder: Path, channels: list[Channel]) -> int:
     legacy = (folder, folder.parent / "sensor_outbox")
     postman = Postman(Outbox(folder), fast, who="notify --flush", legacy=legacy)
     if postman.take_over():
-        left = _flush_here(postman)
+        with postman.lock.beating():
+            left = _flush_here(postman)
     else:
         print(f"{postman.lock.holder()} delivers and is asked to try all.")
         left = _flush_there(folder)

@@ -15,6 +15,7 @@ from rosbot_patrol.alerts.postman import Postman
 from rosbot_patrol.alerts.smtp import SmtpServer, SmtpTransport
 
 ENVELOPE = make_envelope("owner@example.org", "robot@example.org")
+STALE = 3.0  # [s] without a sign of life
 
 
 def put(folder, name):
@@ -33,11 +34,13 @@ def deliver(folder, maildir, port):
         Channel(name="disk", transport=MaildirTransport(Path(maildir), ENVELOPE), pace=pace),
         Channel(name="mail", transport=SmtpTransport(SmtpServer(host="localhost", port=port), ENVELOPE), pace=pace),
     ]
-    postman = Postman(Outbox(folder), channels)
+    postman = Postman(Outbox(folder), channels, stale_after=STALE)
     while not postman.take_over():
         time.sleep(0.01)
     print("delivers", flush=True)
     while True:
+        while not postman.take_over():
+            time.sleep(0.01)
         postman.refresh()
         if not any(postman.deliver(name) for name in postman.channels):
             time.sleep(0.005)

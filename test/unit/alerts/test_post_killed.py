@@ -18,9 +18,10 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 pytest.importorskip("aiosmtpd.smtp", reason="needs python3-aiosmtpd")
-from post_process import ENVELOPE
+from post_process import ENVELOPE, STALE
 from real_smtp import RealSmtp
 
+from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
 
 PROGRAM = str(Path(__file__).resolve().parent / "post_process.py")
@@ -84,6 +85,35 @@ def test_kills_lose_nothing(tmp_path):
     promised, left, mails, files = crash(tmp_path, 4, random.Random(7))
     assert len(promised) >= 4
     assert check(promised, left, mails, files) <= 4  # at most the one that was under way
+
+
+def test_one_that_is_stopped_is_replaced_and_nothing_comes_twice_when_it_goes_on(tmp_path):
+    server, outbox, maildir = RealSmtp(), tmp_path / "outbox", tmp_path / "mail"
+    first = start("deliver", outbox, maildir, server.port)
+    assert first.stdout.readline() == "delivers\n"
+    second = start("deliver", outbox, maildir, server.port)
+    try:
+        first.send_signal(signal.SIGSTOP)
+        for i in range(3):
+            Outbox(outbox).put(Notice(id=f"n{i}", wall=1.79e9, kind="incident", subject="s", text="t"))
+        wait_until(lambda: not Outbox(outbox).waiting(), STALE + 15.0)
+        first.send_signal(signal.SIGCONT)
+        Outbox(outbox).put(Notice(id="n3", wall=1.79e9, kind="incident", subject="s", text="t"))
+        wait_until(lambda: not Outbox(outbox).waiting(), 10.0)
+        time.sleep(0.5)
+    finally:
+        for process in (first, second):
+            kill(process)
+        server.stop()
+    assert len(server.mails) == 4
+    assert len(list((maildir / "new").iterdir())) == 4
+
+
+def wait_until(is_so, seconds):
+    deadline = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
 
 
 if __name__ == "__main__":

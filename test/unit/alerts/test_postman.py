@@ -82,6 +82,75 @@ def test_one_delivers_and_the_other_takes_over(tmp_path):
     assert "test (process" in b.lock.holder()
 
 
+def wait(posts, time, seconds):
+    """As their programs do: look for the lock five times a second; who had it in the end."""
+    for _ in range(round(seconds * 5)):
+        time.now += 0.2
+        held = [post for post in posts if post.take_over()]
+    return held
+
+
+def test_one_that_hangs_loses_the_deliveries_to_the_other_and_sends_no_more(tmp_path, caplog):
+    time, first, second = Time(), Box(), Box()
+    a, b = (postman(tmp_path, channel("mail", box), time=time) for box in (first, second))
+    assert a.take_over()
+    assert wait((a, b), time, 120.0) == [a]
+    a.outbox.put(notice("x"))
+    assert wait((b,), time, 19.0) == []
+    assert wait((b,), time, 2.0) == [b]
+    assert "gave no sign of life for 20 s: taking over" in caplog.text
+    deliver_all(b)
+    b.outbox.put(notice("y"))
+    assert deliver_all(a, look=False) == []  # it goes on
+    assert "this program hung: test (process" in caplog.text
+    assert wait((a, b), time, 60.0) == [b]
+    deliver_all(b)
+    assert (first.ids, second.ids) == ([], ["x", "y"])
+    b.hand_over()
+    assert wait((a,), time, 1.0) == [a]
+
+
+def test_one_that_hangs_in_a_delivery_ends_it_and_nothing_is_lost(tmp_path):
+    time, second = Time(), Box()
+    b = postman(tmp_path, channel("mail", second), time=time)
+
+    class Hangs(Box):
+        def send(self, told):
+            if told.id == "x":
+                assert wait((b,), time, 25.0) == [b]
+                deliver_all(b)
+            return super().send(told)
+
+    first = Hangs()
+    a = postman(tmp_path, channel("mail", first), time=time)
+    a.take_over()
+    for name in ("x", "y"):
+        a.outbox.put(notice(name))
+    (done,) = deliver_all(a)
+    assert done.delivered
+    assert (first.ids, second.ids) == (["x"], ["x", "y"])  # the one that was under way twice, by the same id
+    assert a.outbox.waiting() == []
+    assert not a.is_delivering
+    assert b.is_delivering
+
+
+def test_two_that_wait_for_one_that_hangs_do_not_both_take_over(tmp_path):
+    time = Time()
+    a, b, c = (postman(tmp_path, channel("mail", Box()), time=time) for _ in range(3))
+    a.take_over()
+    assert len(wait((b, c), time, 60.0)) == 1
+    assert sum(post.is_delivering for post in (a, b, c)) == 1
+
+
+def test_who_slept_itself_does_not_take_anothers_silence_for_a_hang(tmp_path):
+    time = Time()
+    a, b = (postman(tmp_path, channel("mail", Box()), time=time) for _ in range(2))
+    assert wait((a, b), time, 5.0) == [a]
+    time.now += 3600.0  # the machine, or this process alone
+    assert not b.take_over()
+    assert wait((a, b), time, 5.0) == [a]
+
+
 def test_channels_take_the_kinds_that_they_ask_for(tmp_path, caplog):
     everything, phone = Box(), Box()
     post = postman(
