@@ -69,10 +69,10 @@ class Watch:
         box = mailbox.Maildir(place, create=False) if (place / "cur").exists() else []
         return sorted(box, key=lambda mail: mail["Message-ID"])
 
-    def mail(self, subject):
+    def mail(self, subject, seconds=12.0):
         """The mail of that subject, once it is there."""
         return wait_for(
-            lambda: [m for m in self.mails() if plain(m["Subject"]) == f"rosbot patrol: {subject}"], 12.0, subject
+            lambda: [m for m in self.mails() if plain(m["Subject"]) == f"rosbot patrol: {subject}"], seconds, subject
         )[0]
 
 
@@ -141,7 +141,7 @@ def test_a_bridge_is_killed_and_its_sensors_are_told_as_one(ros, tmp_path):
         sensor.stop()
 
 
-def test_a_patrol_that_hangs_is_told(ros, tmp_path):
+def test_patrol_and_watch_tell_of_each_other_when_one_hangs(ros, tmp_path):
     """A hung process cannot say so itself; it is stopped here, and goes on."""
     probe = ros.probe()
     for topic in (EVENTS, DIAGNOSTICS):
@@ -151,9 +151,11 @@ def test_a_patrol_that_hangs_is_told(ros, tmp_path):
         "patrol_robot",
         "__name:=patrolling_node",
         f"_path_to_params:={ROOT / SHOWN['path_to_params']}",
-        f"_state_dir:={tmp_path / 'patrol'}",
-        f"_maildir:={tmp_path / 'patrol_mail'}",
+        f"_state_dir:={tmp_path / 'state'}",  # one outbox, and the watch, which began before, delivers
+        f"_maildir:={tmp_path / 'mail'}",
         "_transport:=maildir",
+        "_sensor_watch_after:=6.0",
+        "_sensor_watch_notice_after:=1.0",
     )
     probe.expect(lambda said: "sensor_watch: patrol" in str(said) and "is heard" in str(said), 20.0)
     patrol.popen.send_signal(signal.SIGSTOP)
@@ -165,6 +167,16 @@ def test_a_patrol_that_hangs_is_told(ros, tmp_path):
     patrol.popen.send_signal(signal.SIGCONT)
     probe.expect(lambda said: said.get("kind") == "patrol_gone" and said.get("active") is False, 15.0)
     watch.mail("the patrol (patrolling_node) is well again")
+    watch.node.popen.send_signal(signal.SIGSTOP)
+    probe.expect(
+        lambda said: "patrolling_node: sensor_watch" in str(said) and "it has gone, or hangs" in str(said), 20.0
+    )
+    mail = plain_text(watch.mail("the sensors' watch", 40.0))
+    assert "program sensor_watch has gone, or hangs: nobody tells of motion sensors that fail" in mail
+    patrol.says("/sensor_watch (process")  # "..., which delivered the notices, gave no sign of life": taking over
+    watch.node.popen.send_signal(signal.SIGCONT)
+    watch.mail("the sensors' watch again well", 30.0)
+    watch.node.says("this program hung: /patrolling_node")
 
 
 def test_who_else_speaks(ros, tmp_path):

@@ -70,6 +70,12 @@ class NodeParams(BehaviourParams, SightParams):
     state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
     image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
     rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
+    sensor_watch_after: float = param(
+        20.0, unit="s", lo=6.0, doc="a sensor_watch that was there and says nothing for so long has gone, or hangs"
+    )
+    sensor_watch_notice_after: float = param(
+        60.0, unit="s", lo=0.0, doc="that lasting so long the owner is told, and again when it is over for so long"
+    )
     schedule: str = param("", doc="file of the rounds; empty: none")
     arming: str = param("", doc="file of the modes; empty: all rooms in each mode, without delays")
     known_objects: str = param("", doc="file of things that look like somebody (patrol/known_objects); empty: none")

@@ -58,6 +58,7 @@ from rosbot_patrol.ros.patrol_eyes import PatrolEyes
 from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.ros.patrol_images import PictureRing
 from rosbot_patrol.ros.patrol_inputs import InputParams, PatrolInputs
+from rosbot_patrol.ros.patrol_neighbour import Neighbour
 from rosbot_patrol.ros.patrol_orders import ArmingDesk, Orders, StopSwitch
 from rosbot_patrol.ros.patrol_outputs import Pulse, StatePublisher, Wheels
 from rosbot_patrol.ros.patrol_settings import (
@@ -139,6 +140,7 @@ class PatrolNode:
         )
         self.inputs.on_boxes = self._note_sighting
         self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of)
+        self.neighbour = Neighbour(self.params.sensor_watch_after, self.params.sensor_watch_notice_after, self.health)
         self.markers = PeopleMarkers(inputs.map_frame)
         self._shown = ""
         self._is_over = False
@@ -167,6 +169,7 @@ class PatrolNode:
         self.desk.start()
         self.inputs.start()
         self.missed.start()
+        self.neighbour.start()
         self._actions.start()
         self._loop.start()
         rospy.spin()
@@ -243,6 +246,7 @@ class PatrolNode:
             self._state.publish(time_now, commands.report, self.manager.mission)
         for notice in commands.notices:
             self.desk.take(notice, time_now)
+        commands.words += self.neighbour.step()
         self.desk.follow(commands)
         self._record(time_now, commands, inputs.pose)
         self._show_people(time_now, commands)
