@@ -31,34 +31,29 @@ STANDS_WITHIN = 0.5  # [s] of simulated time, by ground truth at 20 Hz
 STANDS_FOR = 4  # so many messages of 20 Hz on end: after that the patrol may turn the camera, which is its own wish
 FAST, STANDING = 0.25, 0.01  # [m/s]
 RATE = 2.0
-FASTEST = 1.5 * RATE  # simulated seconds in one of the wall, when the clock catches up
 
 
 class Speedometer:
-    """Speeds of the base by ground truth: (stamp [s], [m/s], when it came [s] of the wall)."""
+    """Speeds of the base by ground truth: (stamp [s], [m/s])."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[float, float, float]] = []
+        self.heard: list[tuple[float, float]] = []
         self._subscriber = rospy.Subscriber("/ground_truth/odom", Odometry, self._on_truth, queue_size=50)
 
     def _on_truth(self, message: Odometry) -> None:
         twist = message.twist.twist
         speed = math.hypot(twist.linear.x, twist.linear.y) + 0.2 * abs(twist.angular.z)
-        self.heard.append((message.header.stamp.to_sec(), speed, time.monotonic()))
+        self.heard.append((message.header.stamp.to_sec(), speed))
 
     def is_fast(self) -> bool:
-        return len(self.heard) > 5 and min(speed for _, speed, _ in self.heard[-5:]) > FAST
+        return len(self.heard) > 5 and min(speed for _, speed in self.heard[-5:]) > FAST
 
     def stood_after(self, killed: float) -> float:
-        """How long after a time of the wall it had come to stand, at most, in simulated time; infinite if it never did.
-
-        Messages may have waited: it was at least as late as one that came a little later says, by the fastest clock.
-        """
-        began = max(stamp - FASTEST * max(came - killed, 0.0) for stamp, _, came in self.heard)
-        after = [(stamp, speed) for stamp, speed, _ in self.heard if stamp > began]
+        """How long after a stamp it had come to stand [s]; infinite if it never did."""
+        after = [(stamp, speed) for stamp, speed in self.heard if stamp > killed]
         for first in range(len(after) - STANDS_FOR + 1):
             if all(speed < STANDING for _, speed in after[first : first + STANDS_FOR]):
-                return after[first][0] - began
+                return after[first][0] - killed
         return math.inf
 
     def stop(self) -> None:
@@ -78,7 +73,7 @@ def test_whoever_dies_in_mid_drive_the_base_stands_and_the_patrol_goes_on(master
             assert house.state.state == PatrolState.DRIVING
             pid = house.pids()[f"/{victim}"]
             house.wait(speed.is_fast, 60.0, "the robot driving still")
-            killed = time.monotonic()
+            killed = speed.heard[-1][0]
             os.kill(pid, signal.SIGKILL)
             time.sleep(1.2)  # it is not back yet
             stood[victim] = speed.stood_after(killed)
