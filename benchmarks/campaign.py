@@ -20,6 +20,7 @@ from pathlib import Path
 AIMS = {
     "detection_rate": ">= 1",
     "false_alarms": "<= 0",
+    "told_elsewhere": "<= 0",
     "contacts": "<= 0",
     "home_rate": ">= 1",
     "minutes": "<= 120",

@@ -91,13 +91,13 @@ def page(results: Sequence[Result], command: Callable[[Result], str], *, subtitl
 def _tiles(results: Sequence[Result], counted: Sequence[Share]) -> list[str]:
     found, alarms = counted[0], counted[1]
     touches = sum(len(result.touches or set(result.contacts)) for result in results)
-    home = counted[3]
+    verdicts, home = counted[3:5]
     return [
         _tile(f"{found.trials - found.hits}", "missed", well=found.hits == found.trials),
         _tile(f"{alarms.hits}", "false alarms", well=not alarms.hits),
         _tile(f"{touches}", "touches", well=not touches),
         _tile(f"{home.hits} of {home.trials}", "home again", well=home.hits == home.trials),
-        _tile(f"{counted[2].hits} of {counted[2].trials}", "verdicts", well=counted[2].hits == counted[2].trials),
+        _tile(f"{verdicts.hits} of {verdicts.trials}", "verdicts", well=verdicts.hits == verdicts.trials),
     ]
 
 

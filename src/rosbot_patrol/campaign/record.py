@@ -13,6 +13,7 @@ from rosbot_patrol.errors import ParamError
 from rosbot_patrol.files import write_atomic
 
 RESULT, PLAN, SETTINGS = "result.json", "patrol.json", "campaign.json"
+BESIDE = 1.0  # a notice that tells of a place so far from anybody tells of nobody [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +85,11 @@ class Result:
         return self.verdict == CONFIRMED and not self.was_there
 
     @property
+    def is_elsewhere(self) -> bool:
+        """Whether somebody was there, and the notice tells of a place where nobody was."""
+        return self.verdict == CONFIRMED and self.place_error is not None and self.place_error > BESIDE
+
+    @property
     def has_its_mails(self) -> bool:
         """Whether there came one, or one for each of several people."""
         return 1 <= self.mails <= max(self.people, 1)
@@ -94,6 +100,7 @@ class Result:
         found = [self.problem] if self.problem else []
         found += ["missed"] if self.missed else []
         found += ["false alarm"] if self.false_alarm else []
+        found += [f"told {self.place_error:.1f} m from anybody"] if self.is_elsewhere else []
         is_right = self.verdict in ("clear", *self.allowed)
         if not (self.missed or self.false_alarm or self.problem) and not self.was_there and not is_right:
             found.append(f"{self.verdict or 'no verdict'} in a room without anybody")

@@ -41,9 +41,11 @@ def shares(results: Sequence[Result]) -> list[Share]:
     also = [Share("as it should be though something broke", sum(not r.failures for r in broken), len(broken))]
     nobody = [r for r in results if not r.was_there and not r.problem]
     played = [r for r in results if not r.problem]
+    placed = [r for r in results if r.verdict == CONFIRMED and r.place_error is not None]
     return [
         Share("detected, of those who were there", sum(bool(r.detected) for r in there), len(there)),
         Share("false alarms, where nobody was", sum(r.false_alarm for r in nobody), len(nobody)),
+        Share("told within a metre of somebody", sum(not r.is_elsewhere for r in placed), len(placed)),
         Share("a verdict", sum(bool(r.verdict) for r in results), len(results)),
         Share("home again", sum(r.home is True for r in played), sum(r.home is not None for r in played)),
         Share("without touching anything", sum(not r.contacts for r in played), len(played)),
@@ -164,10 +166,11 @@ def summary(results: Sequence[Result]) -> str:
 
 def figures(results: Sequence[Result]) -> dict[str, float]:
     """The figures of a campaign by name, for a benchmark."""
-    detected, alarms, _, home, _, _, *survived = shares(results)
+    detected, alarms, placed, _, home, _, _, *survived = shares(results)
     named = {
         "detection_rate": detected.hits / detected.trials if detected.trials else 0.0,
         "false_alarms": float(alarms.hits),
+        "told_elsewhere": float(placed.trials - placed.hits),
         "contacts": float(sum(len(r.contacts) for r in results)),
         "home_rate": home.hits / home.trials if home.trials else 0.0,
         "patrols": float(len(results)),

@@ -1,6 +1,6 @@
 """Whether what a box shows may be an intruder: as large as a person, no picture, inside the house, nothing known.
 
-A doubt is no reason to refuse: what was not measured is not held against a box.
+A doubt is no reason to refuse a person: what was not measured is not held against a box.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Judge:
         m = box.measured
         if m is None:
             return "it is too far off to be measured" if box.doubt else ""
-        return self._known(box, m) or self._outside(m) or self._picture(m) or self._size(box, m)
+        return self._known(box, m) or self._outside(m) or self._picture(m) or self._size(box, m) or _part(box, m)
 
     def is_too_near(self, box: Box) -> bool:
         """Whether so little of it is in the picture that a person and a pet look alike: legs, or a part at its side."""
@@ -103,6 +103,11 @@ class Judge:
         if m.top < p.person_top_min * sure:
             return PET
         return "it is too small for a person" if m.height < p.person_height_min * sure else ""
+
+
+def _part(box: Box, m: Measured) -> str:
+    """Half a chair at the picture's side may be half a hydrant; a thing stays, and is seen whole as the robot turns."""
+    return "only a part of it is in the picture" if m.is_cut_aside and box.label != "person" else ""
 
 
 def _has_size(m: Measured) -> bool:

@@ -28,6 +28,7 @@ from rosbot_patrol.ros.house import House, HouseError, Master
 READY = 120.0  # for the house to be on guard [s]
 MAIL = 20.0  # for a mail after the mission [s]
 HOME = 0.35  # from where it began, the robot is home [m]
+NEXT = 1.0  # after a mission, the next one has begun if one waits [s], simulated
 
 Times = dict[str, float]
 
@@ -81,7 +82,8 @@ def _wait_for_the_end(house: House, watch: CampaignWatch, patrol: Patrol, until:
     """Until the mission to the room is over and its mail is there."""
 
     def is_over() -> bool:
-        return _mission(watch.heard, patrol.room)[1] is not None
+        end = _mission(watch.heard, patrol.room)[1]
+        return end is not None and watch.now > watch.heard.states[end].time + NEXT
 
     house.wait(lambda: is_over() or watch.now > WITHIN, until - time.monotonic(), "the end of the patrol")
     if not is_over():

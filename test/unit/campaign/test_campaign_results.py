@@ -54,6 +54,8 @@ def test_an_interval_of_more_than_all_is_refused() -> None:
         ({"mails": 2}, ("2 mails",)),
         ({"contacts": ["sofa", "sofa"]}, ("touched sofa",)),
         ({"home": False}, ("not home",)),
+        ({"place_error": 0.9}, ()),
+        ({"place_error": 2.79}, ("told 2.8 m from anybody",)),
         ({"problem": "did not end within 630 s", "verdict": "", "was_there": False, "mails": 0, "home": None},
          ("did not end within 630 s",)),
     ],
@@ -119,14 +121,14 @@ def test_a_folder_goes_on_with_its_own_campaign_only(tmp_path: Path) -> None:
 
 def test_shares_count_what_they_say() -> None:
     results = [
-        result(0),
+        result(0, place_error=0.1),
         result(1, verdict="clear", mails=0),
         result(2, **EMPTY),
-        result(3, **{**EMPTY, "verdict": "confirmed", "mails": 1}),
+        result(3, **{**EMPTY, "verdict": "confirmed", "mails": 1}, place_error=2.0),
         result(4, problem="did not end", verdict="", was_there=False, home=None, mails=0),
     ]
     counted = [(share.hits, share.trials) for share in shares(results)]
-    assert counted == [(1, 2), (1, 2), (4, 5), (4, 4), (4, 4), (2, 2)]
+    assert counted == [(1, 2), (1, 2), (1, 2), (4, 5), (4, 4), (4, 4), (2, 2)]
     assert "detected, of those who were there: 1 of 2 (9.5% to 90.5%)" in summary(results)
     assert figures(results)["detection_rate"] == 0.5
     assert figures(results)["false_alarms"] == 1.0

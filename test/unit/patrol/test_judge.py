@@ -65,6 +65,12 @@ def test_the_size_of_other_classes_is_not_a_persons() -> None:
     assert Judge().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_flat=True)) != ""
 
 
+def test_a_thing_has_to_be_whole_in_the_picture_from_left_to_right() -> None:
+    refusal = Judge().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_cut_aside=True))
+    assert refusal == "only a part of it is in the picture"
+    assert Judge().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_cut=True)) == ""
+
+
 def test_a_known_object_is_refused_where_it_stands_only() -> None:
     judge = Judge(known=(Known(x=2.0, y=2.0, radius=0.4, name="the statue", label="person"),))
     assert judge.refusal(box()) == "it is the statue at (2.0, 2.0)"
