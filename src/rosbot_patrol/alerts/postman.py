@@ -256,10 +256,14 @@ class Postman:
     # -- inside
 
     def _mind_the_lock(self) -> None:
-        """Deliver no more where another has taken over, as this process hung."""
-        if self.lock.is_lost:
-            log.error("this program hung: %s delivers now", self.lock.holder())
-            self.hand_over()
+        """Deliver no more where another has taken over, as this process hung, or where the lock's file was removed."""
+        if not self.lock.is_lost:
+            return
+        if holder := self.lock.holder():
+            log.error("this program hung: %s delivers now", holder)
+        else:
+            log.error("%s was removed, by which others know who delivers: making it anew", self.lock.path)
+        self.hand_over()
 
     def _is_open(self, entry: Waiting, name: str) -> bool:
         return self.channels[name].takes(entry) and name not in self.receipts.taken.get(entry.id, ())

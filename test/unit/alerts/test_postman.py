@@ -110,6 +110,20 @@ def test_one_that_hangs_loses_the_deliveries_to_the_other_and_sends_no_more(tmp_
     assert wait((a,), time, 1.0) == [a]
 
 
+def test_one_whose_locks_file_was_removed_says_so_and_goes_on(tmp_path, caplog):
+    time, box = Time(), Box()
+    post = postman(tmp_path, channel("mail", box), time=time)
+    assert post.take_over()
+    post.lock.path.unlink()
+    post.outbox.put(notice("x"))
+    assert deliver_all(post, look=False) == []
+    assert "was removed, by which others know who delivers: making it anew" in caplog.text
+    assert "hung" not in caplog.text
+    assert wait((post,), time, 1.0) == [post]
+    deliver_all(post)
+    assert box.ids == ["x"]
+
+
 def test_one_that_hangs_in_a_delivery_ends_it_and_nothing_is_lost(tmp_path):
     time, second = Time(), Box()
     b = postman(tmp_path, channel("mail", second), time=time)
