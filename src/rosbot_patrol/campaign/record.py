@@ -34,7 +34,7 @@ class Result:
         home: whether it came back; None where it went on to another room, or nobody knows.
         suspects: what looked like somebody to the guard, as it says.
         mishap: what broke, "" where nothing did; allowed: verdicts that it made as right.
-        people: who were to be found; mails: that were delivered; missions: that ended.
+        people: who were to be found; mails: about incidents that were delivered; missions: that ended.
         sim_s, wall_s: how long it took.
     """
 
