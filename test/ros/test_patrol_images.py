@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.ros.patrol_images import is_black
+import rospy
+from sensor_msgs.msg import Image
+
+from rosbot_patrol.ros import patrol_images
+from rosbot_patrol.ros.patrol_images import PictureRing, is_black
 
 
 @pytest.mark.parametrize("shape", [(480, 640, 3), (240, 320), (1, 1)])
@@ -22,3 +28,28 @@ def test_a_dark_room_with_a_lamp_in_it_shows_something() -> None:
     picture = np.zeros((480, 640, 3), np.uint8)
     picture[100:140, 300:340] = 90
     assert not is_black(picture.tobytes())
+
+
+def test_a_camera_that_hangs_shows_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    stores = []
+
+    def subscribe(topic, kind, store, **options):
+        stores.append(store)
+        return SimpleNamespace(unregister=lambda: None)
+
+    monkeypatch.setattr(rospy, "Subscriber", subscribe)
+    monkeypatch.setattr(patrol_images, "now", lambda: 1.0)
+    ring = PictureRing("/camera")
+    assert not ring.is_same(None)
+    ring.start()
+    for stamp, level in ((1, 10), (2, 20), (3, 20), (4, 20), (6, 30), (7, 40)):
+        picture = Image(width=2, height=1, encoding="mono8", step=2, data=bytes([level, level]))
+        picture.header.stamp = rospy.Time(stamp)
+        stores[0](picture)
+        if stamp == 4:
+            assert ring.is_same(5.0)  # what comes after it, before its own picture is here
+            assert ring.is_same(None)
+    assert [stamp for stamp in range(1, 9) if ring.is_same(float(stamp))] == [3, 4]
+    assert not ring.is_same(None)
+    ring.stop()
+    assert not ring.is_same(3.0)

@@ -144,12 +144,14 @@ class Frame:
         boxes: nothing seen if empty.
         eye: the camera then, None where its place or its lens is not known.
         counts: False where its boxes could not be measured yet, so that they prove nothing.
+        is_same: its picture is the one before, byte for byte: the camera hangs, or has no noise and the room is still.
     """
 
     stamp: float | None = None
     boxes: tuple[Box, ...] = ()
     eye: Eye | None = None
     counts: bool = True
+    is_same: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

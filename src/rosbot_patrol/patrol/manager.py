@@ -34,6 +34,7 @@ from rosbot_patrol.patrol.orders import Ordered
 from rosbot_patrol.patrol.phases import Views
 from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.patrol.same_pictures import SamePictures
 from rosbot_patrol.patrol.settings import ManagerParams
 from rosbot_patrol.patrol.steady import Heard
 
@@ -66,6 +67,7 @@ class PatrolManager(Ordered):
         )
         self._heard = {name: Heard() for name in ("detector_at", "camera_at", "camera_changed_at")}
         self._battery = BatteryWatch(self.params.battery)
+        self._same_pictures = SamePictures()
         self._homes_tried = 0
         self._is_first = True
         self._is_stopped = False
@@ -159,7 +161,7 @@ class PatrolManager(Ordered):
         steady: dict[str, Any] = {
             name: heard.steady(getattr(inputs, name), now, self._clock.time) for name, heard in self._heard.items()
         }
-        return dataclasses.replace(inputs, **steady)
+        return dataclasses.replace(inputs, frames=self._same_pictures.left(inputs.frames), **steady)
 
     def _is_blind(self, inputs: Inputs) -> bool:
         look = self.params.look

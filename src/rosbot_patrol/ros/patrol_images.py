@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 
 import rospy
 from sensor_msgs.msg import Image
@@ -37,6 +38,8 @@ class PictureRing:
         self._ring = EvidenceRing(seconds=seconds, rate=given.evidence_rate, max_bytes=given.evidence_mb * _MB)
         self._subscriber: rospy.Subscriber | None = None
         self._seen_at = self._changed_at = float("-inf")
+        self._same: deque[float] = deque(maxlen=200)  # stamps of pictures that are the one before
+        self._same_since: float | None = None  # and of the first of those that go on until now
 
     @property
     def is_wanted(self) -> bool:
@@ -53,6 +56,13 @@ class PictureRing:
         """When the last picture came since `start` that differs from the one before [s], -inf before."""
         return self._changed_at
 
+    def is_same(self, stamp: float | None) -> bool:
+        """Whether the picture of a time [s], None for the newest, is known to be the one before, byte for byte."""
+        with self._lock:
+            if self._same_since is not None and (stamp is None or stamp >= self._same_since):
+                return True
+            return stamp is not None and any(abs(stamp - same) <= 0.002 for same in self._same)
+
     def start(self) -> None:
         """Begin to collect, where it does not yet."""
         if self._topic and self._subscriber is None:
@@ -67,6 +77,8 @@ class PictureRing:
             self._subscriber = None
         with self._lock:
             self._ring.clear()
+            self._same.clear()
+            self._same_since = None
             self._seen_at = self._changed_at = float("-inf")
 
     def snapshot(self) -> EvidenceRing:
@@ -103,7 +115,10 @@ class PictureRing:
                 return
             newest = self._ring.newest
             if newest is None or data != newest.data:
-                self._changed_at = now()
+                self._changed_at, self._same_since = now(), None
+            else:
+                self._same.append(picture.stamp)
+                self._same_since = picture.stamp if self._same_since is None else self._same_since
             if not is_black(data):
                 self._seen_at = now()
             self._ring.add(picture)

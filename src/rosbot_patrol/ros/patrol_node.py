@@ -204,6 +204,7 @@ class PatrolNode:
         known = self.inputs.take(time_now, guarded, self._stop_switch.why, is_busy=is_busy)
         return dataclasses.replace(
             known,
+            frames=tuple(dataclasses.replace(f, is_same=self.pictures.is_same(f.stamp)) for f in known.frames),
             requests=known.requests + self._rounds(time_now, known),
             link=self.move_base.link(),
             camera_at=self.pictures.seen_at,

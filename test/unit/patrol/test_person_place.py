@@ -179,6 +179,18 @@ def test_legs_right_before_the_camera_go_on_above_a_box_that_begins_far_below_th
     assert not m.is_cut_above
 
 
+@pytest.mark.parametrize(("left", "known"), [(300, True), (580, False)])  # 639 is the picture's right edge
+def test_what_goes_straight_up_is_of_a_person_only_where_the_picture_shows_both_sides(left: int, known: bool) -> None:
+    view = view_from()
+    leg = Box(label="person", probability=0.9, xmin=left, ymin=0, xmax=left + 59, ymax=335)
+    aside = -1.1 * (left + 30 - 320) / 554.0
+    lidar = np.array([[1.1, aside - 0.03], [1.1, aside], [1.1, aside + 0.03]])
+    m = measure(leg, view, depth_of(leg, 1.1), lidar).measured
+    assert m is not None
+    assert m.is_cut_above
+    assert (m.has_legs is not None) == known
+
+
 def test_a_leg_too_near_to_be_measured_stands_beneath_the_picture() -> None:
     view = view_from()
     box = Box(label="person", probability=0.9, xmin=100, ymin=0, xmax=400, ymax=479)
