@@ -100,6 +100,8 @@ class Eyes:
         view = inputs.scan
         if view is not None:
             self._witness.see(view.scan, view.map_from_laser, self._house.floor)
+            if self._moves_here(view.scan.stamp):
+                self._called_at = now
         sight: Sight | None = None
         for frame in inputs.frames:
             if frame.eye is None or self.coverage is None:
@@ -131,6 +133,14 @@ class Eyes:
         found = self._next(inputs)
         return self._next(inputs) if found is None and self._looks_again() else found
 
+    def _moves_here(self, stamp: float) -> bool:
+        """Whether the lidar sees something move in the mission's room at a time [s]: as good as the sensor's call."""
+        house, mission = self._house, self._mission
+        if house is None or mission is None:
+            return False
+        moving = (thing for thing in self._witness.things if thing.has_moved and thing.at >= stamp)
+        return any(house.room_at(thing.x, thing.y) == mission.room.id for thing in moving)
+
     def _looks_again(self) -> bool:
         """Whether somebody may have come to where it was looked at before; once in a mission."""
         mission = self._mission
@@ -142,7 +152,7 @@ class Eyes:
         self.coverage.forget(self._called_at)
         if self.coverage.share == self._seen_before:
             return False
-        log.info("%s: its sensor called meanwhile: what was seen before that is looked at again", mission.room.title)
+        log.info("%s: something moved there meanwhile: what was seen before is looked at again", mission.room.title)
         self._began, self._views, self._tried = self._now, 0, []
         return True
 

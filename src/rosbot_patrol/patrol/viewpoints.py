@@ -42,7 +42,7 @@ class ViewpointParams:
     viewpoints_time: float = param(150.0, unit="s", lo=0.0, doc="no further viewpoint is begun later than this")
     look_again: bool = param(
         True,
-        doc="nobody was found, and the sensor called meanwhile: once more at what was seen before that",
+        doc="nobody was found, and sensor or lidar saw something move: once more at what was seen before that",
     )
     viewpoint_gain: float = param(0.01, lo=0.0, hi=1.0, doc="share of the floor that a viewpoint must show anew")
     hideout: float = param(

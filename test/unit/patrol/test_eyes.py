@@ -230,6 +230,18 @@ def test_who_comes_in_behind_the_robot_and_is_told_by_the_sensor_is_found(looks:
     assert mission.triggers == 2
 
 
+@pytest.mark.parametrize(("looks", "verdict"), [(True, "confirmed"), (False, "clear")])
+def test_who_comes_in_behind_the_robot_is_found_as_the_lidar_sees_them_move(looks: bool, verdict: str) -> None:
+    world = World(eyes=SightParams(viewpoints=ViewpointParams(look_again=looks)))
+    world.triggers = (1,)
+    world.until(lambda w: len(w.goals) == 2)
+    came = world.now
+    world.people = lambda now: [(9.9, 2.0 - min(0.5 * (now - came), 1.0))]
+    mission = world.until(lambda w: bool(w.ended)).ended[-1]
+    assert mission.verdict.value == verdict
+    assert mission.triggers == 1
+
+
 def test_a_sensor_that_goes_on_calling_has_the_robot_look_again_once() -> None:
     world = World()
     world.triggers = (1,)
