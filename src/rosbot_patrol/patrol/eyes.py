@@ -134,7 +134,7 @@ class Eyes:
         return self._next(inputs) if found is None and self._looks_again() else found
 
     def _moves_here(self, stamp: float) -> bool:
-        """Whether the lidar sees something move in the mission's room at a time [s]: as good as the sensor's call."""
+        """Whether the lidar sees what has moved in the mission's room at a time [s]: as good as the sensor's call."""
         house, mission = self._house, self._mission
         if house is None or mission is None:
             return False

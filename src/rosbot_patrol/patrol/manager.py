@@ -117,6 +117,7 @@ class PatrolManager(Ordered):
         """
         out, self._pending, self._now = self._pending, Commands(), now
         passed = self._pass_time(now, inputs)
+        inputs = dataclasses.replace(inputs, frames=self._same_pictures.left(inputs.frames))
         inputs = self._inputs = self._in_steady_time(now, inputs)
         time = self._clock.time
         self._own_motion.see(time, inputs.pose, awake=not self._is_blind(inputs))
@@ -161,7 +162,7 @@ class PatrolManager(Ordered):
         steady: dict[str, Any] = {
             name: heard.steady(getattr(inputs, name), now, self._clock.time) for name, heard in self._heard.items()
         }
-        return dataclasses.replace(inputs, frames=self._same_pictures.left(inputs.frames), **steady)
+        return dataclasses.replace(inputs, **steady)
 
     def _is_blind(self, inputs: Inputs) -> bool:
         look = self.params.look

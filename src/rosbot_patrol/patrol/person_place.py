@@ -120,9 +120,8 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
             flat = is_flat(samples, is_before, around)
         if along is not None:
             measured = _at(box, view, along, source="depth", error=0.1 + 0.02 * along, flat=flat)
-            is_cut = (
-                measured.is_cut_above and not measured.is_cut_aside
-            )  # one foreleg of a large dog goes straight up, too
+            # aside: one foreleg of a large dog goes straight up, too
+            is_cut = measured.is_cut_above and not measured.is_cut_aside
             if is_cut and found is not None and abs(found - along) < DEEP:
                 measured = replace(measured, has_legs=_has_legs(samples, box, view, along))
             return replace(box, measured=measured)
