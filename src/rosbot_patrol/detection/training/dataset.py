@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH, column
+from rosbot_patrol.detection.training.mixing import View, disguise, mix, repaper, zoom
 from rosbot_patrol.detection.training.overlay import lay_patterns
 
 MARGIN = 8
 OVERLAY = 0.5
 FAINT = 5.0
+MIX, ZOOM = 0.5, 0.4
 JPEGS = ".jpegs"
 NET_HEIGHT = HEIGHT + 2 * MARGIN
 
@@ -58,6 +60,7 @@ class Pictures:
 
     shards: Sequence[np.ndarray | Packed]
     labels: list[list[np.ndarray]]
+    masks: list[list[np.ndarray] | None] = field(default_factory=list)
 
     @classmethod
     def open(cls, folder: Path, name: str) -> Pictures:
@@ -73,13 +76,17 @@ class Pictures:
             raise FileNotFoundError(f"{folder} holds no pictures named {name}-*.npy; make them with render.py")
         packed = {f: Packed.load(f) for f in files if f.suffix == JPEGS}  # a shard that is listed twice is kept once
         shards = [packed[f] if f in packed else np.load(f, mmap_mode="r") for f in files]
-        labels = []
+        labels: list[list[np.ndarray]] = []
+        masks: list[list[np.ndarray] | None] = []
         for file, shard in zip(files, shards, strict=True):
-            rows = np.load(file.with_suffix(".npz"))["boxes"]
-            if rows.shape[1] < len(COLUMNS):  # a set of before the contrast was measured
-                rows = np.pad(rows, ((0, 0), (0, len(COLUMNS) - rows.shape[1])), constant_values=255)
+            with np.load(file.with_suffix(".npz")) as held:
+                rows = held["boxes"]
+                masks.append(np.split(held["masks"], held["mask_ends"][:-1]) if "masks" in held else None)
+            if masks[-1] is None:  # a set of before there were masks, or even the contrast
+                rows = np.pad(rows, ((0, 0), (0, max(len(COLUMNS) - 1 - rows.shape[1], 0))), constant_values=255)
+                rows = np.pad(rows, ((0, 0), (0, len(COLUMNS) - rows.shape[1])))
             labels.append([rows[column(rows, "picture") == i] for i in range(len(shard))])
-        return cls(shards, labels)
+        return cls(shards, labels, masks)
 
     def pack(self) -> Pictures:
         """The same, read once and kept in memory (some 35 kB a picture); a shard that is listed twice is kept once."""
@@ -88,7 +95,7 @@ class Pictures:
             if isinstance(shard, np.memmap) and str(shard.filename) not in packed:
                 packed[str(shard.filename)] = Packed.of(shard)
         shards = [packed[str(s.filename)] if isinstance(s, np.memmap) else s for s in self.shards]
-        return Pictures(shards, self.labels)
+        return Pictures(shards, self.labels, self.masks)
 
     def __len__(self) -> int:
         return sum(len(shard) for shard in self.shards)
@@ -100,6 +107,23 @@ class Pictures:
     def picture(self, shard: int, i: int) -> np.ndarray:
         """RGB, uint8, shape (240, 320, 3)."""
         return self.shards[shard][i]
+
+    def view(self, shard: int, i: int) -> View | None:
+        """The picture with its rows and its mask; None where the set has no masks."""
+        held = self.masks[shard]
+        if held is None:
+            return None
+        return View(self.picture(shard, i), self.labels[shard][i], cv2.imdecode(held[i], cv2.IMREAD_GRAYSCALE))
+
+
+def pack_masks(masks: np.ndarray) -> dict[str, np.ndarray]:
+    """Masks of a shard, shape (N, 240, 320), as arrays for its file: each a png.
+
+    A pixel's value is the actor's number (from 1, column `mask` of its row; a pet has a number and no row), or
+    `FURNITURE` and more for what else stands there, 0 for nothing that is labelled.
+    """
+    files = [cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_COMPRESSION, 4])[1] for mask in masks]
+    return {"masks": np.concatenate(files), "mask_ends": np.cumsum([len(file) for file in files])}
 
 
 def asked(rows: np.ndarray) -> np.ndarray:
@@ -116,15 +140,20 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
     Args:
         pictures: the set.
         chosen: (shard, picture) of each, shape (B, 2).
-        rng: to lay patterns over, to mirror and to shift colours by chance; None for none of it.
+        rng: to mix with others of the set, to lay patterns over, to mirror and to shift colours by chance; None for
+            none of it.
     """
     images = np.full((len(chosen), NET_HEIGHT, WIDTH, 3), 127, np.uint8)
     boxes = []
     for b, (shard, i) in enumerate(chosen):
-        picture = pictures.shards[shard][i]
-        rows = pictures.labels[shard][i]
+        view = pictures.view(shard, i) if rng is not None else None
+        if view is not None and rng is not None:
+            view = _mixed(view, pictures, rng)
+            picture, rows = view.picture, view.rows
+        else:
+            picture, rows = pictures.picture(shard, i), pictures.labels[shard][i]
         x0, y0, x1, y1 = (column(rows, k) for k in ("x0", "y0", "x1", "y1"))
-        if rng is not None and rng.random() < OVERLAY:
+        if view is None and rng is not None and rng.random() < OVERLAY:
             corners = np.stack([x0 * WIDTH, y0 * HEIGHT, x1 * WIDTH, y1 * HEIGHT], axis=1)
             picture = lay_patterns(picture, corners, rng)
         images[b, MARGIN:-MARGIN] = picture
@@ -137,6 +166,18 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
         size = [(x1 - x0) * WIDTH, (y1 - y0) * HEIGHT]
         boxes.append(np.stack([np.full(len(rows), b), column(rows, "kind"), *centre, *size, asked(rows)], axis=1))
     return images, np.concatenate(boxes).astype(np.float32)
+
+
+def _mixed(view: View, pictures: Pictures, rng: np.random.Generator) -> View:
+    if rng.random() < OVERLAY:
+        view = repaper(view, rng)
+    if rng.random() < MIX:
+        shard = int(rng.integers(len(pictures.shards)))
+        donor = pictures.view(shard, int(rng.integers(len(pictures.shards[shard]))))
+        if donor is not None:
+            view = mix(view, donor, rng)
+    view = disguise(view, rng)
+    return zoom(view, rng) if rng.random() < ZOOM else view
 
 
 def _packed(picture: np.ndarray) -> np.ndarray:

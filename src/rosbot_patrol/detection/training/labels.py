@@ -7,7 +7,7 @@ import numpy as np
 WIDTH, HEIGHT = 320, 240
 COLUMNS = (
     "picture", "kind", "x0", "y0", "x1", "y1", "distance", "seen_of_whole", "seen_of_part", "pixels", "light", "test",
-    "contrast",
+    "contrast", "mask",
 )  # fmt: skip
 _AT = {name: i for i, name in enumerate(COLUMNS)}
 
@@ -19,5 +19,6 @@ def column(rows: np.ndarray, name: str) -> np.ndarray:
     `seen_of_whole` is the share of the figure's outline that is seen, `seen_of_part` the share of what lies inside the
     picture's edges; `pixels` counts those seen at 640 x 480, `light` is the picture's mean level.
     `contrast` [levels of 255] is by how much the clearer quarter of its outline stands out in the finished picture.
+    `mask` is the value of its pixels in the picture's mask, 0 where there is none.
     """
     return rows[:, _AT[name]]

@@ -2,6 +2,8 @@
 
 Each box is learnt by every anchor whose shape overlaps it by `MATCH`, and by its best one in any case. Predictions that
 overlap a box well but are not made for it, and all that lie on something too hidden to ask for, are left alone.
+Objectness learns how well the box fits (IoU-aware, as in PP-YOLO, Long et al. 2020): a box of the wrong size counts as
+false, so it must not be sure of itself.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ from rosbot_patrol.detection.darknet_layers import Yolo
 MATCH = 0.45
 IGNORE_IOU = 0.5
 SURPRISE = 0.5
+LEAST_SURE, SURE_FROM = 0.2, 0.75  # objectness of a box that overlaps by LOOSE or less, and the overlap of a sure one
+LOOSE = 0.35
 
 
 @dataclass
@@ -71,10 +75,12 @@ def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, 
         sizes = torch.tensor(head.anchors, device=raw.device)[anchor]
         centre = (torch.sigmoid(mine[:, :2]) + torch.stack([column, row], 1)) * stride
         predicted = torch.cat([centre, torch.exp(mine[:, 2:4].clamp(max=6)) * sizes], 1)
-        result["box"] = (1 - _generalised_iou(predicted, truth.boxes[which])).sum()
+        overlap, generalised = _overlaps(predicted, truth.boxes[which])
+        result["box"] = (1 - generalised).sum()
         wanted = fn.one_hot(truth.kinds[which], head.classes).float()
         result["kind"] = fn.binary_cross_entropy_with_logits(mine[:, 5:], wanted, reduction="sum")
-        target[place, anchor, row, column] = 1.0
+        fit = ((overlap.detach() - LOOSE) / (SURE_FROM - LOOSE)).clamp(0.0, 1.0)
+        target[place, anchor, row, column] = LEAST_SURE + (1.0 - LEAST_SURE) * fit
         weight[place, anchor, row, column] = 1.0
     # a little focal: the many cells that are surely empty count less
     logits = grid[:, :, 4]
@@ -115,7 +121,8 @@ def _shape_iou(sizes: torch.Tensor, anchors: torch.Tensor) -> torch.Tensor:
     return shared / (sizes.prod(dim=1)[:, None] + anchors.prod(dim=1)[None] - shared)
 
 
-def _generalised_iou(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+def _overlaps(a: torch.Tensor, b: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """IoU, and generalised IoU (Rezatofighi et al. 2019), of boxes pair by pair."""
     a_low, a_high, b_low, b_high = (
         a[:, :2] - a[:, 2:] / 2,
         a[:, :2] + a[:, 2:] / 2,
@@ -125,4 +132,5 @@ def _generalised_iou(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     shared = (torch.minimum(a_high, b_high) - torch.maximum(a_low, b_low)).clamp(min=0).prod(dim=1)
     union = a[:, 2:].prod(dim=1) + b[:, 2:].prod(dim=1) - shared
     hull = (torch.maximum(a_high, b_high) - torch.minimum(a_low, b_low)).prod(dim=1)
-    return shared / union.clamp(min=1e-6) - (hull - union) / hull.clamp(min=1e-6)
+    overlap = shared / union.clamp(min=1e-6)
+    return overlap, overlap - (hull - union) / hull.clamp(min=1e-6)

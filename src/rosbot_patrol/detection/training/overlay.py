@@ -22,6 +22,11 @@ def _bank() -> list[np.ndarray]:
     return [draw_pattern(rng).pixels for _ in range(BANK)]
 
 
+def draw_from_bank(rng: np.random.Generator) -> np.ndarray:
+    """Any pattern of the bank, RGB, uint8, square."""
+    return _bank()[int(rng.integers(BANK))]
+
+
 def lay_patterns(picture: np.ndarray, boxes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """The picture with patterns by chance.
 
@@ -48,7 +53,7 @@ def lay_patterns(picture: np.ndarray, boxes: np.ndarray, rng: np.random.Generato
 
 
 def _lay(part: np.ndarray, corners: np.ndarray, rng: np.random.Generator) -> None:
-    pattern = _bank()[int(rng.integers(BANK))]
+    pattern = draw_from_bank(rng)
     times = int(rng.choice([1, 1, 2, 3]))
     side = pattern.shape[0]
     pattern = np.tile(pattern, (times, times, 1)) if times > 1 else pattern

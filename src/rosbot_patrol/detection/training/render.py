@@ -1,13 +1,15 @@
 """Write a set of labelled pictures as shards on disk: seeded, by several processes, going on where it was left.
 
-A shard NAME-0007.npz holds `boxes`, one row per visible actor (see `labels.py`), and NAME-0007.npy the pictures as
-the network gets them without its grey margins, uint8, shape (count, 240, 320, 3); with --jpeg NAME-0007.jpegs.
+A shard NAME-0007.npz holds `boxes`, one row per visible actor (see `labels.py`), and what stands where in each picture
+(`masks`, see `dataset.py`), and NAME-0007.npy the pictures as the network gets them without its grey margins, uint8,
+shape (count, 240, 320, 3); with --jpeg NAME-0007.jpegs.
 """
 
 from __future__ import annotations
 
 import argparse
 import functools
+import itertools
 import multiprocessing
 import os
 import sys
@@ -17,8 +19,9 @@ import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training import scenes
-from rosbot_patrol.detection.training.dataset import JPEGS, Packed
+from rosbot_patrol.detection.training.dataset import JPEGS, Packed, pack_masks
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
+from rosbot_patrol.detection.training.mixing import FURNITURE
 from rosbot_patrol.detection.training.patterns import draw_textures
 from rosbot_patrol.detection.training.test_set import SETS, WORLD, unseen_textures
 from rosbot_patrol.detection.training.visibility import contrast, silhouette
@@ -66,8 +69,8 @@ class Studio:
         plain: bool = False,
         pets: float = 0.0,
         hard: float = 0.0,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """`count` pictures and the rows of their labels; a share of them is taken in the house, if there is one.
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`count` pictures, the rows of their labels, and masks; a share is taken in the house, if there is one.
 
         Args:
             seed: of all chance.
@@ -81,21 +84,24 @@ class Studio:
         rng = np.random.default_rng(seed)
         self.furnish(np.random.default_rng([*seed, 1]))
         assert self.renderer is not None
-        pictures, rows = [], []
+        pictures, rows, masks = [], [], []
         while len(pictures) < count:
             scene = self._scene(rng, house_share, plain)
             self.renderer.clear()
             self.renderer.light = scene.light
+            things = itertools.cycle(range(FURNITURE, 256))
             for body in scene.bodies:
-                self.renderer.add(body)
+                is_thing = body.kind == "furniture" or body.name.startswith("thing")
+                self.renderer.add(body, label=next(things) if is_thing else 0)
             for _ in range(VIEWS):
                 camera = scenes.draw_camera(scene, rng)
                 if camera is None or len(pictures) == count:
                     break
-                picture, labels = self._view(scene, camera, rng, test, pets, hard)
+                picture, labels, mask = self._view(scene, camera, rng, test, pets, hard)
                 rows += [[len(pictures), *label] for label in labels]
                 pictures.append(picture)
-        return np.array(pictures), np.array(rows, np.float32).reshape(-1, len(COLUMNS))
+                masks.append(mask)
+        return np.array(pictures), np.array(rows, np.float32).reshape(-1, len(COLUMNS)), np.array(masks)
 
     def _scene(self, rng: np.random.Generator, house_share: float, plain: bool) -> scenes.Scene:
         if self.world and rng.random() < house_share:
@@ -126,14 +132,14 @@ class Studio:
         seen = self.renderer.labels()
         finished = degrade(picture, rng)
         labels = [
-            _label(actor, seen == i + 1, optical, intrinsics, camera, picture, test, finished)
+            _label(actor, seen, i + 1, optical, intrinsics, camera, picture, test, finished)
             for i, actor in enumerate(actors)
             if actor.body.kind != "pet"
         ]
         for actor in actors:
             for body in (actor.body, *actor.extra):
                 self.renderer.remove(body.name)
-        return finished, [label for label in labels if label]
+        return finished, [label for label in labels if label], seen[::2, ::2].copy()
 
 
 def degrade(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -186,7 +192,8 @@ def _eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[
     return scenes.placed(x, y, height, yaw) @ tilt @ _FORWARD, intrinsics
 
 
-def _label(actor, mask, optical: Matrix, intrinsics: Intrinsics, camera, picture, test: bool, finished):
+def _label(actor, seen, value: int, optical: Matrix, intrinsics: Intrinsics, camera, picture, test: bool, finished):
+    mask = seen == value
     pixels = int(mask.sum())
     if pixels < 12:
         return None
@@ -197,7 +204,7 @@ def _label(actor, mask, optical: Matrix, intrinsics: Intrinsics, camera, picture
     w, h = intrinsics.width, intrinsics.height
     corners = [columns[0] / w, rows[0] / h, (columns[-1] + 1) / w, (rows[-1] + 1) / h]
     shares, light = (pixels / max(whole, pixels), pixels / max(part, pixels)), float(picture.mean())
-    return [kind, *corners, distance, *shares, pixels, light, test, contrast(finished, mask)]
+    return [kind, *corners, distance, *shares, pixels, light, test, contrast(finished, mask), value]
 
 
 def _poster(painter: EglRenderer, look, rng: np.random.Generator) -> Texture:
@@ -223,7 +230,7 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
     global _studio
     if _studio is None:
         _studio = Studio(load_world(options.house) if options.house else None, unseen=options.test)
-    pictures, boxes = _studio.shard(
+    pictures, boxes, masks = _studio.shard(
         [options.seed, index, int(options.test)],
         PER_SHARD,
         test=options.test,
@@ -232,7 +239,7 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
         pets=options.pets,
         hard=options.hard,
     )
-    np.savez_compressed(target.with_suffix(".npz"), boxes=boxes)
+    np.savez(target.with_suffix(".npz"), boxes=boxes, **pack_masks(masks))
     part = target.with_suffix(".part" + target.suffix)
     if options.jpeg:
         Packed.of(pictures).save(part)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rosbot_patrol.detection.training.dataset import JPEGS, Pictures, batch_of
+from rosbot_patrol.detection.training.dataset import JPEGS, Pictures, batch_of, pack_masks
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 
 
@@ -54,3 +54,32 @@ def test_shards_of_jpegs_are_read_like_the_others(folder: Path) -> None:
 def test_no_pictures_of_a_name(folder: Path) -> None:
     with pytest.raises(FileNotFoundError, match="holds no pictures named hall"):
         Pictures.open(folder, "hall")
+
+
+def test_pictures_with_masks_are_mixed_by_chance_and_as_they_are_without(folder: Path) -> None:
+    masks = np.zeros((2, HEIGHT, WIDTH), np.uint8)
+    masks[:, 120:, 80:160] = 1
+    for shard in range(2):
+        file = folder / f"room-{shard:04d}.npz"
+        rows = np.load(file)["boxes"]
+        rows[:, COLUMNS.index("mask")] = 1
+        rows[:, COLUMNS.index("pixels")], rows[:, COLUMNS.index("seen_of_part")] = 38400, 1.0
+        np.savez(file, boxes=rows, **pack_masks(masks))
+    pictures = Pictures.open(folder, "room")
+    view = pictures.pack().view(1, 0)
+    assert view is not None
+    assert (view.mask == masks[0]).all()
+    assert (view.picture == pictures.pack().picture(1, 0)).all()
+    plain, rows = batch_of(pictures, pictures.index(), None)
+    assert rows[:, 2:6].tolist() == [[120.0, 188.0, 80.0, 120.0]] * 4
+    counts = set()
+    for seed in range(8):
+        images, rows = batch_of(pictures, pictures.index(), np.random.default_rng(seed))
+        again, rows_again = batch_of(pictures, pictures.index(), np.random.default_rng(seed))
+        assert (images == again).all()
+        assert (rows == rows_again).all()
+        assert (images != plain).any()
+        assert (rows[:, 2] - rows[:, 4] / 2 >= 0).all()
+        assert (rows[:, 2] + rows[:, 4] / 2 <= WIDTH).all()
+        counts.add(len(rows))
+    assert len(counts) > 1  # some came in from other pictures

@@ -31,7 +31,7 @@ def look_at(studio: render.Studio, monkeypatch: pytest.MonkeyPatch, distance: fl
     studio.renderer.clear()
     for body in scene.bodies:
         studio.renderer.add(body)
-    _, labels = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), False)
+    _, labels, _ = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), False)
     return np.array([[0, *label] for label in labels]).reshape(-1, len(COLUMNS))
 
 
@@ -78,11 +78,21 @@ def test_a_pet_is_seen_and_is_nothing_to_be_found(studio: render.Studio, monkeyp
 
 
 def test_a_shard_repeats_with_its_seed(studio: render.Studio) -> None:
-    pictures, rows = studio.shard([7, 0], 3, test=False)
-    again, rows_again = studio.shard([7, 0], 3, test=False)
+    pictures, rows, masks = studio.shard([7, 0], 3, test=False)
+    again, rows_again, masks_again = studio.shard([7, 0], 3, test=False)
     assert pictures.shape == (3, 240, 320, 3)
     assert np.array_equal(pictures, again)
     assert np.array_equal(rows, rows_again)
+    assert np.array_equal(masks, masks_again)
+
+
+def test_a_mask_shows_where_each_label_is(studio: render.Studio) -> None:
+    _, rows, masks = studio.shard([8, 0], 12, test=False)
+    assert len(rows) > 3
+    for row in rows:
+        y, x = np.nonzero(masks[int(row[0])] == column(row[None], "mask")[0])
+        seen = [x.min() / 320, y.min() / 240, (x.max() + 1) / 320, (y.max() + 1) / 240]
+        assert seen == pytest.approx(row[2:6], abs=0.0065)
 
 
 def test_reduction_is_darknet_s_letterbox() -> None:
