@@ -17,6 +17,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from tqdm import tqdm
@@ -199,9 +200,16 @@ class Batches(torch.utils.data.Dataset):
         return batch_of(self._pictures, chosen, np.random.default_rng([*self._seed, k]))
 
     def ahead(self, loaders: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """All of them, made by so many processes, or by one thread where that is 0: enough beside two cores."""
+        """All of them, made by so many processes, or by one thread where that is 0.
+
+        A process is better even beside two cores: a thread takes the interpreter from a compiled network, which asks
+        for it before each of its kernels.
+        """
         if loaders:
-            for images, rows in torch.utils.data.DataLoader(self, batch_size=None, num_workers=loaders):
+            made = torch.utils.data.DataLoader(
+                self, batch_size=None, num_workers=loaders, prefetch_factor=4, worker_init_fn=_step_back
+            )
+            for images, rows in made:
                 yield images.numpy(), rows.numpy()
             return
         ready: queue.Queue = queue.Queue(2)
@@ -214,6 +222,11 @@ class Batches(torch.utils.data.Dataset):
         threading.Thread(target=fill, daemon=True).start()
         while (item := ready.get()) is not None:
             yield item
+
+
+def _step_back(_: int) -> None:
+    """A loader runs where a network's threads leave time: they wait for each other at each of its layers."""
+    os.nice(14)
 
 
 def main() -> None:
@@ -241,6 +254,7 @@ def main() -> None:
     parser.add_argument("--anchors", action="store_true", help="find anchors and put them into the cfg file first")
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
+    cv2.setNumThreads(1)
     Trainer(options).run()
 
 
