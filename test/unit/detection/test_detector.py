@@ -1,12 +1,16 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
+from rosbot_patrol.detection import draw
 from rosbot_patrol.detection.darknet_cfg import parse_cfg
 from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.detection.darknet_weights import format_weights
 from rosbot_patrol.detection.decode import Candidates
-from rosbot_patrol.detection.detector import DarknetDetector, load_detector, to_detections
-from rosbot_patrol.detection.draw import draw_boxes
+from rosbot_patrol.detection.detector import DarknetDetector, Detection, load_detector, to_detections
+from rosbot_patrol.detection.draw import COLOURS, draw_boxes
 from rosbot_patrol.detection.network import load_network
 from rosbot_patrol.detection.random_weights import random_weights
 from rosbot_patrol.errors import DetectorError, ImageError
@@ -97,6 +101,41 @@ def test_drawing_leaves_the_picture_alone():
     assert drawn.pixels.shape == (240, 320, 3)
     assert (drawn.pixels != before).any()
     np.testing.assert_array_equal(picture.pixels, before)
+
+
+def test_boxes_are_drawn_at_their_places_and_labels_inside():
+    grey = Picture(np.full((480, 640, 3), 128, np.uint8), "bgr8")
+    inside = Detection(0, "person", 0.93, 100, 80, 220, 400)
+    drawn = draw_boxes(grey, [inside]).pixels
+    rows, columns = np.nonzero((drawn != 128).any(axis=2))
+    assert (columns.min(), columns.max(), rows.max()) == (100, 220, 400)
+    assert 55 <= rows.min() <= 65  # the label above it
+    assert tuple(drawn[240, 100]) == tuple(drawn[400, 160]) == COLOURS[0]
+    assert (drawn[82:398, 102:218] == 128).all()
+    corner = Detection(1, "fire hydrant", 0.5, 600, -20, 700, 60)
+    drawn = draw_boxes(grey, [corner]).pixels  # its label would stand beyond the picture's right and upper edge
+    label = (drawn == COLOURS[1]).all(axis=2)
+    assert label[:15, 540:].sum() > 600
+    assert not label[:, :500].any()
+    draw_boxes(grey, [Detection(0, "Wächter 中", 1.0, 50, 70, 50, 70), Detection(0, "a", 1.0, 60, 70, 50, 60)])
+
+
+def test_labels_without_the_font_are_small_and_it_is_said(monkeypatch, caplog):
+    def missing(*_):
+        raise OSError("cannot open resource")
+
+    monkeypatch.setattr(draw.ImageFont, "truetype", missing)
+    draw._font.cache_clear()
+    grey = Picture(np.full((480, 640, 3), 128, np.uint8), "bgr8")
+    drawn = draw_boxes(grey, [Detection(0, "person", 0.93, 100, 80, 220, 400)])
+    draw._font.cache_clear()
+    assert (drawn.pixels != 128).any()
+    assert "DejaVuSans.ttf: cannot open resource (package fonts-dejavu-core)" in caplog.text
+
+
+def test_drawing_does_not_bring_opencv():
+    code = "import sys; from rosbot_patrol.detection import draw; sys.exit('cv2' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def write_files(folder, *, names=None):
