@@ -297,13 +297,58 @@ def junk(rng: Rng) -> list[Piece]:
     return pieces
 
 
+def dressed(rng: Rng) -> list[Piece]:
+    """Clothes and hats on what is nobody: valets, dummies on one foot, tall sacks, full hooks. Nothing like legs."""
+    high = float(rng.uniform(0.9, 1.9))  # where the shoulders would be
+    wood, cloth = wood_colour(rng), any_colour(rng)
+    foot = high * float(rng.uniform(0.15, 0.75))  # where the clothes end
+    wide, deep = float(rng.uniform(0.12, 0.3)), float(rng.uniform(0.05, 0.2))
+    pieces: list[Piece] = []
+    if rng.random() < 0.75:  # a pole on a plate, a plinth or three feet
+        pieces.append((tube(float(rng.uniform(0.015, 0.06)), high), (0, 0, high / 2), wood, ""))
+        if rng.random() < 0.3:
+            side = float(rng.uniform(0.2, 0.45))
+            pieces.append((box(side, side, 0.6 * foot), (0, 0, 0.3 * foot), any_colour(rng), str(rng.choice(WOODS))))
+        else:
+            pieces.append((tube(float(rng.uniform(0.1, 0.28)), 0.04), (0, 0, 0.02), wood, ""))
+    else:  # a sack, which stands by itself
+        foot = 0.0
+    waist = float(rng.uniform(0.5, 1.1))
+    middle = foot + (high - foot) * float(rng.uniform(0.3, 0.7))
+    hem = float(rng.uniform(0.6, 1.4))
+    slope = float(rng.uniform(0.02, 0.15))
+    rings = [
+        (high, 0.4 * deep, 0.3 * wide, 0.0),
+        (high - slope, deep, wide, 0.0),
+        (middle, waist * deep, waist * wide, 0.0),
+        (foot, hem * deep, hem * wide, 0.0),
+    ]
+    pieces.append((loft(rings), (0, 0, 0), cloth, str(rng.choice(CLOTHS))))
+    if rng.random() < 0.4:  # empty sleeves, or bags at its sides
+        drop, thick = float(rng.uniform(0.3, 0.7)), float(rng.uniform(0.03, 0.07))
+        colour = cloth if rng.random() < 0.7 else any_colour(rng)
+        sleeve = loft([(0, thick, thick, 0), (-drop, 0.8 * thick, 1.1 * thick, 0)])
+        pieces += [(sleeve, (0, s * (wide + thick), high - slope), colour, "") for s in (-1, 1)]
+    top = high
+    if rng.random() < 0.5:  # the pole's end, a knob, something round
+        size = float(rng.uniform(0.02, 0.12))
+        top += float(rng.uniform(0.0, 0.15)) + size
+        pieces.append((ellipsoid(size, size, size * rng.uniform(0.6, 1.5), at=(0, 0, top)), (0, 0, 0), wood, ""))
+    if rng.random() < 0.5:  # a hat: crown and brim
+        brim, crown = float(rng.uniform(0.1, 0.25)), float(rng.uniform(0.06, 0.2))
+        hat, at = any_colour(rng), top + float(rng.uniform(0.0, 0.1))
+        pieces.append((tube(brim, 0.02), (0, 0, at), hat, ""))
+        pieces.append((tube(0.5 * brim + 0.02, crown), (0, 0, at + crown / 2), hat, ""))
+    return pieces
+
+
 MAKERS: tuple[Callable[[Rng], list[Piece]], ...] = (
     table, chair, chair, sofa, bed, cupboard, cupboard, shelf, floor_lamp, floor_lamp, coat_stand, coat_stand,
     coat_stand, plant, plant, post, post, post, poles, poles, boxes, boxes, curtain, ball, robot, pet, machine,
 )  # fmt: skip
 
 
-SHAPELESS = (turned, turned, junk)
+SHAPELESS = (turned, turned, junk, dressed)
 
 
 def draw_thing(rng: Rng, name: str, pose: Matrix, *, shapeless: float = 0.0) -> Body:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.detection.training import scenes
-from rosbot_patrol.detection.training.furniture import MAKERS, build, placed
+from rosbot_patrol.detection.training.furniture import MAKERS, SHAPELESS, build, placed
 from rosbot_patrol.simulation.looks import draw_look, is_reserved
 from rosbot_patrol.simulation.meshes import mesh_of
 from rosbot_patrol.simulation.world import load_world
@@ -87,7 +87,7 @@ def test_test_people_are_reserved_and_training_people_are_not() -> None:
     assert not any(is_reserved(draw_look(rng)) for _ in range(300))
 
 
-@pytest.mark.parametrize("maker", sorted(set(MAKERS), key=lambda m: m.__name__), ids=lambda m: m.__name__)
+@pytest.mark.parametrize("maker", sorted({*MAKERS, *SHAPELESS}, key=lambda m: m.__name__), ids=lambda m: m.__name__)
 def test_each_thing_can_be_drawn_and_stands_on_the_floor(maker) -> None:
     for seed in range(5):
         body = build("it", maker(np.random.default_rng(seed)), placed(0, 0))
