@@ -304,7 +304,7 @@ def dressed(rng: Rng) -> list[Piece]:
     foot = high * float(rng.uniform(0.15, 0.75))  # where the clothes end
     wide, deep = float(rng.uniform(0.12, 0.3)), float(rng.uniform(0.05, 0.2))
     pieces: list[Piece] = []
-    if rng.random() < 0.75:  # a pole on a plate, a plinth or three feet
+    if rng.random() < 0.75:  # a pole on a plate or a plinth
         pieces.append((tube(float(rng.uniform(0.015, 0.06)), high), (0, 0, high / 2), wood, ""))
         if rng.random() < 0.3:
             side = float(rng.uniform(0.2, 0.45))
