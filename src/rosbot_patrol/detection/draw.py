@@ -28,9 +28,7 @@ def draw_boxes(picture: Picture, found: Iterable[Detection]) -> Picture:
     for one in found:
         colour = COLOURS[one.class_id % len(COLOURS)]
         thick = max(1, round(canvas.height / 240))
-        # corners in order: a box may lie beyond the picture's edge, or be a line
-        corners = sorted((one.xmin, one.xmax)), sorted((one.ymin, one.ymax))
-        draw.rectangle((corners[0][0], corners[1][0], corners[0][1], corners[1][1]), outline=colour, width=thick)
+        draw.rectangle((one.xmin, one.ymin, one.xmax, one.ymax), outline=colour, width=thick)
         _label(draw, canvas.size, f"{one.name} {one.probability:.0%}", (one.xmin, one.ymin), colour)
     return Picture(np.array(canvas), "bgr8")
 

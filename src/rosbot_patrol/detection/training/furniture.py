@@ -298,7 +298,7 @@ def junk(rng: Rng) -> list[Piece]:
 
 
 def dressed(rng: Rng) -> list[Piece]:
-    """Clothes and hats on what is nobody: valets, dummies on one foot, tall sacks, full hooks. Nothing like legs."""
+    """Clothes and hats on what is nobody: valets, dummies on one foot, tall sacks. Nothing like legs."""
     high = float(rng.uniform(0.9, 1.9))  # where the shoulders would be
     wood, cloth = wood_colour(rng), any_colour(rng)
     foot = high * float(rng.uniform(0.15, 0.75))  # where the clothes end
