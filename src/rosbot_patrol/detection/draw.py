@@ -37,6 +37,8 @@ def _label(
     draw: ImageDraw.ImageDraw, size: tuple[int, int], text: str, corner: tuple[int, int], colour: tuple[int, int, int]
 ) -> None:
     font = _font(max(11, round(size[1] / 36)))
+    if not isinstance(font, ImageFont.FreeTypeFont):  # Pillow's own letters, which are those of Latin 1
+        text = text.encode("latin-1", "replace").decode("latin-1")
     _, top, width, height = font.getbbox(text)
     width, height = width + 2 * _PAD, height - top + 2 * _PAD
     left = min(max(corner[0], 0), max(size[0] - width, 0))

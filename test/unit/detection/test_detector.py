@@ -128,6 +128,7 @@ def test_labels_without_the_font_are_small_and_it_is_said(monkeypatch, caplog):
     draw._font.cache_clear()
     grey = Picture(np.full((480, 640, 3), 128, np.uint8), "bgr8")
     drawn = draw_boxes(grey, [Detection(0, "person", 0.93, 100, 80, 220, 400)])
+    draw_boxes(grey, [Detection(0, "人", 0.93, 100, 80, 220, 400)])
     draw._font.cache_clear()
     assert (drawn.pixels != 128).any()
     assert "DejaVuSans.ttf: cannot open resource (package fonts-dejavu-core)" in caplog.text
