@@ -96,7 +96,11 @@ def child_pids(pid: int) -> list[int]:
 
 @dataclass
 class Mission:
-    """What was seen of one mission, by ground truth."""
+    """What was seen of one mission, by ground truth.
+
+    Attributes:
+        turned: the look-around at the room's point, before any further viewpoint [rad].
+    """
 
     room: int
     states: list[str] = field(default_factory=list)
@@ -109,6 +113,13 @@ class Mission:
     contacts: list[tuple[str, str]] = field(default_factory=list)
     sim_seconds: float = 0.0
     wall_seconds: float = 0.0
+
+    @property
+    def is_at_point(self) -> bool:
+        """Whether it looks around at the room's point; it may go on to further viewpoints, and turn there, too."""
+        if not self.states or self.states[-1] != PatrolState.LOOKING:
+            return False
+        return not any("further viewpoint" in why for why in self.why)
 
 
 class House:
@@ -341,7 +352,7 @@ class House:
         pose = pose2d_from_pose(odometry.pose.pose)
         with self._lock:
             mission = self._mission
-            if mission is not None and mission.states and mission.states[-1] == PatrolState.LOOKING and self.pose:
+            if mission is not None and mission.is_at_point and self.pose:
                 mission.turned += wrap_angle(pose.yaw - self.pose.yaw)
             self.pose, self.pose_stamp = pose, odometry.header.stamp.to_sec()
 
