@@ -26,6 +26,9 @@ _CHEST = 0.45  # of a box, from above, show head and chest
 _CHEST_SHARE = 0.1  # of that has to show, to tell a picture, and of what is around
 _ASIDE, _ABOVE = 0.25, 0.2  # so much of a box is free beside or above its object at most: 99 % of those measured
 _ROWS = 0.4  # of the rows of a box show its object, at least
+_HEAD = GRID // 3  # rows that show the upper part of a person: not all of it is unknown
+_HEAD_SHARE, _HEAD_FARTHER = 0.04, 0.05  # with less of it there, and so much of what is farther, it is something before
+_HEAD_OTHER, _HEAD_TIMES = 0.15, 3.0  # so much of it at another distance, and so many times what is nearer
 _ASIDE_UP = 0.4  # and beside its upper half
 _BEFORE_MOST = 0.7  # of a box may show what stands before its object
 _STRIP, _FREE = 0.1, 0.25  # of a row or column, to belong to it; so much of it has to lie beyond, to be free
@@ -43,6 +46,13 @@ def _middle(samples: Array) -> Array:
 def is_beyond(samples: Array) -> bool:
     """Whether most of a box may lie beyond what the depth camera measures: what it knows is of a thing before that."""
     return bool(np.isfinite(_middle(samples)).mean() < _KNOWN)
+
+
+def is_rather(samples: Array, along: float, other: float) -> bool:
+    """Whether the upper part of a box shows what is at the other, farther distance [m] rather than at the first."""
+    upper = samples[:_HEAD]
+    first, second = (upper < along + DEEP).mean(), (np.abs(upper - other) < DEEP).mean()  # NaN is neither
+    return bool(second >= _HEAD_OTHER and second > _HEAD_TIMES * first)
 
 
 def _nearest(samples: Array) -> float | None:
@@ -77,7 +87,11 @@ def whose(samples: Array) -> tuple[float | None, Mask]:
 
 
 def _fills(is_of_it: Mask, is_farther: Mask) -> bool:
-    """Whether something reaches the sides and the top of its box, and well down; unknown parts may be of it."""
+    """Whether something reaches the sides and the top of its box, and well down.
+
+    Unknown parts may be of it, but not its whole upper part where that shows what is farther: before one at the end of
+    the depth camera's range and a background beyond it, a desk leaves nothing free that is known.
+    """
 
     def takes(axis: int, rows: int) -> Mask:
         is_there = is_of_it[:rows].mean(axis=axis) > _STRIP
@@ -85,7 +99,8 @@ def _fills(is_of_it: Mask, is_farther: Mask) -> bool:
 
     rows, columns, upper = takes(1, GRID), takes(0, GRID), takes(0, GRID // 2)
     is_high = rows.any() and rows.argmax() <= _ABOVE * GRID and rows.mean() >= _ROWS
-    return bool(is_high and _aside(columns) <= _ASIDE and _aside(upper) <= _ASIDE_UP)
+    is_headless = is_of_it[:_HEAD].mean() < _HEAD_SHARE and is_farther[:_HEAD].mean() >= _HEAD_FARTHER
+    return bool(is_high and not is_headless and _aside(columns) <= _ASIDE and _aside(upper) <= _ASIDE_UP)
 
 
 def _aside(columns: Mask) -> float:

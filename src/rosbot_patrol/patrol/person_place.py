@@ -7,7 +7,7 @@ the camera and to some tens of per cent farther off, as low as the camera is; a 
 edge has no feet.
 
 A depth camera that knows the depth of little of a box sees furniture before one who stands beyond its range, where the
-lidar sees legs farther off.
+lidar sees legs farther off; so it does where the upper part of the box is as far off as the lidar's legs.
 
 Nothing in a box is farther off than the floor beneath its lower edge. Depth that says so is of what shows between the
 legs or beside them, as of dark clothes or of one nearer than a depth camera can measure, and is not taken.
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import angle_difference, wrap_angles
-from rosbot_patrol.patrol.box_depth import ASIDE, DEEP, GRID, UP, is_beyond, is_flat, nearer, upright, whose
+from rosbot_patrol.patrol.box_depth import ASIDE, DEEP, GRID, UP, is_beyond, is_flat, is_rather, nearer, upright, whose
 from rosbot_patrol.patrol.inputs import Box, Measured
 from rosbot_patrol.patrol.legs import go_straight_up
 
@@ -107,11 +107,12 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
     if depth is not None:
         samples = _samples(box, view.lens, depth)
         along, is_before = whose(samples)
-        if found is not None and (along or 0.0) < found <= _ABOUT * most and is_beyond(samples):
+        if found is not None and found <= _ABOUT * most and _are_legs_behind(found, along, samples):
             return replace(box, measured=_at(box, view, found, source="lidar", error=0.15 + 0.02 * found, flat=None))
         is_behind = along is not None and along > most
-        leg = upright(samples, *_about_floor(box, view)) if along is not None else None
-        if leg is not None and along is not None and leg < along - DEEP:
+        is_borne_out = found is not None and along is not None and abs(found - along) < DEEP
+        leg = None if along is None or is_borne_out else _leg_before(along, samples, box, view)
+        if leg is not None:
             along = leg
         elif is_behind:
             along = nearer(samples, most)
@@ -185,6 +186,13 @@ def _middles(first: float, last: float, before: int = 0, after: int = 0) -> Arra
     return np.asarray(first + step * (np.arange(-before, GRID + after) + 0.5))
 
 
+def _are_legs_behind(found: float, along: float | None, samples: Array) -> bool:
+    """Whether the lidar's legs are of the one in the box, and what depth tells is of something before [m]."""
+    if is_beyond(samples):
+        return found > (along or 0.0)
+    return along is not None and found > along + DEEP and is_rather(samples, along, found)
+
+
 def _has_legs(samples: Array, box: Box, view: View, along: float) -> bool | None:
     """Whether what is so far along the optical axis [m] stands as a person does."""
     lens, eye = view.lens, float(view.eye[2])
@@ -240,6 +248,13 @@ def _about_floor(box: Box, view: View) -> tuple[float, float]:
         return 0.0, 0.0
     found = _floor_at(box, view, float(box.ymax))
     return 0.85 * _floor_at(box, view, box.ymax + box.slack), 1.1 * found if found < 15.0 else 0.0
+
+
+def _leg_before(along: float, samples: Array, box: Box, view: View) -> float | None:
+    """How far a leg is where the floor ends the box, before what depth tells and what is beyond that floor [m]."""
+    least, most = _about_floor(box, view)
+    leg = upright(samples, least, most) if along > most else None
+    return leg if leg is not None and leg < along - DEEP else None
 
 
 def _floor_at(box: Box, view: View, row: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -324,3 +325,61 @@ def test_a_depth_camera_of_another_size_is_looked_up_by_bearing() -> None:
 def test_the_lens_tells_how_wide_it_looks() -> None:
     assert LENS.view_width == pytest.approx(1.047, abs=0.002)
     assert view_from(yaw=1.2).yaw == pytest.approx(1.2)
+
+
+LEGS = np.array([[4.9, -0.1], [4.9, -0.08], [4.95, 0.1], [4.9, 0.12]])
+
+
+def far_behind_a_desk(box: Box, desk: float, *, upper: float = 0.0, seen: float = 1.0) -> Depth:
+    """Somebody 4.9 m off before what is beyond the depth camera's range, a desk at 3.5 m before them.
+
+    Args:
+        box: of the person.
+        desk: how much of the box it takes, from below.
+        upper: and of the rows above it, by a screen on it at the right.
+        seen: of the body depth is known, the rest is dark.
+    """
+    rows, columns = np.mgrid[0:480, 0:640]
+    aside = (columns - (box.xmin + box.xmax) / 2) / (box.width / 2)
+    down = (rows - box.ymin) / box.height
+    known = np.random.default_rng(2).random(rows.shape) < seen
+    metres = np.where((np.abs(aside) < 0.45) & (down > 0) & known, 4.9 + 0.1 * aside**2, np.nan)
+    metres[(down > 1.0 - desk) | (aside > 1.0 - 2.0 * upper)] = 3.5
+    return Depth(metres.astype(np.float32), LENS)
+
+
+@pytest.mark.parametrize("seen", [1.0, 0.5])
+def test_a_desk_before_somebody_at_the_end_of_the_depth_cameras_range_is_not_them(seen: float) -> None:
+    """In a campaign: people in the flat's study were told to be at the desk before them, 1.1 and 1.3 m off."""
+    view = view_from()
+    box = box_of(view, 5.0, 0.0)
+    m = measure(box, view, far_behind_a_desk(box, 0.45, seen=seen)).measured
+    assert m is not None
+    assert m.source == "depth"
+    assert m.x == pytest.approx(5.0, abs=0.15)
+
+
+def test_legs_farther_off_are_of_one_whose_upper_part_is_as_far() -> None:
+    view = view_from()
+    box = box_of(view, 5.0, 0.0)
+    depth = far_behind_a_desk(box, 0.6, upper=0.11)
+    assert measure(box, view, depth).measured.x == pytest.approx(3.6, abs=0.1)  # nothing tells more
+    m = measure(box, view, depth, LEGS).measured
+    assert m is not None
+    assert m.source == "lidar"
+    assert m.x == pytest.approx(5.0, abs=0.15)
+    near = measure(box, view, far_behind_a_desk(box, 1.2), LEGS).measured  # somebody else's legs: all of it is nearer
+    assert near is not None
+    assert near.x == pytest.approx(3.6, abs=0.1)
+
+
+def test_a_table_leg_is_not_that_of_somebody_whom_depth_and_lidar_put_farther_off() -> None:
+    view = view_from()
+    box = replace(box_of(view, 3.6, 0.0), ymin=60)
+    rows, columns = np.mgrid[0:480, 0:640]
+    metres = np.full((480, 640), 4.9, np.float32)
+    metres[(columns < box.xmin + 0.1 * box.width) & (rows > box.ymin)] = 3.5
+    m = measure(box, view, Depth(metres, LENS), LEGS).measured
+    assert m is not None
+    assert m.x == pytest.approx(5.0, abs=0.15)
+    assert measure(box, view, Depth(metres, LENS)).measured.x == pytest.approx(3.6, abs=0.1)  # nothing tells more
