@@ -44,10 +44,7 @@ class Trainer:
         self.network.set_prior(0.01)
         self.mean = copy.deepcopy(self.network).eval()
         self.run_network = torch.compile(self.network) if options.compile else self.network
-        decayed = [p for p in self.network.parameters() if p.ndim > 1]
-        plain = [p for p in self.network.parameters() if p.ndim <= 1]
-        groups = [{"params": decayed, "weight_decay": 5e-3}, {"params": plain, "weight_decay": 0.0}]
-        self.optimiser = torch.optim.AdamW(groups, lr=options.rate)
+        self.optimiser = Optimiser(self.network, options.rate, muon=options.muon)
         self.steps_each = options.samples // options.batch
         self.total = self.steps_each * options.epochs
         pictures = Pictures.open(options.data, options.name)
@@ -105,8 +102,7 @@ class Trainer:
 
     def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
         share = _schedule(max(self.step / self.total, self._spent()), self.step, self.options.cool)
-        for group in self.optimiser.param_groups:
-            group["lr"] = self.options.rate * share
+        self.optimiser.set_rate(self.options.rate * share)
         inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
         inputs = inputs.contiguous(memory_format=torch.channels_last)
@@ -115,7 +111,7 @@ class Trainer:
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.options.bf16):
             values = [value.float() for value in self.run_network(inputs)]
         parts = yolo_loss(self.spec.heads, values, truth, self.spec.width)  # type: ignore[arg-type]
-        self.optimiser.zero_grad(set_to_none=True)
+        self.network.zero_grad(set_to_none=True)
         sum(parts.values()).backward()  # type: ignore[union-attr]
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 10.0)
         self.optimiser.step()
@@ -166,6 +162,58 @@ class Trainer:
             state = torch.load(file, map_location=self.device, weights_only=True)
             self.network.load_state_dict(state["mean"])
         self.mean.load_state_dict(self.network.state_dict())
+
+
+class Optimiser:
+    """AdamW for all numbers; or Muon for the inner convolutions and AdamW for the rest.
+
+    Muon ("Muon: An optimizer for hidden layers in neural networks", Jordan et al. 2024) as PyTorch has it, for
+    matrices only: a convolution is given to it as one, a row for each filter, that shares its numbers. The length of
+    its steps is that of AdamW's ("Muon is Scalable for LLM Training", Liu et al. 2025), so that one rate serves both.
+    """
+
+    def __init__(self, network: Darknet, rate: float, *, muon: bool) -> None:
+        convolutions = [m for m in network.modules() if isinstance(m, torch.nn.Conv2d)]
+        inner = [c.weight for c in convolutions if c.in_channels > 3 and c.bias is None] if muon else []
+        mine = {id(p) for p in inner}
+        decayed = [p for p in network.parameters() if p.ndim > 1 and id(p) not in mine]
+        plain = [p for p in network.parameters() if p.ndim <= 1]
+        groups = [{"params": decayed, "weight_decay": 5e-3}, {"params": plain, "weight_decay": 0.0}]
+        self._parts: list[torch.optim.Optimizer] = [torch.optim.AdamW(groups, lr=rate)]
+        self._pairs = [(p, torch.nn.Parameter(_as_matrix(p.data))) for p in inner]
+        if any(p.data_ptr() != matrix.data_ptr() for p, matrix in self._pairs):
+            raise RuntimeError("a convolution's numbers are not in one row after the other (channels last)")
+        if inner:
+            matrices = [matrix for _, matrix in self._pairs]
+            self._parts.append(torch.optim.Muon(matrices, lr=rate, weight_decay=5e-3, adjust_lr_fn="match_rms_adamw"))
+
+    def set_rate(self, rate: float) -> None:
+        """The learning rate from now on."""
+        for part in self._parts:
+            for group in part.param_groups:
+                group["lr"] = rate
+
+    def step(self) -> None:
+        """One step by the gradients that the network's parameters have."""
+        for p, matrix in self._pairs:
+            matrix.grad = None if p.grad is None else _as_matrix(p.grad)
+        for part in self._parts:
+            part.step()
+
+    def state_dict(self) -> list[dict]:
+        """Of each part."""
+        return [part.state_dict() for part in self._parts]
+
+    def load_state_dict(self, states: list[dict]) -> None:
+        """What `state_dict` gave."""
+        if len(states) != len(self._parts):
+            raise ValueError("the checkpoint is of another optimiser: give --muon as when it was begun")
+        for part, state in zip(self._parts, states, strict=True):
+            part.load_state_dict(state)
+
+
+def _as_matrix(weights: torch.Tensor) -> torch.Tensor:
+    return weights.permute(0, 2, 3, 1).reshape(len(weights), -1)
 
 
 def _schedule(done: float, step: int, cool: float) -> float:
@@ -248,6 +296,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--loaders", type=int, default=0, help="processes that make batches; 0: a thread")
     parser.add_argument("--bf16", action="store_true")
+    parser.add_argument("--muon", action="store_true", help="Muon instead of AdamW for the inner convolutions")
     parser.add_argument("--freeze", type=int, default=0, help="so many of the first layers keep their numbers")
     parser.add_argument("--pack", action="store_true", help="read all pictures once and keep them in memory as jpegs")
     parser.add_argument("--compile", action="store_true", help="compile the network first; needs a C++ compiler")
