@@ -14,7 +14,7 @@ from rosbot_patrol.detection.darknet_weights import format_weights, parse_weight
 from rosbot_patrol.detection.training.grow import grow  # noqa: E402
 from rosbot_patrol.detection.training.loss import Truth, yolo_loss  # noqa: E402
 from rosbot_patrol.detection.training.network import Darknet  # noqa: E402
-from rosbot_patrol.detection.training.train import _schedule  # noqa: E402
+from rosbot_patrol.detection.training.train import Optimiser, _schedule  # noqa: E402
 
 SPEC = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
 
@@ -152,3 +152,35 @@ def test_what_is_not_asked_for_costs_nothing_either_way() -> None:
     gradient = values[0].grad.view(3, 7, *head.in_shape[1:])[:, 4]
     assert float(gradient[:, 4, 5].abs().max()) == 0.0
     assert float(gradient[:, 0, 0].abs().max()) > 0.0
+
+
+def test_muon_moves_the_inner_convolutions_and_adamw_the_rest() -> None:
+    torch.manual_seed(0)
+    network = Darknet(parse_cfg(LARGE)).to(memory_format=torch.channels_last)
+    optimiser = Optimiser(network, 1e-3, muon=True)
+    before = {name: p.detach().clone() for name, p in network.named_parameters()}
+    sum(head.square().mean() for head in network(torch.rand(2, 3, 32, 64))).backward()
+    optimiser.set_rate(1e-2)
+    optimiser.step()
+    moved = {name: (p.detach() - before[name]) for name, p in network.named_parameters()}
+    assert all(bool(step.abs().max() > 0) for step in moved.values())
+    held = {tuple(matrix.shape) for part in optimiser.state_dict()[1:] for matrix in _buffers(part)}
+    inner = [
+        p for n, p in network.named_parameters() if p.ndim == 4 and p.shape[1] > 3 and f"{n[:-6]}bias" not in moved
+    ]
+    assert inner
+    assert held == {(len(p), p.numel() // len(p)) for p in inner}
+    for p, step in ((p, moved[name]) for name, p in network.named_parameters() if any(p is q for q in inner)):
+        turned = step.permute(0, 2, 3, 1).reshape(len(p), -1)
+        values = torch.linalg.svdvals(turned)  # as long in each direction: that is what Muon does
+        assert float(values.max() / values.min()) < 4
+
+
+def test_a_checkpoint_of_the_other_optimiser_is_refused() -> None:
+    network = Darknet(parse_cfg(LARGE)).to(memory_format=torch.channels_last)
+    with pytest.raises(ValueError, match="--muon"):
+        Optimiser(network, 1e-3, muon=True).load_state_dict(Optimiser(network, 1e-3, muon=False).state_dict())
+
+
+def _buffers(part: dict) -> list[torch.Tensor]:
+    return [state["momentum_buffer"] for state in part["state"].values()]
