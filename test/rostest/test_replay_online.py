@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ class Online:
     """
 
     def __init__(self, ros: Ros, bag: Path, folder: Path, *, heard: list[str], said: list[str]) -> None:
-        self.ros, self.bag, self.heard, self.out = ros, bag, heard, folder / "said.bag"
+        self.ros, self.bag, self.heard, self.said, self.out = ros, bag, heard, said, folder / "said.bag"
         self.recorder = self._start("rosbag", "record", "--quiet", "-O", str(self.out), *said)
 
     def _start(self, *command: str) -> Process:
@@ -48,8 +49,20 @@ class Online:
         self.ros.processes.append(process)
         return process
 
+    def _is_recorded(self) -> bool:
+        """Whether of each topic that is recorded a publisher has the recorder among its links (Slave API)."""
+        master: Any = ServerProxy(self.ros.env["ROS_MASTER_URI"])
+        links = set()
+        for publisher in {
+            name for topic, names in master.getSystemState("/test")[2][0] if topic in self.said for name in names
+        }:
+            node: Any = ServerProxy(master.lookupNode("/test", publisher)[2])
+            links |= {row[4] for row in node.getBusInfo("/test")[2] if row[1].startswith("/record_") and row[2] == "o"}
+        return links.issuperset(self.said)
+
     def play(self, *remaps: str, rate: float = 4.0, linger: float = 2.0) -> Bag:
-        """Play it, all who hear it being there; what was said, with the bag's clock."""
+        """Play it, all who hear it and the recorder being there; what was said, with the bag's clock."""
+        wait_for(self._is_recorded, 60.0, f"the recorder's link to {self.said}")
         arguments = ["--clock", "--hz", "200", "--quiet", "-r", str(rate), "--wait-for-subscribers"]
         play = self._start("rosbag", "play", str(self.bag), *arguments, "--topics", *self.heard, *remaps)
         with Bag(self.bag) as bag:
