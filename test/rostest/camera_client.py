@@ -80,13 +80,13 @@ class Client:
         self._listen("/diagnostics", DiagnosticArray, "health")
         if drawn:
             self._listen("/darknet_ros/detection_image", Image, "drawn")
-        self.wait(lambda: self.camera.get_num_connections() > 0, 10.0)
+        self.wait(lambda: self.camera.get_num_connections() > 0, 20.0)
         time.sleep(0.5)
 
     def _listen(self, topic, kind, name):
         subscriber = rospy.Subscriber(topic, kind, self.heard[name].append)
         if name in ("boxes", "count"):
-            self.wait(lambda: subscriber.get_num_connections() > 0, 10.0)
+            self.wait(lambda: subscriber.get_num_connections() > 0, 20.0)
 
     def wait(self, condition, seconds=5.0):
         until = time.monotonic() + seconds

@@ -159,7 +159,7 @@ class House:
     def send(self, room, move=True):
         from rosbot_patrol.msg import EspTrigger
 
-        wait_until(lambda: self.trigger.get_num_connections() > 0, 10, "the node's subscription")
+        wait_until(lambda: self.trigger.get_num_connections() > 0, 20, "the node's subscription")
         self.trigger.publish(EspTrigger(id=room, move=move))
 
     def wait_for_mission(self, count=1, seconds=60):

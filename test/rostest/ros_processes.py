@@ -37,7 +37,8 @@ class Process:
         self.popen = subprocess.Popen(
             command, env=env, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
-        threading.Thread(target=self._read, daemon=True).start()
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
 
     def _read(self):
         for line in self.popen.stdout:
@@ -45,6 +46,9 @@ class Process:
 
     @property
     def output(self):
+        """What it has said so far; all of it once it has ended, unless a child of its own holds the pipe."""
+        if self.popen.poll() is not None:
+            self.reader.join(0.5)
         return "\n".join(self.lines)
 
     def says(self, text, seconds=PATIENCE):

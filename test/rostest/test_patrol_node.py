@@ -30,7 +30,7 @@ def test_person_makes_one_mail_with_picture(house):
     last = house.wait_for_mission()
     assert last.last_verdict == "confirmed"
     assert house.phases() == ["idle", "driving", "looking", "returning", "idle"] or house.phases()[0] == "starting"
-    wait_until(lambda: any(a.delivered for a in house.alerts), 10, "the delivery")
+    wait_until(lambda: any(a.delivered for a in house.alerts), 20, "the delivery")
     assert [a.delivered for a in house.alerts] == [False, True]
     (mail,) = house.mails()
     assert mail["Subject"] == "rosbot patrol node"
@@ -44,7 +44,7 @@ def test_person_makes_one_mail_with_picture(house):
     assert Path(house.alerts[-1].location).exists()
     assert house.alerts[0].room_id == 2
     assert house.alerts[0].object_class == "person"
-    wait_until(lambda: house.verdicts, 10, "the verdict on /patrol/alerts")
+    wait_until(lambda: house.verdicts, 20, "the verdict on /patrol/alerts")
     assert [(a.kind, a.verdict) for a in (*house.alerts, *house.verdicts)] == [
         ("seen", "confirmed"),
         ("delivered", "confirmed"),
@@ -72,7 +72,7 @@ def test_empty_room_makes_none_and_the_turn_ends_with_zero(house):
     assert house.twists[-1] == 0.0
     turned = float(last.why.split("turned ")[1].split()[0])
     assert abs(turned - 360) <= 6
-    wait_until(lambda: house.verdicts, 10, "the verdict on /patrol/alerts")
+    wait_until(lambda: house.verdicts, 20, "the verdict on /patrol/alerts")
     kept = house.incident(house.verdicts[0].id)
     assert (kept.verdict, house.verdicts[0].verdict) == ("clear", "clear")
 
@@ -113,10 +113,10 @@ def test_triggers_of_a_mission_wait_in_order(house):
     house.start_move_base()
     house.start_patrol()
     house.send(1)
-    wait_until(lambda: house.states[-1].state == "driving", 10, "the drive")
+    wait_until(lambda: house.states[-1].state == "driving", 20, "the drive")
     for room in (3, 2, 3):
         house.send(room)
-    wait_until(lambda: list(house.states[-1].queue) == [3, 2], 5, "the queue")
+    wait_until(lambda: list(house.states[-1].queue) == [3, 2], 20, "the queue")
     house.wait_for_mission(3)
     rooms = [s.room_id for s in house.states if s.state == "driving"]
     assert [r for i, r in enumerate(rooms) if i == 0 or rooms[i - 1] != r] == [1, 3, 2]
@@ -128,7 +128,7 @@ def test_killed_in_mission_goes_on_after_respawn_with_one_mail(house):
     house.person = True
     house.send(2)
     wait_until(lambda: house.states[-1].state == "looking", 20, "the look")
-    wait_until(lambda: any(a.delivered for a in house.alerts), 10, "the delivery")
+    wait_until(lambda: any(a.delivered for a in house.alerts), 20, "the delivery")
     os.killpg(house.patrol.pid, signal.SIGKILL)
     house.patrol.wait()
     house.start_patrol(wait=False)
@@ -260,7 +260,7 @@ def test_the_mail_server_comes_back_and_gets_it_once(house):
         house.start_patrol(**mail)
         wait_until(lambda: server.mails, 20, "the mail")
         # the word on /patrol/alerts may be out before this subscriber is connected again: the log has it in any case
-        wait_until(lambda: "delivered by smtp" in house.log(house.patrol), 10, "the word about it")
+        wait_until(lambda: "delivered by smtp" in house.log(house.patrol), 20, "the word about it")
         time.sleep(1.0)
         assert len(server.mails) == 1
     assert not list((house.folder / "state" / "outbox").glob("*.notice"))
@@ -290,8 +290,8 @@ def test_two_programs_share_an_outbox_and_one_takes_over(house):
     wait_until(lambda: said.get(what, "").endswith("/sensor_watch delivers"), 20, "the other")
     note = Notice(id="from-here", wall=time.time(), kind="incident", subject="s", text="t")
     Outbox(house.folder / "state" / "outbox").put(note)
-    wait_until(lambda: len(house.mails()) == 2, 10, "the mail that another program put")
-    wait_until(lambda: "notice from-here delivered by maildir" in house.log(watch), 10, "the word about it")
+    wait_until(lambda: len(house.mails()) == 2, 20, "the mail that another program put")
+    wait_until(lambda: "notice from-here delivered by maildir" in house.log(watch), 20, "the word about it")
     assert said["sensor_watch: mail"].startswith("notices go to the Maildir")
 
 
@@ -334,7 +334,7 @@ def test_a_full_disk_is_said_the_patrol_goes_on_and_the_mail_comes_when_there_is
     assert house.mails() == []
     (inside / "filler").unlink()
     wait_until(lambda: house.mails(), 20, "the mail")
-    wait_until(lambda: errors[-1].endswith("delivers"), 10, "that all is well")
+    wait_until(lambda: errors[-1].endswith("delivers"), 20, "that all is well")
     assert len(house.mails()) == 1
 
 
@@ -355,8 +355,8 @@ def test_the_narrator_tells_and_ends_with_the_mission(house, person, verdict, st
         {"exit_after_mission": True, "expect_verdict": verdict, "summary_file": str(summary), "time_limit": 60},
     )
     house.start_patrol()
-    wait_until(lambda: "On guard." in house.log(narrator), 10, "the word")
-    wait_until(lambda: house.trigger.get_num_connections() > 1, 10, "the narrator's subscription")
+    wait_until(lambda: "On guard." in house.log(narrator), 20, "the word")
+    wait_until(lambda: house.trigger.get_num_connections() > 1, 20, "the narrator's subscription")
     house.person = person
     house.send(3)
     assert narrator.wait(60) == status
@@ -389,14 +389,14 @@ def test_the_file_of_sensors_says_which_room_an_id_calls_to_and_a_silent_sensor_
     house.start_patrol(sensors=str(house.folder / "sensors.yaml"))
     for unknown in (2, 4):
         house.send(unknown)
-    wait_until(lambda: "has no sensor with id 2" in house.log(house.patrol), 10, "the refusal")
-    wait_until(lambda: "enabled: false" in house.log(house.patrol), 10, "the other refusal")
+    wait_until(lambda: "has no sensor with id 2" in house.log(house.patrol), 20, "the refusal")
+    wait_until(lambda: "enabled: false" in house.log(house.patrol), 20, "the other refusal")
     house.send(9)
-    wait_until(lambda: house.states[-1].room_id == 2, 10, "the mission")
-    wait_until(lambda: events.get_num_connections() > 0, 10, "the subscription")
+    wait_until(lambda: house.states[-1].room_id == 2, 20, "the mission")
+    wait_until(lambda: events.get_num_connections() > 0, 20, "the subscription")
     events.publish(SensorEvent(kind="silent", active=True, room=5))
     events.publish(SensorEvent(kind="look", active=True, id=9, room=3, text="sensor 9 is silent"))
-    wait_until(lambda: list(house.states[-1].queue) == [3], 10, "the queue")
+    wait_until(lambda: list(house.states[-1].queue) == [3], 20, "the queue")
     house.wait_for_mission(1)
     events.unregister()
 

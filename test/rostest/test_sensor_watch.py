@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import free_port, wait_for
+from ros_processes import PATIENCE, free_port, wait_for
 
 from rosbot_patrol.rosserial.keys import add_key, new_key
 from rosbot_patrol.rosserial.poor_link import LinkQuality
@@ -112,7 +112,7 @@ def test_a_sensor_falls_silent_and_comes_back_all_the_way_to_the_mail(ros, tmp_p
     probe.expect(event("silent", 3, False))
     watch.mail('sensor 3 "Haustür" in room 5 (corridor hall) is well again')
     shown = ros.node("sensors")
-    assert shown.popen.wait(10.0) == 0
+    assert shown.popen.wait(PATIENCE) == 0
     line = r'^3 +5 corridor hall "Haustür" +ok +\d s ago +never +0 +127\.0\.0\.1:\d+ \(key\)$'
     assert re.search(line, shown.output, re.M), shown.output
     assert len(watch.mails()) == 2
@@ -227,11 +227,11 @@ def test_a_plain_publisher_is_watched_too_and_a_silent_one_asks_for_a_look(ros, 
 def test_a_bad_file_is_one_sentence(ros, tmp_path):
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 12}])
     watch.node.says("sensors[0]/room: there is no room 12: ")
-    assert watch.node.popen.wait(5.0) == 1
+    assert watch.node.popen.wait(PATIENCE) == 1
     assert "Traceback" not in watch.node.output
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 2}], motion_sensors=str(ROOT / "config" / "house_sensors.yaml"))
     watch.node.says("sensor 1 watches room 2, and room 1 in")
-    assert watch.node.popen.wait(5.0) == 1
+    assert watch.node.popen.wait(PATIENCE) == 1
 
 
 def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp_path):

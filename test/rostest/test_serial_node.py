@@ -13,7 +13,7 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 import contextlib
 
-from ros_processes import free_port, wait_for
+from ros_processes import PATIENCE, free_port, wait_for
 
 from rosbot_patrol.rosserial.packet import Parser, encode
 from rosbot_patrol.rosserial.tcp_client import EspClient
@@ -86,14 +86,14 @@ def test_taken_port_is_one_sentence_and_exit_1(ros):
     tcp_bridge(ros, port)
     second = ros.node("serial_node.py", "tcp", str(port), "__name:=esp_client2")
     second.says(f"TCP port {port} is already taken by another program")
-    assert second.popen.wait(5.0) == 1
+    assert second.popen.wait(PATIENCE) == 1
     assert "Traceback" not in second.output
 
 
 def test_wrong_argument_is_one_sentence(ros, tmp_path):
     node = ros.node("serial_node.py", "tcp", "many")
     node.says("argument 2: expected a TCP port, got 'many'")
-    assert node.popen.wait(5.0) == 1
+    assert node.popen.wait(PATIENCE) == 1
     node = ros.node("serial_node.py", "_port:=tcp", "_allow_publish:=['everything']", "__name:=misled")
     node.says("allow_publish: expected 'TOPIC PACKAGE/TYPE', got 'everything'")
     path = tmp_path / "keys.yaml"
@@ -101,7 +101,7 @@ def test_wrong_argument_is_one_sentence(ros, tmp_path):
     path.chmod(0o644)
     node = ros.node("serial_node.py", "_port:=tcp", f"_key_file:={path}", "__name:=open")
     node.says(f"/open/key_file: {path}: others can read it (mode 644); 'chmod 600 {path}'")
-    assert node.popen.wait(5.0) == 1
+    assert node.popen.wait(PATIENCE) == 1
 
 
 def test_strangers_get_nothing_through_and_the_sensor_does_not_notice(ros):

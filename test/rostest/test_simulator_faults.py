@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import free_port, wait_for
+from ros_processes import PATIENCE, free_port, wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 URDF, WORLD = f"_urdf:={ROOT}/urdf/rosbot.urdf", f"_world:={ROOT}/worlds/house.world"
@@ -275,7 +275,7 @@ def test_a_bad_scenario_is_one_sentence_and_the_end(ros, tmp_path, text, sentenc
     play.write_text(text)
     node = ros.node("simulator", URDF, WORLD, f"_scenario:={play}")
     node.says(sentence, 20.0)
-    assert node.popen.wait(5.0) == 1
+    assert node.popen.wait(PATIENCE) == 1
     assert "Traceback" not in node.output
 
 

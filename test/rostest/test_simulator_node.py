@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import free_port, wait_for
+from ros_processes import PATIENCE, free_port, wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 URDF, WORLD = f"_urdf:={ROOT}/urdf/rosbot.urdf", f"_world:={ROOT}/worlds/house.world"
@@ -125,7 +125,7 @@ def test_paused_time_stands_still_and_the_robot_comes_by_service(ros):
 def test_bad_input_is_one_sentence_and_the_end(ros, arguments, sentence):
     node = ros.node("simulator", *arguments)
     node.says(sentence, 20.0)
-    assert node.popen.wait(5.0) == 1
+    assert node.popen.wait(PATIENCE) == 1
     assert "Traceback" not in node.output
 
 

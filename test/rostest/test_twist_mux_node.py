@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, wait_for
+from ros_processes import PATIENCE, Process, wait_for
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "twist_mux.yaml"
 TWIST, BOOL = "geometry_msgs/Twist", "std_msgs/Bool"
@@ -87,7 +87,7 @@ def test_two_sources_of_one_priority_are_one_sentence(ros, base):
     )
     mux = ros.node("twist_mux")
     mux.says("topics/priority: 1 is given twice")
-    assert mux.popen.wait(5.0) == 1
+    assert mux.popen.wait(PATIENCE) == 1
 
 
 def test_teleop_without_a_terminal_waits(ros):
