@@ -17,7 +17,7 @@ from rospy.core import is_shutdown_requested
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import PatrolError
-from rosbot_patrol.ros import logs
+from rosbot_patrol.ros import greeting, logs
 from rosbot_patrol.ros.priority import Priority, take
 
 T = TypeVar("T")
@@ -37,6 +37,7 @@ def run_node(
         init_options: further arguments of `rospy.init_node`.
     """
     refused = take(priority)  # before there are other threads: they take after this one
+    greeting.install()
     rospy.init_node(name, **init_options)
     logs.install()
     if refused:
