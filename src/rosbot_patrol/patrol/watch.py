@@ -2,7 +2,8 @@
 
 A detector that is shown the same picture again and again (a dead camera behind darknet_ros) adds nothing: pictures
 count by their stamp. Pictures in which nothing was seen count against. Sure is what the median of the pictures'
-probabilities is, so that one lucky picture does not make up for doubtful ones. What the judge refuses (a pet, a poster,
+probabilities is, so that one lucky picture does not make up for doubtful ones. Half of a thing looks like half of a
+person: what shows only in boxes that the picture's side cuts has to be surer. What the judge refuses (a pet, a poster,
 one outside) counts as nothing seen. Where places are known, only boxes near each other make one person: two who are in
 view at once are confirmed each.
 """
@@ -30,6 +31,9 @@ class WatchParams:
     span: float = param(0.2, unit="s", lo=0.0, hi=10.0, doc="least time from the first of them to the last")
     max_age: float = param(10.0, unit="s", lo=0.1, doc="older pictures are forgotten")
     min_score: float = param(0.65, lo=0.0, hi=1.0, doc="least median of the probabilities")
+    cut_score: float = param(
+        0.8, lo=0.0, hi=1.0, doc="the same where every box ends at the picture's left or right edge, if it is more"
+    )
     min_height: int = param(16, unit="px", lo=1, doc="smaller boxes are not believed")
     min_aspect: float = param(0.15, lo=0.0, doc="least height / width of a box")
     max_aspect: float = param(8.0, lo=0.1, doc="greatest height / width of a box")
@@ -155,7 +159,8 @@ class Watch:
                 shown.append((max(same, key=_score), view))
         sure = statistics.median_low(box.probability for box, _ in shown)
         span = shown[-1][1].stamp - shown[0][1].stamp
-        if len(shown) < self.params.frames or span < self.params.span - 1e-6 or sure < self.params.min_score:
+        is_sure = sure >= self._least([box for box, _ in shown])
+        if len(shown) < self.params.frames or span < self.params.span - 1e-6 or not is_sure:
             return []
         best, view = max(shown, key=lambda pair: (pair[0].probability, pair[0].height))
         others = sorted((b for b in view.boxes if b is not best), key=lambda b: (b.label != best.label, -b.probability))
@@ -170,6 +175,11 @@ class Watch:
                 measured=measured,
             )
         ]
+
+    def _least(self, shown: list[Box]) -> float:
+        """The median that these have to have."""
+        is_cut = all(box.measured is not None and box.measured.is_cut_aside for box in shown)
+        return max(self.params.min_score, self.params.cut_score) if is_cut else self.params.min_score
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -170,6 +170,24 @@ def test_of_places_about_as_sure_the_newest_is_told(watch):
     assert found[0].measured.x == pytest.approx(1.4)
 
 
+@pytest.mark.parametrize(("probability", "is_one"), [(0.75, False), (0.85, True)])
+def test_what_the_side_of_the_picture_cuts_has_to_be_surer(watch, probability, is_one):
+    # half a potted plant at the picture's edge came as a person of 0.71
+    found = feed(watch, frames(*[[placed(1.0, 1.0, probability, is_cut_aside=True)]] * 5))
+    assert bool(found) == is_one
+
+
+def test_one_box_that_is_whole_lets_the_usual_score_do(watch):
+    cut = [placed(1.0, 1.0, 0.75, is_cut_aside=True)]
+    assert feed(watch, frames(cut, cut)) == []
+    assert len(feed(watch, frames([placed(1.0, 1.0, 0.75)], start=1.2))) == 1
+
+
+def test_a_score_for_what_is_cut_below_the_usual_one_changes_nothing():
+    watch = Watch(("person",), WatchParams(min_score=0.7, cut_score=0.5))
+    assert feed(watch, frames(*[[placed(1.0, 1.0, 0.65, is_cut_aside=True)]] * 5)) == []
+
+
 def test_what_the_judge_refuses_counts_as_nothing_seen_and_is_told():
     watch = Watch(("person",), judge=Judge(known=(Known(x=1.0, y=1.0, name="the coat stand"),)))
     watch.start(0.0)
