@@ -1,4 +1,4 @@
-"""The shards that `render.py` wrote, as batches: pictures in the network's letterbox and their boxes."""
+"""The shards that `render.py` wrote, as batches: pictures as the network gets them and their boxes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,10 @@ from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH, colu
 from rosbot_patrol.detection.training.mixing import View, disguise, mix, repaper, zoom
 from rosbot_patrol.detection.training.overlay import lay_patterns
 
-MARGIN = 8
 OVERLAY = 0.5
 FAINT = 5.0
 MIX, ZOOM = 0.5, 0.4
 JPEGS = ".jpegs"
-NET_HEIGHT = HEIGHT + 2 * MARGIN
 
 
 class Packed:
@@ -33,7 +31,7 @@ class Packed:
 
     @classmethod
     def of(cls, pictures: np.ndarray) -> Packed:
-        """Of pictures, RGB, uint8, shape (N, 240, 320, 3)."""
+        """Of pictures, RGB, uint8, shape (N, 288, 384, 3)."""
         return cls([_packed(picture) for picture in pictures])
 
     @classmethod
@@ -64,7 +62,12 @@ class Pictures:
 
     @classmethod
     def open(cls, folder: Path, name: str) -> Pictures:
-        """All finished shards of that name, or of several names with commas between them."""
+        """All finished shards of that name, or of several names with commas between them.
+
+        Raises:
+            FileNotFoundError: there are none.
+            ValueError: pictures of another size, drawn for a network before this one.
+        """
         files = [
             f
             for one in name.split(",")
@@ -76,6 +79,10 @@ class Pictures:
             raise FileNotFoundError(f"{folder} holds no pictures named {name}-*.npy; make them with render.py")
         packed = {f: Packed.load(f) for f in files if f.suffix == JPEGS}  # a shard that is listed twice is kept once
         shards = [packed[f] if f in packed else np.load(f, mmap_mode="r") for f in files]
+        for file, shard in zip(files, shards, strict=True):
+            if shard[0].shape != (HEIGHT, WIDTH, 3):
+                high, wide = shard[0].shape[:2]
+                raise ValueError(f"{file} holds pictures of {wide} x {high}, not {WIDTH} x {HEIGHT}: draw them anew")
         labels: list[list[np.ndarray]] = []
         masks: list[list[np.ndarray] | None] = []
         for file, shard in zip(files, shards, strict=True):
@@ -105,7 +112,7 @@ class Pictures:
         return np.array([(s, i) for s, shard in enumerate(self.shards) for i in range(len(shard))])
 
     def picture(self, shard: int, i: int) -> np.ndarray:
-        """RGB, uint8, shape (240, 320, 3)."""
+        """RGB, uint8, shape (288, 384, 3)."""
         return self.shards[shard][i]
 
     def view(self, shard: int, i: int) -> View | None:
@@ -117,7 +124,7 @@ class Pictures:
 
 
 def pack_masks(masks: np.ndarray) -> dict[str, np.ndarray]:
-    """Masks of a shard, shape (N, 240, 320), as arrays for its file: each a png.
+    """Masks of a shard, shape (N, 288, 384), as arrays for its file: each a png.
 
     A pixel's value is the actor's number (from 1, column `mask` of its row; a pet has a number and no row), or
     `FURNITURE` and more for what else stands there, 0 for nothing that is labelled.
@@ -135,7 +142,7 @@ def asked(rows: np.ndarray) -> np.ndarray:
 
 
 def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
-    """Pictures uint8 (B, 256, 320, 3) and rows (batch, kind, centre x, y, width, height [px], asked).
+    """Pictures uint8 (B, 288, 384, 3) and rows (batch, kind, centre x, y, width, height [px], asked).
 
     Args:
         pictures: the set.
@@ -143,7 +150,7 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
         rng: to mix with others of the set, to lay patterns over, to mirror and to shift colours by chance; None for
             none of it.
     """
-    images = np.full((len(chosen), NET_HEIGHT, WIDTH, 3), 127, np.uint8)
+    images = np.empty((len(chosen), HEIGHT, WIDTH, 3), np.uint8)
     boxes = []
     for b, (shard, i) in enumerate(chosen):
         view = pictures.view(shard, i) if rng is not None else None
@@ -156,13 +163,13 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
         if view is None and rng is not None and rng.random() < OVERLAY:
             corners = np.stack([x0 * WIDTH, y0 * HEIGHT, x1 * WIDTH, y1 * HEIGHT], axis=1)
             picture = lay_patterns(picture, corners, rng)
-        images[b, MARGIN:-MARGIN] = picture
+        images[b] = picture
         if rng is not None:
             if rng.random() < 0.5:
                 images[b] = images[b, :, ::-1]
                 x0, x1 = 1 - x1, 1 - x0
-            images[b, MARGIN:-MARGIN] = _recolour(images[b, MARGIN:-MARGIN], rng)
-        centre = [(x0 + x1) / 2 * WIDTH, (y0 + y1) / 2 * HEIGHT + MARGIN]
+            images[b] = _recolour(images[b], rng)
+        centre = [(x0 + x1) / 2 * WIDTH, (y0 + y1) / 2 * HEIGHT]
         size = [(x1 - x0) * WIDTH, (y1 - y0) * HEIGHT]
         boxes.append(np.stack([np.full(len(rows), b), column(rows, "kind"), *centre, *size, asked(rows)], axis=1))
     return images, np.concatenate(boxes).astype(np.float32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-WIDTH, HEIGHT = 320, 240
+WIDTH, HEIGHT = 384, 288
 COLUMNS = (
     "picture", "kind", "x0", "y0", "x1", "y1", "distance", "seen_of_whole", "seen_of_part", "pixels", "light", "test",
     "contrast", "mask",

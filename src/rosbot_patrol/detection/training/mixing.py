@@ -28,9 +28,9 @@ class View:
     """A picture, what is in it, and where.
 
     Attributes:
-        picture: RGB, uint8, shape (240, 320, 3).
+        picture: RGB, uint8, shape (288, 384, 3).
         rows: of labels (`labels.py`), shape (N, columns).
-        mask: uint8, shape (240, 320): 1 to 99 an actor, `FURNITURE` and more what else is labelled, 0 the rest.
+        mask: uint8, shape (288, 384): 1 to 99 an actor, `FURNITURE` and more what else is labelled, 0 the rest.
     """
 
     picture: np.ndarray
@@ -155,7 +155,7 @@ def _dyed(part: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _pixels(row: np.ndarray, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """The row's box in pixels, one more on each side: it was measured on a picture of twice the size."""
+    """The row's box in pixels, one more on each side: it was measured at 640 x 480."""
     x0, y0, x1, y1 = row[_BOX] * [shape[1], shape[0], shape[1], shape[0]]
     return max(int(x0) - 1, 0), max(int(y0) - 1, 0), min(int(x1) + 2, shape[1]), min(int(y1) + 2, shape[0])
 

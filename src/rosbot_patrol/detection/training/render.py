@@ -1,8 +1,8 @@
 """Write a set of labelled pictures as shards on disk: seeded, by several processes, going on where it was left.
 
 A shard NAME-0007.npz holds `boxes`, one row per visible actor (see `labels.py`), and what stands where in each picture
-(`masks`, see `dataset.py`), and NAME-0007.npy the pictures as the network gets them without its grey margins, uint8,
-shape (count, 240, 320, 3); with --jpeg NAME-0007.jpegs.
+(`masks`, see `dataset.py`), and NAME-0007.npy the pictures as the network gets them (a 640 x 480
+picture in its letterbox), uint8, shape (count, 288, 384, 3); with --jpeg NAME-0007.jpegs.
 """
 
 from __future__ import annotations
@@ -139,11 +139,12 @@ class Studio:
         for actor in actors:
             for body in (actor.body, *actor.extra):
                 self.renderer.remove(body.name)
-        return finished, [label for label in labels if label], seen[::2, ::2].copy()
+        mask = cv2.resize(seen, (WIDTH, HEIGHT), interpolation=cv2.INTER_NEAREST)
+        return finished, [label for label in labels if label], mask
 
 
 def degrade(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """What a camera, a turning robot and jpeg make of a picture, and the network's own reduction to 320 x 240."""
+    """What a camera, a turning robot and jpeg make of a picture, and the network's own reduction to 384 x 288."""
     out = picture
     if rng.random() < 0.7:
         gains = np.exp(rng.normal(0, 0.25)) * (1 + rng.normal(0, 0.05, 3))
@@ -173,7 +174,7 @@ def _noise(rng: np.random.Generator, level: float) -> np.ndarray:
 
 
 def reduce(picture: np.ndarray, *, exact: bool = True) -> np.ndarray:
-    """640 x 480 to 320 x 240, as darknet's letterbox does it, or by area."""
+    """640 x 480 to 384 x 288, as darknet's letterbox does it, or by area."""
     if not exact:
         return cv2.resize(picture, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
     x = np.linspace(0, picture.shape[1] - 1, WIDTH, dtype=np.float32)

@@ -19,7 +19,7 @@ from rosbot_patrol.detection.darknet_cfg import read_cfg
 from rosbot_patrol.detection.darknet_weights import read_weights
 from rosbot_patrol.detection.letterbox import Letterbox
 from rosbot_patrol.detection.network import load_network
-from rosbot_patrol.detection.training.dataset import MARGIN, Pictures, asked, batch_of
+from rosbot_patrol.detection.training.dataset import Pictures, asked, batch_of
 from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH, column
 from rosbot_patrol.detection.training.scoring import KINDS, Found, average_precision, figures, groups, match, say
 from rosbot_patrol.images.encodings import Picture
@@ -35,8 +35,7 @@ def load_forward(cfg: Path, weights: Path, *, threads: int = 2) -> Forward:
     place = Letterbox(WIDTH, HEIGHT, spec.width, spec.height)
 
     def forward(images: np.ndarray) -> list[np.ndarray]:
-        inner = np.ascontiguousarray(images[:, MARGIN:-MARGIN])
-        answers = [network.run(Picture(picture, "rgb8"), place) for picture in inner]
+        answers = [network.run(Picture(picture, "rgb8"), place) for picture in images]
         return [np.stack(values) for values in zip(*answers, strict=True)]
 
     return forward

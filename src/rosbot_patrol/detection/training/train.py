@@ -104,7 +104,6 @@ class Trainer:
         share = _schedule(max(self.step / self.total, self._spent()), self.step, self.options.cool)
         self.optimiser.set_rate(self.options.rate * share)
         inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
-        inputs[:, :, :8] = inputs[:, :, -8:] = 0.5
         inputs = inputs.contiguous(memory_format=torch.channels_last)
         boxes = torch.from_numpy(rows).to(self.device)
         truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0)

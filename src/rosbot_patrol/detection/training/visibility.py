@@ -32,12 +32,12 @@ def _corners(shape) -> np.ndarray:
     return mesh_of(shape).positions
 
 
-def contrast(picture: np.ndarray, mask: np.ndarray, *, reach: int = 9) -> float:
+def contrast(picture: np.ndarray, mask: np.ndarray, *, reach: int = 11) -> float:
     """By how much [levels] what lies inside of an outline differs from what lies beside it, at its clearer quarter.
 
     Args:
-        picture: RGB, uint8, shape (240, 320, 3).
-        mask: where the figure is seen, of twice the size.
+        picture: RGB, uint8, shape (288, 384, 3).
+        mask: where the figure is seen, at 640 x 480.
         reach: size [px] of the neighbourhoods that are compared.
     """
     small = cv2.resize(mask.astype(np.uint8), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)

@@ -33,7 +33,7 @@ def test_pictures_in_memory_are_those_on_disk(folder: Path) -> None:
         off = np.abs(memory.picture(shard, i).astype(int) - disk.picture(shard, i))
         assert off.mean() < 2.0
     _, rows = batch_of(memory, memory.index()[:2], None)
-    assert rows[0, 2:6].tolist() == [120.0, 188.0, 80.0, 120.0]
+    assert rows[0, 2:6].tolist() == [144.0, 216.0, 96.0, 144.0]
 
 
 def test_shards_of_jpegs_are_read_like_the_others(folder: Path) -> None:
@@ -58,7 +58,7 @@ def test_no_pictures_of_a_name(folder: Path) -> None:
 
 def test_pictures_with_masks_are_mixed_by_chance_and_as_they_are_without(folder: Path) -> None:
     masks = np.zeros((2, HEIGHT, WIDTH), np.uint8)
-    masks[:, 120:, 80:160] = 1
+    masks[:, 144:, 96:192] = 1
     for shard in range(2):
         file = folder / f"room-{shard:04d}.npz"
         rows = np.load(file)["boxes"]
@@ -71,7 +71,7 @@ def test_pictures_with_masks_are_mixed_by_chance_and_as_they_are_without(folder:
     assert (view.mask == masks[0]).all()
     assert (view.picture == pictures.pack().picture(1, 0)).all()
     plain, rows = batch_of(pictures, pictures.index(), None)
-    assert rows[:, 2:6].tolist() == [[120.0, 188.0, 80.0, 120.0]] * 4
+    assert rows[:, 2:6].tolist() == [[144.0, 216.0, 96.0, 144.0]] * 4
     counts = set()
     for seed in range(8):
         images, rows = batch_of(pictures, pictures.index(), np.random.default_rng(seed))

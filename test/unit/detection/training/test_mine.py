@@ -26,7 +26,7 @@ def test_misses_and_false_alarms_count_by_their_size() -> None:
 
 
 def test_what_is_picked_is_a_set_like_any_other(tmp_path: Path) -> None:
-    shots = np.stack([np.full((240, 320, 3), level, np.uint8) for level in (10, 90, 200)])
+    shots = np.stack([np.full((288, 384, 3), level, np.uint8) for level in (10, 90, 200)])
     np.save(tmp_path / "a-0000.npy", shots)
     np.savez(tmp_path / "a-0000.npz", boxes=np.array([label(0), label(2)], np.float32))
     mine.write_set(Pictures.open(tmp_path, "a"), np.array([[0, 1], [0, 2]]), tmp_path, "hard")

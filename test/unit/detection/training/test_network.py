@@ -23,11 +23,11 @@ def test_weights_go_out_and_in_again() -> None:
     torch.manual_seed(0)
     network, other = Darknet(SPEC), Darknet(SPEC)
     network.train()
-    network(torch.rand(4, 3, 256, 320))
+    network(torch.rand(4, 3, 288, 384))
     data = format_weights(SPEC, network.to_weights(), seen=5)
     assert len(data) == weights_size(SPEC) < 20_000_000
     other.from_weights(parse_weights(data, SPEC))
-    picture = torch.rand(1, 3, 256, 320)
+    picture = torch.rand(1, 3, 288, 384)
     with torch.inference_mode():
         pairs = zip(network.eval()(picture), other.eval()(picture), strict=True)
         assert all(torch.allclose(a, b, atol=1e-4) for a, b in pairs)
@@ -138,8 +138,8 @@ def test_the_loss_is_least_for_the_right_values_and_leads_there() -> None:
     from rosbot_patrol.detection.letterbox import Letterbox
 
     raw = [value.detach().numpy()[0] for value in values]
-    found = decode(SPEC.heads, raw, Letterbox(320, 256, 320, 256), threshold=0.3, iou_threshold=0.4)
-    assert np.allclose(found.boxes[0] * [320, 256, 320, 256], [100, 120, 60, 150], atol=4)
+    found = decode(SPEC.heads, raw, Letterbox(384, 288, 384, 288), threshold=0.3, iou_threshold=0.4)
+    assert np.allclose(found.boxes[0] * [384, 288, 384, 288], [100, 120, 60, 150], atol=4)
     assert found.probabilities[0].argmax() == 1
 
 

@@ -80,7 +80,7 @@ def test_a_pet_is_seen_and_is_nothing_to_be_found(studio: render.Studio, monkeyp
 def test_a_shard_repeats_with_its_seed(studio: render.Studio) -> None:
     pictures, rows, masks = studio.shard([7, 0], 3, test=False)
     again, rows_again, masks_again = studio.shard([7, 0], 3, test=False)
-    assert pictures.shape == (3, 240, 320, 3)
+    assert pictures.shape == (3, 288, 384, 3)
     assert np.array_equal(pictures, again)
     assert np.array_equal(rows, rows_again)
     assert np.array_equal(masks, masks_again)
@@ -91,14 +91,14 @@ def test_a_mask_shows_where_each_label_is(studio: render.Studio) -> None:
     assert len(rows) > 3
     for row in rows:
         y, x = np.nonzero(masks[int(row[0])] == column(row[None], "mask")[0])
-        seen = [x.min() / 320, y.min() / 240, (x.max() + 1) / 320, (y.max() + 1) / 240]
+        seen = [x.min() / 384, y.min() / 288, (x.max() + 1) / 384, (y.max() + 1) / 288]
         assert seen == pytest.approx(row[2:6], abs=0.0065)
 
 
 def test_reduction_is_darknet_s_letterbox() -> None:
     picture = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     picture = cv2.GaussianBlur(picture, (0, 0), 2)
-    exact = Letterbox(640, 480, 320, 256).draw(picture)[:, 8:-8].transpose(1, 2, 0) * 255
+    exact = Letterbox(640, 480, 384, 288).draw(picture).transpose(1, 2, 0) * 255
     assert np.abs(render.reduce(picture) - exact)[:-1].max() < 4.0  # darknet's last row comes out black
 
 
@@ -106,18 +106,18 @@ def test_degrading_keeps_size_and_kind() -> None:
     rng = np.random.default_rng(0)
     for _ in range(10):
         out = render.degrade(np.full((480, 640, 3), 128, np.uint8), rng)
-        assert out.shape == (240, 320, 3)
+        assert out.shape == (288, 384, 3)
         assert out.dtype == np.uint8
     assert render._noise(rng, 5.0).std() == pytest.approx(5.0, rel=0.1)
 
 
 def test_contrast_is_the_step_at_the_outline() -> None:
-    picture = np.full((240, 320, 3), 60, np.uint8)
+    picture = np.full((288, 384, 3), 60, np.uint8)
     mask = np.zeros((480, 640), bool)
     mask[100:300, 200:400] = True
-    picture[50:150, 100:200] = 100
+    picture[60:180, 120:240] = 100
     assert visibility.contrast(picture, mask) == pytest.approx(40, abs=4)
-    assert visibility.contrast(np.full((240, 320, 3), 60, np.uint8), mask) == pytest.approx(0, abs=0.1)
+    assert visibility.contrast(np.full((288, 384, 3), 60, np.uint8), mask) == pytest.approx(0, abs=0.1)
 
 
 def test_training_and_tests_have_other_textures() -> None:
@@ -130,9 +130,9 @@ def test_training_and_tests_have_other_textures() -> None:
 
 
 def test_patterns_are_laid_only_beside_people() -> None:
-    picture = np.random.default_rng(0).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+    picture = np.random.default_rng(0).integers(0, 255, (288, 384, 3), dtype=np.uint8)
     box = np.array([[100.0, 40.0, 180.0, 239.0]])
-    changed = np.zeros((240, 320), bool)
+    changed = np.zeros((288, 384), bool)
     for seed in range(30):
         out = overlay.lay_patterns(picture, box, np.random.default_rng(seed))
         changed |= (out != picture).any(axis=2)

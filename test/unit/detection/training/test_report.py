@@ -29,19 +29,18 @@ def row(
 @pytest.fixture
 def pictures(tmp_path: Path) -> Pictures:
     """Two pictures: a person on the left of the first, nothing in the second."""
-    shots = np.zeros((2, 240, 320, 3), np.uint8)
-    shots[0, 24:216, 64:128] = (10, 200, 30)
+    shots = np.zeros((2, 288, 384, 3), np.uint8)
+    shots[0, 29:259, 77:153] = (10, 200, 30)
     np.save(tmp_path / "set-0000.npy", shots)
     np.savez(tmp_path / "set-0000.npz", boxes=np.array([row()], np.float32))
     return Pictures.open(tmp_path, "set")
 
 
-def test_a_batch_lies_in_the_letterbox_with_its_boxes(pictures: Pictures) -> None:
+def test_a_batch_holds_pictures_and_their_boxes(pictures: Pictures) -> None:
     images, rows = batch_of(pictures, pictures.index(), None)
-    assert images.shape == (2, 256, 320, 3)
-    assert (images[:, :8] == 127).all()
-    assert rows.tolist() == [[0, 0, pytest.approx(96), pytest.approx(128), pytest.approx(64), pytest.approx(192), 1]]
-    assert (images[0, 32:224, 64:128] == (10, 200, 30)).all()
+    assert images.shape == (2, 288, 384, 3)
+    assert rows.tolist() == [[0, 0, *map(pytest.approx, (115.2, 144, 76.8, 230.4)), 1]]
+    assert (images[0, 29:259, 77:153] == (10, 200, 30)).all()
 
 
 def test_a_mirrored_picture_has_mirrored_boxes(pictures: Pictures) -> None:
@@ -53,8 +52,8 @@ def test_a_mirrored_picture_has_mirrored_boxes(pictures: Pictures) -> None:
         x, y = int(rows[0, 2]), int(rows[0, 3])
         seen.add(x)
         assert images[0, y, x].max() > 100
-        assert images[0, y, 320 - x].max() < 30
-    assert seen == {96, 224}
+        assert images[0, y, 384 - x].max() < 30
+    assert seen == {115, 268}
 
 
 def test_hardly_seen_people_are_not_asked_for() -> None:
@@ -75,7 +74,7 @@ def test_anchors_are_the_usual_sizes_and_go_into_the_cfg(tmp_path: Path) -> None
         for _ in range(50):
             rows.append(row(box=(0.1, 0.1, 0.1 + w * rng.uniform(0.95, 1.05), 0.1 + h * rng.uniform(0.95, 1.05))))
     anchors = find_anchors(Pictures([], [[np.array(rows)]]), 2, 1)
-    assert np.allclose(anchors, [[32, 48], [96, 192]], rtol=0.06)
+    assert np.allclose(anchors, [[38.4, 57.6], [115.2, 230.4]], rtol=0.06)
     cfg = tmp_path / "a.cfg"
     cfg.write_text("[yolo]\nanchors = 1,1, 2,2\nmask=0\n[yolo]\nanchors=1,1\n")
     write_anchors(cfg, np.array([[32.4, 48.0], [96.0, 192.0]]))
@@ -102,7 +101,7 @@ def forward_of(*boxes):
     return forward
 
 
-GOOD = (96 / 320, 128 / 256, 64 / 320, 192 / 256, 0)
+GOOD = (0.3, 0.5, 0.2, 0.8, 0)
 
 
 def test_a_found_person_counts_once(pictures: Pictures) -> None:
@@ -131,7 +130,7 @@ def test_a_person_taken_for_a_hydrant_is_false(pictures: Pictures) -> None:
 
 
 def test_a_second_box_on_somebody_is_false(pictures: Pictures) -> None:
-    low = (96 / 320, 0.65, 50 / 320, 80 / 256, 0)
+    low = (0.3, 0.66, 0.16, 0.33, 0)
     found = report.find_all(pictures, CFG, forward_of(GOOD, low))
     result = scoring.figures(found, 0.5)
     assert (result["person: boxes"], result["person: false"]) == (2, 1)
@@ -139,9 +138,9 @@ def test_a_second_box_on_somebody_is_false(pictures: Pictures) -> None:
     assert scoring.average_precision(found, 0) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("box", [GOOD, (96 / 320, 150 / 256, 50 / 320, 100 / 256, 0)])
+@pytest.mark.parametrize("box", [GOOD, (0.3, 0.59, 0.16, 0.42, 0)])
 def test_a_box_on_somebody_hardly_seen_is_left_out(tmp_path: Path, box) -> None:
-    np.save(tmp_path / "set-0000.npy", np.zeros((1, 240, 320, 3), np.uint8))
+    np.save(tmp_path / "set-0000.npy", np.zeros((1, 288, 384, 3), np.uint8))
     np.savez(tmp_path / "set-0000.npz", boxes=np.array([row(part=0.1)], np.float32))
     result = scoring.figures(report.find_all(Pictures.open(tmp_path, "set"), CFG, forward_of(box)), 0.5)
     assert result["persons 1-6 m, half of the figure seen: there"] == 0
@@ -149,9 +148,16 @@ def test_a_box_on_somebody_hardly_seen_is_left_out(tmp_path: Path, box) -> None:
 
 
 def test_a_set_without_contrast_is_taken_as_clear(tmp_path: Path) -> None:
-    np.save(tmp_path / "old-0000.npy", np.zeros((1, 240, 320, 3), np.uint8))
+    np.save(tmp_path / "old-0000.npy", np.zeros((1, 288, 384, 3), np.uint8))
     np.savez(tmp_path / "old-0000.npz", boxes=np.array([row()[:-1]], np.float32))
     assert asked(Pictures.open(tmp_path, "old").labels[0][0]).tolist() == [True]
+
+
+def test_pictures_of_another_size_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "old-0000.npy", np.zeros((1, 240, 320, 3), np.uint8))
+    np.savez(tmp_path / "old-0000.npz", boxes=np.array([row()], np.float32))
+    with pytest.raises(ValueError, match=r"old-0000.npy holds pictures of 320 x 240, not 384 x 288"):
+        Pictures.open(tmp_path, "old")
 
 
 def test_the_interval_is_wilson_s() -> None:
