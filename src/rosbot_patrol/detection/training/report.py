@@ -21,7 +21,17 @@ from rosbot_patrol.detection.letterbox import Letterbox
 from rosbot_patrol.detection.network import load_network
 from rosbot_patrol.detection.training.dataset import Pictures, asked, batch_of
 from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH, column
-from rosbot_patrol.detection.training.scoring import KINDS, Found, average_precision, figures, groups, match, say
+from rosbot_patrol.detection.training.scoring import (
+    AIMED,
+    KINDS,
+    Found,
+    average_precision,
+    figures,
+    groups,
+    match,
+    say,
+    say_found_at,
+)
 from rosbot_patrol.images.encodings import Picture
 
 FLOOR = 0.02
@@ -66,7 +76,7 @@ def find_all(pictures: Pictures, cfg: Path, forward: Forward, *, batch: int = 16
 def draw_worst(pictures: Pictures, found: Found, threshold: float, target: Path, *, count: int = 10) -> None:
     """A picture of the worst misses (upper rows) and false alarms (lower rows)."""
     labels = found.labels
-    wanted = groups(found)["persons 1-6 m, half of the figure seen"]
+    wanted = groups(found)[AIMED]
     missed = np.flatnonzero(wanted & (found.hit <= threshold))
     missed = missed[np.argsort(-column(labels, "pixels")[missed])][:count]
     false = found.boxes[found.false(0) | found.false(1)]
@@ -153,6 +163,7 @@ def main() -> None:
         sys.stdout.write(say(results[-1]) + "\n")
     precisions = {f"average precision, {k}": average_precision(found, i) for i, k in enumerate(KINDS)}
     sys.stdout.write("".join(f"{k}: {v:.4f}\n" for k, v in precisions.items()))
+    sys.stdout.write(say_found_at(found) + "\n")
     if options.json:
         options.json.write_text(json.dumps({"thresholds": results, **precisions}, indent=1))
     if options.sheets:

@@ -18,6 +18,7 @@ from rosbot_patrol.detection.training.dataset import asked
 from rosbot_patrol.detection.training.labels import column
 
 KINDS = ("person", "fire hydrant")
+AIMED = "persons 1-6 m, half of the figure seen"
 HIT = 0.5
 INSIDE = 0.5
 
@@ -94,6 +95,28 @@ def average_precision(found: Found, kind: int) -> float:
     return float(np.sum(np.diff(np.concatenate([[0], recall])) * precision))
 
 
+def found_at(found: Found, precision: float) -> tuple[float, int, int]:
+    """What is found of the persons that are aimed at, where the threshold is as low as that precision allows.
+
+    Args:
+        found: what a network found in a set.
+        precision: least share of right boxes among all boxes of persons.
+
+    Returns:
+        The threshold (1 where none is high enough), how many are found with it or more, how many there are.
+    """
+    good = found.good(0)
+    counts = good | found.false(0)
+    order = np.argsort(-found.boxes[counts, 2], kind="stable")
+    scores = found.boxes[counts, 2][order]
+    right = np.cumsum(good[counts][order]) / np.arange(1, len(order) + 1)
+    last = np.append(scores[1:] < scores[:-1], True)  # of boxes that are as sure, all count or none
+    enough = np.flatnonzero((right >= precision) & last)
+    threshold = float(scores[enough[-1]]) if len(enough) else 1.0
+    aimed = groups(found)[AIMED]
+    return threshold, int((found.hit[aimed] >= threshold).sum()), int(aimed.sum())
+
+
 def groups(found: Found) -> dict[str, np.ndarray]:
     """The sets of labels whose recall is told, the one that is aimed at first."""
     rows = found.labels
@@ -104,7 +127,7 @@ def groups(found: Found) -> dict[str, np.ndarray]:
     aimed = person & near & (whole >= 0.5)
     edge = (column(rows, "x0") < 0.01) | (column(rows, "x1") > 0.99)
     sets = {
-        "persons 1-6 m, half of the figure seen": aimed,
+        AIMED: aimed,
         "persons 1-6 m, half of what is inside the picture seen": person & near & (part >= 0.5),
         "fire hydrants 1-6 m, half seen": ~person & near & (part >= 0.5),
     }
@@ -160,6 +183,15 @@ def say(result: dict[str, float]) -> str:
             share = _share(value - result[stem + ": false"], value)
             alone = result[stem + ": false where there is none"]
             lines.append(f"  precision, {stem}: {share} ({alone:.0f} false with none there)")
+    return "\n".join(lines)
+
+
+def say_found_at(found: Found, precisions: tuple[float, ...] = (0.95, 0.99, 0.995)) -> str:
+    """How many of the persons that are aimed at are found at those precisions, as lines of text."""
+    lines = []
+    for precision in precisions:
+        threshold, hits, there = found_at(found, precision)
+        lines.append(f"{AIMED}, at a precision of {precision:.1%} (threshold {threshold:.3f}): {_share(hits, there)}")
     return "\n".join(lines)
 
 

@@ -147,6 +147,22 @@ def test_a_box_on_somebody_hardly_seen_is_left_out(tmp_path: Path, box) -> None:
     assert result["person: boxes"] == 0
 
 
+def test_what_is_found_at_a_precision() -> None:
+    # four sure boxes right, one false, two more right, one false: six of the eight persons
+    rows = np.array([row(picture=i) for i in range(8)], np.float32)
+    boxes = np.zeros((8, 9))
+    boxes[:, 2] = 0.95, 0.9, 0.85, 0.8, 0.7, 0.6, 0.5, 0.4
+    boxes[:, 7] = 0, 1, 2, 3, -1, 4, 5, -1
+    hit = np.array([0.95, 0.9, 0.85, 0.8, 0.6, 0.5, 0, 0])
+    found = scoring.Found(boxes, rows, hit, np.zeros((8, 2), int))
+    assert scoring.found_at(found, 1.0) == (0.8, 4, 8)
+    assert scoring.found_at(found, 0.85) == (0.5, 6, 8)
+    assert scoring.found_at(found, 0.7) == (0.4, 6, 8)
+    boxes[:, 2] = 0.9  # as sure as the false ones: there is no threshold between them
+    assert scoring.found_at(found, 0.8) == (1.0, 0, 8)
+    assert "precision of 99.5% (threshold 1.000): 0/8 = 0.00 %" in scoring.say_found_at(found)
+
+
 def test_a_set_without_contrast_is_taken_as_clear(tmp_path: Path) -> None:
     np.save(tmp_path / "old-0000.npy", np.zeros((1, 288, 384, 3), np.uint8))
     np.savez(tmp_path / "old-0000.npz", boxes=np.array([row()[:-1]], np.float32))
