@@ -1,8 +1,8 @@
 """Write a set of labelled pictures as shards on disk: seeded, by several processes, going on where it was left.
 
 A shard NAME-0007.npz holds `boxes`, one row per visible actor (see `labels.py`), and what stands where in each picture
-(`masks`, see `dataset.py`), and NAME-0007.npy the pictures as the network gets them (a 640 x 480
-picture in its letterbox), uint8, shape (count, 288, 384, 3); with --jpeg NAME-0007.jpegs.
+(`masks`, see `dataset.py`), and NAME-0007.npy the pictures as the network gets them (a 640 x 480 picture in
+its letterbox), uint8, shape (count, 288, 384, 3); with --jpeg NAME-0007.jpegs.
 """
 
 from __future__ import annotations
