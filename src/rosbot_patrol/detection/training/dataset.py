@@ -49,7 +49,7 @@ class Packed:
         return len(self._files)
 
     def __getitem__(self, i: int) -> np.ndarray:
-        return cv2.imdecode(self._files[i], cv2.IMREAD_COLOR)[..., ::-1]
+        return cv2.cvtColor(cv2.imdecode(self._files[i], cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
 
 
 @dataclass
@@ -166,7 +166,7 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
         images[b] = picture
         if rng is not None:
             if rng.random() < 0.5:
-                images[b] = images[b, :, ::-1]
+                images[b] = cv2.flip(images[b], 1)
                 x0, x1 = 1 - x1, 1 - x0
             images[b] = _recolour(images[b], rng)
         centre = [(x0 + x1) / 2 * WIDTH, (y0 + y1) / 2 * HEIGHT]
@@ -197,5 +197,6 @@ def _recolour(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     levels = np.arange(256, dtype=np.float32)
     gains = np.exp(rng.normal(0, 0.15)) * (1 + rng.normal(0, 0.06, 3))
     tables = [np.clip(levels * gain + rng.normal(0, 4), 0, 255).astype(np.uint8) for gain in gains]
-    order = rng.permutation(3) if rng.random() < 0.1 else np.arange(3)
-    return np.stack([tables[c][picture[..., order[c]]] for c in range(3)], axis=-1)
+    if rng.random() < 0.1:
+        picture = picture[..., rng.permutation(3)].copy()
+    return cv2.LUT(picture, np.stack(tables, axis=-1)[None])

@@ -41,7 +41,7 @@ class View:
         """Left and right changed."""
         rows = self.rows.copy()
         rows[:, _BOX[0]], rows[:, _BOX[2]] = 1 - self.rows[:, _BOX[2]], 1 - self.rows[:, _BOX[0]]
-        return View(self.picture[:, ::-1], rows, self.mask[:, ::-1])
+        return View(cv2.flip(self.picture, 1), rows, cv2.flip(self.mask, 1))
 
 
 def mix(view: View, donor: View, rng: np.random.Generator, *, furniture: float = 0.3) -> View:
@@ -55,7 +55,9 @@ def mix(view: View, donor: View, rng: np.random.Generator, *, furniture: float =
     """
     if rng.random() < 0.5:
         donor = donor.mirrored()
-    kinds, counts = np.unique(donor.mask, return_counts=True)
+    counts = np.bincount(donor.mask.ravel(), minlength=256)
+    kinds = np.flatnonzero(counts)
+    counts = counts[kinds]
     share = np.where(kinds >= FURNITURE, furniture, 0.85)
     share[(kinds == 0) | (counts > LARGEST * donor.mask.size)] = 0.0
     chosen = np.zeros(256, bool)
@@ -73,7 +75,7 @@ def mix(view: View, donor: View, rng: np.random.Generator, *, furniture: float =
         levels = np.clip(np.arange(256) * np.exp(rng.normal(0, 0.25)), 0, 255).astype(np.uint8)
         before = cv2.LUT(np.ascontiguousarray(before), levels)
     picture = view.picture.copy()
-    picture[:, into] = _laid(picture[:, into], before, there[:, into], soft=bool(rng.random() < 0.6))
+    _lay(picture[:, into], before, there[:, into], soft=bool(rng.random() < 0.6))
     mask = np.where(there, 0, view.mask)
     rows = _seen(view.rows, view.mask, mask)
     used = int(column(rows, "mask").max(initial=0)) + 1
@@ -125,11 +127,16 @@ def zoom(view: View, rng: np.random.Generator, *, most: float = 0.25) -> View:
     return View(picture, _cut(view.rows, view.mask, mask, scale=sx * sy), mask)
 
 
-def _laid(under: np.ndarray, over: np.ndarray, where: np.ndarray, *, soft: bool) -> np.ndarray:
+def _lay(under: np.ndarray, over: np.ndarray, where: np.ndarray, *, soft: bool) -> None:
+    """Put one picture over another where it is to be, in place; `soft` with edges as a camera has them."""
+    columns, lines = np.flatnonzero(where.any(axis=0)), np.flatnonzero(where.any(axis=1))
+    part = slice(max(lines[0] - 1, 0), lines[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2)
     if not soft:
-        return np.where(where[:, :, None], over, under)
-    share = cv2.blur(where.astype(np.uint8) * 255, (3, 3))[:, :, None].astype(np.uint16)
-    return ((over * share + under * (255 - share)) // 255).astype(np.uint8)
+        np.copyto(under[part], over[part], where=where[part][:, :, None])
+        return
+    share = cv2.merge([cv2.blur(where[part].astype(np.uint8) * 255, (3, 3))] * 3)
+    above = cv2.multiply(over[part], share, scale=1 / 255.0)
+    under[part] = cv2.add(above, cv2.multiply(under[part], cv2.bitwise_not(share), scale=1 / 255.0))
 
 
 def _dyed(part: np.ndarray, rng: np.random.Generator) -> np.ndarray:
