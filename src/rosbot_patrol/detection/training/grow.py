@@ -9,16 +9,13 @@ zeros where that copies, and the zero scale of "Accurate, Large Minibatch SGD", 
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
 import torch
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
 from rosbot_patrol.detection.darknet_layers import Convolutional, Layer, NetworkSpec, Route, Shortcut
-from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights, read_weights
+from rosbot_patrol.detection.darknet_weights import ConvWeights
 from rosbot_patrol.detection.training.network import Darknet
+from rosbot_patrol.detection.training.shrink import change_weights_file
 
 Map = np.ndarray
 
@@ -88,15 +85,7 @@ def _embed(mine: ConvWeights, theirs: ConvWeights, source: Map) -> None:
 
 def main() -> None:
     """Grow a weights file from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    for name in ("old_cfg", "old_weights", "new_cfg", "new_weights"):
-        parser.add_argument(name, type=Path)
-    parser.add_argument("--pairs", required=True, help="NEW:OLD of each convolution that is taken over, with commas")
-    options = parser.parse_args()
-    pairs = {int(a): int(b) for a, b in (pair.split(":") for pair in options.pairs.split(","))}
-    old, new = read_cfg(str(options.old_cfg)), read_cfg(str(options.new_cfg))
-    network = grow(old, read_weights(str(options.old_weights), old), new, pairs)
-    options.new_weights.write_bytes(format_weights(new, network.to_weights()))
+    change_weights_file(__doc__, lambda *of: grow(*of).to_weights())
 
 
 if __name__ == "__main__":

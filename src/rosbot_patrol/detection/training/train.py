@@ -43,6 +43,10 @@ class Trainer:
         self.network = Darknet(self.spec).to(self.device, memory_format=torch.channels_last)
         self.network.set_prior(0.01)
         self.mean = copy.deepcopy(self.network).eval()
+        self._mean_values, self._values = (
+            [value for value in part.state_dict().values() if value.dtype.is_floating_point]
+            for part in (self.mean, self.network)
+        )
         self.run_network = torch.compile(self.network) if options.compile else self.network
         self.optimiser = Optimiser(self.network, options.rate, muon=options.muon)
         self.steps_each = options.samples // options.batch
@@ -121,11 +125,7 @@ class Trainer:
     def _average(self) -> None:
         keep = min(0.998, (1 + self.step) / (20 + self.step))
         with torch.no_grad():
-            for mine, now in zip(self.mean.state_dict().values(), self.network.state_dict().values(), strict=True):
-                if mine.dtype.is_floating_point:
-                    mine.lerp_(now, 1 - keep)
-                else:
-                    mine.copy_(now)
+            torch._foreach_lerp_(self._mean_values, self._values, 1 - keep)
 
     def _save(self) -> None:
         state = {
