@@ -3,9 +3,9 @@
 A detector that is shown the same picture again and again (a dead camera behind darknet_ros) adds nothing: pictures
 count by their stamp. Pictures in which nothing was seen count against. Sure is what the median of the pictures'
 probabilities is, so that one lucky picture does not make up for doubtful ones. Half of a thing looks like half of a
-person: what shows only in boxes that the picture's side cuts has to be surer. What the judge refuses (a pet, a poster,
-one outside) counts as nothing seen. Where places are known, only boxes near each other make one person: two who are in
-view at once are confirmed each.
+person: what shows only in boxes that the picture's side cuts has to be surer; and so has what is no person. What the
+judge refuses (a pet, a poster, one outside) counts as nothing seen. Where places are known, only boxes near each other
+make one person: two who are in view at once are confirmed each.
 """
 
 from __future__ import annotations
@@ -33,6 +33,9 @@ class WatchParams:
     min_score: float = param(0.65, lo=0.0, hi=1.0, doc="least median of the probabilities")
     cut_score: float = param(
         0.8, lo=0.0, hi=1.0, doc="the same where every box ends at the picture's left or right edge, if it is more"
+    )
+    thing_score: float = param(
+        0.8, lo=0.0, hi=1.0, doc="the same for a class that is no person, whose size tells little, if it is more"
     )
     min_height: int = param(16, unit="px", lo=1, doc="smaller boxes are not believed")
     min_aspect: float = param(0.15, lo=0.0, doc="least height / width of a box")
@@ -178,8 +181,10 @@ class Watch:
 
     def _least(self, shown: list[Box]) -> float:
         """The median that these have to have."""
-        is_cut = all(box.measured is not None and box.measured.is_cut_aside for box in shown)
-        return max(self.params.min_score, self.params.cut_score) if is_cut else self.params.min_score
+        least = self.params.min_score
+        if all(box.measured is not None and box.measured.is_cut_aside for box in shown):
+            least = max(least, self.params.cut_score)
+        return least if shown[0].label == "person" else max(least, self.params.thing_score)
 
 
 @dataclass(frozen=True, kw_only=True)

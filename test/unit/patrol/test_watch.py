@@ -188,6 +188,12 @@ def test_a_score_for_what_is_cut_below_the_usual_one_changes_nothing():
     assert feed(watch, frames(*[[placed(1.0, 1.0, 0.65, is_cut_aside=True)]] * 5)) == []
 
 
+@pytest.mark.parametrize(("probability", "is_one"), [(0.75, False), (0.85, True)])
+def test_what_is_no_person_has_to_be_surer(watch, probability, is_one):
+    # a waste bin behind the leg of a table, two rooms away, came as a hydrant of 0.66
+    assert bool(feed(watch, frames(*[[box("fire hydrant", probability)]] * 5))) == is_one
+
+
 def test_what_the_judge_refuses_counts_as_nothing_seen_and_is_told():
     watch = Watch(("person",), judge=Judge(known=(Known(x=1.0, y=1.0, name="the coat stand"),)))
     watch.start(0.0)
