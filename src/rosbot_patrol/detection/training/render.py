@@ -34,6 +34,7 @@ from rosbot_patrol.simulation.world import World, load_world
 PER_SHARD = 500
 VIEWS = 5
 SHAPELESS = 0.3
+FINDABLE = ("person", "fire_hydrant")
 _FORWARD = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])
 
 
@@ -69,6 +70,7 @@ class Studio:
         plain: bool = False,
         pets: float = 0.0,
         hard: float = 0.0,
+        cases: float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`count` pictures, the rows of their labels, and masks; a share is taken in the house, if there is one.
 
@@ -80,6 +82,7 @@ class Studio:
             plain: leave the house's colours, light and furniture as they are.
             pets: share of the pictures with cats or dogs.
             hard: share of what is hard to tell (`scenes.draw_actors`).
+            cases: share of the views that are the cases in which networks err most (the same).
         """
         rng = np.random.default_rng(seed)
         self.furnish(np.random.default_rng([*seed, 1]))
@@ -94,10 +97,10 @@ class Studio:
                 is_thing = body.kind == "furniture" or body.name.startswith("thing")
                 self.renderer.add(body, label=next(things) if is_thing else 0)
             for _ in range(VIEWS):
-                camera = scenes.draw_camera(scene, rng)
+                camera = scenes.draw_camera(scene, rng, open_view=cases > 0)
                 if camera is None or len(pictures) == count:
                     break
-                picture, labels, mask = self._view(scene, camera, rng, test, pets, hard)
+                picture, labels, mask = self._view(scene, camera, rng, test, pets, hard, cases)
                 rows += [[len(pictures), *label] for label in labels]
                 pictures.append(picture)
                 masks.append(mask)
@@ -116,9 +119,11 @@ class Studio:
         test: bool,
         pets: float = 0.0,
         hard: float = 0.0,
+        cases: float = 0.0,
     ):
         assert self.renderer is not None
-        actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets, hard=hard)
+        options = {"pets": pets, "hard": hard, "cases": cases, "shapeless": self.shapeless}
+        actors = scenes.draw_actors(scene, camera, rng, reserved=test, **options)
         for i, actor in enumerate(actors):
             self.renderer.add(actor.body, label=i + 1)
             self.renderer.move(actor.body.name, actor.pose)
@@ -134,7 +139,7 @@ class Studio:
         labels = [
             _label(actor, seen, i + 1, optical, intrinsics, camera, picture, test, finished)
             for i, actor in enumerate(actors)
-            if actor.body.kind != "pet"
+            if actor.body.kind in FINDABLE
         ]
         for actor in actors:
             for body in (actor.body, *actor.extra):
@@ -239,6 +244,7 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
         plain=options.plain,
         pets=options.pets,
         hard=options.hard,
+        cases=options.cases,
     )
     np.savez(target.with_suffix(".npz"), boxes=boxes, **pack_masks(masks))
     part = target.with_suffix(".part" + target.suffix)
@@ -265,6 +271,7 @@ def main() -> None:
     parser.add_argument("--plain", action="store_true", help="leave the house as it is")
     parser.add_argument("--pets", type=float, default=0.0, help="share of the pictures with cats or dogs")
     parser.add_argument("--hard", type=float, default=0.0, help="share of people behind things, of pets nearby")
+    parser.add_argument("--cases", type=float, default=0.0, help="share that is a case of scenes.CASES")
     parser.add_argument("--jpeg", action="store_true", help="keep the pictures as jpegs, a seventh as large")
     parser.add_argument("--set", choices=SETS, help="draw these pictures of the tests, which test_set.py lays down")
     parser.add_argument("--processes", type=int, default=2)
@@ -274,7 +281,7 @@ def main() -> None:
         chosen = SETS[options.set]
         options.name, options.pictures, options.seed = options.set, chosen.pictures, chosen.seed
         options.house, options.house_share, options.pets, options.plain = WORLD, chosen.house_share, chosen.pets, False
-        options.hard, options.jpeg = 0.0, False
+        options.hard, options.cases, options.jpeg = 0.0, 0.0, False
     options.folder.mkdir(parents=True, exist_ok=True)
     shards = -(-options.pictures // PER_SHARD)
     jobs = [(options, i) for i in range(shards)]

@@ -8,6 +8,7 @@ from rosbot_patrol.detection.letterbox import Letterbox
 from rosbot_patrol.detection.training import overlay, patterns, render, visibility
 from rosbot_patrol.detection.training.furniture import box, build, placed
 from rosbot_patrol.detection.training.labels import COLUMNS, column
+from rosbot_patrol.detection.training.mixing import FURNITURE
 from rosbot_patrol.detection.training.scenes import Actor, Scene
 from rosbot_patrol.simulation.actors import person_body, person_pose_parts
 from rosbot_patrol.simulation.looks import Look
@@ -75,6 +76,15 @@ def test_a_pet_is_seen_and_is_nothing_to_be_found(studio: render.Studio, monkeyp
         seen[there] = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), False, 1.0)
     assert seen[True][1] == []
     assert (seen[True][0] != seen[False][0]).any()
+
+
+def test_of_a_case_only_people_and_hydrants_are_labelled(studio: render.Studio) -> None:
+    _, rows, masks = studio.shard([9, 0], 40, test=False, cases=1.0)
+    assert set(column(rows, "kind")) == {0, 1}
+    labelled = {(row[0], column(row[None], "mask")[0]) for row in rows}
+    actors = {(n, value) for n, mask in enumerate(masks) for value in np.unique(mask) if 0 < value < FURNITURE}
+    assert labelled <= actors
+    assert len(actors - labelled) > 5, "things and pets that were put there are in the mask, with no label"
 
 
 def test_a_shard_repeats_with_its_seed(studio: render.Studio) -> None:
