@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training import scenes
+from rosbot_patrol.detection.training.cases import draw_case
 from rosbot_patrol.detection.training.dataset import JPEGS, Packed, pack_masks
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 from rosbot_patrol.detection.training.mixing import FURNITURE
@@ -82,7 +83,7 @@ class Studio:
             plain: leave the house's colours, light and furniture as they are.
             pets: share of the pictures with cats or dogs.
             hard: share of what is hard to tell (`scenes.draw_actors`).
-            cases: share of the views that are the cases in which networks err most (the same).
+            cases: share of the views that are the cases in which networks err most (`cases.CASES`).
         """
         rng = np.random.default_rng(seed)
         self.furnish(np.random.default_rng([*seed, 1]))
@@ -122,8 +123,10 @@ class Studio:
         cases: float = 0.0,
     ):
         assert self.renderer is not None
-        options = {"pets": pets, "hard": hard, "cases": cases, "shapeless": self.shapeless}
-        actors = scenes.draw_actors(scene, camera, rng, reserved=test, **options)
+        if cases and rng.random() < cases:
+            actors = draw_case(scene, camera, rng, reserved=test, shapeless=self.shapeless)
+        else:
+            actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets, hard=hard)
         for i, actor in enumerate(actors):
             self.renderer.add(actor.body, label=i + 1)
             self.renderer.move(actor.body.name, actor.pose)
@@ -271,7 +274,7 @@ def main() -> None:
     parser.add_argument("--plain", action="store_true", help="leave the house as it is")
     parser.add_argument("--pets", type=float, default=0.0, help="share of the pictures with cats or dogs")
     parser.add_argument("--hard", type=float, default=0.0, help="share of people behind things, of pets nearby")
-    parser.add_argument("--cases", type=float, default=0.0, help="share that is a case of scenes.CASES")
+    parser.add_argument("--cases", type=float, default=0.0, help="share that is a case of cases.CASES")
     parser.add_argument("--jpeg", action="store_true", help="keep the pictures as jpegs, a seventh as large")
     parser.add_argument("--set", choices=SETS, help="draw these pictures of the tests, which test_set.py lays down")
     parser.add_argument("--processes", type=int, default=2)

@@ -31,7 +31,6 @@ Rng = np.random.Generator
 FLOORS = ("wood", "tiles", "carpet", "marble", "plaster", "checks", "")
 WALLS = ("plaster", "plaster", "", "bricks", "stripes", "tiles", "wood", "marble", "checks")
 POSTERS = 8
-CASES = {"pair": 0.22, "legs": 0.22, "screen": 0.24, "decoys": 0.17, "far": 0.07, "hydrants": 0.08}
 
 
 @dataclass
@@ -135,7 +134,7 @@ def draw_camera(scene: Scene, rng: Rng, *, open_view: bool = False) -> tuple[flo
         if scene.is_free(x, y, 0.3):
             yaws = [float(rng.uniform(-np.pi, np.pi)) for _ in range(6)]
             if open_view:
-                return x, y, max(yaws, key=lambda yaw: _reach(scene, x, y, yaw) * rng.uniform(0.5, 1.0))
+                return x, y, max(yaws, key=lambda yaw: reach(scene, x, y, yaw) * rng.uniform(0.5, 1.0))
             return x, y, max(yaws, key=lambda yaw: _view(scene, x, y, yaw)) if rng.random() < 0.65 else yaws[0]
     return None
 
@@ -148,8 +147,6 @@ def draw_actors(
     reserved: bool = False,
     pets: float = 0.0,
     hard: float = 0.0,
-    cases: float = 0.0,
-    shapeless: float = 0.0,
 ) -> list[Actor]:
     """People and hydrants before a camera, where there is room for them; often none at all.
 
@@ -160,27 +157,20 @@ def draw_actors(
         reserved: draw people that training never sees.
         pets: share of the views with a cat or a dog, or two, as well; they come last and are nothing to be found.
         hard: that share of people stands behind furniture, sits or crouches, and of pets right before the camera.
-        cases: share of the views that are one of `CASES` instead, in which networks err most: two people one before the
-            other, legs right before the camera, somebody behind a thing or a pet, things one before the other and
-            nobody, people far off, hydrants partly hidden. Their things come along as actors that are nothing to find.
-        shapeless: of those things (`furniture.draw_thing`).
     """
-    if cases and rng.random() < cases:
-        case = str(rng.choice(list(CASES), p=list(CASES.values())))
-        return max((_draw_case(case, scene, camera, rng, reserved, shapeless) for _ in range(4)), key=len)
     people = int(rng.choice([0, 1, 2, 3, 4], p=[0.30, 0.47, 0.14, 0.06, 0.03]))
     hydrants = int(rng.choice([0, 1, 2], p=[0.76, 0.20, 0.04]))
     actors: list[Actor] = []
     for i in range(people + hydrants):
         is_hard = bool(hard) and i < people and bool(rng.random() < hard)
-        spot = _hidden_spot(scene, camera, rng) if is_hard else _spot(scene, camera, rng)
+        spot = _hidden_spot(scene, camera, rng) if is_hard else find_spot(scene, camera, rng)
         if spot is None:
             continue
         pose = placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi)))
         if i < people:
             actors.append(draw_person(rng, f"actor{i}", pose, reserved, low=is_hard))
         else:
-            actors.append(_draw_hydrant(rng, f"actor{i}", pose, reserved))
+            actors.append(draw_hydrant(rng, f"actor{i}", pose, reserved))
         if not (i < people and rng.random() < 0.25):
             scene_margin = Place(spot[0], spot[1], 0.15, 0.15, 0.0)
             scene.places.append(scene_margin)
@@ -189,63 +179,8 @@ def draw_actors(
             scene.places.pop()
     if pets and rng.random() < pets:
         near = 2.5 if hard and rng.random() < hard else 0.0
-        spots = [_spot(scene, camera, rng, most=near) for _ in range(int(rng.integers(1, 3)))]
-        actors += [_draw_pet(rng, f"pet{i}", spot) for i, spot in enumerate(spots) if spot is not None]
-    return actors
-
-
-def _draw_case(
-    case: str, scene: Scene, camera: tuple[float, float, float], rng: Rng, reserved: bool, shapeless: float
-) -> list[Actor]:
-    actors: list[Actor] = []
-    first, view = len(scene.places), _reach(scene, *camera)
-
-    def away(least: float, most: float) -> float:
-        return float(rng.uniform(least, max(least, min(most, view - 0.5))))
-
-    def put(kind: str, spot: tuple[float, float] | None) -> None:
-        if spot is None:
-            return
-        name, pose = f"actor{len(actors)}", placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi)))
-        if kind == "any":
-            kind = str(rng.choice(["thing", "pet", "hydrant"], p=[0.55, 0.3, 0.15]))
-        if kind == "person":
-            actors.append(draw_person(rng, name, pose, reserved, low=bool(rng.random() < 0.5)))
-        elif kind == "hydrant":
-            actors.append(_draw_hydrant(rng, name, pose, reserved))
-        elif kind == "pet":
-            actors.append(_draw_pet(rng, name, spot))
-        else:
-            actors.append(Actor(draw_thing(rng, name, pose, shapeless=shapeless), pose, None, []))
-        scene.places.append(Place(*spot, 0.1, 0.1, 0.0))
-
-    def row(kinds: list[str], distance: float, behind: tuple[float, float], aside: float) -> None:
-        """One behind the other, each at most `aside` [m] out of line."""
-        bearing = float(rng.uniform(-0.5, 0.5))
-        for kind in kinds:
-            turn = float(rng.uniform(-aside, aside)) / distance
-            put(kind, _place(scene, camera, distance, bearing + turn))
-            distance += float(rng.uniform(*behind))
-
-    if case == "pair":
-        row(["person"] * (2 if rng.random() < 0.8 else 3), away(0.9, 4.5), (0.4, 1.8), 0.35)
-    elif case == "legs":
-        for _ in range(1 if rng.random() < 0.75 else 2):
-            put("person", _place(scene, camera, away(0.6, 1.4), float(rng.uniform(-0.75, 0.75))))
-        if rng.random() < 0.5:
-            put("person" if rng.random() < 0.3 else "any", _spot(scene, camera, rng, most=4.0))
-    elif case == "screen":
-        screens = ["any"] * (1 if rng.random() < 0.7 else 2)
-        row([*screens, "person"], away(0.6, 4.5), (0.35, 1.2), 0.3)
-    elif case == "decoys":
-        row(["any"] * int(rng.integers(2, 5)), away(0.6, 4.0), (0.3, 1.2), 0.35)
-    elif case == "far":
-        for _ in range(int(rng.integers(1, 4))):
-            put("person", _place(scene, camera, away(min(4.5, 0.7 * view), 8.5), float(rng.uniform(-0.5, 0.5))))
-    else:
-        screen = str(rng.choice(["hydrant", "pet", "thing", "person"]))
-        row([screen, "hydrant"], away(0.6, 4.0), (0.3, 1.0), 0.25)
-    del scene.places[first:]
+        spots = [find_spot(scene, camera, rng, most=near) for _ in range(int(rng.integers(1, 3)))]
+        actors += [draw_animal(rng, f"pet{i}", spot) for i, spot in enumerate(spots) if spot is not None]
     return actors
 
 
@@ -296,7 +231,8 @@ def _named(rng: Rng) -> Look:
     return plain[int(rng.integers(len(plain)))]
 
 
-def _draw_hydrant(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
+def draw_hydrant(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
+    """A fire hydrant by chance, red or yellow more often than not."""
     red = (float(rng.uniform(0.5, 0.95)), float(rng.uniform(0.03, 0.2)), float(rng.uniform(0.02, 0.15)))
     yellow = (float(rng.uniform(0.7, 1.0)), float(rng.uniform(0.55, 0.8)), float(rng.uniform(0.02, 0.2)))
     colour = red if rng.random() < 0.6 else yellow if rng.random() < 0.6 else any_colour(rng)
@@ -304,7 +240,8 @@ def _draw_hydrant(rng: Rng, name: str, pose: Matrix, reserved: bool) -> Actor:
     return Actor(hydrant_body(name, colour, caps=caps, height=float(rng.uniform(0.6, 0.95))), pose, None, [])
 
 
-def _draw_pet(rng: Rng, name: str, spot: tuple[float, float]) -> Actor:
+def draw_animal(rng: Rng, name: str, spot: tuple[float, float]) -> Actor:
+    """A cat or a dog by chance, at a spot [m] on the floor; nothing to be found."""
     look = draw_pet(str(rng.choice(sorted(PETS))), rng)
     if rng.random() < 0.4:
         look = replace(look, fur=wood_colour(rng), height=look.height * float(rng.uniform(0.8, 1.25)))
@@ -326,15 +263,16 @@ def _hidden_spot(scene: Scene, camera: tuple[float, float, float], rng: Rng) -> 
         for behind in np.arange(0.25, 1.6, 0.15):
             px, py = x + (away + behind) * np.cos(bearing), y + (away + behind) * np.sin(bearing)
             if x0 < px < x1 and y0 < py < y1 and scene.is_free(px, py, 0.22):
-                if _sees(scene, (x, y), (px, py)):
+                if sees(scene, (x, y), (px, py)):
                     return float(px), float(py)
                 break
-    return _spot(scene, camera, rng)
+    return find_spot(scene, camera, rng)
 
 
-def _spot(
+def find_spot(
     scene: Scene, camera: tuple[float, float, float], rng: Rng, *, most: float = 0.0
 ) -> tuple[float, float] | None:
+    """A free spot [m] before a camera, hardly ever behind a wall, or None; `most`: no farther than that [m]."""
     x, y, yaw = camera
     near = float(np.exp(rng.uniform(np.log(0.7), np.log(8.5))))
     distance = near if rng.random() < 0.35 else float(rng.uniform(1.2, 8.5))
@@ -347,24 +285,12 @@ def _spot(
         px, py = x + distance * np.cos(bearing), y + distance * np.sin(bearing)
         x0, x1, y0, y1 = scene.extent
         inside = x0 < px < x1 and y0 < py < y1
-        if inside and scene.is_free(px, py, 0.22) and (rng.random() < 0.05 or _sees(scene, (x, y), (px, py))):
+        if inside and scene.is_free(px, py, 0.22) and (rng.random() < 0.05 or sees(scene, (x, y), (px, py))):
             return float(px), float(py)
     return None
 
 
-def _place(
-    scene: Scene, camera: tuple[float, float, float], distance: float, bearing: float
-) -> tuple[float, float] | None:
-    """The spot at that distance and bearing [rad] before a camera, if it is free and no wall hides it."""
-    x, y, yaw = camera
-    px, py = x + distance * np.cos(yaw + bearing), y + distance * np.sin(yaw + bearing)
-    x0, x1, y0, y1 = scene.extent
-    if x0 < px < x1 and y0 < py < y1 and scene.is_free(px, py, 0.2) and _sees(scene, (x, y), (px, py)):
-        return float(px), float(py)
-    return None
-
-
-def _reach(scene: Scene, x: float, y: float, yaw: float) -> float:
+def reach(scene: Scene, x: float, y: float, yaw: float) -> float:
     """How far that way is free, up to 9 m."""
     ways = np.arange(0.4, 9.0, 0.15)[:, None]
     px, py, hx, hy, turn = np.array([(p.x, p.y, p.half_x, p.half_y, p.yaw) for p in scene.places]).reshape(-1, 5).T
@@ -382,7 +308,7 @@ def _view(scene: Scene, x: float, y: float, yaw: float) -> float:
     return 9.0
 
 
-def _sees(scene: Scene, start: tuple[float, float], end: tuple[float, float]) -> bool:
+def sees(scene: Scene, start: tuple[float, float], end: tuple[float, float]) -> bool:
     """Whether no wall stands between two points."""
     ways = np.linspace(0.05, 0.95, 24)
     points = np.array(start) + ways[:, None] * (np.array(end) - np.array(start))
