@@ -22,12 +22,7 @@ CASES = {"pair": 0.22, "legs": 0.22, "screen": 0.24, "decoys": 0.17, "far": 0.07
 
 
 def draw_case(
-    scene: Scene,
-    camera: tuple[float, float, float],
-    rng: Rng,
-    *,
-    reserved: bool = False,
-    shapeless: float = 0.0,
+    scene: Scene, camera: tuple[float, float, float], rng: Rng, reserved: bool = False, shapeless: float = 0.0
 ) -> list[Actor]:
     """One of `CASES`, by its share: two people one before the other, legs right before the camera, somebody behind a
     thing or a pet, things one before the other and nobody, people far off, hydrants partly hidden.
