@@ -1,4 +1,4 @@
-"""Views in which a network errs most, drawn on purpose: who and what is put before a camera, one before the other."""
+"""Views in which a network errs most, drawn on purpose: where the camera is, who and what is put before it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rosbot_patrol.detection.training.scenes import (
     Rng,
     Scene,
     draw_animal,
+    draw_camera,
     draw_hydrant,
     draw_person,
     find_spot,
@@ -18,16 +19,50 @@ from rosbot_patrol.detection.training.scenes import (
     sees,
 )
 
-CASES = {"pair": 0.22, "legs": 0.22, "screen": 0.24, "decoys": 0.17, "far": 0.07, "hydrants": 0.08}
+CASES = {"pair": 0.17, "legs": 0.17, "screen": 0.19, "decoys": 0.14, "far": 0.06, "hydrants": 0.07, "edge": 0.20}
+HALF_VIEW = float(np.arctan2(320, 554.3827))  # [rad], from the middle of the picture to its left or right edge
+
+
+def pick_case(rng: Rng) -> str:
+    """One of `CASES`, by its share."""
+    return str(rng.choice(list(CASES), p=list(CASES.values())))
+
+
+def case_camera(case: str, scene: Scene, rng: Rng) -> tuple[float, float, float] | None:
+    """x, y, yaw of a camera for that case, or None where there is no room for one.
+
+    For "edge" one of which the left or right edge cuts a thing that stands there, more often than not a narrow one:
+    of a plant its crown is left, of a chair its back.
+    """
+    if case == "edge":
+        things = [p for p in scene.places if 0.1 < max(p.half_x, p.half_y) < 0.6]
+        narrow = [p for p in things if max(p.half_x, p.half_y) < 0.3]
+        if narrow and rng.random() < 0.7:
+            things = narrow
+        x0, x1, y0, y1 = scene.extent
+        for _ in range(40 if things else 0):
+            thing = things[int(rng.integers(len(things)))]
+            away, bearing = float(rng.uniform(0.7, 4.0)), float(rng.uniform(-np.pi, np.pi))
+            x, y = thing.x - away * float(np.cos(bearing)), thing.y - away * float(np.sin(bearing))
+            if x0 < x < x1 and y0 < y < y1 and scene.is_free(x, y, 0.3) and sees(scene, (x, y), (thing.x, thing.y)):
+                half = max(thing.half_x, thing.half_y)
+                return x, y, bearing + _to_edge(rng, half / away)
+    return draw_camera(scene, rng, open_view=True)
 
 
 def draw_case(
-    scene: Scene, camera: tuple[float, float, float], rng: Rng, reserved: bool = False, shapeless: float = 0.0
+    case: str,
+    scene: Scene,
+    camera: tuple[float, float, float],
+    rng: Rng,
+    reserved: bool = False,
+    shapeless: float = 0.0,
 ) -> list[Actor]:
-    """One of `CASES`, by its share: two people one before the other, legs right before the camera, somebody behind a
-    thing or a pet, things one before the other and nobody, people far off, hydrants partly hidden.
+    """One of `CASES`: two people one before the other, legs right before the camera, somebody behind a thing or a pet,
+    things one before the other and nobody, people far off, hydrants partly hidden, things cut by the picture's edge.
 
     Args:
+        case: its name.
         scene: where; what stands in the way is kept clear of.
         camera: x, y, yaw.
         rng: chance.
@@ -36,9 +71,15 @@ def draw_case(
 
     Returns:
         Who and what is there, of four attempts the one that found room for most; things and pets are nothing to find.
+        Of the case "edge" the first: often nobody is to be there.
     """
-    case = str(rng.choice(list(CASES), p=list(CASES.values())))
-    return max((_draw(case, scene, camera, rng, reserved, shapeless) for _ in range(4)), key=len)
+    attempts = range(1 if case == "edge" else 4)
+    return max((_draw(case, scene, camera, rng, reserved, shapeless) for _ in attempts), key=len)
+
+
+def _to_edge(rng: Rng, half: float) -> float:
+    """The bearing of the left or the right edge of the picture, give or take `half` [rad]."""
+    return float(rng.choice([-1.0, 1.0])) * (HALF_VIEW + float(rng.uniform(-half, half)))
 
 
 def _draw(
@@ -89,6 +130,13 @@ def _draw(
     elif case == "far":
         for _ in range(int(rng.integers(1, 4))):
             put("person", _place(scene, camera, away(min(4.5, 0.7 * view), 8.5), float(rng.uniform(-0.5, 0.5))))
+    elif case == "edge":
+        for kind, share in (("thing", 0.35), ("person", 0.3), ("any", 0.1)):
+            if rng.random() < share:
+                distance = float(rng.uniform(0.7, 3.0))
+                put(kind, _place(scene, camera, distance, _to_edge(rng, 0.25 / distance)))
+        if rng.random() < 0.2:
+            put("person", find_spot(scene, camera, rng))
     else:
         screen = str(rng.choice(["hydrant", "pet", "thing", "person"]))
         row([screen, "hydrant"], away(0.6, 4.0), (0.3, 1.0), 0.25)

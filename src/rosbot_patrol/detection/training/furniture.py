@@ -342,16 +342,32 @@ def dressed(rng: Rng) -> list[Piece]:
     return pieces
 
 
+def topiary(rng: Rng) -> list[Piece]:
+    """A plant grown as one smooth crown on a bare stem, in a wide pot."""
+    pot, stem = float(rng.uniform(0.15, 0.45)), float(rng.uniform(0.05, 0.8))
+    wide, high = float(rng.uniform(0.15, 0.4)), float(rng.uniform(0.15, 0.4))
+    foot, rim = (float(v) for v in rng.uniform(0.1, 0.25, 2))
+    level = float(rng.uniform(0.15, 0.7))
+    green = (level * float(rng.uniform(0.1, 0.8)), level, level * float(rng.uniform(0.1, 0.7)))
+    clay = (0.62, 0.34, 0.22) if rng.random() < 0.4 else any_colour(rng)
+    crown = ellipsoid(wide, wide, wide if rng.random() < 0.6 else high)
+    return [
+        (loft([(pot, rim, rim, 0), (0, foot, foot, 0)]), (0, 0, 0), clay, ""),
+        (tube(float(rng.uniform(0.01, 0.04)), pot + stem), (0, 0, (pot + stem) / 2), wood_colour(rng), ""),
+        (crown, (0, 0, pot + stem + 0.7 * high), green, "" if rng.random() < 0.7 else "leaves"),
+    ]
+
+
 MAKERS: tuple[Callable[[Rng], list[Piece]], ...] = (
     table, chair, chair, sofa, bed, cupboard, cupboard, shelf, floor_lamp, floor_lamp, coat_stand, coat_stand,
     coat_stand, plant, plant, post, post, post, poles, poles, boxes, boxes, curtain, ball, robot, pet, machine,
 )  # fmt: skip
 
 
-SHAPELESS = (turned, turned, junk, dressed)
+SHAPELESS = (turned, turned, junk, dressed, topiary)
 
 
 def draw_thing(rng: Rng, name: str, pose: Matrix, *, shapeless: float = 0.0) -> Body:
-    """A thing by chance at that place; with a chance of `shapeless` one that has no name."""
+    """A thing by chance at that place; with a chance of `shapeless` one of `SHAPELESS`, most of which have no name."""
     makers = SHAPELESS if shapeless and rng.random() < shapeless else MAKERS
     return build(name, makers[int(rng.integers(len(makers)))](rng), pose)

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training import scenes
-from rosbot_patrol.detection.training.cases import draw_case
+from rosbot_patrol.detection.training.cases import case_camera, draw_case, pick_case
 from rosbot_patrol.detection.training.dataset import JPEGS, Packed, pack_masks
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 from rosbot_patrol.detection.training.mixing import FURNITURE
@@ -98,10 +98,11 @@ class Studio:
                 is_thing = body.kind == "furniture" or body.name.startswith("thing")
                 self.renderer.add(body, label=next(things) if is_thing else 0)
             for _ in range(VIEWS):
-                camera = scenes.draw_camera(scene, rng, open_view=cases > 0)
+                case = pick_case(rng) if cases and rng.random() < cases else ""
+                camera = case_camera(case, scene, rng) if case else scenes.draw_camera(scene, rng)
                 if camera is None or len(pictures) == count:
                     break
-                picture, labels, mask = self._view(scene, camera, rng, test, pets, hard, cases)
+                picture, labels, mask = self._view(scene, camera, rng, test, pets, hard, case)
                 rows += [[len(pictures), *label] for label in labels]
                 pictures.append(picture)
                 masks.append(mask)
@@ -120,11 +121,11 @@ class Studio:
         test: bool,
         pets: float = 0.0,
         hard: float = 0.0,
-        cases: float = 0.0,
+        case: str = "",
     ):
         assert self.renderer is not None
-        if cases and rng.random() < cases:
-            actors = draw_case(scene, camera, rng, reserved=test, shapeless=self.shapeless)
+        if case:
+            actors = draw_case(case, scene, camera, rng, reserved=test, shapeless=self.shapeless)
         else:
             actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets, hard=hard)
         for i, actor in enumerate(actors):
