@@ -4,7 +4,8 @@ Somebody half hidden behind furniture is seen for long, but never surely: the wa
 a row, lets them pass. Here boxes are gathered by the place of what they show. Something with a person's face from one
 side only (a coat on a stand, a shadow) is doubtful, and worth a look from elsewhere; something that is taken for a
 person from two sides, at one place, is confirmed. Each side's pictures count as one witness, however many there are:
-pictures from one place err alike.
+pictures from one place err alike. Half of a thing looks like half of a person: a side that shows it only in boxes that the
+picture's side cuts leaves it doubtful, unless they are sure.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ class SuspectParams:
     grave_pictures: int = param(
         20, lo=1, hi=_PICTURES, doc="from one side, with that median, and without a second look the room is not clear"
     )
+    cut_score: float = param(
+        0.8, lo=0.0, hi=1.0, doc="`weak_score` of a side all of whose boxes the picture's side cuts, if it is more"
+    )
     weak_sides: int = param(2, lo=1, hi=10, doc="sides from which it has to look like a person")
     side_angle: float = param(0.6, unit="rad", lo=0.05, hi=3.1, doc="seen from so far aside is another side")
     weak_error: float = param(0.6, unit="m", lo=0.05, doc="what is not known better than that has no place")
@@ -51,10 +55,12 @@ class Side:
         bearing: from the thing to where it was first seen from, in map [rad].
         scores: probabilities of the last pictures.
         eye: the camera at the last of them.
+        is_cut: the picture's left or right edge cut the thing in all of them.
     """
 
     bearing: float
     eye: Pose2D
+    is_cut: bool = True
     scores: deque[float] = field(default_factory=lambda: deque(maxlen=_PICTURES))
 
     @property
@@ -131,10 +137,11 @@ class Suspects:
                 continue
             suspect = self._take(box, m, stamp, boxes)
             suspect.seen_at = stamp
-            self._side(suspect, eye).scores.append(box.probability)
-            witnesses = self._witnesses(suspect)
-            suspect.is_grave = bool(witnesses) or any(self._lasts(side) for side in suspect.sides)
-            if not suspect.is_told and len(witnesses) >= self.params.weak_sides:
+            side = self._side(suspect, eye)
+            side.scores.append(box.probability)
+            side.is_cut &= m.is_cut_aside
+            suspect.is_grave = any(self._is_weak(side) or self._lasts(side) for side in suspect.sides)
+            if not suspect.is_told and len(self._witnesses(suspect)) >= self.params.weak_sides:
                 suspect.is_told = True
                 found.append(self._confirmation(suspect))
         return tuple(found)
@@ -174,8 +181,11 @@ class Suspects:
         return nearest
 
     def _witnesses(self, suspect: Suspect) -> list[Side]:
-        p = self.params
-        return [s for s in suspect.sides if len(s.scores) >= p.weak_pictures and s.score >= p.weak_score]
+        least = self.params.cut_score
+        return [s for s in suspect.sides if self._is_weak(s) and (not s.is_cut or s.score >= least)]
+
+    def _is_weak(self, side: Side) -> bool:
+        return len(side.scores) >= self.params.weak_pictures and side.score >= self.params.weak_score
 
     def _lasts(self, side: Side) -> bool:
         return len(side.scores) >= self.params.grave_pictures and side.score >= self.params.grave_score

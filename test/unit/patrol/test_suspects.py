@@ -11,8 +11,8 @@ from rosbot_patrol.patrol.suspects import SuspectParams, Suspects
 WEST, SOUTH, SOUTH_WEST = Pose2D(-3.0, 0.0, 0.0), Pose2D(0.0, -3.0, 1.57), Pose2D(-3.0, -1.0, 0.3)
 
 
-def box(x: float = 0.0, y: float = 0.0, score: float = 0.6, error: float = 0.2) -> Box:
-    measured = Measured(x=x, y=y, error=error, away=3.0, top=1.0, height=0.7, width=0.5)
+def box(x: float = 0.0, y: float = 0.0, score: float = 0.6, error: float = 0.2, cut: bool = False) -> Box:
+    measured = Measured(x=x, y=y, error=error, away=3.0, top=1.0, height=0.7, width=0.5, is_cut_aside=cut)
     return Box(label="person", probability=score, xmin=100, ymin=50, xmax=200, ymax=250, measured=measured)
 
 
@@ -55,6 +55,17 @@ def test_another_place_a_weaker_sight_and_a_place_not_known_are_no_second_side(o
     seen = Seen()
     seen.see(WEST, box())
     assert seen.see(SOUTH, other, pictures=50) == []
+
+
+def test_what_the_edge_of_the_picture_cuts_from_one_side_is_doubtful_until_it_is_sure_or_whole() -> None:
+    seen = Seen()
+    assert seen.see(WEST, box()) == []
+    assert seen.see(SOUTH, box(score=0.7, cut=True), pictures=50) == []
+    assert [(s.is_told, s.is_grave) for s in seen.suspects.doubtful()] == [(False, True)]
+    assert len(seen.see(SOUTH, box(score=0.7), pictures=1)) == 1
+    sure = Seen()
+    sure.see(WEST, box())
+    assert len(sure.see(SOUTH, box(score=0.85, cut=True))) == 1
 
 
 def test_two_pictures_are_a_doubt_and_few_are_no_side() -> None:
