@@ -4,8 +4,8 @@ Somebody half hidden behind furniture is seen for long, but never surely: the wa
 a row, lets them pass. Here boxes are gathered by the place of what they show. Something with a person's face from one
 side only (a coat on a stand, a shadow) is doubtful, and worth a look from elsewhere; something that is taken for a
 person from two sides, at one place, is confirmed. Each side's pictures count as one witness, however many there are:
-pictures from one place err alike. Half of a thing looks like half of a person: a side that shows it only in boxes that the
-picture's side cuts leaves it doubtful, unless they are sure.
+pictures from one place err alike. Half of a thing looks like half of a person: a side that shows it only in boxes
+that the picture's side cuts leaves it doubtful, unless they are sure.
 """
 
 from __future__ import annotations
