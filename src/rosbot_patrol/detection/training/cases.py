@@ -18,9 +18,11 @@ from rosbot_patrol.detection.training.scenes import (
     reach,
     sees,
 )
+from rosbot_patrol.simulation.scene import Intrinsics
 
 CASES = {"pair": 0.17, "legs": 0.17, "screen": 0.19, "decoys": 0.14, "far": 0.06, "hydrants": 0.07, "edge": 0.20}
-HALF_VIEW = float(np.arctan2(320, 554.3827))  # [rad], from the middle of the picture to its left or right edge
+_CAMERA = Intrinsics()
+HALF_VIEW = float(np.arctan2(_CAMERA.width / 2, _CAMERA.fx))  # [rad], from the middle of the picture to its side
 
 
 def pick_case(rng: Rng) -> str:
