@@ -48,6 +48,10 @@ class Packed:
     def __len__(self) -> int:
         return len(self._files)
 
+    def file(self, i: int) -> np.ndarray:
+        """The jpeg of a picture, uint8."""
+        return self._files[i]
+
     def __getitem__(self, i: int) -> np.ndarray:
         return cv2.cvtColor(cv2.imdecode(self._files[i], cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
 
@@ -83,17 +87,9 @@ class Pictures:
             if shard[0].shape != (HEIGHT, WIDTH, 3):
                 high, wide = shard[0].shape[:2]
                 raise ValueError(f"{file} holds pictures of {wide} x {high}, not {WIDTH} x {HEIGHT}: draw them anew")
-        labels: list[list[np.ndarray]] = []
-        masks: list[list[np.ndarray] | None] = []
-        for file, shard in zip(files, shards, strict=True):
-            with np.load(file.with_suffix(".npz")) as held:
-                rows = held["boxes"]
-                masks.append(np.split(held["masks"], held["mask_ends"][:-1]) if "masks" in held else None)
-            if masks[-1] is None:  # a set of before there were masks, or even the contrast
-                rows = np.pad(rows, ((0, 0), (0, max(len(COLUMNS) - 1 - rows.shape[1], 0))), constant_values=255)
-                rows = np.pad(rows, ((0, 0), (0, len(COLUMNS) - rows.shape[1])))
-            labels.append([rows[column(rows, "picture") == i] for i in range(len(shard))])
-        return cls(shards, labels, masks)
+        sizes = {f: len(shard) for f, shard in zip(files, shards, strict=True)}
+        read = {f: _labels(f.with_suffix(".npz"), count) for f, count in sizes.items()}
+        return cls(shards, [read[f][0] for f in files], [read[f][1] for f in files])
 
     def pack(self) -> Pictures:
         """The same, read once and kept in memory (some 35 kB a picture); a shard that is listed twice is kept once."""
@@ -115,6 +111,11 @@ class Pictures:
         """RGB, uint8, shape (288, 384, 3)."""
         return self.shards[shard][i]
 
+    def jpeg(self, shard: int, i: int) -> np.ndarray:
+        """The file of a picture as it is packed, uint8."""
+        held = self.shards[shard]
+        return held.file(i) if isinstance(held, Packed) else _packed(held[i])
+
     def view(self, shard: int, i: int) -> View | None:
         """The picture with its rows and its mask; None where the set has no masks."""
         held = self.masks[shard]
@@ -123,13 +124,28 @@ class Pictures:
         return View(self.picture(shard, i), self.labels[shard][i], cv2.imdecode(held[i], cv2.IMREAD_GRAYSCALE))
 
 
+def _labels(file: Path, count: int) -> tuple[list[np.ndarray], list[np.ndarray] | None]:
+    """Rows of each picture of a shard, and the png of its mask; None for a set of before there were masks."""
+    with np.load(file) as held:
+        rows = held["boxes"]
+        masks = np.split(held["masks"], held["mask_ends"][:-1]) if "masks" in held else None
+    if masks is None:  # perhaps of before there was even the contrast
+        rows = np.pad(rows, ((0, 0), (0, max(len(COLUMNS) - 1 - rows.shape[1], 0))), constant_values=255)
+        rows = np.pad(rows, ((0, 0), (0, len(COLUMNS) - rows.shape[1])))
+    return [rows[column(rows, "picture") == i] for i in range(count)], masks
+
+
 def pack_masks(masks: np.ndarray) -> dict[str, np.ndarray]:
     """Masks of a shard, shape (N, 288, 384), as arrays for its file: each a png.
 
     A pixel's value is the actor's number (from 1, column `mask` of its row; a pet has a number and no row), or
     `FURNITURE` and more for what else stands there, 0 for nothing that is labelled.
     """
-    files = [cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_COMPRESSION, 4])[1] for mask in masks]
+    return join_masks([cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_COMPRESSION, 4])[1] for mask in masks])
+
+
+def join_masks(files: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """Masks that are pngs already, as arrays for a shard's file."""
     return {"masks": np.concatenate(files), "mask_ends": np.cumsum([len(file) for file in files])}
 
 

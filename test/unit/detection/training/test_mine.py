@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.detection.training import mine
-from rosbot_patrol.detection.training.dataset import Pictures
+from rosbot_patrol.detection.training.dataset import Packed, Pictures, pack_masks
 from rosbot_patrol.detection.training.scoring import Found
 
 
@@ -34,6 +34,34 @@ def test_what_is_picked_is_a_set_like_any_other(tmp_path: Path) -> None:
     for k in range(2):
         assert np.abs(picked.picture(0, k).astype(int) - shots[k + 1]).max() < 3  # a jpeg
     assert [len(rows) for rows in picked.labels[0]] == [0, 1]
+
+
+def test_masks_come_along_and_the_jpeg_is_not_made_anew(tmp_path: Path) -> None:
+    shots = np.random.default_rng(1).integers(0, 255, (3, 288, 384, 3), np.uint8)
+    masks = np.zeros((3, 288, 384), np.uint8)
+    masks[2, 100:200, 50:90] = 1
+    Packed.of(shots).save(tmp_path / "a-0000.jpegs")
+    np.savez(tmp_path / "a-0000.npz", boxes=np.array([label(2)], np.float32), **pack_masks(masks))
+    source = Pictures.open(tmp_path, "a")
+    mine.write_set(source, np.array([[0, 0], [0, 2]]), tmp_path, "hard")
+    picked = Pictures.open(tmp_path, "a,hard,hard")
+    assert len(picked) == 7
+    assert picked.shards[1] is picked.shards[2]
+    assert (picked.picture(1, 1) == source.picture(0, 2)).all()
+    view = picked.view(1, 1)
+    assert view is not None
+    assert (view.mask == masks[2]).all()
+
+
+def test_a_set_picked_already_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shots = np.full((1, 288, 384, 3), 40, np.uint8)
+    for name in ("vary", "hard_vary"):
+        Packed.of(shots).save(tmp_path / f"{name}-0000.jpegs")
+    models = Path(__file__).parents[4] / "models"
+    files = ["--cfg", str(models / "house.cfg"), "--weights", str(models / "house.weights"), "--data", str(tmp_path)]
+    monkeypatch.setattr("sys.argv", ["mine", *files, "--name", "vary"])
+    mine.main()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["hard_vary-0000.jpegs", "vary-0000.jpegs"]
 
 
 def test_test_pictures_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
