@@ -14,12 +14,15 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import simplejpeg
 
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.images.encodings import ENCODINGS, Picture
 from rosbot_patrol.params import param
 
 COLOURS = ("rgb8", "bgr8", "rgba8", "bgra8", "8UC3", "8UC4")
+_ORDERS = {"rgb8": "RGB", "rgba8": "RGBA", "bgra8": "BGRA"}
+_BY_CHANNELS = {1: "GRAY", 3: "BGR", 4: "BGRA"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +35,12 @@ class CompressedParams:
     jpeg_optimize: bool = param(False)
     jpeg_restart_interval: int = param(0, lo=0, hi=65535)
     png_level: int = param(9, lo=1, hi=9, doc="effort of a png")
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is a jpeg as any, without the special kinds that only `cv2.imencode` writes."""
+        special = self.jpeg_progressive or self.jpeg_optimize or self.jpeg_restart_interval > 0
+        return self.format == "jpeg" and not special
 
     def options(self) -> list[int]:
         """The same for `cv2.imencode`."""
@@ -54,16 +63,38 @@ def compress(picture: Picture, params: CompressedParams) -> tuple[str, bytes]:
     if _has_no_place(picture, params.format):
         picture = picture.eight_bits()
     colour = picture.encoding in COLOURS
-    pixels = _blue_first(picture) if colour else picture.pixels
-    if pixels.dtype != np.uint8 and params.format == "jpeg":
+    if picture.pixels.dtype != np.uint8 and params.format == "jpeg":
         pixels = picture.eight_bits().pixels
-    elif pixels.dtype == np.float32:
+    elif picture.pixels.dtype == np.float32:
         raise ImageError(f"a picture of encoding {picture.encoding} cannot be a {params.format}")
-    done, data = cv2.imencode("." + params.format, pixels, params.options())
-    if not done:
-        raise ImageError(f"a picture of {picture.width}x{picture.height} {picture.encoding} gives no {params.format}")
+    else:
+        pixels = picture.pixels
     text = f"{picture.encoding}; {params.format} compressed {'bgr8' if colour else ''}"
-    return text, data.tobytes()
+    data = _plain_jpeg(pixels, picture.encoding, params) if params.plain else _encode(pixels, picture.encoding, params)
+    if data is None:
+        raise ImageError(f"a picture of {picture.width}x{picture.height} {picture.encoding} gives no {params.format}")
+    return text, data
+
+
+def _plain_jpeg(pixels: np.ndarray, encoding: str, params: CompressedParams) -> bytes | None:
+    """As `_encode`, a quarter faster: the colours need not be put in another order first."""
+    order = _ORDERS.get(encoding, _BY_CHANNELS[pixels.shape[2]])
+    try:
+        data: bytes = simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), params.jpeg_quality, order, "420")
+    except ValueError:  # such as more columns than a jpeg can have
+        return None
+    return data
+
+
+def _encode(pixels: np.ndarray, encoding: str, params: CompressedParams) -> bytes | None:
+    codes = {"rgb8": cv2.COLOR_RGB2BGR, "rgba8": cv2.COLOR_RGBA2BGR, "bgra8": cv2.COLOR_BGRA2BGR}
+    code = codes.get(encoding, cv2.COLOR_BGRA2BGR if pixels.shape[2] == 4 else None)
+    pixels = pixels if code is None else cv2.cvtColor(pixels, code)
+    try:
+        done, data = cv2.imencode("." + params.format, pixels, params.options())
+    except cv2.error:  # as above
+        return None
+    return data.tobytes() if done else None
 
 
 def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
@@ -95,12 +126,6 @@ def _has_no_place(picture: Picture, name: str) -> bool:
     known = ENCODINGS[picture.encoding]
     deep = picture.pixels.dtype == np.uint16
     return known.channels == 2 or (deep and (known.channels > 1 or (known.raw and name == "jpeg")))
-
-
-def _blue_first(picture: Picture) -> np.ndarray:
-    codes = {"rgb8": cv2.COLOR_RGB2BGR, "rgba8": cv2.COLOR_RGBA2BGR, "bgra8": cv2.COLOR_BGRA2BGR}
-    code = codes.get(picture.encoding, cv2.COLOR_BGRA2BGR if picture.pixels.shape[2] == 4 else None)
-    return picture.pixels if code is None else cv2.cvtColor(picture.pixels, code)
 
 
 def _restore(pixels: np.ndarray, encoding: str, mode: str) -> Picture:

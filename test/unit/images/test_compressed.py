@@ -82,6 +82,33 @@ def test_broken_bytes_are_a_sentence(data):
         decompress("rgb8; jpeg compressed bgr8", data)
 
 
+@pytest.mark.parametrize("encoding", [*COLOURS, "mono8", "8UC3"])
+@pytest.mark.parametrize("change", [{"jpeg_progressive": True}, {"jpeg_optimize": True}, {"jpeg_restart_interval": 4}])
+def test_the_special_kinds_of_jpeg_show_the_same(encoding, change):
+    picture = make_picture(encoding)
+    plain = decompress(*compress(picture, CompressedParams(jpeg_quality=95)))
+    text, data = compress(picture, CompressedParams(jpeg_quality=95, **change))
+    special = decompress(text, data)
+    assert special.encoding == plain.encoding
+    assert np.abs(special.pixels.astype(int) - plain.pixels).mean() < 2
+    marker = {"jpeg_progressive": b"\xff\xc2", "jpeg_restart_interval": b"\xff\xdd\x00\x04\x00\x04"}
+    assert marker.get(next(iter(change)), b"") in data
+
+
+@pytest.mark.parametrize("special", [False, True])
+def test_a_picture_too_wide_for_a_jpeg_is_a_sentence(special):
+    wide = Picture(np.zeros((1, 70000, 3), np.uint8), "rgb8")
+    with pytest.raises(ImageError, match="70000x1"):
+        compress(wide, CompressedParams(jpeg_progressive=special))
+
+
+def test_a_part_of_a_picture_is_compressed_as_it_is():
+    whole = make_picture("rgb8")
+    part = Picture(whole.pixels[4:30, 8:40], "rgb8")
+    copied = Picture(part.pixels.copy(), "rgb8")
+    assert compress(part, CompressedParams()) == compress(copied, CompressedParams())
+
+
 def test_unknown_encoding_in_the_format():
     with pytest.raises(ImageError, match="'nv21'"):
         decompress("nv21; jpeg compressed bgr8", b"x")
