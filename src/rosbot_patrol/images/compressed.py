@@ -6,13 +6,17 @@ as blue, green, red, the source's encoding restored on the way back.
 Differs: 16-bit pictures become jpegs with their values scaled to 8 bits, where upstream cuts them off at 255; `mode`
 gray gives mono8 for jpeg too; a depth picture as jpeg is refused; colours of 16 bits and yuv422 travel as 8 bits a
 colour.
+
+A jpeg as most are is written and read by libjpeg-turbo itself (simplejpeg), whatever the order of its colours; OpenCV,
+which takes a node 100 MB, is loaded for the rest.
 """
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass
+from typing import Any
 
-import cv2
 import numpy as np
 import simplejpeg
 
@@ -21,6 +25,7 @@ from rosbot_patrol.images.encodings import ENCODINGS, Picture
 from rosbot_patrol.params import param
 
 COLOURS = ("rgb8", "bgr8", "rgba8", "bgra8", "8UC3", "8UC4")
+MOST_PIXELS = 1 << 26
 _ORDERS = {"rgb8": "RGB", "rgba8": "RGBA", "bgra8": "BGRA"}
 _BY_CHANNELS = {1: "GRAY", 3: "BGR", 4: "BGRA"}
 
@@ -44,6 +49,7 @@ class CompressedParams:
 
     def options(self) -> list[int]:
         """The same for `cv2.imencode`."""
+        cv2 = _opencv()
         if self.format == "png":
             return [cv2.IMWRITE_PNG_COMPRESSION, self.png_level]
         return [
@@ -87,6 +93,7 @@ def _plain_jpeg(pixels: np.ndarray, encoding: str, params: CompressedParams) -> 
 
 
 def _encode(pixels: np.ndarray, encoding: str, params: CompressedParams) -> bytes | None:
+    cv2 = _opencv()
     codes = {"rgb8": cv2.COLOR_RGB2BGR, "rgba8": cv2.COLOR_RGBA2BGR, "bgra8": cv2.COLOR_BGRA2BGR}
     code = codes.get(encoding, cv2.COLOR_BGRA2BGR if pixels.shape[2] == 4 else None)
     pixels = pixels if code is None else cv2.cvtColor(pixels, code)
@@ -111,6 +118,11 @@ def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
     encoding = text.partition(";")[0].strip() if ";" in text else ""
     if encoding and encoding not in ENCODINGS:
         raise ImageError(f"the encoding '{encoding}' (of the format '{text}') is not known here")
+    pixels = _read_plain_jpeg(data, encoding) if mode == "unchanged" else None
+    if pixels is not None:
+        as_it_was = encoding in _ORDERS and pixels.shape[2] > 1
+        return Picture(pixels, encoding) if as_it_was else _restore(pixels, encoding, mode)
+    cv2 = _opencv()
     flag = {"gray": cv2.IMREAD_GRAYSCALE, "color": cv2.IMREAD_COLOR}.get(mode, cv2.IMREAD_UNCHANGED)
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flag) if data else None
@@ -119,6 +131,27 @@ def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
     if pixels is None:
         raise ImageError(f"{len(data)} bytes of the format '{text}' are no picture that can be read")
     return _restore(pixels.reshape(*pixels.shape[:2], -1), encoding, mode)
+
+
+def _read_plain_jpeg(data: bytes, encoding: str) -> np.ndarray | None:
+    """Shape (height, width, channels), its colours in the order of that encoding, else blue first; None where it is no
+    jpeg as most are, is broken or very large, which is left to OpenCV.
+    """
+    if not data.startswith(b"\xff\xd8"):
+        return None
+    try:
+        height, width, colours, _ = simplejpeg.decode_jpeg_header(data)
+        if height * width > MOST_PIXELS or colours not in ("YCbCr", "RGB", "Gray"):
+            return None
+        order = "GRAY" if colours == "Gray" else _ORDERS.get(encoding, "BGR")
+        pixels: np.ndarray = simplejpeg.decode_jpeg(data, order)
+    except ValueError:
+        return None
+    return pixels
+
+
+def _opencv() -> Any:
+    return importlib.import_module("cv2")
 
 
 def _has_no_place(picture: Picture, name: str) -> bool:
@@ -139,6 +172,9 @@ def _restore(pixels: np.ndarray, encoding: str, mode: str) -> Picture:
         return Picture(pixels, "mono8" if pixels.dtype == np.uint8 else "mono16")
     if pixels.dtype != np.uint8:
         raise ImageError(f"a colour picture of {pixels.dtype.itemsize * 8} bits a value is not supported")
+    if channels == 3 and encoding not in _ORDERS:
+        return Picture(pixels, "bgr8")
+    cv2 = _opencv()
     codes = {
         (3, "rgb8"): cv2.COLOR_BGR2RGB,
         (3, "rgba8"): cv2.COLOR_BGR2RGBA,

@@ -14,7 +14,6 @@ import importlib
 import struct
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from rosbot_patrol.errors import ImageError
@@ -59,6 +58,7 @@ def compress_depth(picture: Picture, params: CompressedDepthParams) -> tuple[str
     if params.format == "rvl":
         data = _rvl(values)
     else:
+        cv2 = importlib.import_module("cv2")
         done, coded = cv2.imencode(".png", values, [cv2.IMWRITE_PNG_COMPRESSION, params.png_level])
         if not done:
             raise ImageError(f"a picture of {picture.width}x{picture.height} {picture.encoding} gives no png")
@@ -119,6 +119,7 @@ def _from_rvl(body: bytes, text: str) -> np.ndarray:
 
 
 def _from_png(body: bytes, text: str) -> np.ndarray:
+    cv2 = importlib.import_module("cv2")
     values = cv2.imdecode(np.frombuffer(body, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if values is None or values.ndim != 2 or values.dtype != np.uint16:
         raise ImageError(f"{len(body)} bytes of the format '{text}' are no png of 16-bit values")

@@ -28,7 +28,7 @@ def _raw(message: Any) -> PictureRecord | Refused:
 
 
 def _compressed(message: Any) -> PictureRecord | Refused:
-    codec = importlib.import_module("rosbot_patrol.images.compressed")  # brings OpenCV, 98 MB
+    codec = importlib.import_module("rosbot_patrol.images.compressed")  # only where there are such, as simplejpeg
     try:
         picture = codec.decompress(message.format, bytes(message.data))
     except ImageError as err:

@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import cv2
 import numpy as np
 import pytest
@@ -100,6 +103,46 @@ def test_a_picture_too_wide_for_a_jpeg_is_a_sentence(special):
     wide = Picture(np.zeros((1, 70000, 3), np.uint8), "rgb8")
     with pytest.raises(ImageError, match="70000x1"):
         compress(wide, CompressedParams(jpeg_progressive=special))
+
+
+@pytest.mark.parametrize("encoding", [*COLOURS, "mono8", "8UC3", ""])
+@pytest.mark.parametrize("flag", [{}, {"jpeg_progressive": True}])
+def test_a_jpeg_reads_as_opencv_reads_it(encoding, flag):
+    _, data = compress(make_picture(encoding or "bgr8", width=61, height=33), CompressedParams(**flag))
+    ours = decompress(f"{encoding}; jpeg compressed bgr8" if encoding else "jpeg", data)
+    theirs = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    assert np.abs(ours.to("bgr8").pixels.astype(int) - theirs).max() <= 1
+    assert ours.encoding == {"": "bgr8", "8UC3": "bgr8"}.get(encoding, encoding)
+
+
+def test_a_grey_jpeg_is_grey_whatever_its_format_says():
+    _, data = compress(make_picture("mono8"), CompressedParams())
+    back = decompress("rgb8; jpeg compressed bgr8", data)
+    assert (back.encoding, back.pixels.shape) == ("mono8", (48, 64, 1))
+
+
+def test_half_a_jpeg_is_read_as_far_as_it_goes_or_is_a_sentence():
+    picture = make_picture("rgb8", width=320, height=240)
+    text, data = compress(picture, CompressedParams())
+    back = decompress(text, data[: len(data) // 2])  # as upstream's, whose OpenCV says so on stderr
+    assert back.pixels.shape == (240, 320, 3)
+    assert np.abs(back.pixels[:60].astype(int) - picture.pixels[:60]).mean() < 12
+    with pytest.raises(ImageError):
+        decompress(text, data[:100])
+
+
+def test_jpegs_there_and_back_do_without_opencv():
+    code = """
+import sys
+import numpy as np
+from rosbot_patrol.images.compressed import CompressedParams, compress, decompress
+from rosbot_patrol.images.encodings import Picture
+for encoding, channels in (("rgb8", 3), ("bgr8", 3), ("rgba8", 4), ("bgra8", 4), ("mono8", 1)):
+    text, data = compress(Picture(np.full((8, 8, channels), 90, np.uint8), encoding), CompressedParams())
+    assert decompress(text, data).encoding == encoding
+sys.exit("cv2" in sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_a_part_of_a_picture_is_compressed_as_it_is():
