@@ -20,6 +20,7 @@ A figure that cannot be had here (no weights, no darknet) is left out, and the t
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import io
 import json
 import os
@@ -238,6 +239,8 @@ def main() -> None:
     if arguments.part:
         print(json.dumps(part(arguments.part, arguments.repeats, arguments.folder)))
         return
+    if importlib.util.find_spec("rosbot_patrol") is None:
+        sys.exit("benchmarks/detection.py: there is no rosbot_patrol in this shell; `. scripts/env` brings it")
     figures: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in PARTS:
