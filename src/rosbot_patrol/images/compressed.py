@@ -96,8 +96,8 @@ def _encode(pixels: np.ndarray, encoding: str, params: CompressedParams) -> byte
     cv2 = _opencv()
     codes = {"rgb8": cv2.COLOR_RGB2BGR, "rgba8": cv2.COLOR_RGBA2BGR, "bgra8": cv2.COLOR_BGRA2BGR}
     code = codes.get(encoding, cv2.COLOR_BGRA2BGR if pixels.shape[2] == 4 else None)
-    pixels = pixels if code is None else cv2.cvtColor(pixels, code)
     try:
+        pixels = pixels if code is None else cv2.cvtColor(pixels, code)
         done, data = cv2.imencode("." + params.format, pixels, params.options())
     except cv2.error:  # as above
         return None

@@ -99,10 +99,11 @@ def test_the_special_kinds_of_jpeg_show_the_same(encoding, change):
 
 
 @pytest.mark.parametrize("special", [False, True])
-def test_a_picture_too_wide_for_a_jpeg_is_a_sentence(special):
-    wide = Picture(np.zeros((1, 70000, 3), np.uint8), "rgb8")
-    with pytest.raises(ImageError, match="70000x1"):
-        compress(wide, CompressedParams(jpeg_progressive=special))
+@pytest.mark.parametrize(("width", "height"), [(70000, 1), (0, 0)])
+def test_a_size_that_no_jpeg_has_is_a_sentence(special, width, height):
+    picture = Picture(np.zeros((height, width, 3), np.uint8), "rgb8")
+    with pytest.raises(ImageError, match=f"{width}x{height}"):
+        compress(picture, CompressedParams(jpeg_progressive=special))
 
 
 @pytest.mark.parametrize("encoding", [*COLOURS, "mono8", "8UC3", ""])
