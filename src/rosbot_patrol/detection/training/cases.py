@@ -30,14 +30,16 @@ def pick_case(rng: Rng) -> str:
     return str(rng.choice(list(CASES), p=list(CASES.values())))
 
 
-def case_camera(case: str, scene: Scene, rng: Rng) -> tuple[float, float, float] | None:
+def case_camera(
+    case: str, scene: Scene, rng: Rng, things: list[Place] | None = None
+) -> tuple[float, float, float] | None:
     """x, y, yaw of a camera for that case, or None where there is no room for one.
 
     For "edge" one of which the left or right edge cuts a thing that stands there, more often than not a narrow one:
-    of a plant its crown is left, of a chair its back.
+    of a plant its crown is left, of a chair its back. `things`: one of these, not of all that stand there.
     """
     if case == "edge":
-        things = [p for p in scene.places if 0.1 < max(p.half_x, p.half_y) < 0.6]
+        things = [p for p in scene.places if 0.1 < max(p.half_x, p.half_y) < 0.6] if things is None else things
         narrow = [p for p in things if max(p.half_x, p.half_y) < 0.3]
         if narrow and rng.random() < 0.7:
             things = narrow

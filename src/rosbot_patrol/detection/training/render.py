@@ -136,7 +136,7 @@ class Studio:
             for extra in actor.extra:
                 self.renderer.add(extra)
                 self.renderer.move(extra.name, extra.pose)
-        optical, intrinsics = _eye(camera, rng)
+        optical, intrinsics = eye(camera, rng)
         picture = self.renderer.render(optical, intrinsics)[0]
         seen = self.renderer.labels()
         finished = degrade(picture, rng)
@@ -191,7 +191,8 @@ def reduce(picture: np.ndarray, *, exact: bool = True) -> np.ndarray:
     return cv2.remap(picture, *np.meshgrid(x, y), cv2.INTER_LINEAR)
 
 
-def _eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[Matrix, Intrinsics]:
+def eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[Matrix, Intrinsics]:
+    """Where a camera of the robot is, its optical frame in the world, and its lens: give or take what a robot sways."""
     x, y, yaw = camera
     pitch, roll = rng.normal(0, 0.012, 2)
     tilt = np.array([[1, 0, pitch, 0], [0, 1, -roll, 0], [-pitch, roll, 1, 0], [0, 0, 0, 1.0]])

@@ -103,7 +103,7 @@ def draw_room(rng: Rng, *, shapeless: float = 0.0) -> Scene:
 def draw_house(rng: Rng, world: World, *, plain: bool = False, shapeless: float = 0.0) -> Scene:
     """The house of a world, in its own colours or painted by chance, with some more furniture; `plain`: as it is."""
     bodies = list(world.bodies)
-    places = [p for b in bodies for p in _footprints(b)]
+    places = [p for b in bodies for p in footprints(b)]
     if not plain and rng.random() < 0.6:
         bodies = [_repaint(b, rng) for b in bodies]
     walls = np.array([(p.x, p.y) for p in places])
@@ -123,7 +123,7 @@ def furnish(scene: Scene, rng: Rng, count: int, *, shapeless: float = 0.0) -> No
             pose = placed(x, y, 0, float(rng.uniform(0, 2 * np.pi)))
             body = draw_thing(rng, f"thing{i}", pose, shapeless=shapeless)
             scene.bodies.append(body)
-            scene.places += _footprints(body)
+            scene.places += footprints(body)
 
 
 def draw_camera(scene: Scene, rng: Rng, *, open_view: bool = False) -> tuple[float, float, float] | None:
@@ -322,7 +322,8 @@ def _near(place: Place, x: float, y: float, margin: float) -> bool:
     return bool(abs(c * dx + s * dy) < place.half_x + margin and abs(-s * dx + c * dy) < place.half_y + margin)
 
 
-def _footprints(body: Body) -> list[Place]:
+def footprints(body: Body) -> list[Place]:
+    """What of a body stands in the way on the floor; nothing of what is higher than 1.6 m."""
     places: list[Place] = []
     if body.kind == "floor":
         return places

@@ -178,11 +178,11 @@ def say(result: dict[str, float]) -> str:
     for name, value in result.items():
         stem, _, what = name.rpartition(": ")
         if what == "there":
-            lines.append(f"  recall, {stem}: {_share(result[stem + ': found'], value)}")
+            lines.append(f"  recall, {stem}: {share(result[stem + ': found'], value)}")
         elif what == "boxes":
-            share = _share(value - result[stem + ": false"], value)
+            right = share(value - result[stem + ": false"], value)
             alone = result[stem + ": false where there is none"]
-            lines.append(f"  precision, {stem}: {share} ({alone:.0f} false with none there)")
+            lines.append(f"  precision, {stem}: {right} ({alone:.0f} false with none there)")
     return "\n".join(lines)
 
 
@@ -191,11 +191,12 @@ def say_found_at(found: Found, precisions: tuple[float, ...] = (0.95, 0.99, 0.99
     lines = []
     for precision in precisions:
         threshold, hits, there = found_at(found, precision)
-        lines.append(f"{AIMED}, at a precision of {precision:.1%} (threshold {threshold:.3f}): {_share(hits, there)}")
+        lines.append(f"{AIMED}, at a precision of {precision:.1%} (threshold {threshold:.3f}): {share(hits, there)}")
     return "\n".join(lines)
 
 
-def _share(hits: float, count: float) -> str:
+def share(hits: float, count: float) -> str:
+    """As text: "97/100 = 97.00 % (95 %: ...)", with the interval of `wilson`."""
     if not count:
         return "none there"
     low, high = wilson(hits, count)

@@ -154,7 +154,7 @@ def test_labels_tell_bodies_apart() -> None:
     renderer = EglRenderer()
     renderer.add(build("a", [(box(0.2, 0.2, 0.2), (0, 0, 0), (1, 0, 0), "")], placed(2, 0.5, 0.2)), label=3)
     renderer.add(build("b", [(box(0.2, 0.2, 0.2), (0, 0, 0), (0, 1, 0), "")], placed(2, -0.5, 0.2)), label=200)
-    optical, intrinsics = render._eye((0.0, 0.0, 0.0), np.random.default_rng(0))
+    optical, intrinsics = render.eye((0.0, 0.0, 0.0), np.random.default_rng(0))
     renderer.render(optical, intrinsics)
     assert set(np.unique(renderer.labels())) == {0, 3, 200}
     renderer.close()

@@ -1,0 +1,118 @@
+"""What networks take for a person in the houses as they are, with nobody in them.
+
+    python -m rosbot_patrol.detection.training.empty_views --cfg house.cfg --weights BEFORE.weights AFTER.weights
+
+Views by chance, views of which the picture's edge cuts a thing, and those in which that thing is a plant: of one that
+the edge cuts the crown is left, which looks like half a person. All networks see the same pictures; seeded.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from rosbot_patrol.detection import decode
+from rosbot_patrol.detection.darknet_cfg import read_cfg
+from rosbot_patrol.detection.letterbox import Letterbox
+from rosbot_patrol.detection.training import scenes
+from rosbot_patrol.detection.training.cases import case_camera
+from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH
+from rosbot_patrol.detection.training.render import degrade, eye
+from rosbot_patrol.detection.training.report import FLOOR, Forward, load_forward
+from rosbot_patrol.simulation.renderer import EglRenderer
+from rosbot_patrol.simulation.world import World, load_world
+
+HOUSES = ("house", "office", "flat")
+KINDS = {"chance": "by chance", "edge": "of which the edge cuts a thing", "plant": "of which the edge cuts a plant"}
+PERSON = 0
+
+
+def views(world: World, kind: str, count: int, seed: int) -> Iterator[np.ndarray]:
+    """Pictures of a world with nobody in it, as a network gets them: RGB, uint8, shape (288, 384, 3).
+
+    Args:
+        world: its colours, textures and light are left as they are.
+        kind: one of `KINDS`.
+        count: so many cameras are drawn; those outside the house, or for which there is no room, give no picture.
+        seed: of where the camera is, and of what it and jpeg make of the picture.
+    """
+    rng = np.random.default_rng([seed, list(KINDS).index(kind)])
+    scene = scenes.draw_house(rng, world, plain=True)
+    things = None
+    if kind == "plant":
+        things = [p for body in world.bodies if "plant" in body.name for p in scenes.footprints(body)]
+        if not things:
+            return
+    renderer = EglRenderer()
+    renderer.light = scene.light
+    for body in scene.bodies:
+        renderer.add(body)
+    try:
+        for _ in range(count):
+            camera = scenes.draw_camera(scene, rng) if kind == "chance" else case_camera("edge", scene, rng, things)
+            if camera is not None and _indoors(scene, camera[0], camera[1]):
+                yield degrade(renderer.render(*eye(camera, rng))[0], rng)
+    finally:
+        renderer.close()
+
+
+def _indoors(scene: scenes.Scene, x: float, y: float) -> bool:
+    """Whether something stands within 9 m in six of eight directions."""
+    return sum(scenes.reach(scene, x, y, yaw) < 9.0 for yaw in np.arange(8) * np.pi / 4) >= 6
+
+
+def surest(pictures: Iterator[np.ndarray], cfg: Path, forwards: Sequence[Forward]) -> np.ndarray:
+    """The probability of the surest person that each network sees in each picture, shape (N, networks); 0 for none."""
+    spec = read_cfg(str(cfg))
+    place = Letterbox(WIDTH, HEIGHT, spec.width, spec.height)
+    rows = []
+    for picture in pictures:
+        row = []
+        for forward in forwards:
+            values = [value[0] for value in forward(picture[None])]
+            found = decode.decode(spec.heads, values, place, threshold=FLOOR, iou_threshold=0.4)
+            row.append(float(found.probabilities[:, PERSON].max(initial=0.0)))
+        rows.append(row)
+    return np.array(rows).reshape(-1, len(forwards))
+
+
+def _work(job: tuple[argparse.Namespace, str, str]) -> tuple[str, np.ndarray]:
+    options, kind, house = job
+    cv2.setNumThreads(1)
+    forwards = [load_forward(options.cfg, file, threads=1) for file in options.weights]
+    world = load_world(options.worlds / f"{house}.world")
+    return kind, surest(views(world, kind, options.views, options.seed), options.cfg, forwards)
+
+
+def main() -> None:
+    """Count from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cfg", type=Path, required=True)
+    parser.add_argument("--weights", type=Path, nargs="+", required=True)
+    parser.add_argument("--views", type=int, default=1500, help="of each kind in each house")
+    parser.add_argument("--worlds", type=Path, default=Path("worlds"))
+    parser.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--seed", type=int, default=77)
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    os.environ["LP_NUM_THREADS"] = "1"  # Mesa's own threads, in each process
+    jobs = [(options, kind, house) for kind in options.kinds for house in HOUSES]
+    with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
+        results = pool.map(_work, jobs, chunksize=1)
+    for kind in options.kinds:
+        rows = np.concatenate([found for of, found in results if of == kind])
+        for file, column in zip(options.weights, rows.T, strict=True):
+            over = ", ".join(f"{int((column > t).sum())} above {t}" for t in (0.3, 0.4, 0.6))
+            most = column.max(initial=0.0)
+            sys.stdout.write(f"{len(rows)} views {KINDS[kind]}, {file}: {over}; the surest {most:.2f}\n")
+
+
+if __name__ == "__main__":
+    main()
