@@ -12,20 +12,18 @@ import argparse
 import multiprocessing
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from rosbot_patrol.detection import decode
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.letterbox import Letterbox
 from rosbot_patrol.detection.training import scenes
 from rosbot_patrol.detection.training.cases import case_camera
-from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH
+from rosbot_patrol.detection.training.dataset import Pictures
+from rosbot_patrol.detection.training.labels import COLUMNS
 from rosbot_patrol.detection.training.render import degrade, eye
-from rosbot_patrol.detection.training.report import FLOOR, Forward, load_forward
+from rosbot_patrol.detection.training.report import Forward, find_all, load_forward
 from rosbot_patrol.simulation.renderer import EglRenderer
 from rosbot_patrol.simulation.world import World, load_world
 
@@ -68,27 +66,25 @@ def _indoors(scene: scenes.Scene, x: float, y: float) -> bool:
     return sum(scenes.reach(scene, x, y, yaw) < 9.0 for yaw in np.arange(8) * np.pi / 4) >= 6
 
 
-def surest(pictures: Iterator[np.ndarray], cfg: Path, forwards: Sequence[Forward]) -> np.ndarray:
-    """The probability of the surest person that each network sees in each picture, shape (N, networks); 0 for none."""
-    spec = read_cfg(str(cfg))
-    place = Letterbox(WIDTH, HEIGHT, spec.width, spec.height)
-    rows = []
-    for picture in pictures:
-        row = []
-        for forward in forwards:
-            values = [value[0] for value in forward(picture[None])]
-            found = decode.decode(spec.heads, values, place, threshold=FLOOR, iou_threshold=0.4)
-            row.append(float(found.probabilities[:, PERSON].max(initial=0.0)))
-        rows.append(row)
-    return np.array(rows).reshape(-1, len(forwards))
+def surest(shots: np.ndarray, cfg: Path, forward: Forward) -> np.ndarray:
+    """The probability of the surest person that a network sees in each of N pictures, shape (N,); 0 for none."""
+    nobody = np.zeros((0, len(COLUMNS)), np.float32)
+    boxes = find_all(Pictures([shots], [[nobody] * len(shots)]), cfg, forward).boxes
+    persons = boxes[boxes[:, 1] == PERSON]
+    most = np.zeros(len(shots))
+    np.maximum.at(most, persons[:, 0].astype(int), persons[:, 2])
+    return most
 
 
 def _work(job: tuple[argparse.Namespace, str, str]) -> tuple[str, np.ndarray]:
     options, kind, house = job
     cv2.setNumThreads(1)
-    forwards = [load_forward(options.cfg, file, threads=1) for file in options.weights]
     world = load_world(options.worlds / f"{house}.world")
-    return kind, surest(views(world, kind, options.views, options.seed), options.cfg, forwards)
+    shots = list(views(world, kind, options.views, options.seed))
+    if not shots:
+        return kind, np.zeros((0, len(options.weights)))
+    forwards = [load_forward(options.cfg, file, threads=1) for file in options.weights]
+    return kind, np.stack([surest(np.array(shots), options.cfg, forward) for forward in forwards], axis=1)
 
 
 def main() -> None:

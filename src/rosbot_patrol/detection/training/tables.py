@@ -21,11 +21,7 @@ Figures = dict[str, float]
 
 
 def threshold_rows(test: list[Figures], fresh: list[Figures], before: list[Figures]) -> list[str]:
-    """Rows by threshold: each of the test pictures, then the fresh ones and the network before for comparison.
-
-    Raises:
-        ValueError: a report lacks the threshold that ships, or the one that the patrol asks for.
-    """
+    """Rows by threshold: each of the test pictures, then the fresh ones and the network before for comparison."""
     rows = [
         _row(f"**{f['threshold']:g}** (shipped)" if f["threshold"] == SHIPPED else f"{f['threshold']:g}", f)
         for f in test
@@ -62,13 +58,25 @@ def replace_rows(text: str, header: str, rows: list[str]) -> str:
     return "\n".join([*lines[:first], *rows, *lines[last:]]) + "\n"
 
 
+def read_report(file: Path, *thresholds: float) -> list[Figures]:
+    """The figures of a report, by threshold.
+
+    Raises:
+        ValueError: it is no report, or lacks one of those thresholds.
+    """
+    try:
+        report = json.loads(file.read_text())["thresholds"]
+        held = [figures["threshold"] for figures in report]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{file}: not what report.py --json writes ({type(error).__name__}: {error})") from error
+    lacking = [f"{t:g}" for t in thresholds if t not in held]
+    if lacking:
+        raise ValueError(f"{file}: nothing at a threshold of {', '.join(lacking)}: add it to report.py --threshold")
+    return list(report)
+
+
 def _at(report: list[Figures], threshold: float) -> Figures:
-    for figures in report:
-        if figures["threshold"] == threshold:
-            return figures
-    raise ValueError(
-        f"the report holds no threshold of {threshold:g}; make it with report.py --threshold {threshold:g}"
-    )
+    return next(figures for figures in report if figures["threshold"] == threshold)
 
 
 def _row(name: str, figures: Figures) -> str:
@@ -106,15 +114,13 @@ def main() -> None:
     ):
         parser.add_argument(f"--{name}", type=Path, required=True, help=f"report of {what}")
     options = parser.parse_args()
-    test, fresh, before = (
-        json.loads(file.read_text())["thresholds"] for file in (options.test, options.fresh, options.before)
-    )
-    text = options.readme.read_text()
     try:
-        text = replace_rows(text, BY_THRESHOLD, threshold_rows(test, fresh, before))
+        test, fresh = read_report(options.test, SHIPPED), read_report(options.fresh, SHIPPED)
+        before = read_report(options.before, SHIPPED, SURE)
+        text = replace_rows(options.readme.read_text(), BY_THRESHOLD, threshold_rows(test, fresh, before))
         text = replace_rows(text, BY_GROUP, group_rows(test))
-    except ValueError as error:
-        sys.exit(f"{options.readme}: {error}")
+    except (OSError, ValueError) as error:
+        sys.exit(f"tables: {error}; {options.readme} is as it was")
     options.readme.write_text(text)
 
 

@@ -69,10 +69,20 @@ def test_the_tables_that_ship_have_the_rows_of_a_report(tmp_path: Path) -> None:
         assert row[: row.index("|", 1)] in shipped
 
 
-def test_a_report_without_the_threshold_is_named(readme: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_wrong_with_a_file_is_said_and_nothing_is_written(
+    readme: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = readme.read_text()
     new, short = report(tmp_path / "new", 0.9), report(tmp_path / "short", 0.9, (0.4,))
-    with pytest.raises(SystemExit, match=r"no threshold of 0\.8; make it with report\.py"):
+    with pytest.raises(SystemExit, match=r"short: nothing at a threshold of 0\.8: add it to report\.py --threshold"):
         run(monkeypatch, readme, new, new, short)
+    for name, text in (("torn", '{"thresholds": [{'), ("list", "[1]"), ("other", '{"thresholds": [{"a": 1}]}')):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(SystemExit, match=rf"{name}: not what report\.py --json writes"):
+            run(monkeypatch, readme, tmp_path / name, new, new)
+    with pytest.raises(SystemExit, match=r"absent: not what report\.py --json writes \(FileNotFoundError"):
+        run(monkeypatch, readme, tmp_path / "absent", new, new)
+    assert readme.read_text() == old
     readme.write_text("nothing\n")
     with pytest.raises(SystemExit, match="0 tables begin with"):
         run(monkeypatch, readme, new, new, new)
