@@ -88,7 +88,7 @@ class Pictures:
                 high, wide = shard[0].shape[:2]
                 raise ValueError(f"{file} holds pictures of {wide} x {high}, not {WIDTH} x {HEIGHT}: draw them anew")
         sizes = {f: len(shard) for f, shard in zip(files, shards, strict=True)}
-        read = {f: _labels(f.with_suffix(".npz"), count) for f, count in sizes.items()}
+        read = {f: read_labels(f.with_suffix(".npz"), count) for f, count in sizes.items()}
         return cls(shards, [read[f][0] for f in files], [read[f][1] for f in files])
 
     def pack(self) -> Pictures:
@@ -124,7 +124,7 @@ class Pictures:
         return View(self.picture(shard, i), self.labels[shard][i], cv2.imdecode(held[i], cv2.IMREAD_GRAYSCALE))
 
 
-def _labels(file: Path, count: int) -> tuple[list[np.ndarray], list[np.ndarray] | None]:
+def read_labels(file: Path, count: int) -> tuple[list[np.ndarray], list[np.ndarray] | None]:
     """Rows of each picture of a shard, and the png of its mask; None for a set of before there were masks."""
     with np.load(file) as held:
         rows = held["boxes"]

@@ -25,68 +25,82 @@ LOOSE = 0.35
 @dataclass
 class Truth:
     """Boxes of a batch, in the network's input: shape (N, 4) centre and size [px], batch index, class, and whether
-    the box is asked for (else it is left alone).
+    the box is asked for (else it is left alone). `exists` is False for rows that only fill a batch up to a fixed size
+    (such rows are asked for neither); None where there are none of them.
     """
 
     boxes: torch.Tensor
     batch: torch.Tensor
     kinds: torch.Tensor
     asked: torch.Tensor
+    exists: torch.Tensor | None = None
 
 
 def yolo_loss(heads: list[Yolo], values: list[torch.Tensor], truth: Truth, width: int) -> dict[str, torch.Tensor]:
     """Parts of the loss: box, objectness, kind; each already weighted."""
+    parts, _ = yolo_losses(heads, values, truth, width)
+    return parts
+
+
+def yolo_losses(
+    heads: list[Yolo], values: list[torch.Tensor], truth: Truth, width: int
+) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
+    """The same, and the objectness of each picture alone, shape (batch,): how badly each goes wrong.
+
+    No operation's shape depends on the values, so that a GPU never has to wait for the processor to hear one.
+    """
     sizes = torch.tensor([a for head in heads for a in head.anchors], device=truth.boxes.device)
     overlap = _shape_iou(truth.boxes[:, 2:], sizes)
     take = (overlap > MATCH) | (overlap == overlap.max(dim=1, keepdim=True).values)
     take &= truth.asked[:, None]
-    parts = {name: values[0].new_zeros(()) for name in ("box", "object", "kind")}
-    matched = values[0].new_zeros((), dtype=torch.float32)
+    parts = {name: values[0].new_zeros((), dtype=torch.float32) for name in ("box", "kind")}
+    each = values[0].new_zeros(values[0].shape[0], dtype=torch.float32)
     first = 0
     for head, raw in zip(heads, values, strict=True):
         count = len(head.anchors)
         found = _head_loss(head, raw.float(), truth, take[:, first : first + count], width)
-        for name in ("box", "object", "kind"):
+        for name in ("box", "kind"):
             parts[name] = parts[name] + found[name]
-        matched = matched + found["matched"]
+        each = each + 2.0 * found["object"]
         first += count
-    batch = values[0].shape[0]
-    matched = matched.clamp(min=1.0)
-    return {
-        "box": 2.0 * parts["box"] / matched,
-        "object": 4.0 * parts["object"] / batch / 2.0,
-        "kind": 0.5 * parts["kind"] / matched,
-    }
+    matched = take.sum().clamp(min=1)
+    weighted = {"box": 2.0 * parts["box"] / matched, "object": each.mean(), "kind": 0.5 * parts["kind"] / matched}
+    return weighted, each.detach()
 
 
 def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, width: int) -> dict[str, torch.Tensor]:
     batch, _, rows, columns = raw.shape
+    anchors = len(head.anchors)
     stride = width / columns
-    grid = raw.view(batch, len(head.anchors), 5 + head.classes, rows, columns)
-    which, anchor = take.nonzero(as_tuple=True)
-    place = truth.batch[which]
-    column = (truth.boxes[which, 0] / stride).long().clamp(0, columns - 1)
-    row = (truth.boxes[which, 1] / stride).long().clamp(0, rows - 1)
-    target = grid.new_zeros(batch, len(head.anchors), rows, columns)
-    weight = _weight(head, grid, truth, stride)
-    result = {"box": raw.new_zeros(()), "kind": raw.new_zeros(()), "matched": raw.new_tensor(float(len(which)))}
-    if len(which):
-        mine = grid[place, anchor, :, row, column]
-        sizes = torch.tensor(head.anchors, device=raw.device)[anchor]
-        centre = (torch.sigmoid(mine[:, :2]) + torch.stack([column, row], 1)) * stride
-        predicted = torch.cat([centre, torch.exp(mine[:, 2:4].clamp(max=6)) * sizes], 1)
-        overlap, generalised = _overlaps(predicted, truth.boxes[which])
-        result["box"] = (1 - generalised).sum()
-        wanted = fn.one_hot(truth.kinds[which], head.classes).float()
-        result["kind"] = fn.binary_cross_entropy_with_logits(mine[:, 5:], wanted, reduction="sum")
-        fit = ((overlap.detach() - LOOSE) / (SURE_FROM - LOOSE)).clamp(0.0, 1.0)
-        target[place, anchor, row, column] = LEAST_SURE + (1.0 - LEAST_SURE) * fit
-        weight[place, anchor, row, column] = 1.0
+    grid = raw.view(batch, anchors, 5 + head.classes, rows, columns)
+    column = (truth.boxes[:, 0] / stride).long().clamp(0, columns - 1)
+    row = (truth.boxes[:, 1] / stride).long().clamp(0, rows - 1)
+    mine = grid[truth.batch, :, :, row, column]  # (N, anchors, 5 + classes)
+    sizes = torch.tensor(head.anchors, device=raw.device)
+    place = torch.stack([column, row], 1)[:, None]
+    centre = (torch.sigmoid(mine[..., :2]) + place) * stride
+    predicted = torch.cat([centre, torch.exp(mine[..., 2:4].clamp(max=6)) * sizes], 2)
+    overlap, generalised = _overlaps(predicted, truth.boxes[:, None].expand_as(predicted))
+    wanted = fn.one_hot(truth.kinds, head.classes).float()[:, None].expand_as(mine[..., 5:])
+    unlike = fn.binary_cross_entropy_with_logits(mine[..., 5:], wanted, reduction="none").sum(2)
+    none = unlike.new_zeros(())
+    result = {
+        "box": torch.where(take, 1 - generalised, none).sum(),
+        "kind": torch.where(take, unlike, none).sum(),
+    }
+    fit = ((overlap.detach() - LOOSE) / (SURE_FROM - LOOSE)).clamp(0.0, 1.0)
+    which = torch.arange(anchors, device=raw.device)
+    cell = ((truth.batch[:, None] * anchors + which) * rows + row[:, None]) * columns + column[:, None]
+    cell = torch.where(take, cell, batch * anchors * rows * columns)  # those not taken go to a cell beyond the last
+    target = fit.new_zeros(batch * anchors * rows * columns + 1)
+    target = target.scatter(0, cell.flatten(), (LEAST_SURE + (1.0 - LEAST_SURE) * fit).flatten())
+    target = target[:-1].view(batch, anchors, rows, columns)
+    weight = torch.where(target > 0, 1.0, _weight(head, grid, truth, stride))
     # a little focal: the many cells that are surely empty count less
     logits = grid[:, :, 4]
     surprise = (torch.sigmoid(logits) - target).abs().detach() ** SURPRISE
     each = fn.binary_cross_entropy_with_logits(logits, target, reduction="none")
-    result["object"] = (each * surprise * weight).sum()
+    result["object"] = (each * surprise * weight).sum((1, 2, 3))
     return result
 
 
@@ -112,6 +126,8 @@ def _weight(head: Yolo, grid: torch.Tensor, truth: Truth, stride: float) -> torc
         middle = (away.abs() < box[:, :, 2:] / 2 + stride).all(dim=2)
         doubtful = (shared / own.clamp(min=1.0) > 0.3) | middle
         alone = torch.where(truth.asked[:, None, None, None], good, doubtful)
+        if truth.exists is not None:
+            alone &= truth.exists[:, None, None, None]
         left.index_add_(0, truth.batch, alone.float())
     return (left == 0.0).float()
 
@@ -122,15 +138,15 @@ def _shape_iou(sizes: torch.Tensor, anchors: torch.Tensor) -> torch.Tensor:
 
 
 def _overlaps(a: torch.Tensor, b: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """IoU, and generalised IoU (Rezatofighi et al. 2019), of boxes pair by pair."""
+    """IoU, and generalised IoU (Rezatofighi et al. 2019), of boxes pair by pair, shape (..., 4)."""
     a_low, a_high, b_low, b_high = (
-        a[:, :2] - a[:, 2:] / 2,
-        a[:, :2] + a[:, 2:] / 2,
-        b[:, :2] - b[:, 2:] / 2,
-        b[:, :2] + b[:, 2:] / 2,
+        a[..., :2] - a[..., 2:] / 2,
+        a[..., :2] + a[..., 2:] / 2,
+        b[..., :2] - b[..., 2:] / 2,
+        b[..., :2] + b[..., 2:] / 2,
     )
-    shared = (torch.minimum(a_high, b_high) - torch.maximum(a_low, b_low)).clamp(min=0).prod(dim=1)
-    union = a[:, 2:].prod(dim=1) + b[:, 2:].prod(dim=1) - shared
-    hull = (torch.maximum(a_high, b_high) - torch.minimum(a_low, b_low)).prod(dim=1)
+    shared = (torch.minimum(a_high, b_high) - torch.maximum(a_low, b_low)).clamp(min=0).prod(dim=-1)
+    union = a[..., 2:].prod(dim=-1) + b[..., 2:].prod(dim=-1) - shared
+    hull = (torch.maximum(a_high, b_high) - torch.minimum(a_low, b_low)).prod(dim=-1)
     overlap = shared / union.clamp(min=1e-6)
     return overlap, overlap - (hull - union) / hull.clamp(min=1e-6)

@@ -17,14 +17,15 @@ BANK = 300
 
 
 @functools.cache
-def _bank() -> list[np.ndarray]:
+def pattern_bank() -> list[np.ndarray]:
+    """The patterns, RGB, uint8, square, all of one size."""
     rng = np.random.default_rng(31)
     return [draw_pattern(rng).pixels for _ in range(BANK)]
 
 
 def draw_from_bank(rng: np.random.Generator) -> np.ndarray:
     """Any pattern of the bank, RGB, uint8, square."""
-    return _bank()[int(rng.integers(BANK))]
+    return pattern_bank()[int(rng.integers(BANK))]
 
 
 def lay_patterns(picture: np.ndarray, boxes: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -7,8 +7,6 @@ the running mean of the weights (EMA) after every epoch.
 from __future__ import annotations
 
 import argparse
-import copy
-import math
 import os
 import queue
 import sys
@@ -23,11 +21,10 @@ import torch
 from tqdm import tqdm
 
 from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_weights import format_weights, read_weights
 from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
 from rosbot_patrol.detection.training.dataset import Pictures, batch_of
-from rosbot_patrol.detection.training.loss import Truth, yolo_loss
-from rosbot_patrol.detection.training.network import Darknet
+from rosbot_patrol.detection.training.learner import Learner, schedule
+from rosbot_patrol.detection.training.loss import Truth
 
 
 class Trainer:
@@ -39,21 +36,14 @@ class Trainer:
         if options.anchors and not options.checkpoint.exists():
             write_anchors(options.cfg, find_anchors(Pictures.open(options.data, options.name), 6, options.seed))
         self.spec = read_cfg(str(options.cfg))
-        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-        self.network = Darknet(self.spec).to(self.device, memory_format=torch.channels_last)
-        self.network.set_prior(0.01)
-        self.mean = copy.deepcopy(self.network).eval()
-        self._mean_values, self._values = (
-            [value for value in part.state_dict().values() if value.dtype.is_floating_point]
-            for part in (self.mean, self.network)
+        device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.learner = Learner(
+            self.spec, device, options.rate, muon=options.muon, bf16=options.bf16, compile_it=options.compile
         )
-        self.run_network = torch.compile(self.network) if options.compile else self.network
-        self.optimiser = Optimiser(self.network, options.rate, muon=options.muon)
         self.steps_each = options.samples // options.batch
         self.total = self.steps_each * options.epochs
         pictures = Pictures.open(options.data, options.name)
         self.pictures = pictures.pack() if options.pack else pictures
-        self.step = 0
         self.epoch = 0
         self.begun = time.monotonic()
 
@@ -69,7 +59,7 @@ class Trainer:
     def _epoch(self) -> None:
         index = self._share(self.pictures.index())
         epoch = Batches(self.pictures, index, self.options.batch, (self.options.seed, self.epoch))
-        self.network.train()
+        self.learner.network.train()
         self._freeze()
         sums: dict[str, float] = {}
         batches = epoch.ahead(self.options.loaders)
@@ -88,7 +78,7 @@ class Trainer:
 
     def _freeze(self) -> None:
         """Let the first layers be as they are: nothing goes back through them, the costliest part of a step."""
-        for block in self.network.blocks[: self.options.freeze]:
+        for block in self.learner.network.blocks[: self.options.freeze]:
             block.requires_grad_(False).eval()
 
     def _spent(self) -> float:
@@ -105,125 +95,30 @@ class Trainer:
         return index[np.concatenate(orders)[start : start + count]]
 
     def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
-        share = _schedule(max(self.step / self.total, self._spent()), self.step, self.options.cool)
-        self.optimiser.set_rate(self.options.rate * share)
-        inputs = torch.from_numpy(images).to(self.device).permute(0, 3, 1, 2).float().div_(255.0)
+        learner = self.learner
+        share = schedule(max(learner.step / self.total, self._spent()), learner.step, self.options.cool)
+        inputs = torch.from_numpy(images).to(learner.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs = inputs.contiguous(memory_format=torch.channels_last)
-        boxes = torch.from_numpy(rows).to(self.device)
+        boxes = torch.from_numpy(rows).to(learner.device)
         truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0)
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.options.bf16):
-            values = [value.float() for value in self.run_network(inputs)]
-        parts = yolo_loss(self.spec.heads, values, truth, self.spec.width)  # type: ignore[arg-type]
-        self.network.zero_grad(set_to_none=True)
-        sum(parts.values()).backward()  # type: ignore[union-attr]
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), 10.0)
-        self.optimiser.step()
-        self.step += 1
-        self._average()
-        return {name: float(value.detach()) for name, value in parts.items()}
-
-    def _average(self) -> None:
-        keep = min(0.998, (1 + self.step) / (20 + self.step))
-        with torch.no_grad():
-            torch._foreach_lerp_(self._mean_values, self._values, 1 - keep)
+        parts, _ = learner.learn(inputs, truth, self.options.rate * share)
+        return {name: float(value) for name, value in parts.items()}
 
     def _save(self) -> None:
-        state = {
-            "network": self.network.state_dict(),
-            "mean": self.mean.state_dict(),
-            "optimiser": self.optimiser.state_dict(),
-            "step": self.step,
-            "epoch": self.epoch,
-        }
         part = self.options.checkpoint.with_suffix(".part")
-        torch.save(state, part)
+        torch.save({**self.learner.state_dict(), "epoch": self.epoch}, part)
         os.replace(part, self.options.checkpoint)
-        weights = format_weights(self.spec, self.mean.to_weights(), seen=self.step * self.options.batch, bits=10)
-        self.options.weights.write_bytes(weights)
+        self.options.weights.write_bytes(self.learner.weights(self.learner.step * self.options.batch))
 
     def _resume(self) -> None:
         if self.options.start and not self.options.checkpoint.exists():
-            self._start_from(self.options.start)
+            self.learner.start_from(self.options.start)
         if not self.options.checkpoint.exists():
             return
-        state = torch.load(self.options.checkpoint, map_location=self.device, weights_only=True)
-        self.network.load_state_dict(state["network"])
-        self.mean.load_state_dict(state["mean"])
-        self.optimiser.load_state_dict(state["optimiser"])
-        self.step, self.epoch = state["step"], state["epoch"]
+        state = torch.load(self.options.checkpoint, map_location=self.learner.device, weights_only=True)
+        self.learner.load_state_dict(state)
+        self.epoch = state["epoch"]
         sys.stdout.write(f"going on after epoch {self.epoch}\n")
-
-    def _start_from(self, file: Path) -> None:
-        """Begin with the weights of a checkpoint, or of a file in darknet's format."""
-        if file.suffix == ".weights":
-            self.network.from_weights(read_weights(str(file), self.spec))
-        else:
-            state = torch.load(file, map_location=self.device, weights_only=True)
-            self.network.load_state_dict(state["mean"])
-        self.mean.load_state_dict(self.network.state_dict())
-
-
-class Optimiser:
-    """AdamW for all numbers; or Muon for the inner convolutions and AdamW for the rest.
-
-    Muon ("Muon: An optimizer for hidden layers in neural networks", Jordan et al. 2024) as PyTorch has it, for
-    matrices only: a convolution is given to it as one, a row for each filter, that shares its numbers. The length of
-    its steps is that of AdamW's ("Muon is Scalable for LLM Training", Liu et al. 2025), so that one rate serves both.
-    """
-
-    def __init__(self, network: Darknet, rate: float, *, muon: bool) -> None:
-        convolutions = [m for m in network.modules() if isinstance(m, torch.nn.Conv2d)]
-        inner = [c.weight for c in convolutions if c.in_channels > 3 and c.bias is None] if muon else []
-        mine = {id(p) for p in inner}
-        decayed = [p for p in network.parameters() if p.ndim > 1 and id(p) not in mine]
-        plain = [p for p in network.parameters() if p.ndim <= 1]
-        groups = [{"params": decayed, "weight_decay": 5e-3}, {"params": plain, "weight_decay": 0.0}]
-        self._parts: list[torch.optim.Optimizer] = [torch.optim.AdamW(groups, lr=rate)]
-        self._pairs = [(p, torch.nn.Parameter(_as_matrix(p.data))) for p in inner]
-        if any(p.data_ptr() != matrix.data_ptr() for p, matrix in self._pairs):
-            raise RuntimeError("a convolution's numbers are not in one row after the other (channels last)")
-        if inner:
-            matrices = [matrix for _, matrix in self._pairs]
-            self._parts.append(torch.optim.Muon(matrices, lr=rate, weight_decay=5e-3, adjust_lr_fn="match_rms_adamw"))
-
-    def set_rate(self, rate: float) -> None:
-        """The learning rate from now on."""
-        for part in self._parts:
-            for group in part.param_groups:
-                group["lr"] = rate
-
-    def step(self) -> None:
-        """One step by the gradients that the network's parameters have."""
-        for p, matrix in self._pairs:
-            matrix.grad = None if p.grad is None else _as_matrix(p.grad)
-        for part in self._parts:
-            part.step()
-
-    def state_dict(self) -> list[dict]:
-        """Of each part."""
-        return [part.state_dict() for part in self._parts]
-
-    def load_state_dict(self, states: list[dict]) -> None:
-        """What `state_dict` gave."""
-        if len(states) != len(self._parts):
-            raise ValueError("the checkpoint is of another optimiser: give --muon as when it was begun")
-        for part, state in zip(self._parts, states, strict=True):
-            part.load_state_dict(state)
-
-
-def _as_matrix(weights: torch.Tensor) -> torch.Tensor:
-    return weights.permute(0, 2, 3, 1).reshape(len(weights), -1)
-
-
-def _schedule(done: float, step: int, cool: float) -> float:
-    """Share of the learning rate: up in 200 steps, level, and down as a cosine in the last `cool` of all.
-
-    Level for long, so that a training can be made longer after its start ("Scaling Laws and Compute-Optimal Training
-    Beyond Fixed Training Durations", Haegele et al. 2024).
-    """
-    warm = min(1.0, (step + 1) / 200)
-    left = min(max(1 - done, 0.0) / max(cool, 1e-9), 1.0)
-    return warm * (0.02 + 0.98 * 0.5 * (1 - math.cos(math.pi * left)))
 
 
 class Batches(torch.utils.data.Dataset):

@@ -12,9 +12,10 @@ torch = pytest.importorskip("torch", reason="PyTorch is installed only in the en
 from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg  # noqa: E402
 from rosbot_patrol.detection.darknet_weights import format_weights, parse_weights, weights_size  # noqa: E402
 from rosbot_patrol.detection.training.grow import grow  # noqa: E402
-from rosbot_patrol.detection.training.loss import Truth, yolo_loss  # noqa: E402
+from rosbot_patrol.detection.training.learner import Learner, Optimiser, schedule  # noqa: E402
+from rosbot_patrol.detection.training.loss import Truth, yolo_loss, yolo_losses  # noqa: E402
+from rosbot_patrol.detection.training.muon import StackedMuon  # noqa: E402
 from rosbot_patrol.detection.training.network import Darknet  # noqa: E402
-from rosbot_patrol.detection.training.train import Optimiser, _schedule  # noqa: E402
 
 SPEC = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
 
@@ -115,7 +116,7 @@ def test_a_pair_that_does_not_fit_is_refused() -> None:
 
 
 def test_the_rate_rises_stays_and_falls() -> None:
-    shares = [_schedule(step / 1000, step, 0.4) for step in (0, 300, 599, 800, 999, 1500)]
+    shares = [schedule(step / 1000, step, 0.4) for step in (0, 300, 599, 800, 999, 1500)]
     assert shares == pytest.approx([1 / 200, 1.0, 1.0, 0.51, 0.02, 0.02], abs=2e-3)
 
 
@@ -184,3 +185,50 @@ def test_a_checkpoint_of_the_other_optimiser_is_refused() -> None:
 
 def _buffers(part: dict) -> list[torch.Tensor]:
     return [state["momentum_buffer"] for state in part["state"].values()]
+
+
+def test_rows_that_only_fill_a_batch_up_change_nothing() -> None:
+    torch.manual_seed(1)
+    values = [torch.randn(4, 21, *head.in_shape[1:]) for head in SPEC.heads]
+    boxes, batch = torch.rand(9, 4) * 90 + 10, torch.arange(9) % 4
+    kinds, asked = torch.arange(9) % 2, torch.rand(9) < 0.7
+    plain = yolo_loss(SPEC.heads, values, Truth(boxes, batch, kinds, asked), SPEC.width)
+    none = torch.zeros(5, dtype=torch.bool)
+    exists = torch.cat([torch.ones(9, dtype=torch.bool), none])
+    more = [torch.zeros(5, 4), torch.arange(5) % 4, torch.zeros(5, dtype=torch.long), none]
+    filled = [torch.cat(pair) for pair in zip((boxes, batch, kinds, asked), more, strict=True)]
+    parts, each = yolo_losses(SPEC.heads, values, Truth(*filled, exists), SPEC.width)
+    assert {k: float(v) for k, v in parts.items()} == pytest.approx({k: float(v) for k, v in plain.items()}, rel=1e-5)
+    assert float(each.mean()) == pytest.approx(float(plain["object"]), rel=1e-5)
+    assert each.shape == (4,)
+
+
+def test_muon_of_many_matrices_at_once_steps_as_pytorchs_own() -> None:
+    torch.manual_seed(2)
+    shapes = [(32, 64), (64, 288), (96, 240), (48, 48)]
+    ours = [torch.nn.Parameter(torch.randn(shape) * 0.05) for shape in shapes]
+    theirs = [torch.nn.Parameter(p.data.clone()) for p in ours]
+    one = StackedMuon(ours, 3e-3, weight_decay=5e-3)
+    other = torch.optim.Muon(theirs, lr=3e-3, weight_decay=5e-3, adjust_lr_fn="match_rms_adamw")
+    for _ in range(4):
+        for p, q in zip(ours, theirs, strict=True):
+            p.grad = torch.randn_like(p)
+            q.grad = p.grad.clone()
+        one.step()
+        other.step()
+    for p, q in zip(ours, theirs, strict=True):
+        assert torch.allclose(p, q, atol=2e-6)
+
+
+def test_a_step_of_nothing_is_forgotten() -> None:
+    torch.manual_seed(0)
+    learner = Learner(parse_cfg(SMALL, "small"), torch.device("cpu"), 1e-3)
+    before = {name: value.clone() for name, value in learner.network.state_dict().items()}
+    truth = Truth(torch.tensor([[20.0, 16, 10, 20]]), torch.tensor([0]), torch.tensor([0]), torch.tensor([True]))
+    learner.network.train()
+    learner.learn(torch.rand(2, 3, 32, 64), truth, 1e-2)
+    assert any(not torch.equal(before[name], value) for name, value in learner.network.state_dict().items())
+    learner.network.load_state_dict(before)
+    learner.restart(None)
+    assert learner.step == 0
+    assert not learner.optimiser._parts[0].state

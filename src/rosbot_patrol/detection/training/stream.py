@@ -1,0 +1,86 @@
+"""Draw training pictures for as long as somebody learns them: all kinds that `scripts/train_network` draws, in turns.
+
+Each shard, `stream-00007.npy` with its npz, is as `render.py` writes it, and depends on the seed and its number only.
+"""
+
+from __future__ import annotations
+
+import itertools
+import multiprocessing
+import os
+import time
+from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from rosbot_patrol.detection.training.dataset import pack_masks
+from rosbot_patrol.detection.training.render import Studio
+from rosbot_patrol.simulation.world import load_world
+
+PER_SHARD, WAITING = 250, 80
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of pictures: a house of `worlds/`, or rooms by chance, and what `Studio.shard` is told."""
+
+    house: str = ""
+    told: dict[str, Any] = field(default_factory=dict)
+
+
+def _kinds() -> list[Kind]:
+    """Those of a round of 42 shards, with the shares that `scripts/train_network` has."""
+    kinds = []
+    for house in ("house", "office", "flat"):
+        kinds.append(Kind(house, {"house_share": 1.0, "plain": True, "pets": 0.4, "hard": 0.4}))
+        kinds.append(Kind(house, {"house_share": 1.0, "pets": 0.3, "hard": 0.4}))
+        kinds += [Kind(house, {"house_share": 1.0, "plain": True, "cases": 1.0})] * 2
+    kinds += [Kind("", {"house_share": 0.0, "cases": 1.0})] * 10
+    return kinds + [Kind("", {"house_share": 0.0, "pets": 0.3, "hard": 0.35})] * 20
+
+
+ROUND = _kinds()
+
+
+def kind_of(number: int, seed: int) -> Kind:
+    """The kind of a shard by its number: all of a round in an order by chance, then all again."""
+    order = np.random.default_rng([seed, 77, number // len(ROUND)]).permutation(len(ROUND))
+    return ROUND[int(order[number % len(ROUND)])]
+
+
+def draw(folder: Path, worlds: Path, seed: int, first: int, step: int, last: int | None = None) -> None:
+    """Draw the shards `first`, `first` + `step` and so on before `last` into a folder; waits while it is full."""
+    cv2.setNumThreads(1)
+    os.nice(5)
+    studios: dict[str, Studio] = {}
+    for number in itertools.count(first, step):
+        if last is not None and number >= last:
+            return
+        while len(list(folder.glob("stream-*.npy"))) > WAITING:
+            time.sleep(0.5)
+        kind = kind_of(number, seed)
+        if kind.house not in studios:
+            studios[kind.house] = Studio(load_world(worlds / f"{kind.house}.world") if kind.house else None)
+        pictures, boxes, masks = studios[kind.house].shard([seed, number, 2], PER_SHARD, test=False, **kind.told)
+        target = folder / f"stream-{number:05d}.npy"
+        np.savez(target.with_suffix(".npz"), boxes=boxes, **pack_masks(masks))
+        part = target.with_suffix(".part.npy")
+        np.save(part, pictures)
+        part.rename(target)
+
+
+def start(folder: Path, worlds: Path, seed: int, processes: int, first: int = 0) -> list[BaseProcess]:
+    """Processes that draw the shards from `first` on into a folder; they end with the process that started them."""
+    for name in ("LP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ[name] = "1"
+    context = multiprocessing.get_context("spawn")
+    started: list[BaseProcess] = []
+    for k in range(processes):
+        process = context.Process(target=draw, args=(folder, worlds, seed, first + k, processes), daemon=True)
+        process.start()
+        started.append(process)
+    return started
