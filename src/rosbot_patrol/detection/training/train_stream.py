@@ -86,14 +86,17 @@ class StreamTrainer:
         self.options = options
         self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
         on_gpu = self.device.type == "cuda"
+        if not on_gpu:
+            sys.stdout.write("PyTorch sees no GPU: this is a trial, a hundred times slower, and nothing is compiled\n")
+        compile_it = options.compile and on_gpu
         torch.backends.cudnn.benchmark = True
         self.learner = Learner(
-            read_cfg(str(options.cfg)), self.device, options.rate, muon=True, bf16=True, compile_it=options.compile
+            read_cfg(str(options.cfg)), self.device, options.rate, muon=True, bf16=True, compile_it=compile_it
         )
         self.learner.network.train()
         room = torch.cuda.mem_get_info()[0] - options.reserve * 1e9 if on_gpu else 4e9
         self.pool = ViewPool(min(int(room / VIEW_BYTES), options.views), self.device)
-        self.mixer = Mixer(self.pool, options.seed, compile_it=options.compile)
+        self.mixer = Mixer(self.pool, options.seed, compile_it=compile_it)
         self.scores = torch.zeros(self.pool.places, device=self.device)
         self._sums = {name: torch.zeros((), device=self.device) for name in ("box", "object", "kind")}
         self._counted = 0
@@ -107,7 +110,7 @@ class StreamTrainer:
         """Learn until the minutes are over, those of a run before with the same checkpoint counted in.
 
         Raises:
-            RuntimeError: a process that draws has ended with an error.
+            RuntimeError: a process that draws has ended with an error, or the minutes were over before the first step.
         """
         options = self.options
         begun = said = saved = time.monotonic()
@@ -134,6 +137,11 @@ class StreamTrainer:
                 saved = now
         self._spent = time.monotonic() - begun
         self._say(self._spent, 0.0)
+        if self.learner.step == 0:
+            raise RuntimeError(
+                f"nothing was learnt in {options.minutes:g} minutes: {self.pool.added} of the {options.least} views to "
+                "begin with were there; give it more --minutes"
+            )
         self.save()
 
     def _prepare(self) -> None:

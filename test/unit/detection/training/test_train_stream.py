@@ -108,3 +108,10 @@ def test_the_end_of_a_process_that_draws_is_an_error(tmp_path: Path) -> None:
 
     with pytest.raises(RuntimeError, match="draws"):
         StreamTrainer(options(tmp_path, minutes=5)).run(Feed(tmp_path, 1, pin=False), [Ended()])  # type: ignore[list-item]
+
+
+def test_minutes_that_are_over_before_the_first_step_are_an_error(tmp_path: Path) -> None:
+    write_shard(tmp_path, 0)
+    with pytest.raises(RuntimeError, match=r"nothing was learnt in 0\.05 minutes: 3 of the 100 views"):
+        StreamTrainer(options(tmp_path, minutes=0.05, least=100)).run(Feed(tmp_path, 1, pin=False), [])
+    assert not (tmp_path / "new.weights").exists()
