@@ -8,10 +8,10 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import os
-import time
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 import cv2
@@ -61,7 +61,7 @@ def draw(folder: Path, worlds: Path, seed: int, first: int, step: int, last: int
         if last is not None and number >= last:
             return
         while len(list(folder.glob("stream-*.npy"))) > WAITING:
-            time.sleep(0.5)
+            sleep(0.5)
         kind = kind_of(number, seed)
         if kind.house not in studios:
             studios[kind.house] = Studio(load_world(worlds / f"{kind.house}.world") if kind.house else None)

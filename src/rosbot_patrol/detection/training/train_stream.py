@@ -42,7 +42,7 @@ class Feed:
     """Shards of a folder as they are finished, read by threads of their own; a file that was read is deleted."""
 
     def __init__(self, folder: Path, threads: int, *, pin: bool) -> None:
-        self.ready: queue.Queue[Views] = queue.Queue(4)
+        self.ready: queue.Queue[Views | Exception] = queue.Queue(4)
         self._folder, self._pin = folder, pin
         self._seen: set[Path] = set()
         self._lock = threading.Lock()
@@ -63,7 +63,11 @@ class Feed:
             if file is None:
                 time.sleep(0.2)
                 continue
-            views = read_views(file)
+            try:
+                views = read_views(file)
+            except (OSError, ValueError, KeyError) as err:
+                self.ready.put(err)
+                return
             self.ready.put(views.pinned() if self._pin else views)
             file.unlink()
             file.with_suffix(".npz").unlink()
@@ -182,6 +186,8 @@ class StreamTrainer:
             views = feed.ready.get_nowait()
         except queue.Empty:
             return
+        if isinstance(views, Exception):
+            raise views
         known = self.scores[: self.pool.size]
         usual = known.mean().clamp(min=1e-3) if self.pool.size else 1.0
         self.scores[self.pool.add(views)] = usual

@@ -47,6 +47,6 @@ def test_it_waits_while_nobody_takes_what_is_drawn(tmp_path: Path, monkeypatch: 
         for file in tmp_path.glob("stream-*"):
             file.unlink()
 
-    monkeypatch.setattr(stream.time, "sleep", take)
+    monkeypatch.setattr(stream, "sleep", take)
     stream.draw(tmp_path, WORLDS, 5, 0, 1, last=3)
     assert len(waits) == 2

@@ -61,7 +61,7 @@ def test_shards_come_once_and_their_files_go(tmp_path: Path) -> None:
     feed = Feed(tmp_path, 2, pin=False)
     for number in range(3):
         write_shard(tmp_path, number)
-    counts = [len(feed.ready.get(timeout=10).rows) for _ in range(3)]
+    counts = [len(feed.ready.get(timeout=10).rows) for _ in range(3)]  # type: ignore[union-attr]
     assert counts == [3, 3, 3]
     end = time.monotonic() + 10
     while list(tmp_path.iterdir()) and time.monotonic() < end:
@@ -75,6 +75,8 @@ def test_a_shard_without_masks_is_refused_by_its_name(tmp_path: Path) -> None:
     np.savez(file.with_suffix(".npz"), boxes=np.zeros((0, 14), np.float32))
     with pytest.raises(ValueError, match=r"stream-00004\.npy has no masks"):
         read_views(file)
+    with pytest.raises(ValueError, match=r"stream-00004\.npy has no masks"):
+        StreamTrainer(options(tmp_path, minutes=5)).run(Feed(tmp_path, 1, pin=False), [])
 
 
 def test_it_learns_from_what_is_drawn_and_writes_the_weights(
