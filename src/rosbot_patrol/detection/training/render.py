@@ -251,14 +251,19 @@ def _work(job: tuple[argparse.Namespace, int]) -> str:
         hard=options.hard,
         cases=options.cases,
     )
+    write_shard(target, pictures, boxes, masks)
+    return target.name
+
+
+def write_shard(target: Path, pictures: np.ndarray, boxes: np.ndarray, masks: np.ndarray) -> None:
+    """Write what `Studio.shard` gave, as jpegs where the name ends so; the file is there when it is whole."""
     np.savez(target.with_suffix(".npz"), boxes=boxes, **pack_masks(masks))
     part = target.with_suffix(".part" + target.suffix)
-    if options.jpeg:
+    if target.suffix == JPEGS:
         Packed.of(pictures).save(part)
     else:
         np.save(part, pictures)
     part.rename(target)
-    return target.name
 
 
 _studio: Studio | None = None

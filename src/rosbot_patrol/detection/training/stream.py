@@ -17,8 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from rosbot_patrol.detection.training.dataset import pack_masks
-from rosbot_patrol.detection.training.render import Studio
+from rosbot_patrol.detection.training.render import Studio, write_shard
 from rosbot_patrol.simulation.world import load_world
 
 PER_SHARD, WAITING = 250, 80
@@ -66,11 +65,7 @@ def draw(folder: Path, worlds: Path, seed: int, first: int, step: int, last: int
         if kind.house not in studios:
             studios[kind.house] = Studio(load_world(worlds / f"{kind.house}.world") if kind.house else None)
         pictures, boxes, masks = studios[kind.house].shard([seed, number, 2], PER_SHARD, test=False, **kind.told)
-        target = folder / f"stream-{number:05d}.npy"
-        np.savez(target.with_suffix(".npz"), boxes=boxes, **pack_masks(masks))
-        part = target.with_suffix(".part.npy")
-        np.save(part, pictures)
-        part.rename(target)
+        write_shard(folder / f"stream-{number:05d}.npy", pictures, boxes, masks)
 
 
 def start(folder: Path, worlds: Path, seed: int, processes: int, first: int = 0) -> list[BaseProcess]:

@@ -127,9 +127,7 @@ class StreamTrainer:
             self._spent = now - begun
             self._take(feed, drawing)
             rate = 0.0
-            if self.pool.size < options.least:
-                time.sleep(0.05)
-            else:
+            if self.pool.size >= options.least:
                 spent = self._spent / 60 / options.minutes
                 rate = options.rate * schedule(spent, self.learner.step, options.cool)
                 self._learn(rate)
@@ -183,7 +181,8 @@ class StreamTrainer:
         if any(process.exitcode for process in drawing):
             raise RuntimeError("a process that draws the pictures has ended; its error is above")
         try:
-            views = feed.ready.get_nowait()
+            waits = self.pool.size < self.options.least
+            views = feed.ready.get(waits, timeout=0.05)
         except queue.Empty:
             return
         if isinstance(views, Exception):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_networks import small_cfg
 
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 
@@ -34,28 +35,7 @@ def test_weights_go_out_and_in_again() -> None:
         assert all(torch.allclose(a, b, atol=1e-4) for a, b in pairs)
 
 
-SMALL = """
-[net]
-width=64
-height=32
-channels=3
-[convolutional]
-batch_normalize=1
-filters=4
-size=3
-stride=2
-pad=1
-activation=leaky
-[convolutional]
-filters=7
-size=1
-activation=linear
-[yolo]
-mask=0
-anchors=10,20
-classes=2
-num=1
-"""
+SMALL = small_cfg()
 LARGE = """
 [net]
 width=64

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from oblongs import BLUE, make_view
+from small_networks import small_cfg
 
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 pytest.importorskip("moderngl", reason="moderngl is in .ws/train only after scripts/train_network --stream")
@@ -16,28 +17,7 @@ pytest.importorskip("moderngl", reason="moderngl is in .ws/train only after scri
 from rosbot_patrol.detection.training.dataset import pack_masks  # noqa: E402
 from rosbot_patrol.detection.training.train_stream import Feed, StreamTrainer, read_views  # noqa: E402
 
-CFG = """
-[net]
-width=384
-height=288
-channels=3
-[convolutional]
-batch_normalize=1
-filters=4
-size=3
-stride=16
-pad=1
-activation=leaky
-[convolutional]
-filters=7
-size=1
-activation=linear
-[yolo]
-mask=0
-anchors=40,100
-classes=2
-num=1
-"""
+CFG = small_cfg(384, 288, 16, "40,100")
 
 
 def write_shard(folder: Path, number: int, count: int = 3) -> Path:
