@@ -10,10 +10,13 @@ from __future__ import annotations
 import argparse
 import functools
 import itertools
+import math
 import multiprocessing
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -21,6 +24,7 @@ import numpy as np
 from rosbot_patrol.detection.training import scenes
 from rosbot_patrol.detection.training.cases import case_camera, draw_case, pick_case
 from rosbot_patrol.detection.training.dataset import JPEGS, Packed, pack_masks
+from rosbot_patrol.detection.training.kinds import KINDS, MOST
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 from rosbot_patrol.detection.training.mixing import FURNITURE
 from rosbot_patrol.detection.training.patterns import draw_textures
@@ -230,29 +234,27 @@ def _poster(painter: EglRenderer, look, rng: np.random.Generator) -> Texture:
     return Texture(painter.render(eye, view)[0][::-1].copy(), 0.0)
 
 
-def _work(job: tuple[argparse.Namespace, int]) -> str:
-    options, index = job
-    target = options.folder / f"{options.name}-{index:04d}{JPEGS if options.jpeg else '.npy'}"
-    if target.exists():
-        return target.name
+@dataclass(frozen=True)
+class _Job:
+    """A shard to be drawn: its file, the seed, the house, whether it is for tests, and what `Studio.shard` is told."""
+
+    target: Path
+    seed: tuple[int, int, int]
+    house: Path | None
+    test: bool
+    told: dict[str, Any]
+
+
+def _work(job: _Job) -> str:
+    if job.target.exists():
+        return job.target.name
     if os.nice(0) < 5:
         os.nice(5)
     cv2.setNumThreads(1)
-    global _studio
-    if _studio is None:
-        _studio = Studio(load_world(options.house) if options.house else None, unseen=options.test)
-    pictures, boxes, masks = _studio.shard(
-        [options.seed, index, int(options.test)],
-        PER_SHARD,
-        test=options.test,
-        house_share=options.house_share,
-        plain=options.plain,
-        pets=options.pets,
-        hard=options.hard,
-        cases=options.cases,
-    )
-    write_shard(target, pictures, boxes, masks)
-    return target.name
+    if job.house not in _studios:
+        _studios[job.house] = Studio(load_world(job.house) if job.house else None, unseen=job.test)
+    write_shard(job.target, *_studios[job.house].shard([*job.seed], PER_SHARD, test=job.test, **job.told))
+    return job.target.name
 
 
 def write_shard(target: Path, pictures: np.ndarray, boxes: np.ndarray, masks: np.ndarray) -> None:
@@ -266,11 +268,42 @@ def write_shard(target: Path, pictures: np.ndarray, boxes: np.ndarray, masks: np
     part.rename(target)
 
 
-_studio: Studio | None = None
+_studios: dict[Path | None, Studio] = {}
+
+
+def _jobs(options: argparse.Namespace, name: str, pictures: float, seed: int, house: Path | None, **told) -> list[_Job]:
+    """The shards of a set."""
+    test = options.set is not None
+    targets = [
+        options.folder / f"{name}-{k:04d}{JPEGS if options.jpeg else '.npy'}"
+        for k in range(math.ceil(pictures / PER_SHARD))
+    ]
+    return [_Job(target, (seed, k, int(test)), house, test, told) for k, target in enumerate(targets)]
+
+
+def _jobs_of_kinds(options: argparse.Namespace) -> list[_Job]:
+    """The shards of all kinds of training pictures."""
+    jobs = []
+    for kind in KINDS:
+        house = options.worlds / f"{kind.house}.world" if kind.house else None
+        pictures = options.pictures * kind.parts / MOST
+        jobs += _jobs(options, kind.name(options.seed), pictures, options.seed + kind.offset, house, **kind.told)
+    return jobs
+
+
+def _jobs_asked_for(options: argparse.Namespace) -> list[_Job]:
+    if options.kinds:
+        return _jobs_of_kinds(options)
+    if options.set is not None:
+        chosen = SETS[options.set]
+        told = {"house_share": chosen.house_share, "pets": chosen.pets}
+        return _jobs(options, options.set, chosen.pictures, chosen.seed, WORLD, **told)
+    told = {name: getattr(options, name) for name in ("house_share", "plain", "pets", "hard", "cases")}
+    return _jobs(options, options.name, options.pictures, options.seed, options.house, **told)
 
 
 def main() -> None:
-    """Make a set from the command line."""
+    """Make sets from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--name", default="train")
@@ -283,21 +316,17 @@ def main() -> None:
     parser.add_argument("--hard", type=float, default=0.0, help="share of people behind things, of pets nearby")
     parser.add_argument("--cases", type=float, default=0.0, help="share that is a case of cases.CASES")
     parser.add_argument("--jpeg", action="store_true", help="keep the pictures as jpegs, a seventh as large")
-    parser.add_argument("--set", choices=SETS, help="draw these pictures of the tests, which test_set.py lays down")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--set", choices=SETS, help="draw these pictures of the tests, which test_set.py lays down")
+    which.add_argument("--kinds", action="store_true", help="draw all kinds of kinds.py; --pictures: of the commonest")
+    parser.add_argument("--worlds", type=Path, default=Path("worlds"), help="where the houses of --kinds are")
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
-    options.test = options.set is not None
-    if options.test:
-        chosen = SETS[options.set]
-        options.name, options.pictures, options.seed = options.set, chosen.pictures, chosen.seed
-        options.house, options.house_share, options.pets, options.plain = WORLD, chosen.house_share, chosen.pets, False
-        options.hard, options.cases, options.jpeg = 0.0, 0.0, False
     options.folder.mkdir(parents=True, exist_ok=True)
-    shards = -(-options.pictures // PER_SHARD)
-    jobs = [(options, i) for i in range(shards)]
+    jobs = _jobs_asked_for(options)
     with multiprocessing.get_context("spawn").Pool(options.processes) as pool:
         for done, name in enumerate(pool.imap_unordered(_work, jobs), 1):
-            sys.stdout.write(f"\r{done}/{shards} shards ({name}) ")
+            sys.stdout.write(f"\r{done}/{len(jobs)} shards ({name}) ")
             sys.stdout.flush()
     sys.stdout.write("\n")
 

@@ -1,4 +1,4 @@
-"""Draw training pictures for as long as somebody learns them: all kinds that `scripts/train_network` draws, in turns.
+"""Draw training pictures for as long as somebody learns them: all kinds in turns, with the shares of `kinds.py`.
 
 Each shard, `stream-00007.npy` with its npz, is as `render.py` writes it, and depends on the seed and its number only.
 """
@@ -8,41 +8,19 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import os
-from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from time import sleep
-from typing import Any
 
 import cv2
 import numpy as np
 
+from rosbot_patrol.detection.training.kinds import KINDS, Kind
 from rosbot_patrol.detection.training.render import Studio, write_shard
 from rosbot_patrol.simulation.world import load_world
 
 PER_SHARD, WAITING = 250, 80
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of pictures: a house of `worlds/`, or rooms by chance, and what `Studio.shard` is told."""
-
-    house: str = ""
-    told: dict[str, Any] = field(default_factory=dict)
-
-
-def _kinds() -> list[Kind]:
-    """Those of a round of 42 shards, with the shares that `scripts/train_network` has."""
-    kinds = []
-    for house in ("house", "office", "flat"):
-        kinds.append(Kind(house, {"house_share": 1.0, "plain": True, "pets": 0.4, "hard": 0.4}))
-        kinds.append(Kind(house, {"house_share": 1.0, "pets": 0.3, "hard": 0.4}))
-        kinds += [Kind(house, {"house_share": 1.0, "plain": True, "cases": 1.0})] * 2
-    kinds += [Kind("", {"house_share": 0.0, "cases": 1.0})] * 10
-    return kinds + [Kind("", {"house_share": 0.0, "pets": 0.3, "hard": 0.35})] * 20
-
-
-ROUND = _kinds()
+ROUND = [kind for kind in KINDS for _ in range(kind.parts)]
 
 
 def kind_of(number: int, seed: int) -> Kind:
