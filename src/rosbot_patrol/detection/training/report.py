@@ -30,6 +30,7 @@ from rosbot_patrol.detection.training.scoring import (
     groups,
     match,
     say,
+    say_false_alarms,
     say_found_at,
 )
 from rosbot_patrol.images.encodings import Picture
@@ -163,7 +164,7 @@ def main() -> None:
         sys.stdout.write(say(results[-1]) + "\n")
     precisions = {f"average precision, {k}": average_precision(found, i) for i, k in enumerate(KINDS)}
     sys.stdout.write("".join(f"{k}: {v:.4f}\n" for k, v in precisions.items()))
-    sys.stdout.write(say_found_at(found) + "\n")
+    sys.stdout.write(say_found_at(found) + "\n" + say_false_alarms(found, options.threshold) + "\n")
     if options.json:
         options.json.write_text(json.dumps({"thresholds": results, **precisions}, indent=1))
     if options.sheets:

@@ -9,6 +9,7 @@ him by 0.5, or lies by more than half inside his box, is left out of the count.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +22,13 @@ KINDS = ("person", "fire hydrant")
 AIMED = "persons 1-6 m, half of the figure seen"
 HIT = 0.5
 INSIDE = 0.5
+TOUCHES = 0.1
+FALSE_ALARMS = (
+    "of the wrong size, on a person who is found by no surer box",
+    "a second one, on a person who is found",
+    "beside the persons of the picture",
+    "in a picture with no person",
+)
 
 
 @dataclass
@@ -162,6 +170,26 @@ def figures(found: Found, threshold: float) -> dict[str, float]:
     return out
 
 
+def false_alarms(found: Found, threshold: float) -> dict[str, int]:
+    """What the false boxes of persons above a threshold are: how many of each of `FALSE_ALARMS`.
+
+    A box belongs to the person it overlaps most, where that is an IoU of `TOUCHES` or more.
+    """
+    counts = dict.fromkeys(FALSE_ALARMS, 0)
+    wrong, second, beside, nobody = FALSE_ALARMS
+    person = column(found.labels, "kind") == 0
+    for box in found.boxes[found.false(0) & (found.boxes[:, 2] > threshold)]:
+        there = np.flatnonzero(person & (column(found.labels, "picture") == box[0]))
+        overlap = _iou(box[3:7], found.labels[there, 2:6])
+        if not len(there):
+            counts[nobody] += 1
+        elif overlap.max() < TOUCHES:
+            counts[beside] += 1
+        else:
+            counts[second if found.hit[there[overlap.argmax()]] >= box[2] else wrong] += 1
+    return counts
+
+
 def wilson(hits: float, count: float) -> tuple[float, float]:
     """The 95 % interval of a share (Wilson 1927)."""
     if not count:
@@ -192,6 +220,16 @@ def say_found_at(found: Found, precisions: tuple[float, ...] = (0.95, 0.99, 0.99
     for precision in precisions:
         threshold, hits, there = found_at(found, precision)
         lines.append(f"{AIMED}, at a precision of {precision:.1%} (threshold {threshold:.3f}): {share(hits, there)}")
+    return "\n".join(lines)
+
+
+def say_false_alarms(found: Found, thresholds: Sequence[float]) -> str:
+    """What `false_alarms` counts, as lines of text."""
+    lines = []
+    for threshold in thresholds:
+        counts = false_alarms(found, threshold)
+        lines.append(f"{sum(counts.values())} false boxes of persons above {threshold:g}:")
+        lines += [f"  {count} {what}" for what, count in counts.items()]
     return "\n".join(lines)
 
 

@@ -163,6 +163,29 @@ def test_what_is_found_at_a_precision() -> None:
     assert "precision of 99.5% (threshold 1.000): 0/8 = 0.00 %" in scoring.say_found_at(found)
 
 
+@pytest.mark.parametrize(
+    ("boxes", "expected"),
+    [
+        ([GOOD], (0, 0, 0, 0)),
+        ([(0.3, 0.3, 0.2, 0.36, 0)], (1, 0, 0, 0)),
+        ([GOOD, (0.3, 0.66, 0.16, 0.33, 0)], (0, 1, 0, 0)),
+        ([(0.8, 0.5, 0.2, 0.7, 0)], (0, 0, 1, 0)),
+    ],
+)
+def test_false_alarms_are_told_by_what_they_are(pictures: Pictures, boxes, expected) -> None:
+    found = report.find_all(pictures, CFG, forward_of(*boxes))
+    assert tuple(scoring.false_alarms(found, 0.5).values()) == expected
+    assert scoring.say_false_alarms(found, [0.5]).startswith(f"{sum(expected)} false boxes of persons above 0.5:")
+    assert sum(scoring.false_alarms(found, 0.99).values()) == 0
+
+
+def test_a_false_alarm_where_nobody_is() -> None:
+    boxes = np.zeros((1, 9))
+    boxes[0, [0, 2, 7]] = 1, 0.9, -1
+    found = scoring.Found(boxes, np.array([row(kind=1, picture=1)], np.float32), np.zeros(1), np.zeros((2, 2), int))
+    assert scoring.false_alarms(found, 0.5)["in a picture with no person"] == 1
+
+
 def test_a_set_without_contrast_is_taken_as_clear(tmp_path: Path) -> None:
     np.save(tmp_path / "old-0000.npy", np.zeros((1, 288, 384, 3), np.uint8))
     np.savez(tmp_path / "old-0000.npz", boxes=np.array([row()[:-1]], np.float32))
