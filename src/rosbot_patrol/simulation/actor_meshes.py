@@ -6,9 +6,11 @@ metres, in the frame of the joint that carries the part.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.simulation.meshes import grid_faces
 from rosbot_patrol.simulation.scene import Shape
@@ -22,12 +24,18 @@ def loft(sections: Sequence[Section], *, y: float = 0.0, sides: int = _SIDES) ->
     rows = np.array(
         [(sections[0][0], 1e-4, 1e-4, sections[0][3]), *sections, (sections[-1][0], 1e-4, 1e-4, sections[-1][3])]
     )
-    angle = np.linspace(0, 2 * np.pi, sides + 1)
+    cosines, sines = _circle(sides)
     points = np.empty((len(rows), sides + 1, 3))
-    points[..., 0] = rows[:, 1, None] * np.cos(angle) + rows[:, 3, None]
-    points[..., 1] = rows[:, 2, None] * np.sin(angle) + y
+    points[..., 0] = rows[:, 1, None] * cosines + rows[:, 3, None]
+    points[..., 1] = rows[:, 2, None] * sines + y
     points[..., 2] = rows[:, 0, None]
     return Shape(kind="mesh", vertices=points.reshape(-1, 3), faces=grid_faces(len(rows), sides + 1))
+
+
+@functools.lru_cache(maxsize=16)
+def _circle(sides: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    angle = np.linspace(0, 2 * np.pi, sides + 1)
+    return np.cos(angle), np.sin(angle)
 
 
 def ellipsoid(

@@ -193,7 +193,8 @@ def _sole(foot: Matrix) -> float:
     return float((corners @ foot.T)[:, 2].min())
 
 
-def _figure(look: Look) -> list[tuple[str, Shape, Colour, str]]:
+@functools.lru_cache(maxsize=32)
+def _figure(look: Look) -> tuple[tuple[str, Shape, Colour, str], ...]:
     """(joint, shape, colour, texture) of each visual."""
     h, b, loose = look.height, look.build, look.loose
     hip, skull = 0.088 * h * (0.6 + 0.4 * b), 0.128 * h
@@ -214,7 +215,7 @@ def _figure(look: Look) -> list[tuple[str, Shape, Colour, str]]:
             (f"forearm_{side}", parts.forearm(_FOREARM * h, b, loose=loose if look.sleeves == "long" else 0.0), *lower),
             (f"forearm_{side}", parts.hand(_FOREARM * h), look.skin, ""),
         ]
-    return figure + _extras(look, hip, skull)
+    return (*figure, *_extras(look, hip, skull))
 
 
 @functools.lru_cache(maxsize=256)

@@ -7,8 +7,10 @@ fill it once.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,23 +68,36 @@ def mesh_of(shape: Shape) -> Mesh:
 
 def box(x: float, y: float, z: float) -> Mesh:
     """A box about its middle."""
+    unit, normals, signs, faces = _unit_box()
     half = np.array([x, y, z]) / 2
-    positions, normals, uv, span = [], [], [], []
-    for axis in range(3):
-        u, v = [(1, 2), (0, 2), (0, 1)][axis]
-        for sign in (-1.0, 1.0):
-            corners = np.zeros((4, 3))
-            corners[:, axis] = sign * half[axis]
-            corners[:, u] = half[u] * np.array([-1, 1, 1, -1]) * (sign if axis != 1 else -sign)
-            corners[:, v] = half[v] * np.array([-1, -1, 1, 1])
-            normal = np.zeros(3)
-            normal[axis] = sign
-            positions.append(corners)
-            normals.append(np.tile(normal, (4, 1)))
-            uv.append(corners[:, (u, v)] * [(sign if axis != 1 else -sign), 1.0])
-            span.append(np.tile(2 * half[[u, v]], (4, 1)))
-    quads = np.arange(24).reshape(6, 4)
-    return Mesh(np.vstack(positions), np.vstack(normals), np.vstack(uv), np.vstack(span), _split(quads))
+    across = half[_BOX_AXES].repeat(4, axis=0)
+    return Mesh(unit * half, normals, across * signs, 2 * across, faces)
+
+
+_BOX_AXES = np.repeat([[1, 2], [0, 2], [0, 1]], 2, axis=0)
+"""The axes along which each of the six faces of a box is wide and high."""
+
+
+@functools.lru_cache(maxsize=1)
+def _unit_box() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Corners of the box of half sizes 1, normals, signs of the texture coordinates, and triangles."""
+    corners, normals, signs = np.zeros((6, 4, 3)), np.zeros((6, 4, 3)), np.zeros((6, 4, 2))
+    for face, (u, v) in enumerate(_BOX_AXES):
+        axis, sign = face // 2, 2.0 * (face % 2) - 1.0
+        turned = -sign if axis == 1 else sign
+        corners[face, :, axis] = normals[face, :, axis] = sign
+        corners[face, :, u] = np.array([-1, 1, 1, -1]) * turned
+        corners[face, :, v] = np.array([-1, -1, 1, 1])
+        signs[face] = np.stack([corners[face, :, u] * turned, corners[face, :, v]], axis=1)
+    faces = _split(np.arange(24).reshape(6, 4))
+    return _kept(corners.reshape(-1, 3), normals.reshape(-1, 3), signs.reshape(-1, 2), faces)
+
+
+def _kept(*arrays: NDArray[Any]) -> Any:
+    """The same arrays, to be used again and again: nobody may write into them."""
+    for array in arrays:
+        array.flags.writeable = False
+    return arrays
 
 
 def plane(x: float, y: float) -> Mesh:
@@ -94,13 +109,22 @@ def plane(x: float, y: float) -> Mesh:
 
 def cylinder(radius: float, length: float, *, sides: int = _SIDES) -> Mesh:
     """A cylinder about its middle, along z, with its two lids."""
+    angle, ring, normals, faces = _unit_cylinder(sides)
+    low, high = ring * radius - [0, 0, length / 2], ring * radius + [0, 0, length / 2]
+    around, n = 2 * np.pi * radius, sides + 1
+    uv, span = np.empty((4 * n, 2)), np.empty((4 * n, 2))
+    uv[:n, 0] = uv[n : 2 * n, 0] = angle * radius - around / 2
+    uv[:n, 1], uv[n : 2 * n, 1] = -length / 2, length / 2
+    uv[2 * n : 3 * n], uv[3 * n :] = low[:, :2], high[:, :2]
+    span[: 2 * n], span[2 * n :] = (around, length), 2 * radius
+    return Mesh(np.concatenate([low, high, low, high]), normals, uv, span, faces)
+
+
+@functools.lru_cache(maxsize=8)
+def _unit_cylinder(sides: int) -> Any:
+    """Angles and ring of radius 1, shape (sides + 1, 3); normals and triangles of the whole."""
     angle = np.linspace(0, 2 * np.pi, sides + 1)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1)
-    low, high = ring * radius - [0, 0, length / 2], ring * radius + [0, 0, length / 2]
-    around = 2 * np.pi * radius
-    side_uv = np.stack([angle * radius - around / 2, np.zeros(sides + 1)], axis=1)
-    uv = np.vstack([side_uv - [0, length / 2], side_uv - [0, -length / 2], low[:, :2], high[:, :2]])
-    span = np.vstack([np.tile([around, length], (2 * sides + 2, 1)), np.tile([2 * radius] * 2, (2 * sides + 2, 1))])
     down, up = np.tile([0.0, 0, -1], (sides + 1, 1)), np.tile([0.0, 0, 1], (sides + 1, 1))
     n = sides + 1
     i = np.arange(sides)
@@ -108,9 +132,7 @@ def cylinder(radius: float, length: float, *, sides: int = _SIDES) -> Mesh:
     fan = np.arange(1, sides - 1)
     bottom = np.stack([np.zeros_like(fan), fan + 1, fan], axis=1) + 2 * n
     top = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1) + 3 * n
-    return Mesh(
-        np.vstack([low, high, low, high]), np.vstack([ring, ring, down, up]), uv, span, np.vstack([walls, bottom, top])
-    )
+    return _kept(angle, ring, np.vstack([ring, ring, down, up]), np.vstack([walls, bottom, top]))
 
 
 def sphere(radius: float, length: float, *, sides: int = _SIDES, rings: int = _RINGS) -> Mesh:
@@ -128,41 +150,67 @@ def sphere(radius: float, length: float, *, sides: int = _SIDES, rings: int = _R
     return Mesh(positions.reshape(-1, 3), normals.reshape(-1, 3), uv.reshape(-1, 2), span, grid_faces(*a.shape))
 
 
+@functools.lru_cache(maxsize=256)
 def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
-    """Triangles between neighbours of a (rows, columns) grid of vertices, rows downwards, columns to the left."""
+    """Triangles between neighbours of a (rows, columns) grid of vertices, rows downwards, columns to the left.
+
+    The array is kept and given again: it cannot be written into.
+    """
     i = np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]
     quads = np.stack([i, i + columns, i + columns + 1, i + 1], axis=-1)
-    return _split(quads.reshape(-1, 4))
+    (faces,) = _kept(_split(quads.reshape(-1, 4)))
+    return faces
 
 
 def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
     """Normals of the vertices: the mean of their triangles' by area, vertices at one place taken together."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    weighted = np.cross(b - a, c - a)
-    _, place = np.unique(np.round(vertices, 5), axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    sums = np.zeros((place.max() + 1, 3))
-    for k in range(3):
-        np.add.at(sums, place[faces[:, k]], weighted)
-    sums /= np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-12)
-    normals: NDArray[np.float64] = sums[place]
+    weighted = _cross(vertices, faces)
+    place = _places(vertices)
+    at = place[faces].T.ravel()
+    count = int(place.max()) + 1
+    sums = np.empty((count, 3))
+    for axis, part in enumerate(weighted.T):
+        sums[:, axis] = np.bincount(at, np.concatenate([part] * 3), count)
+    normals: NDArray[np.float64] = (sums / np.maximum(_lengths(sums), 1e-12)[:, None])[place]
     return normals
+
+
+def _cross(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Normals of triangles, as long as twice their area."""
+    corners = vertices[faces]
+    (ax, ay, az), (bx, by, bz) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+
+
+def _lengths(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    x, y, z = vectors.T
+    lengths: NDArray[np.float64] = np.sqrt(x * x + y * y + z * z)
+    return lengths
+
+
+def _places(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
+    """A number for each vertex, the same for those at one place (to 10 um)."""
+    rounded = np.round(vertices, 5)
+    order = np.lexsort(rounded.T)
+    ranked = rounded[order]
+    place = np.empty(len(vertices), np.int64)
+    place[order[:1]] = 0
+    place[order[1:]] = np.cumsum((ranked[1:] != ranked[:-1]).any(axis=1))
+    return place
 
 
 def sharp_normals(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Corners of the triangles, shape (3 F, 3), and their normals: smooth but across edges sharper than 50 deg."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    weighted = np.cross(b - a, c - a)
-    flat = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-12)
-    _, place = np.unique(np.round(vertices, 5), axis=0, return_inverse=True)
+    weighted = _cross(vertices, faces)
+    flat = weighted / np.maximum(_lengths(weighted), 1e-12)[:, None]
     sums = np.repeat(weighted, 3, axis=0)
-    for meeting in _meetings(place.reshape(-1)[faces.ravel()]):
+    for meeting in _meetings(_places(vertices)[faces.ravel()]):
         own, theirs = flat[meeting // 3], weighted[meeting // 3]
         is_near = np.einsum("gik,gjk->gij", own, own) >= _SHARP
         sums[meeting] = np.einsum("gij,gjk->gik", is_near, theirs)
-    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    lengths = _lengths(sums)[:, None]
     up = np.array([0.0, 0.0, 1.0])  # of a triangle without area
     return vertices[faces.ravel()], np.where(lengths > 0.0, sums / np.maximum(lengths, 1e-300), up)
 

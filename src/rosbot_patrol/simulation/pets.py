@@ -210,7 +210,8 @@ def _leg(look: PetLook, leg: str, paw: tuple[float, float, float]) -> dict[str, 
     }
 
 
-def _figure(look: PetLook) -> list[tuple[str, Shape, Colour]]:
+@functools.lru_cache(maxsize=64)
+def _figure(look: PetLook) -> tuple[tuple[str, Shape, Colour], ...]:
     """(joint, shape, colour) of each visual."""
     h, fur, belly = look.height, look.fur, look.belly
     parts = [
@@ -230,7 +231,7 @@ def _figure(look: PetLook) -> list[tuple[str, Shape, Colour]]:
         shin = loft([(0.01 * h, r, 0.8 * r, 0), (-0.5 * lower, 0.75 * r, 0.65 * r, 0), (-lower, 0.7 * r, 0.7 * r, 0)])
         paw = loft([(0.0, 0.75 * r, 0.7 * r, 0), (-0.025 * h, 1.2 * r, r, 0.5 * r), (-0.05 * h, 1.25 * r, r, 0.6 * r)])
         parts += [(f"{leg}_upper", thigh, fur), (f"{leg}_lower", shin, fur), (f"{leg}_paw", paw, belly)]
-    return parts
+    return tuple(parts)
 
 
 @functools.lru_cache(maxsize=64)

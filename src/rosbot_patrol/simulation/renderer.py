@@ -175,9 +175,20 @@ class EglRenderer(SceneRenderer):
     def labels(self) -> NDArray[np.uint8]:
         """The label of what the last picture shows in each pixel, shape (height, width)."""
         assert self._target is not None, "labels() comes after render()"
-        (width, height), buffer = self._target[0], self._target[1]
-        pixels = np.frombuffer(buffer.read(components=4), np.uint8)
-        return pixels.reshape(height, width, 4)[:, :, 3]
+        return self._read(self._target[1], self._target[0])[:, :, 3]
+
+    def render_labelled(self, world_from_optical: Matrix, intrinsics: Intrinsics) -> NDArray[np.uint8]:
+        """The picture in colour and, as a fourth of them, its `labels()`, shape (height, width, 4).
+
+        It is read in one piece, without the depth: faster than `render` and `labels` in turn.
+        """
+        size = (intrinsics.width, intrinsics.height)
+        return self._read(self._draw(world_from_optical, intrinsics, size), size)
+
+    @staticmethod
+    def _read(buffer: Any, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Colour and label of each pixel, shape (height, width, 4)."""
+        return np.frombuffer(buffer.read(components=4), np.uint8).reshape(size[1], size[0], 4)
 
     def close(self) -> None:
         """Give the context and all its memory back."""

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.actor_meshes import loft
 from rosbot_patrol.simulation.mesh_files import load_mesh
-from rosbot_patrol.simulation.meshes import Mesh, mesh_of
+from rosbot_patrol.simulation.meshes import Mesh, mesh_of, smooth_normals
 from rosbot_patrol.simulation.scene import Shape
 from rosbot_patrol.simulation.textures import NAMES, SIDE, standard_textures
 
@@ -86,3 +87,39 @@ def test_textures_are_pictures_and_repeat_with_the_seed() -> None:
     for name, texture in textures.items():
         assert texture.pixels.shape == (SIDE, SIDE, 3), name
         assert np.array_equal(texture.pixels, standard_textures(3)[name].pixels)
+
+
+def plain_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """What `smooth_normals` says of itself, vertex by vertex."""
+    normals = np.zeros_like(vertices)
+    for i, vertex in enumerate(vertices):
+        for face in faces:
+            a, b, c = vertices[face]
+            meets = sum(bool((np.round(corner, 5) == np.round(vertex, 5)).all()) for corner in (a, b, c))
+            normals[i] += meets * np.cross(b - a, c - a)
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def test_normals_are_the_mean_of_all_triangles_that_meet() -> None:
+    limb = loft([(0.5, 0.1, 0.08, 0.01), (0.2, 0.2, 0.1, 0.0), (-0.4, 0.05, 0.05, 0.02)], y=0.1)
+    assert limb.vertices is not None
+    assert limb.faces is not None
+    expected = plain_normals(limb.vertices, limb.faces)
+    assert smooth_normals(limb.vertices, limb.faces) == pytest.approx(expected, abs=1e-12)
+
+
+def test_the_faces_of_a_box_have_their_own_corners_and_their_size() -> None:
+    mesh = mesh_of(Shape(kind="box", size=(1.0, 2.0, 3.0)))
+    for i in range(6):
+        corners, span = mesh.positions[4 * i : 4 * i + 4], mesh.span[4 * i]
+        axis = i // 2
+        assert np.abs(corners).max(axis=0) == pytest.approx([0.5, 1.0, 1.5])
+        assert (mesh.normals[4 * i : 4 * i + 4] * corners)[:, axis] == pytest.approx(mesh.positions.max(axis=0)[axis])
+        assert span == pytest.approx(np.delete([1.0, 2.0, 3.0], axis))
+        assert mesh.uv[4 * i : 4 * i + 4].max(axis=0) == pytest.approx(span / 2)
+
+
+@pytest.mark.parametrize(("kind", "size"), [("box", (1.0, 1.0, 1.0)), ("cylinder", (0.5, 1.0)), ("sphere", (1.0,))])
+def test_what_shapes_share_cannot_be_written_into(kind, size) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        mesh_of(Shape(kind=kind, size=size)).faces[0] = 0

@@ -141,11 +141,12 @@ class Studio:
                 self.renderer.add(extra)
                 self.renderer.move(extra.name, extra.pose)
         optical, intrinsics = eye(camera, rng)
-        picture = self.renderer.render(optical, intrinsics)[0]
-        seen = self.renderer.labels()
+        both = self.renderer.render_labelled(optical, intrinsics)
+        picture, seen = cv2.cvtColor(both, cv2.COLOR_RGBA2RGB), cv2.extractChannel(both, 3)
         finished = degrade(picture, rng)
+        light = float(picture.mean())
         labels = [
-            _label(actor, seen, i + 1, optical, intrinsics, camera, picture, test, finished)
+            _label(actor, seen, i + 1, optical, intrinsics, camera, light, test, finished)
             for i, actor in enumerate(actors)
             if actor.body.kind in FINDABLE
         ]
@@ -207,9 +208,9 @@ def eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[M
     return scenes.placed(x, y, height, yaw) @ tilt @ _FORWARD, intrinsics
 
 
-def _label(actor, seen, value: int, optical: Matrix, intrinsics: Intrinsics, camera, picture, test: bool, finished):
+def _label(actor, seen, value: int, optical: Matrix, intrinsics: Intrinsics, camera, light: float, test, finished):
     mask = seen == value
-    pixels = int(mask.sum())
+    pixels = int(np.count_nonzero(mask))
     if pixels < 12:
         return None
     columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
@@ -218,7 +219,7 @@ def _label(actor, seen, value: int, optical: Matrix, intrinsics: Intrinsics, cam
     kind = 0 if actor.body.kind == "person" else 1
     w, h = intrinsics.width, intrinsics.height
     corners = [columns[0] / w, rows[0] / h, (columns[-1] + 1) / w, (rows[-1] + 1) / h]
-    shares, light = (pixels / max(whole, pixels), pixels / max(part, pixels)), float(picture.mean())
+    shares = (pixels / max(whole, pixels), pixels / max(part, pixels))
     return [kind, *corners, distance, *shares, pixels, light, test, contrast(finished, mask), value]
 
 

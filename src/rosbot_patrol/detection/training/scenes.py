@@ -5,6 +5,7 @@ Looks and postures that `simulation/looks.py` and `simulation/actors.py` reserve
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -33,7 +34,7 @@ WALLS = ("plaster", "plaster", "", "bricks", "stripes", "tiles", "wood", "marble
 POSTERS = 8
 
 
-@dataclass
+@dataclass(frozen=True)
 class Place:
     """An upright box that stands in the way: middle, half sizes and yaw on the floor."""
 
@@ -42,6 +43,12 @@ class Place:
     half_x: float
     half_y: float
     yaw: float
+
+    @functools.cached_property
+    def frame(self) -> tuple[float, ...]:
+        """Middle, half sizes, cosine and sine of the yaw, as Python's own numbers: one by one faster than numpy's."""
+        own = self.x, self.y, self.half_x, self.half_y, np.cos(self.yaw), np.sin(self.yaw)
+        return tuple(float(value) for value in own)
 
 
 @dataclass
@@ -55,6 +62,7 @@ class Scene:
 
     def is_free(self, x: float, y: float, margin: float) -> bool:
         """Whether nothing stands within `margin` of a point."""
+        x, y = float(x), float(y)
         return all(not _near(p, x, y, margin) for p in self.places)
 
 
@@ -302,10 +310,9 @@ def reach(scene: Scene, x: float, y: float, yaw: float) -> float:
 
 def _view(scene: Scene, x: float, y: float, yaw: float) -> float:
     """How far one sees that way, up to 9 m; by half metres, as the test pictures are drawn: some walls are missed."""
-    for distance in np.arange(0.5, 9.0, 0.5):
-        if not scene.is_free(x + distance * np.cos(yaw), y + distance * np.sin(yaw), 0.05):
-            return float(distance)
-    return 9.0
+    ways = np.arange(0.5, 9.0, 0.5)
+    hit = _taken(scene.places, x + ways * np.cos(yaw), y + ways * np.sin(yaw), 0.05)
+    return float(ways[hit.argmax()]) if hit.any() else 9.0
 
 
 def sees(scene: Scene, start: tuple[float, float], end: tuple[float, float]) -> bool:
@@ -313,13 +320,22 @@ def sees(scene: Scene, start: tuple[float, float], end: tuple[float, float]) -> 
     ways = np.linspace(0.05, 0.95, 24)
     points = np.array(start) + ways[:, None] * (np.array(end) - np.array(start))
     walls = [p for p in scene.places if max(p.half_x, p.half_y) > 0.5 and min(p.half_x, p.half_y) < 0.1]
-    return all(not _near(p, px, py, 0.0) for p in walls for px, py in points)
+    return not _taken(walls, points[:, 0], points[:, 1], 0.0).any()
 
 
 def _near(place: Place, x: float, y: float, margin: float) -> bool:
-    c, s = np.cos(place.yaw), np.sin(place.yaw)
-    dx, dy = x - place.x, y - place.y
-    return bool(abs(c * dx + s * dy) < place.half_x + margin and abs(-s * dx + c * dy) < place.half_y + margin)
+    place_x, place_y, half_x, half_y, c, s = place.frame
+    dx, dy = x - place_x, y - place_y
+    return abs(c * dx + s * dy) < half_x + margin and abs(-s * dx + c * dy) < half_y + margin
+
+
+def _taken(places: list[Place], x: np.ndarray, y: np.ndarray, margin: float) -> np.ndarray:
+    """Of many points, shape (N,), whether one of the places is as near as that: `_near` for all of them at once."""
+    frames = np.array([place.frame for place in places]).reshape(-1, 6, 1)
+    place_x, place_y, half_x, half_y, c, s = frames.transpose(1, 0, 2)
+    dx, dy = x - place_x, y - place_y
+    near = (np.abs(c * dx + s * dy) < half_x + margin) & (np.abs(-s * dx + c * dy) < half_y + margin)
+    return np.asarray(near.any(axis=0))
 
 
 def footprints(body: Body) -> list[Place]:

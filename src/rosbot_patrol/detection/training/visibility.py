@@ -25,7 +25,7 @@ def silhouette(actor, optical: Matrix, intrinsics: Intrinsics) -> tuple[int, int
         hull = cv2.convexHull((np.stack([u, v], axis=1) / scale).astype(np.float32))
         cv2.fillConvexPoly(canvas, hull.astype(np.int32), 1)
     inner = canvas[pad // scale : (pad + 480) // scale, pad // scale : (pad + 640) // scale]
-    return int(canvas.sum()) * scale * scale, int(inner.sum()) * scale * scale
+    return cv2.countNonZero(canvas) * scale * scale, cv2.countNonZero(inner) * scale * scale
 
 
 def _corners(shape) -> np.ndarray:
@@ -41,7 +41,9 @@ def contrast(picture: np.ndarray, mask: np.ndarray, *, reach: int = 11) -> float
         reach: size [px] of the neighbourhoods that are compared.
     """
     small = cv2.resize(mask.astype(np.uint8), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    grey, ones = picture.astype(np.float32).mean(axis=2), small.astype(np.float32)
+    near = _around(small, reach)
+    small = small[near]
+    grey, ones = picture[near].astype(np.float32).mean(axis=2), small.astype(np.float32)
     size = (reach, reach)
     edge = cv2.dilate(small, np.ones((3, 3), np.uint8)) != cv2.erode(small, np.ones((3, 3), np.uint8))
     inside, there = cv2.boxFilter(grey * ones, -1, size), cv2.boxFilter(ones, -1, size)
@@ -51,3 +53,12 @@ def contrast(picture: np.ndarray, mask: np.ndarray, *, reach: int = 11) -> float
         return 0.0
     gap = np.abs(inside[good] / there[good] - outside[good] / away[good])
     return float(np.percentile(gap, 75))
+
+
+def _around(mask: np.ndarray, reach: int) -> tuple[slice, slice]:
+    """The rows and columns in which a mask is set, and `reach` more on each side: nothing beyond is looked at."""
+    spans = []
+    for axis in (1, 0):
+        at = np.flatnonzero(mask.any(axis=axis))
+        spans.append(slice(max(int(at[0]) - reach, 0), int(at[-1]) + reach + 1) if len(at) else slice(0, 1))
+    return spans[0], spans[1]

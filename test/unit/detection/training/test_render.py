@@ -155,6 +155,23 @@ def test_labels_tell_bodies_apart() -> None:
     renderer.add(build("a", [(box(0.2, 0.2, 0.2), (0, 0, 0), (1, 0, 0), "")], placed(2, 0.5, 0.2)), label=3)
     renderer.add(build("b", [(box(0.2, 0.2, 0.2), (0, 0, 0), (0, 1, 0), "")], placed(2, -0.5, 0.2)), label=200)
     optical, intrinsics = render.eye((0.0, 0.0, 0.0), np.random.default_rng(0))
-    renderer.render(optical, intrinsics)
+    colour, _ = renderer.render(optical, intrinsics)
     assert set(np.unique(renderer.labels())) == {0, 3, 200}
+    both = renderer.render_labelled(optical, intrinsics)
+    assert np.array_equal(both, np.dstack([colour, renderer.labels()]))
     renderer.close()
+
+
+@pytest.mark.parametrize("place", [(0, 0, 40, 90), (600, 300, 40, 180), (200, 100, 60, 200), (0, 0, 640, 480)])
+def test_contrast_needs_only_what_lies_around_the_figure(place, monkeypatch: pytest.MonkeyPatch) -> None:
+    x, y, wide, high = place
+    picture = np.random.default_rng(2).integers(0, 255, (288, 384, 3), dtype=np.uint8)
+    mask = np.zeros((480, 640), bool)
+    mask[y : y + high, x : x + wide] = True
+    there = visibility.contrast(picture, mask)
+    monkeypatch.setattr(visibility, "_around", lambda *_: (slice(None), slice(None)))
+    assert there == pytest.approx(visibility.contrast(picture, mask), abs=1e-4)
+
+
+def test_nobody_stands_out_of_nothing() -> None:
+    assert visibility.contrast(np.zeros((288, 384, 3), np.uint8), np.zeros((480, 640), bool)) == 0.0

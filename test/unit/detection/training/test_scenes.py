@@ -96,3 +96,16 @@ def test_each_thing_can_be_drawn_and_stands_on_the_floor(maker) -> None:
         )
         assert -0.1 < lowest < 0.15
         assert all(0 <= c <= 1 for v in body.visuals for c in v.material.rgba)
+
+
+def test_many_points_are_free_as_each_of_them_is() -> None:
+    rng = np.random.default_rng(4)
+    room = scenes.draw_room(rng)
+    x, y = rng.uniform(-3, 8, (2, 300))
+    taken = scenes._taken(room.places, x, y, 0.1)
+    assert taken.tolist() == [not room.is_free(px, py, 0.1) for px, py in zip(x, y, strict=True)]
+    assert 0 < taken.sum() < len(taken)
+    assert not scenes._taken([], x, y, 0.1).any()
+    assert scenes._view(room, 0.0, 0.0, 0.3) == next(
+        (d for d in np.arange(0.5, 9, 0.5) if not room.is_free(d * np.cos(0.3), d * np.sin(0.3), 0.05)), 9.0
+    )
