@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 
@@ -34,6 +35,10 @@ class Kind:
     def name(self, seed: int) -> str:
         """Of its set with a seed."""
         return f"{self.stem}_{seed}"
+
+    def world(self, worlds: Path) -> Path | None:
+        """The file of its house in that folder; None for rooms by chance."""
+        return worlds / f"{self.house}.world" if self.house else None
 
 
 def _of_houses() -> list[Kind]:

@@ -252,10 +252,15 @@ def _work(job: _Job) -> str:
     if os.nice(0) < 5:
         os.nice(5)
     cv2.setNumThreads(1)
-    if job.house not in _studios:
-        _studios[job.house] = Studio(load_world(job.house) if job.house else None, unseen=job.test)
-    write_shard(job.target, *_studios[job.house].shard([*job.seed], PER_SHARD, test=job.test, **job.told))
+    studio = studio_of(job.house, unseen=job.test)
+    write_shard(job.target, *studio.shard([*job.seed], PER_SHARD, test=job.test, **job.told))
     return job.target.name
+
+
+@functools.cache
+def studio_of(house: Path | None, *, unseen: bool = False) -> Studio:
+    """This process's studio for the world of that file, or for rooms by chance."""
+    return Studio(load_world(house) if house else None, unseen=unseen)
 
 
 def write_shard(target: Path, pictures: np.ndarray, boxes: np.ndarray, masks: np.ndarray) -> None:
@@ -267,9 +272,6 @@ def write_shard(target: Path, pictures: np.ndarray, boxes: np.ndarray, masks: np
     else:
         np.save(part, pictures)
     part.rename(target)
-
-
-_studios: dict[Path | None, Studio] = {}
 
 
 def _jobs(options: argparse.Namespace, name: str, pictures: float, seed: int, house: Path | None, **told) -> list[_Job]:
@@ -286,8 +288,7 @@ def _jobs_of_kinds(options: argparse.Namespace) -> list[_Job]:
     """The shards of all kinds of training pictures."""
     jobs = []
     for kind in KINDS:
-        house = options.worlds / f"{kind.house}.world" if kind.house else None
-        pictures = options.pictures * kind.parts / MOST
+        pictures, house = options.pictures * kind.parts / MOST, kind.world(options.worlds)
         jobs += _jobs(options, kind.name(options.seed), pictures, options.seed + kind.offset, house, **kind.told)
     return jobs
 

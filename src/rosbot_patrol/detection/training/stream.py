@@ -16,8 +16,7 @@ import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training.kinds import KINDS, Kind
-from rosbot_patrol.detection.training.render import Studio, write_shard
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.detection.training.render import studio_of, write_shard
 
 PER_SHARD, WAITING = 250, 80
 ROUND = [kind for kind in KINDS for _ in range(kind.parts)]
@@ -33,17 +32,14 @@ def draw(folder: Path, worlds: Path, seed: int, first: int, step: int, last: int
     """Draw the shards `first`, `first` + `step` and so on before `last` into a folder; waits while it is full."""
     cv2.setNumThreads(1)
     os.nice(5)
-    studios: dict[str, Studio] = {}
     for number in itertools.count(first, step):
         if last is not None and number >= last:
             return
         while len(list(folder.glob("stream-*.npy"))) > WAITING:
             sleep(0.5)
         kind = kind_of(number, seed)
-        if kind.house not in studios:
-            studios[kind.house] = Studio(load_world(worlds / f"{kind.house}.world") if kind.house else None)
-        pictures, boxes, masks = studios[kind.house].shard([seed, number, 2], PER_SHARD, test=False, **kind.told)
-        write_shard(folder / f"stream-{number:05d}.npy", pictures, boxes, masks)
+        shard = studio_of(kind.world(worlds)).shard([seed, number, 2], PER_SHARD, test=False, **kind.told)
+        write_shard(folder / f"stream-{number:05d}.npy", *shard)
 
 
 def start(folder: Path, worlds: Path, seed: int, processes: int, first: int = 0) -> list[BaseProcess]:
