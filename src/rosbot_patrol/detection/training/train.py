@@ -1,7 +1,8 @@
 """Train the network of a cfg file on the pictures that `render.py` made; goes on from its last checkpoint.
 
 Seeded: order of the pictures, their recolouring and the first weights come from `--seed`. Writes darknet weights of
-the running mean of the weights (EMA) after every epoch.
+the running mean of the weights (EMA) after every epoch. `--minutes` counts the runs before with the same checkpoint in,
+but not what a stop took away from an epoch.
 """
 
 from __future__ import annotations
@@ -45,12 +46,11 @@ class Trainer:
         pictures = Pictures.open(options.data, options.name)
         self.pictures = pictures.pack() if options.pack else pictures
         self.epoch = 0
-        self.begun = time.monotonic()
+        self.begun = time.monotonic()  # of this run, less the time that those before it took
 
     def run(self) -> None:
-        """Train all epochs that are left."""
-        self._resume()
-        self.begun = time.monotonic()
+        """Train all epochs that are left, or until the minutes are over."""
+        self.begun = time.monotonic() - self._resume()
         while self.epoch < self.options.epochs and self._spent() < 1:
             self._epoch()
             self.epoch += 1
@@ -82,7 +82,7 @@ class Trainer:
             block.requires_grad_(False).eval()
 
     def _spent(self) -> float:
-        """Share of the minutes of this run that are over; 0 where it may take as long as it does."""
+        """Share of the minutes that are over; 0 where it may take as long as it does."""
         return (time.monotonic() - self.begun) / 60 / self.options.minutes if self.options.minutes else 0.0
 
     def _share(self, index: np.ndarray) -> np.ndarray:
@@ -106,19 +106,22 @@ class Trainer:
 
     def _save(self) -> None:
         part = self.options.checkpoint.with_suffix(".part")
-        torch.save({**self.learner.state_dict(), "epoch": self.epoch}, part)
+        spent = time.monotonic() - self.begun
+        torch.save({**self.learner.state_dict(), "epoch": self.epoch, "spent": spent}, part)
         os.replace(part, self.options.checkpoint)
         self.options.weights.write_bytes(self.learner.weights(self.learner.step * self.options.batch))
 
-    def _resume(self) -> None:
-        if self.options.start and not self.options.checkpoint.exists():
-            self.learner.start_from(self.options.start)
+    def _resume(self) -> float:
+        """Begin, or go on from the checkpoint; the seconds that went into it."""
         if not self.options.checkpoint.exists():
-            return
+            if self.options.start:
+                self.learner.start_from(self.options.start)
+            return 0.0
         state = torch.load(self.options.checkpoint, map_location=self.learner.device, weights_only=True)
         self.learner.load_state_dict(state)
         self.epoch = state["epoch"]
-        sys.stdout.write(f"going on after epoch {self.epoch}\n")
+        sys.stdout.write(f"going on after epoch {self.epoch} and {state['spent']:.0f} s\n")
+        return state["spent"]
 
 
 class Batches(torch.utils.data.Dataset):
