@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
+from rosbot_patrol.detection.training.dataset import pack_masks
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 from rosbot_patrol.detection.training.mixing import View
 
@@ -23,3 +26,11 @@ def make_view(*figures: tuple[int, int, tuple[int, int, int, int]], colour: tupl
             row |= {"seen_of_whole": 0.8, "seen_of_part": 1.0, "pixels": 4 * (x1 - x0) * (y1 - y0)}
             rows.append([row[name] for name in COLUMNS])
     return View(picture, np.array(rows, np.float32).reshape(-1, len(COLUMNS)), mask)
+
+
+def write_shard(file: Path, count: int, colour: tuple[int, int, int] = GREY) -> None:
+    """A shard of `count` times the same view with a person, with its labels and masks beside it."""
+    view = make_view((0, 1, (40, 60, 90, 220)), colour=colour)
+    rows = np.concatenate([view.rows + np.eye(1, view.rows.shape[1], dtype=np.float32) * k for k in range(count)])
+    np.savez(file.with_suffix(".npz"), boxes=rows, **pack_masks(np.array([view.mask] * count)))
+    np.save(file, np.array([view.picture] * count))

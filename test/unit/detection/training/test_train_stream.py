@@ -8,24 +8,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oblongs import BLUE, make_view
+from oblongs import BLUE
+from oblongs import write_shard as write_views
 from small_networks import small_cfg
 
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 pytest.importorskip("moderngl", reason="moderngl is in .ws/train only after scripts/train_network --stream")
 
-from rosbot_patrol.detection.training.dataset import pack_masks  # noqa: E402
 from rosbot_patrol.detection.training.train_stream import Feed, StreamTrainer, read_views  # noqa: E402
 
 CFG = small_cfg(384, 288, 16, "40,100")
 
 
 def write_shard(folder: Path, number: int, count: int = 3) -> Path:
-    view = make_view((0, 1, (40, 60, 90, 220)), colour=BLUE)
     file = folder / f"stream-{number:05d}.npy"
-    rows = np.concatenate([view.rows + np.eye(1, view.rows.shape[1], dtype=np.float32) * k for k in range(count)])
-    np.savez(file.with_suffix(".npz"), boxes=rows, **pack_masks(np.array([view.mask] * count)))
-    np.save(file, np.array([view.picture] * count))
+    write_views(file, count, BLUE)
     return file
 
 

@@ -5,24 +5,19 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import numpy as np
 import pytest
-from oblongs import make_view
+from oblongs import write_shard
 from small_networks import small_cfg
 
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 
-from rosbot_patrol.detection.training.dataset import pack_masks  # noqa: E402
 from rosbot_patrol.detection.training.train import Trainer  # noqa: E402
 
 
 @pytest.fixture
 def options(tmp_path: Path) -> argparse.Namespace:
     """Of a training of three epochs of two steps, on a shard of four pictures."""
-    view = make_view((0, 1, (40, 60, 90, 220)))
-    rows = np.concatenate([view.rows + np.eye(1, view.rows.shape[1], dtype=np.float32) * k for k in range(4)])
-    np.save(tmp_path / "room-0000.npy", np.array([view.picture] * 4))
-    np.savez(tmp_path / "room-0000.npz", boxes=rows, **pack_masks(np.array([view.mask] * 4)))
+    write_shard(tmp_path / "room-0000.npy", 4)
     (tmp_path / "small.cfg").write_text(small_cfg(384, 288, 16, "40,100"))
     return argparse.Namespace(
         data=tmp_path, name="room", cfg=tmp_path / "small.cfg", weights=tmp_path / "new.weights",
