@@ -24,6 +24,7 @@ from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH, column
 from rosbot_patrol.detection.training.scoring import (
     AIMED,
     KINDS,
+    SUPPRESSION,
     Found,
     average_precision,
     figures,
@@ -32,6 +33,7 @@ from rosbot_patrol.detection.training.scoring import (
     say,
     say_false_alarms,
     say_found_at,
+    say_spared,
 )
 from rosbot_patrol.images.encodings import Picture
 
@@ -65,7 +67,7 @@ def find_all(pictures: Pictures, cfg: Path, forward: Forward, *, batch: int = 16
             rows = pictures.labels[shard][i].copy()
             rows[:, 0] = start + b
             mine = [value[b] for value in values]
-            found = decode.decode(spec.heads, mine, place, threshold=FLOOR, iou_threshold=0.4)
+            found = decode.decode(spec.heads, mine, place, threshold=FLOOR, iou_threshold=SUPPRESSION)
             got, hit = match(start + b, found, rows, first)
             first += len(hit)
             boxes.append(got)
@@ -164,7 +166,8 @@ def main() -> None:
         sys.stdout.write(say(results[-1]) + "\n")
     precisions = {f"average precision, {k}": average_precision(found, i) for i, k in enumerate(KINDS)}
     sys.stdout.write("".join(f"{k}: {v:.4f}\n" for k, v in precisions.items()))
-    sys.stdout.write(say_found_at(found) + "\n" + say_false_alarms(found, options.threshold) + "\n")
+    for lines in (say_found_at(found), say_spared(found), say_false_alarms(found, options.threshold)):
+        sys.stdout.write(lines + "\n")
     if options.json:
         options.json.write_text(json.dumps({"thresholds": results, **precisions}, indent=1))
     if options.sheets:

@@ -23,6 +23,7 @@ AIMED = "persons 1-6 m, half of the figure seen"
 HIT = 0.5
 INSIDE = 0.5
 TOUCHES = 0.1
+SUPPRESSION = 0.4  # the overlap beyond which darknet_ros keeps one box of two
 FALSE_ALARMS = (
     "of the wrong size, on a person who is found by no surer box",
     "a second one, on a person who is found",
@@ -190,6 +191,24 @@ def false_alarms(found: Found, threshold: float) -> dict[str, int]:
     return counts
 
 
+def spared(found: Found, sure: np.ndarray) -> int:
+    """How many of the persons that are aimed at darknet's suppression leaves, if every box is as it should be.
+
+    Args:
+        found: what is there; what a network found in it does not matter.
+        sure: objectness of the box of each label, shape (labels,).
+    """
+    left = 0
+    aimed, wanted, pictures = groups(found)[AIMED], found.wanted, column(found.labels, "picture")
+    for picture in np.unique(pictures[aimed]):
+        there = np.flatnonzero((pictures == picture) & wanted)
+        low, high = found.labels[there, 2:4], found.labels[there, 4:6]
+        boxes = np.hstack([(low + high) / 2, high - low])
+        exact = decode.Candidates(boxes, sure[there], aimed[there, None].astype(float))
+        left += int(decode.suppress_by_objectness(exact, SUPPRESSION).probabilities.sum())
+    return left
+
+
 def wilson(hits: float, count: float) -> tuple[float, float]:
     """The 95 % interval of a share (Wilson 1927)."""
     if not count:
@@ -221,6 +240,15 @@ def say_found_at(found: Found, precisions: tuple[float, ...] = (0.95, 0.99, 0.99
         threshold, hits, there = found_at(found, precision)
         lines.append(f"{AIMED}, at a precision of {precision:.1%} (threshold {threshold:.3f}): {share(hits, there)}")
     return "\n".join(lines)
+
+
+def say_spared(found: Found) -> str:
+    """What `spared` tells where those aimed at are the surest, and where they are the least sure, as lines of text."""
+    aimed = groups(found)[AIMED]
+    return "\n".join(
+        f"{AIMED}, left by the suppression of exact boxes, {how}: {share(spared(found, sure), aimed.sum())}"
+        for how, sure in (("theirs the surest", aimed.astype(float)), ("theirs the least sure", (~aimed).astype(float)))
+    )
 
 
 def say_false_alarms(found: Found, thresholds: Sequence[float]) -> str:

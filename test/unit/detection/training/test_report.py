@@ -147,6 +147,21 @@ def test_a_box_on_somebody_hardly_seen_is_left_out(tmp_path: Path, box) -> None:
     assert result["person: boxes"] == 0
 
 
+def test_what_suppression_leaves_of_exact_boxes() -> None:
+    front, behind = row(box=(0.2, 0.1, 0.4, 0.9)), row(box=(0.25, 0.1, 0.45, 0.9))
+    beside = row(picture=1, box=(0.6, 0.1, 0.8, 0.9))
+    covered = row(picture=1, box=(0.6, 0.1, 0.82, 0.9), whole=0.3)
+    unasked = row(picture=2, box=(0.2, 0.1, 0.41, 0.9), part=0.1, whole=0.1)
+    labels = np.array([front, behind, beside, covered, row(picture=2), unasked])
+    found = scoring.Found(np.zeros((0, 9)), labels, np.zeros(6), np.zeros((3, 2), int))
+    aimed = scoring.groups(found)[scoring.AIMED]
+    assert aimed.tolist() == [True, True, True, False, True, False]
+    assert scoring.spared(found, aimed.astype(float)) == 3  # of front and behind one goes
+    assert scoring.spared(found, (~aimed).astype(float)) == 2  # and the one whom somebody less seen overlaps
+    assert "theirs the surest: 3/4 = 75.00 %" in scoring.say_spared(found)
+    assert "theirs the least sure: 2/4 = 50.00 %" in scoring.say_spared(found)
+
+
 def test_what_is_found_at_a_precision() -> None:
     # four sure boxes right, one false, two more right, one false: six of the eight persons
     rows = np.array([row(picture=i) for i in range(8)], np.float32)
