@@ -124,6 +124,30 @@ def test_a_record_waits_for_the_seconds_after_a_sighting_but_not_for_good(house)
     assert house.check()["b"].closed is not None
 
 
+def test_pictures_leave_the_room_to_a_notice_that_waits_for_it(house):
+    """What a full disk has left again is the notice's; the record is complete once that is written."""
+    house.keeper.give_way(True)
+    house.mission("a", verdict="confirmed")
+    house.keeper.step()
+    (record,) = house.check().values()
+    assert record.verdict == "confirmed"
+    assert record.closed is None
+    assert [v.id for v in house.verdicts] == ["a"]
+    house.keeper.give_way(False)
+    house.keeper.step()
+    (record,) = house.check().values()
+    assert record.closed == WALL + 9.0
+
+
+def test_a_program_that_ends_completes_its_records_although_a_notice_waits(house):
+    house.keeper.give_way(True)
+    house.mission("a")
+    house.keeper.finish()
+    house.keeper.step()
+    (record,) = house.check().values()
+    assert record.closed == WALL + 9.0
+
+
 def test_a_restart_goes_on_with_a_record_and_closes_the_others(house):
     for name in ("a", "b"):
         house.keeper.put([Entry(incident=name, begin=Incident(id=name, wall=WALL, room_id=1, room_name="hall"))])

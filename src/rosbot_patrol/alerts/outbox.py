@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 
 _NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|eml)")
 _SCRATCH = re.compile(r"\..*\.(?P<pid>\d+)\.tmp")
-_FULL = (errno.ENOSPC, errno.EDQUOT)
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 RESERVE = 2 << 20  # [bytes]
 
 
@@ -101,7 +101,7 @@ class Outbox:
         try:
             write_atomic(path, data)
         except OSError as err:
-            if err.errno not in _FULL or not self._make_room(len(data)):
+            if err.errno not in DISK_FULL or not self._make_room(len(data)):
                 raise
             log.error("the disk is full: the notice took of what is kept free for it")
             write_atomic(path, data)

@@ -99,7 +99,7 @@ class IncidentKeeper:
         self._seen: deque[tuple[str, float]] = deque()
         self._closing: dict[str, _Closing] = {}
         self._looking = ""
-        self._is_ending = False
+        self._is_ending = self._gives_way = False
         self._lost = 0
         self._complaint = ("", 0.0)
         self._tidy_at = 0.0
@@ -132,6 +132,12 @@ class IncidentKeeper:
         """The program ends: complete what is over without waiting for more pictures."""
         self._is_ending = True
         self._wake.set()
+
+    def give_way(self, wanted: bool) -> None:
+        """Leave what room the disk has to a notice that did not find its own: no pictures and reports meanwhile."""
+        if wanted != self._gives_way:
+            self._gives_way = wanted
+            self._wake.set()
 
     def put(self, entries: Sequence[Entry]) -> None:
         """Take entries."""
@@ -185,6 +191,9 @@ class IncidentKeeper:
         while self._entries:
             self._write(store, self._entries[0])
             self._entries.popleft()
+        if self._gives_way and not self._is_ending:
+            self._tidy(store)
+            return _IDLE
         self._collect(store)
         for incident_id in [i for i, closing in self._closing.items() if self._is_due(i, closing)]:
             self._close(store, incident_id, self._closing[incident_id])

@@ -18,6 +18,7 @@ from rosbot_patrol.alerts.incident_files import NewFile
 from rosbot_patrol.alerts.incident_store import recall_incident
 from rosbot_patrol.alerts.mail import one_line, token
 from rosbot_patrol.alerts.notice import Notice as PostNotice
+from rosbot_patrol.alerts.outbox import DISK_FULL
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
 from rosbot_patrol.alerts.postman import Delivery
 from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
@@ -143,6 +144,7 @@ class AlertDesk:
             if not self._jobs[0]():
                 return DISK_RETRY
             self._jobs.popleft()
+            self._keeper.give_way(False)
             return 0.0
         save = self._memory
         if save is None:
@@ -180,6 +182,7 @@ class AlertDesk:
                 put(incident_notice(incident, picture, picture_note=note))
             except OSError as err:
                 log.error("the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, place, err)
+                self._keeper.give_way(err.errno in DISK_FULL)
                 return False
             self._told[incident.id] = incident
             self._publish(incident, transport="", location=place, text=incident.sentence)
@@ -200,6 +203,7 @@ class AlertDesk:
             self._held.remove(token(release.mission))
         except (OSError, ValueError) as err:
             log.error("the notice about %s that waited cannot be used: %s; trying on", release.mission, err)
+            self._keeper.give_way(isinstance(err, OSError) and err.errno in DISK_FULL)
             return False
         text = f"the notice is {'dropped' if release.is_dropped else 'sent'}: {release.why}"
         log.warning("%s (%s)", text, release.mission)
