@@ -16,6 +16,9 @@ from rosbot_patrol.detection.training.overlay import lay_patterns
 OVERLAY = 0.5
 FAINT = 5.0
 MIX, ZOOM = 0.5, 0.4
+HIDDEN = 0.65
+SHOWS = {"seen_of_part": (0.4, 0.6), "seen_of_whole": (0.25, 0.45)}
+"""Shares seen of a person, up to which he hides, and from which on he shows: see `sureness`."""
 JPEGS = ".jpegs"
 
 
@@ -157,14 +160,26 @@ def asked(rows: np.ndarray) -> np.ndarray:
     return big & (column(rows, "seen_of_part") > 0.25) & clear & (height > 0.05)
 
 
+def sureness(rows: np.ndarray) -> np.ndarray:
+    """How sure a network is to be of each row at most: less of a person who hides, or of whom the edge leaves little.
+
+    Of the boxes that are false, those surer than most right ones are of the wrong size on such people; so no box on
+    them is to be worth as much as one on somebody who shows.
+    """
+    shown = [np.clip((column(rows, name) - low) / (high - low), 0.0, 1.0) for name, (low, high) in SHOWS.items()]
+    return np.where(column(rows, "kind") == 0, HIDDEN + (1.0 - HIDDEN) * np.min(shown, axis=0), 1.0)
+
+
 def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
-    """Pictures uint8 (B, 288, 384, 3) and rows (batch, kind, centre x, y, width, height [px], asked).
+    """Pictures uint8 (B, 288, 384, 3) and rows (batch, kind, centre x, y, width, height [px], sureness).
 
     Args:
         pictures: the set.
         chosen: (shard, picture) of each, shape (B, 2).
         rng: to mix with others of the set, to lay patterns over, to mirror and to shift colours by chance; None for
             none of it.
+
+    Sureness is that of `sureness`, 0 for who is not `asked` for.
     """
     images = np.empty((len(chosen), HEIGHT, WIDTH, 3), np.uint8)
     boxes = []
@@ -187,7 +202,8 @@ def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | 
             images[b] = _recolour(images[b], rng)
         centre = [(x0 + x1) / 2 * WIDTH, (y0 + y1) / 2 * HEIGHT]
         size = [(x1 - x0) * WIDTH, (y1 - y0) * HEIGHT]
-        boxes.append(np.stack([np.full(len(rows), b), column(rows, "kind"), *centre, *size, asked(rows)], axis=1))
+        sure = asked(rows) * sureness(rows)
+        boxes.append(np.stack([np.full(len(rows), b), column(rows, "kind"), *centre, *size, sure], axis=1))
     return images, np.concatenate(boxes).astype(np.float32)
 
 

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 import torch
 
-from rosbot_patrol.detection.training.dataset import FAINT, MIX, OVERLAY, ZOOM
+from rosbot_patrol.detection.training.dataset import FAINT, HIDDEN, MIX, OVERLAY, SHOWS, ZOOM
 from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH
 from rosbot_patrol.detection.training.loss import Truth
 from rosbot_patrol.detection.training.mixing import FEWEST, FURNITURE, LARGEST
@@ -74,7 +74,10 @@ def truth_of(rows: torch.Tensor) -> Truth:
     clear = (flat[:, AT["light"]] > 6.0) & (flat[:, AT["contrast"]] > FAINT)
     asked = (flat[:, AT["pixels"]] > fewest) & (flat[:, AT["seen_of_part"]] > 0.25) & clear & (y1 - y0 > 0.05)
     batch = torch.arange(count, device=rows.device).repeat_interleave(most)
-    return Truth(boxes, batch, flat[:, AT["kind"]].long(), asked & exists, exists)
+    shown = [((flat[:, AT[name]] - low) / (high - low)).clamp(0.0, 1.0) for name, (low, high) in SHOWS.items()]
+    kind = flat[:, AT["kind"]].long()
+    sure = torch.where(kind == 0, HIDDEN + (1.0 - HIDDEN) * torch.stack(shown).amin(dim=0), 1.0)
+    return Truth(boxes, batch, kind, asked & exists, exists, sure)
 
 
 def draw_chance(count: int, patterns: int, device: torch.device, generator: torch.Generator) -> Chance:
@@ -297,20 +300,20 @@ def _covered(
     left = (now.float() / before.clamp(min=1))[..., None]
     there = (rows[..., AT["mask"]] > 0) & (same | (now >= FEWEST))
     box = torch.where(same[..., None], rows[..., _BOX], _bounds(lines, columns))
-    part = rows[..., AT["seen_of_part"], None]
+    whole, part = rows[..., AT["seen_of_whole"], None], rows[..., AT["seen_of_part"], None]
+    whole = torch.where(same[..., None], whole, whole * left.clamp(max=1.0))
     part = torch.where((same | donor)[..., None], part, part * left)
     pixels = rows[..., AT["pixels"], None]
     pixels = torch.where(same[..., None], pixels, pixels * left)
-    return _put(rows, box, part, pixels, there)
+    return _put(rows, box, torch.cat([whole, part, pixels], dim=-1), there)
 
 
-def _put(
-    rows: torch.Tensor, box: torch.Tensor, part: torch.Tensor, pixels: torch.Tensor, there: torch.Tensor
-) -> torch.Tensor:
+def _put(rows: torch.Tensor, box: torch.Tensor, seen: torch.Tensor, there: torch.Tensor) -> torch.Tensor:
+    """Rows with other boxes, and other shares of the whole, of the part and pixels that are seen."""
     kind, distance = rows[..., :1], rows[..., AT["distance"], None]
     rest = rows[..., AT["light"] : AT["mask"]]
     number = (rows[..., AT["mask"]] * there)[..., None]
-    return torch.cat([kind, box, distance, part, pixels, rest, number], dim=-1)
+    return torch.cat([kind, box, distance, seen, rest, number], dim=-1)
 
 
 def _disguise(
@@ -388,5 +391,8 @@ def _zoomed(
     plain = torch.where(chance["mirrored"][:, None, None], flipped, rows[..., _BOX])
     box = torch.where(zoomed[..., None], _bounds(lines, columns), plain)
     left = torch.where(zoomed, now.float() / before.clamp(min=1), 1.0)[..., None]
+    larger = torch.where(zoomed, chance["zoom"].prod(dim=1, keepdim=True), 1.0)[..., None]
+    whole = rows[..., AT["seen_of_whole"], None] * (left / larger).clamp(max=1.0)
     pixels = rows[..., AT["pixels"], None] * left
-    return _put(rows, box, rows[..., AT["seen_of_part"], None], pixels, ~zoomed | (now >= FEWEST))
+    seen = torch.cat([whole, rows[..., AT["seen_of_part"], None], pixels], dim=-1)
+    return _put(rows, box, seen, ~zoomed | (now >= FEWEST))

@@ -18,15 +18,16 @@ from rosbot_patrol.detection.darknet_layers import Yolo
 MATCH = 0.45
 IGNORE_IOU = 0.5
 SURPRISE = 0.5
-LEAST_SURE, SURE_FROM = 0.2, 0.75  # objectness of a box that overlaps by LOOSE or less, and the overlap of a sure one
-LOOSE = 0.35
+LEAST_SURE, SURE_FROM = 0.1, 0.75  # objectness of a box that overlaps by LOOSE or less, and the overlap of a sure one
+LOOSE = 0.45
 
 
 @dataclass
 class Truth:
     """Boxes of a batch, in the network's input: shape (N, 4) centre and size [px], batch index, class, and whether
     the box is asked for (else it is left alone). `exists` is False for rows that only fill a batch up to a fixed size
-    (such rows are asked for neither); None where there are none of them.
+    (such rows are asked for neither); None where there are none of them. `sure` is the objectness of a box that fits, 1
+    where it is None.
     """
 
     boxes: torch.Tensor
@@ -34,6 +35,7 @@ class Truth:
     kinds: torch.Tensor
     asked: torch.Tensor
     exists: torch.Tensor | None = None
+    sure: torch.Tensor | None = None
 
 
 def yolo_loss(heads: list[Yolo], values: list[torch.Tensor], truth: Truth, width: int) -> dict[str, torch.Tensor]:
@@ -89,11 +91,14 @@ def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, 
         "kind": torch.where(take, unlike, none).sum(),
     }
     fit = ((overlap.detach() - LOOSE) / (SURE_FROM - LOOSE)).clamp(0.0, 1.0)
+    surest = LEAST_SURE + (1.0 - LEAST_SURE) * fit
+    if truth.sure is not None:
+        surest = surest * truth.sure[:, None]
     which = torch.arange(anchors, device=raw.device)
     cell = ((truth.batch[:, None] * anchors + which) * rows + row[:, None]) * columns + column[:, None]
     cell = torch.where(take, cell, batch * anchors * rows * columns)  # those not taken go to a cell beyond the last
     target = fit.new_zeros(batch * anchors * rows * columns + 1)
-    target = target.scatter(0, cell.flatten(), (LEAST_SURE + (1.0 - LEAST_SURE) * fit).flatten())
+    target = target.scatter(0, cell.flatten(), surest.flatten())
     target = target[:-1].view(batch, anchors, rows, columns)
     weight = torch.where(target > 0, 1.0, _weight(head, grid, truth, stride))
     # a little focal: the many cells that are surely empty count less

@@ -100,7 +100,7 @@ class Trainer:
         inputs = torch.from_numpy(images).to(learner.device).permute(0, 3, 1, 2).float().div_(255.0)
         inputs = inputs.contiguous(memory_format=torch.channels_last)
         boxes = torch.from_numpy(rows).to(learner.device)
-        truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0)
+        truth = Truth(boxes[:, 2:6], boxes[:, 0].long(), boxes[:, 1].long(), boxes[:, 6] > 0, sure=boxes[:, 6])
         parts, _ = learner.learn(inputs, truth, self.options.rate * share)
         return {name: float(value) for name, value in parts.items()}
 

@@ -14,7 +14,9 @@ import torch
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH
 
 MOST_ROWS = 8
-KEPT = ("kind", "x0", "y0", "x1", "y1", "distance", "seen_of_part", "pixels", "light", "contrast", "mask")
+KEPT = (
+    "kind", "x0", "y0", "x1", "y1", "distance", "seen_of_whole", "seen_of_part", "pixels", "light", "contrast", "mask",
+)  # fmt: skip
 _KEPT_AT = [COLUMNS.index(name) for name in KEPT]
 AT = {name: i for i, name in enumerate(KEPT)}
 

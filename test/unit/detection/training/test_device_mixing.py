@@ -10,7 +10,7 @@ from oblongs import BLUE, RED, make_view
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 
 from rosbot_patrol.detection.training import device_mixing, mixing  # noqa: E402
-from rosbot_patrol.detection.training.dataset import asked  # noqa: E402
+from rosbot_patrol.detection.training.dataset import asked, sureness  # noqa: E402
 from rosbot_patrol.detection.training.device_mixing import Mixer, draw_chance, mix_batch, truth_of  # noqa: E402
 from rosbot_patrol.detection.training.labels import COLUMNS, HEIGHT, WIDTH  # noqa: E402
 from rosbot_patrol.detection.training.mixing import View  # noqa: E402
@@ -66,7 +66,7 @@ def test_who_comes_from_a_donor_stands_before_what_was_there() -> None:
     assert np.array_equal(picture[~there], view.picture[~there])
     assert sorted(map(tuple, boxes(rows).round())) == [(40, 60, 90, 220), (90, 100, 100, 200)]
     hidden = rows[rows[:, AT["mask"]] == 1][0]
-    assert hidden[AT["seen_of_part"]] == pytest.approx(0.25)
+    assert hidden[AT["seen_of_part"]] == hidden[AT["seen_of_whole"]] == pytest.approx(0.25)
     assert hidden[AT["pixels"]] == pytest.approx(4000)
     assert rows[rows[:, AT["mask"]] != 1][0][AT["pixels"]] == pytest.approx(4 * 50 * 160)
 
@@ -84,6 +84,8 @@ def test_a_donor_is_moved_and_mirrored(shift: int, mirrored: bool, wanted: tuple
     picture, rows = run(make_view(colour=BLUE), donor, mixed=True, donor_shift=shift, donor_mirrored=mirrored)
     assert boxes(rows)[0] == pytest.approx([wanted[0], 60, wanted[1], 220])
     assert rows[0, AT["pixels"]] == pytest.approx(4 * (wanted[1] - wanted[0]) * 160)
+    assert rows[0, AT["seen_of_whole"]] == pytest.approx((wanted[1] - wanted[0]) / 50)
+    assert rows[0, AT["seen_of_part"]] == 1.0
     columns = np.flatnonzero((picture != BLUE).any(axis=(0, 2)))
     assert (columns[0], columns[-1] + 1) == wanted
 
@@ -105,6 +107,7 @@ def test_enlarging_is_as_opencv_does_it() -> None:
     for row, value in zip(rows, (1, 2), strict=True):
         y, x = np.nonzero(mask == value)
         assert boxes(row[None])[0] == pytest.approx([x.min(), y.min(), x.max() + 1, y.max() + 1], abs=1.01)
+        assert row[AT["seen_of_whole"]] == pytest.approx(1.0, abs=0.03)
         assert row[AT["pixels"]] == pytest.approx(view.rows[value - 1, COLUMNS.index("pixels")] * 1.32, rel=0.03)
 
 
@@ -133,17 +136,20 @@ def test_half_of_somebody_is_dressed_anew_up_to_an_edge() -> None:
     assert (lines[0], lines[-1] + 1) == (140, 220)
 
 
-def test_who_is_asked_for_is_as_for_single_pictures() -> None:
+def test_who_is_asked_for_and_how_surely_is_as_for_single_pictures() -> None:
     rng = np.random.default_rng(4)
     rows = np.zeros((MOST_ROWS * 200, len(COLUMNS)), np.float32)
     ranges = {"y1": 0.15, "distance": 8, "seen_of_part": 1, "pixels": 900, "light": 20, "contrast": 15, "x1": 1}
+    ranges["seen_of_whole"] = 1
     for name, most in ranges.items():
         rows[:, COLUMNS.index(name)] = rng.uniform(0, most, len(rows))
     rows[:, COLUMNS.index("mask")] = 1
+    rows[:, COLUMNS.index("kind")] = rng.integers(2, size=len(rows))
     kept = torch.from_numpy(rows[:, [COLUMNS.index(name) for name in KEPT]]).view(200, MOST_ROWS, -1)
     truth = truth_of(kept)
     assert np.array_equal(truth.asked.numpy(), asked(rows))
     assert 0 < truth.asked.sum() < len(rows)
+    assert truth.sure.numpy() == pytest.approx(sureness(rows), abs=1e-5)
     kept[..., AT["mask"]] = 0
     assert not truth_of(kept).asked.any()
     assert not truth_of(kept).exists.any()

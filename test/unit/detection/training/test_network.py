@@ -124,6 +124,19 @@ def test_the_loss_is_least_for_the_right_values_and_leads_there() -> None:
     assert found.probabilities[0].argmax() == 1
 
 
+def test_a_box_that_fits_is_to_be_as_sure_as_the_truth_says() -> None:
+    values = [torch.zeros(1, 21, *head.in_shape[1:], requires_grad=True) for head in SPEC.heads]
+    box, none = torch.tensor([[100.0, 120.0, 60.0, 150.0]]), torch.tensor([0])
+    truth = Truth(box, none, none, torch.tensor([True]), sure=torch.tensor([0.65]))
+    optimiser = torch.optim.Adam(values, lr=0.1)
+    for _ in range(200):
+        optimiser.zero_grad()
+        sum(yolo_loss(SPEC.heads, values, truth, SPEC.width).values()).backward()
+        optimiser.step()
+    sure = max(float(v.detach().view(3, 7, *v.shape[2:])[:, 4].sigmoid().max()) for v in values)
+    assert sure == pytest.approx(0.65, abs=0.03)
+
+
 def test_what_is_not_asked_for_costs_nothing_either_way() -> None:
     values = [torch.zeros(1, 21, *head.in_shape[1:], requires_grad=True) for head in SPEC.heads]
     box = torch.tensor([[160.0, 128.0, 100.0, 200.0]])

@@ -7,7 +7,7 @@ import pytest
 
 from rosbot_patrol.detection.training import report, scoring
 from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
-from rosbot_patrol.detection.training.dataset import OVERLAY, Pictures, asked, batch_of
+from rosbot_patrol.detection.training.dataset import OVERLAY, Pictures, asked, batch_of, sureness
 
 CFG = Path(__file__).parents[4] / "models" / "house.cfg"
 
@@ -60,6 +60,12 @@ def test_hardly_seen_people_are_not_asked_for() -> None:
     rows = np.array([row(), row(part=0.1), row(pixels=50), row(light=2.0), row(box=(0.5, 0.5, 0.51, 0.52))])
     rows = np.vstack([rows, row(contrast=3.0)])
     assert asked(rows).tolist() == [True, False, False, False, False, False]
+
+
+def test_who_hides_is_to_be_less_sure_and_a_hydrant_is_not() -> None:
+    rows = np.array([row(), row(part=0.5, whole=0.5), row(part=0.3, whole=0.3), row(part=0.9, whole=0.35)])
+    rows = np.vstack([rows, row(part=0.9, whole=0.2), row(kind=1, part=0.3, whole=0.3)])
+    assert sureness(rows) == pytest.approx([1.0, 0.825, 0.65, 0.825, 0.65, 1.0])
 
 
 def test_a_folder_without_pictures_is_named(tmp_path: Path) -> None:
