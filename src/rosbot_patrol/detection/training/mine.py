@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.detection.training.dataset import JPEGS, Packed, Pictures, join_masks
+from rosbot_patrol.detection.training.dataset import JPEGS, Packed, Pictures, join_masks, sureness
 from rosbot_patrol.detection.training.render import PER_SHARD
 from rosbot_patrol.detection.training.report import find_all, load_forward
 from rosbot_patrol.detection.training.scoring import Found
@@ -34,7 +34,7 @@ def errors(found: Found, threshold: float) -> np.ndarray:
     false = found.boxes[(found.false(0) | found.false(1)) & (found.boxes[:, 2] > threshold)]
     np.add.at(score, false[:, 0].astype(int), false[:, 2])
     rows = found.labels[found.wanted]
-    np.add.at(score, rows[:, 0].astype(int), np.maximum(0.8 - found.hit[found.wanted], 0.0))
+    np.add.at(score, rows[:, 0].astype(int), np.maximum(0.8 * sureness(rows) - found.hit[found.wanted], 0.0))
     return score
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.detection.training import mine
-from rosbot_patrol.detection.training.dataset import Packed, Pictures, pack_masks
+from rosbot_patrol.detection.training.dataset import HIDDEN, Packed, Pictures, pack_masks
 from rosbot_patrol.detection.training.scoring import Found
 
 
@@ -23,6 +23,16 @@ def test_misses_and_false_alarms_count_by_their_size() -> None:
         index=np.zeros((4, 2), int),
     )
     assert mine.errors(found, 0.2) == pytest.approx([0.0, 0.7, 0.5, 0.0])
+
+
+def test_who_hides_need_not_be_as_sure() -> None:
+    found = Found(
+        boxes=np.zeros((0, 9)),
+        labels=np.array([label(0, part=0.3), label(1, part=0.3)]),
+        hit=np.array([0.55, 0.2]),
+        index=np.zeros((2, 2), int),
+    )
+    assert mine.errors(found, 0.2) == pytest.approx([0.0, 0.8 * HIDDEN - 0.2])
 
 
 def test_what_is_picked_is_a_set_like_any_other(tmp_path: Path) -> None:
