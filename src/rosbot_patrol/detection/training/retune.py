@@ -1,23 +1,64 @@
 """Move a network's objectness, so that thresholds mean what they meant before; the order of boxes stays.
 
+    python -m rosbot_patrol.detection.training.retune house.cfg FROM.weights TO.weights --data FOLDER --name SETS
     python -m rosbot_patrol.detection.training.retune house.cfg FROM.weights TO.weights --gain 1.05 --offset 0.5
 
 A network that learns `dataset.sureness` is less sure of whoever hides, so that at a threshold of old it has fewer false
 alarms and finds fewer people. Who asks for a probability of 0.8 (the patrol) wants the false alarms of old, and more.
+So the first form finds gain and offset itself: with them as many boxes of persons are false as `FALSE` says, in
+pictures that the network has not learnt.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from rosbot_patrol.detection.darknet_cfg import read_cfg
 from rosbot_patrol.detection.darknet_layers import NetworkSpec, Yolo
 from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights, read_weights
+from rosbot_patrol.detection.training.dataset import Pictures
+from rosbot_patrol.detection.training.report import find_all, load_forward
+from rosbot_patrol.detection.training.scoring import Found
 
 OBJECTNESS = 4  # its place among the filters of an anchor
+FALSE = {0.4: 19.5, 0.8: 3.75}
+"""False boxes of persons above thresholds, in 1,000 pictures as `render.py --kinds --pictures 2000` draws them: those
+that the network of the eleventh step has, told from 36,000."""
+
+
+def find_figures(found: Found, wanted: Mapping[float, float] = FALSE) -> tuple[float, float]:
+    """The gain and the offset with which a network has so many false boxes of persons.
+
+    Args:
+        found: what it found, before, in pictures that it has not learnt.
+        wanted: above each of two thresholds, how many in 1,000 pictures.
+
+    Raises:
+        ValueError: too few pictures, or too few false boxes, to tell.
+    """
+    sure = np.sort(found.boxes[found.false(0), 2])[::-1]
+    before, after = [], []
+    for threshold, rate in sorted(wanted.items()):
+        count = round(rate * len(found.index) / 1000)
+        if not 0 < count < len(sure) or sure[count] == sure[count - 1]:
+            raise ValueError(
+                f"{len(sure)} false boxes in {len(found.index)} pictures do not tell where {count} of them are: "
+                "draw more pictures, or give --gain and --offset"
+            )
+        before.append(_logit(float(sure[count - 1] + sure[count]) / 2))
+        after.append(_logit(threshold))
+    gain = (after[1] - after[0]) / (before[1] - before[0])
+    return gain, after[0] - gain * before[0]
+
+
+def _logit(probability: float) -> float:
+    return float(np.log(probability / (1 - probability)))
 
 
 def retune(spec: NetworkSpec, numbers: Sequence[ConvWeights], gain: float, offset: float) -> list[ConvWeights]:
@@ -53,9 +94,21 @@ def main() -> None:
         parser.add_argument(name, type=Path)
     parser.add_argument("--gain", type=float, default=1.0)
     parser.add_argument("--offset", type=float, default=0.0)
+    parser.add_argument("--data", type=Path, help="a folder of pictures by which to find both")
+    parser.add_argument("--name", help="its sets, with commas between them, as `kinds.py` names them")
     options = parser.parse_args()
+    if (options.data is None) != (options.name is None):
+        parser.error("--data and --name belong together")
     spec = read_cfg(str(options.cfg))
-    numbers = retune(spec, read_weights(str(options.weights), spec), options.gain, options.offset)
+    gain, offset = options.gain, options.offset
+    if options.data is not None:
+        try:
+            pictures = Pictures.open(options.data, options.name)
+            gain, offset = find_figures(find_all(pictures, options.cfg, load_forward(options.cfg, options.weights)))
+        except (FileNotFoundError, ValueError) as error:
+            sys.exit(f"retune: {error}")
+        sys.stdout.write(f"gain {gain:.3f}, offset {offset:.3f}\n")
+    numbers = retune(spec, read_weights(str(options.weights), spec), gain, offset)
     options.to.write_bytes(format_weights(spec, numbers, bits=10))
 
 

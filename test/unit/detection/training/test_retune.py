@@ -10,7 +10,9 @@ from small_networks import small_cfg
 
 from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg
 from rosbot_patrol.detection.darknet_weights import read_weights
-from rosbot_patrol.detection.training.retune import main, retune
+from rosbot_patrol.detection.training.labels import COLUMNS
+from rosbot_patrol.detection.training.retune import find_figures, main, retune
+from rosbot_patrol.detection.training.scoring import Found
 
 MODELS = Path(__file__).parents[4] / "models"
 SPEC = read_cfg(str(MODELS / "house.cfg"))
@@ -40,6 +42,38 @@ def test_what_would_turn_the_order_round_or_is_no_yolo_is_refused() -> None:
     layers = [NUMBERS[-1]] * len(region.convolutions)
     with pytest.raises(ValueError, match=r"old, line \d+: not a \[yolo\] head"):
         retune(region, layers, 1.0, 0.0)
+
+
+def found_false(probabilities: np.ndarray, pictures: int) -> Found:
+    """Boxes of persons, all of them false, in pictures with nobody."""
+    boxes = np.zeros((len(probabilities), 9))
+    boxes[:, 2], boxes[:, 7] = probabilities, -1
+    return Found(boxes, np.zeros((0, len(COLUMNS))), np.zeros(0), np.zeros((pictures, 2), int))
+
+
+def test_as_many_are_false_above_a_threshold_as_are_wanted() -> None:
+    sure = np.random.default_rng(1).uniform(0.02, 0.7, 300)
+    gain, offset = find_figures(found_false(sure, 2000), {0.4: 50.0, 0.8: 10.0})
+    moved = 1 / (1 + np.exp(-(gain * np.log(sure / (1 - sure)) + offset)))
+    assert (moved > 0.4).sum() == 100
+    assert (moved > 0.8).sum() == 20
+
+
+@pytest.mark.parametrize(("boxes", "pictures"), [(100, 2000), (300, 10), (0, 2000)])
+def test_too_little_to_tell_by_is_said(boxes: int, pictures: int) -> None:
+    sure = np.linspace(0.02, 0.7, boxes)
+    with pytest.raises(ValueError, match=f"{boxes} false boxes in {pictures} pictures .* draw more pictures"):
+        find_figures(found_false(sure, pictures), {0.4: 50.0, 0.8: 10.0})
+
+
+def test_where_there_are_no_pictures_the_command_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = [str(MODELS / "house.cfg"), str(MODELS / "house.weights"), str(tmp_path / "to.weights")]
+    monkeypatch.setattr("sys.argv", ["retune", *files, "--data", str(tmp_path), "--name", "vary_1"])
+    with pytest.raises(SystemExit, match=r"retune: .* holds no pictures named vary_1"):
+        main()
+    monkeypatch.setattr("sys.argv", ["retune", *files, "--data", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        main()
 
 
 def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
