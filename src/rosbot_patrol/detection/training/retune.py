@@ -99,6 +99,8 @@ def main() -> None:
     options = parser.parse_args()
     if (options.data is None) != (options.name is None):
         parser.error("--data and --name belong together")
+    if options.data is not None and (options.gain, options.offset) != (1.0, 0.0):
+        parser.error("--data finds --gain and --offset: give the one or the others")
     spec = read_cfg(str(options.cfg))
     gain, offset = options.gain, options.offset
     if options.data is not None:

@@ -71,9 +71,17 @@ def test_where_there_are_no_pictures_the_command_says_so(tmp_path: Path, monkeyp
     monkeypatch.setattr("sys.argv", ["retune", *files, "--data", str(tmp_path), "--name", "vary_1"])
     with pytest.raises(SystemExit, match=r"retune: .* holds no pictures named vary_1"):
         main()
-    monkeypatch.setattr("sys.argv", ["retune", *files, "--data", str(tmp_path)])
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [([], "belong together"), (["--name", "vary_1", "--gain", "1.1"], "give the one or the others")],
+)
+def test_figures_are_found_or_given(more: list[str], message: str, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    monkeypatch.setattr("sys.argv", ["retune", "house.cfg", "from.weights", "to.weights", "--data", "here", *more])
     with pytest.raises(SystemExit):
         main()
+    assert message in capsys.readouterr().err
 
 
 def test_from_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
