@@ -169,6 +169,7 @@ def main() -> None:
     for lines in (say_found_at(found), say_spared(found), say_false_alarms(found, options.threshold)):
         sys.stdout.write(lines + "\n")
     if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps({"thresholds": results, **precisions}, indent=1))
     if options.sheets:
         draw_worst(pictures, found, options.threshold[0], options.sheets / f"worst_{options.name}.jpg")

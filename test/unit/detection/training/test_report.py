@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -232,3 +233,15 @@ def test_sheets_are_drawn(pictures: Pictures, tmp_path: Path) -> None:
     report.draw_found(pictures, found, 0.5, tmp_path / "found.jpg", count=5)
     report.draw_samples(pictures, tmp_path / "samples.jpg", count=2)
     assert all((tmp_path / f"{n}.jpg").stat().st_size > 1000 for n in ("worst", "found", "samples"))
+
+
+def test_from_the_command_line_into_folders_that_are_not_there(
+    pictures: Pictures, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    network = ["--cfg", str(CFG), "--weights", str(CFG.with_suffix(".weights"))]
+    to = ["--json", str(tmp_path / "a" / "report.json"), "--sheets", str(tmp_path / "b")]
+    monkeypatch.setattr("sys.argv", ["report", "--data", str(tmp_path), "--name", "set", *network, *to])
+    report.main()
+    assert "average precision, person: 0.0000" in capsys.readouterr().out
+    assert len(json.loads((tmp_path / "a" / "report.json").read_text())["thresholds"]) == 1
+    assert {"worst_set.jpg", "found_set.jpg"} <= {file.name for file in (tmp_path / "b").iterdir()}
