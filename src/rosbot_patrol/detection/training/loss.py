@@ -8,12 +8,13 @@ false, so it must not be sure of itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 import torch.nn.functional as fn
 
 from rosbot_patrol.detection.darknet_layers import Yolo
+from rosbot_patrol.detection.training.apart import cut_apart
 
 MATCH = 0.45
 IGNORE_IOU = 0.5
@@ -51,6 +52,7 @@ def yolo_losses(
 
     No operation's shape depends on the values, so that a GPU never has to wait for the processor to hear one.
     """
+    truth = replace(truth, boxes=cut_apart(truth.boxes, truth.batch, truth.asked))
     sizes = torch.tensor([a for head in heads for a in head.anchors], device=truth.boxes.device)
     overlap = _shape_iou(truth.boxes[:, 2:], sizes)
     take = (overlap > MATCH) | (overlap == overlap.max(dim=1, keepdim=True).values)
