@@ -59,6 +59,13 @@ def _cut(
 
 
 def _iou(low: torch.Tensor, high: torch.Tensor, other_low: torch.Tensor, other_high: torch.Tensor) -> torch.Tensor:
-    shared = (torch.minimum(high, other_high) - torch.maximum(low, other_low)).clamp(min=0).prod(dim=-1)
-    union = (high - low).prod(dim=-1) + (other_high - other_low).prod(dim=-1) - shared
+    shared, union = shared_and_union(low, high, other_low, other_high)
     return shared / union.clamp(min=1e-6)
+
+
+def shared_and_union(
+    low: torch.Tensor, high: torch.Tensor, other_low: torch.Tensor, other_high: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Areas [px^2] that boxes share and that they cover together, pair by pair; corners, shape (..., 2)."""
+    shared = (torch.minimum(high, other_high) - torch.maximum(low, other_low)).clamp(min=0).prod(dim=-1)
+    return shared, (high - low).prod(dim=-1) + (other_high - other_low).prod(dim=-1) - shared

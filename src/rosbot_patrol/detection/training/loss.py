@@ -14,7 +14,7 @@ import torch
 import torch.nn.functional as fn
 
 from rosbot_patrol.detection.darknet_layers import Yolo
-from rosbot_patrol.detection.training.apart import cut_apart
+from rosbot_patrol.detection.training.apart import cut_apart, shared_and_union
 
 MATCH = 0.45
 IGNORE_IOU = 0.5
@@ -152,8 +152,7 @@ def _overlaps(a: torch.Tensor, b: torch.Tensor) -> tuple[torch.Tensor, torch.Ten
         b[..., :2] - b[..., 2:] / 2,
         b[..., :2] + b[..., 2:] / 2,
     )
-    shared = (torch.minimum(a_high, b_high) - torch.maximum(a_low, b_low)).clamp(min=0).prod(dim=-1)
-    union = a[..., 2:].prod(dim=-1) + b[..., 2:].prod(dim=-1) - shared
+    shared, union = shared_and_union(a_low, a_high, b_low, b_high)
     hull = (torch.maximum(a_high, b_high) - torch.minimum(a_low, b_low)).prod(dim=-1)
     overlap = shared / union.clamp(min=1e-6)
     return overlap, overlap - (hull - union) / hull.clamp(min=1e-6)
