@@ -3,7 +3,7 @@
 darknet keeps one of two boxes that overlap by more than 0.4, so of two people who stand half one behind the other one
 is not told. Nothing says that a box must reach to the last pixel: each may end a little earlier on the other's side and
 still count as right (an overlap of 0.5 with the label's). So a network learns such boxes cut. What "Repulsion Loss:
-Detecting Pedestrians in a Crowd", Wang et al. 2018, does by a term of the loss, is done here to what is learnt.
+Detecting Pedestrians in a Crowd", Wang et al. 2018, does by a term of the loss, is done here to what is learnt as well.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ MOST = 0.25  # of a box's width or height is cut at most: the overlap with what 
 STEPS = 26
 
 
-def cut_apart(boxes: torch.Tensor, batch: torch.Tensor, asked: torch.Tensor) -> torch.Tensor:
+def cut_apart(boxes: torch.Tensor, batch: torch.Tensor, asked: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """The boxes, of which those that overlap another by more than `APART` are cut, both by the same share.
+
+    The second value is the row of the box that each is cut away from, its own where it is not cut, shape (N,).
 
     Each is cut away from the one that it overlaps most, across or upwards, whichever takes less; where `MOST` of both
     is not enough, they stay as they are. No operation's shape depends on the values.
@@ -26,10 +28,10 @@ def cut_apart(boxes: torch.Tensor, batch: torch.Tensor, asked: torch.Tensor) -> 
         batch: picture of each, shape (N,).
         asked: whether each is asked for; what is not neither is cut nor cuts, shape (N,).
     """
-    if len(boxes) < 2:
-        return boxes
-    low, high = boxes[:, :2] - boxes[:, 2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2
     number = torch.arange(len(boxes), device=boxes.device)
+    if len(boxes) < 2:
+        return boxes, number
+    low, high = boxes[:, :2] - boxes[:, 2:] / 2, boxes[:, :2] + boxes[:, 2:] / 2
     pairs = (batch[:, None] == batch) & asked[:, None] & asked & (number[:, None] != number)
     overlap = torch.where(pairs, _iou(low[:, None], high[:, None], low, high), 0.0)
     most, other = overlap.max(dim=1)
@@ -46,7 +48,8 @@ def cut_apart(boxes: torch.Tensor, batch: torch.Tensor, asked: torch.Tensor) -> 
     share = torch.nn.functional.one_hot(axis, 2) * cut[:, None]
     low = low + torch.where(before, 0.0, share) * boxes[:, 2:]
     high = high - torch.where(before, share, 0.0) * boxes[:, 2:]
-    return torch.where(cut[:, None] > 0, torch.cat([(low + high) / 2, high - low], dim=1), boxes)
+    boxes = torch.where(cut[:, None] > 0, torch.cat([(low + high) / 2, high - low], dim=1), boxes)
+    return boxes, torch.where(cut > 0, other, number)
 
 
 def _cut(

@@ -14,13 +14,14 @@ import torch
 import torch.nn.functional as fn
 
 from rosbot_patrol.detection.darknet_layers import Yolo
-from rosbot_patrol.detection.training.apart import cut_apart, shared_and_union
+from rosbot_patrol.detection.training.apart import APART, cut_apart, shared_and_union
 
 MATCH = 0.45
 IGNORE_IOU = 0.5
 SURPRISE = 0.5
 LEAST_SURE, SURE_FROM = 0.1, 0.75  # objectness of a box that overlaps by LOOSE or less, and the overlap of a sure one
 LOOSE = 0.45
+CUT = 6.0  # times as much counts a box that is cut apart from another: so few are, and suppression takes what is not
 
 
 @dataclass
@@ -52,7 +53,8 @@ def yolo_losses(
 
     No operation's shape depends on the values, so that a GPU never has to wait for the processor to hear one.
     """
-    truth = replace(truth, boxes=cut_apart(truth.boxes, truth.batch, truth.asked))
+    boxes, other = cut_apart(truth.boxes, truth.batch, truth.asked)
+    truth = replace(truth, boxes=boxes)
     sizes = torch.tensor([a for head in heads for a in head.anchors], device=truth.boxes.device)
     overlap = _shape_iou(truth.boxes[:, 2:], sizes)
     take = (overlap > MATCH) | (overlap == overlap.max(dim=1, keepdim=True).values)
@@ -62,7 +64,7 @@ def yolo_losses(
     first = 0
     for head, raw in zip(heads, values, strict=True):
         count = len(head.anchors)
-        found = _head_loss(head, raw.float(), truth, take[:, first : first + count], width)
+        found = _head_loss(head, raw.float(), truth, other, take[:, first : first + count], width)
         for name in ("box", "kind"):
             parts[name] = parts[name] + found[name]
         each = each + 2.0 * found["object"]
@@ -72,7 +74,9 @@ def yolo_losses(
     return weighted, each.detach()
 
 
-def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, width: int) -> dict[str, torch.Tensor]:
+def _head_loss(
+    head: Yolo, raw: torch.Tensor, truth: Truth, other: torch.Tensor, take: torch.Tensor, width: int
+) -> dict[str, torch.Tensor]:
     batch, _, rows, columns = raw.shape
     anchors = len(head.anchors)
     stride = width / columns
@@ -88,8 +92,11 @@ def _head_loss(head: Yolo, raw: torch.Tensor, truth: Truth, take: torch.Tensor, 
     wanted = fn.one_hot(truth.kinds, head.classes).float()[:, None].expand_as(mine[..., 5:])
     unlike = fn.binary_cross_entropy_with_logits(mine[..., 5:], wanted, reduction="none").sum(2)
     none = unlike.new_zeros(())
+    theirs, _ = _overlaps(predicted, truth.boxes[other][:, None].expand_as(predicted))
+    cut = (other != torch.arange(len(other), device=raw.device))[:, None]
+    amiss = torch.where(cut, CUT * (1 - generalised + (theirs - APART).clamp(min=0.0)), 1 - generalised)
     result = {
-        "box": torch.where(take, 1 - generalised, none).sum(),
+        "box": torch.where(take, amiss, none).sum(),
         "kind": torch.where(take, unlike, none).sum(),
     }
     fit = ((overlap.detach() - LOOSE) / (SURE_FROM - LOOSE)).clamp(0.0, 1.0)

@@ -11,8 +11,9 @@ torch = pytest.importorskip("torch", reason="PyTorch is installed only in the en
 
 from rosbot_patrol.detection import decode  # noqa: E402
 from rosbot_patrol.detection.darknet_cfg import read_cfg  # noqa: E402
+from rosbot_patrol.detection.darknet_layers import Yolo  # noqa: E402
 from rosbot_patrol.detection.training.apart import APART, MOST, cut_apart  # noqa: E402
-from rosbot_patrol.detection.training.loss import Truth, yolo_loss  # noqa: E402
+from rosbot_patrol.detection.training.loss import CUT, Truth, yolo_loss  # noqa: E402
 from rosbot_patrol.detection.training.scoring import SUPPRESSION  # noqa: E402
 
 Corners = tuple[float, float, float, float]
@@ -24,7 +25,7 @@ def _cut(*corners: Corners, pictures: list[int] | None = None, hidden: int = -1)
     boxes = torch.cat([(at[:, :2] + at[:, 2:]) / 2, at[:, 2:] - at[:, :2]], dim=1)
     asked = torch.arange(len(at)) != hidden
     batch = torch.tensor(pictures) if pictures else torch.zeros(len(at), dtype=torch.long)
-    cut = cut_apart(boxes, batch, asked)
+    cut, _ = cut_apart(boxes, batch, asked)
     return torch.cat([cut[:, :2] - cut[:, 2:] / 2, cut[:, :2] + cut[:, 2:] / 2], dim=1).numpy()
 
 
@@ -86,17 +87,54 @@ def test_what_stays_as_it_is(boxes: tuple, more: dict) -> None:
 
 def test_none_at_all_are_fine() -> None:
     none = torch.zeros(0, 4)
-    assert cut_apart(none, torch.zeros(0, dtype=torch.long), torch.zeros(0, dtype=torch.bool)).shape == (0, 4)
+    boxes, other = cut_apart(none, torch.zeros(0, dtype=torch.long), torch.zeros(0, dtype=torch.bool))
+    assert boxes.shape == (0, 4)
+    assert other.shape == (0,)
 
 
-def test_the_loss_learns_boxes_cut() -> None:
+def _predicting(heads: list[Yolo], boxes: torch.Tensor, cells_of: torch.Tensor, width: int) -> list[torch.Tensor]:
+    """Values by which all anchors of the cell of each of `cells_of` say the box of `boxes` in the same row."""
+    values = []
+    for head in heads:
+        _, rows, columns = head.in_shape
+        value = torch.zeros(1, len(head.anchors), 5 + head.classes, rows, columns)
+        cells = (cells_of[:, :2] / width * columns).long()
+        for box, (column, row) in zip(boxes, cells, strict=True):
+            value[0, :, :2, row, column] = torch.logit(box[:2] / width * columns - torch.stack([column, row]))
+            value[0, :, 2:4, row, column] = torch.log(box[2:] / torch.tensor(head.anchors))
+        values.append(value.flatten(1, 2))
+    return values
+
+
+def test_the_loss_learns_boxes_cut_and_heeds_them_more() -> None:
     spec = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
-    torch.manual_seed(0)
-    values = [torch.randn(1, 21, *head.in_shape[1:]) for head in spec.heads]
     kinds, asked = torch.zeros(2, dtype=torch.long), torch.ones(2, dtype=torch.bool)
     whole = torch.tensor([[120.0, 110, 40, 120], [130.0, 110, 40, 120]])
-    cut = cut_apart(whole, kinds, asked)
-    assert not torch.equal(whole, cut)
-    assert torch.equal(cut_apart(cut, kinds, asked), cut)
-    by_whole, by_cut = (yolo_loss(spec.heads, values, Truth(b, kinds, kinds, asked), spec.width) for b in (whole, cut))
-    assert all(torch.equal(by_whole[name], by_cut[name]) for name in by_whole)
+    cut, other = cut_apart(whole, kinds, asked)
+    assert other.tolist() == [1, 0]
+    again, none = cut_apart(cut, kinds, asked)
+    assert torch.equal(again, cut)
+    assert none.tolist() == [0, 1]
+
+    def loss(learnt: torch.Tensor, predicted: torch.Tensor) -> dict[str, torch.Tensor]:
+        values = _predicting(spec.heads, predicted, cut, spec.width)
+        return yolo_loss(spec.heads, values, Truth(learnt, kinds, kinds, asked), spec.width)
+
+    exact, far, plain = loss(whole, cut), loss(whole, whole), loss(cut, whole)
+    assert exact["box"] == pytest.approx(0.0, abs=1e-5)
+    assert torch.equal(far["kind"], plain["kind"])
+    assert torch.equal(far["object"], plain["object"])
+    corners = torch.cat([cut[:, :2] - cut[:, 2:] / 2, cut[:, :2] + cut[:, 2:] / 2], dim=1).numpy()
+    into_the_other = _iou(np.array((100.0, 50.0, 140.0, 170.0)), corners[1]) - APART
+    assert into_the_other > 0.05
+    assert float(far["box"]) == pytest.approx(CUT * (float(plain["box"]) + 2.0 * into_the_other), rel=1e-4)
+
+
+def test_a_box_alone_counts_once() -> None:
+    spec = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
+    kinds, asked = torch.zeros(2, dtype=torch.long), torch.ones(2, dtype=torch.bool)
+    boxes = torch.tensor([[120.0, 110, 40, 120], [220.0, 110, 40, 120]])
+    assert cut_apart(boxes, kinds, asked)[1].tolist() == [0, 1]
+    values = _predicting(spec.heads, boxes * torch.tensor([1.0, 1.0, 0.5, 1.0]), boxes, spec.width)
+    part = yolo_loss(spec.heads, values, Truth(boxes, kinds, kinds, asked), spec.width)["box"]
+    assert float(part) == pytest.approx(2.0 * 0.5, rel=1e-4)
