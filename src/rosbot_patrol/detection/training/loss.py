@@ -3,7 +3,8 @@
 Each box is learnt by every anchor whose shape overlaps it by `MATCH`, and by its best one in any case. Predictions that
 overlap a box well but are not made for it, and all that lie on something too hidden to ask for, are left alone.
 Objectness learns how well the box fits (IoU-aware, as in PP-YOLO, Long et al. 2020): a box of the wrong size counts as
-false, so it must not be sure of itself.
+false, so it must not be sure of itself. Boxes that suppression would take for one are learnt cut apart (`apart.py`) and
+count `CUT` times; what such a box reaches into the other's counts besides, as in "Repulsion Loss", Wang et al. 2018.
 """
 
 from __future__ import annotations
