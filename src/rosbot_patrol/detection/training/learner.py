@@ -24,7 +24,7 @@ class Learner:
         device: where it learns.
         rate: of learning, at its highest.
         muon: see `Optimiser`.
-        bf16: compute in bfloat16 where that does.
+        bf16: compute in bfloat16 where that does, and where the machine does it itself (`computes_bf16`).
         compile_it: compile the network first, and on a GPU the loss with it.
     """
 
@@ -38,7 +38,7 @@ class Learner:
         bf16: bool = False,
         compile_it: bool = False,
     ) -> None:
-        self.spec, self.device, self._bf16 = spec, device, bf16
+        self.spec, self.device, self._bf16 = spec, device, bf16 and computes_bf16(device)
         self.network = Darknet(spec).to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.network.set_prior(0.01)
         self.mean = copy.deepcopy(self.network).eval()
@@ -132,14 +132,15 @@ class Optimiser:
         decayed = [p for p in network.parameters() if p.ndim > 1 and id(p) not in mine]
         plain = [p for p in network.parameters() if p.ndim <= 1]
         groups = [{"params": decayed, "weight_decay": 5e-3}, {"params": plain, "weight_decay": 0.0}]
-        on_gpu = plain[0].is_cuda
+        on_gpu, bf16 = plain[0].is_cuda, computes_bf16(plain[0].device)
         self._parts: list[torch.optim.Optimizer] = [torch.optim.AdamW(groups, lr=rate, fused=on_gpu)]
         self._pairs = [(p, torch.nn.Parameter(_as_matrix(p.data))) for p in inner]
         if any(p.data_ptr() != matrix.data_ptr() for p, matrix in self._pairs):
             raise RuntimeError("a convolution's numbers are not in one row after the other (channels last)")
         matrices = [matrix for _, matrix in self._pairs]
-        if inner and on_gpu:
-            self._parts.append(StackedMuon(matrices, rate, weight_decay=5e-3))
+        if inner and (on_gpu or not bf16):
+            dtype = torch.bfloat16 if bf16 else torch.float32
+            self._parts.append(StackedMuon(matrices, rate, weight_decay=5e-3, dtype=dtype))
         elif inner:
             self._parts.append(torch.optim.Muon(matrices, lr=rate, weight_decay=5e-3, adjust_lr_fn="match_rms_adamw"))
 
@@ -175,6 +176,18 @@ class Optimiser:
 
 def _as_matrix(weights: torch.Tensor) -> torch.Tensor:
     return weights.permute(0, 2, 3, 1).reshape(len(weights), -1)
+
+
+def computes_bf16(device: torch.device, cpuinfo: Path = Path("/proc/cpuinfo")) -> bool:
+    """Whether bfloat16 is faster there than float32.
+
+    PyTorch computes it on any processor, but where that has no instructions for it this takes more than twice as long.
+    """
+    if device.type != "cpu":
+        return True
+    lines = cpuinfo.read_text().splitlines()
+    flags = next((line.split(":", 1)[1].split() for line in lines if line.startswith(("flags", "Features"))), [])
+    return not {"avx512_bf16", "amx_bf16", "bf16"}.isdisjoint(flags)
 
 
 def schedule(done: float, step: int, cool: float) -> float:

@@ -1,6 +1,8 @@
 """Muon for many matrices at once: the same steps as `torch.optim.Muon`, in a few large operations instead of thousands.
 
-A GPU takes a tenth of the time for them that way; two processor cores would take longer, for what is filled up.
+A GPU takes a tenth of the time for them that way. A processor that has no bfloat16 of its own takes 0.07 s instead of
+0.25 for a step of the house network in float32, in which PyTorch's cannot; there nothing is filled up, for two cores
+would take longer for that.
 """
 
 from __future__ import annotations
@@ -21,11 +23,19 @@ class StackedMuon(torch.optim.Optimizer):
         lr: learning rate.
         weight_decay: apart from the gradients, times the rate.
         momentum: of the mean of the gradients, by Nesterov.
+        dtype: what to compute the steps in.
     """
 
     def __init__(
-        self, matrices: Sequence[torch.nn.Parameter], lr: float, *, weight_decay: float = 0.1, momentum: float = 0.95
+        self,
+        matrices: Sequence[torch.nn.Parameter],
+        lr: float,
+        *,
+        weight_decay: float = 0.1,
+        momentum: float = 0.95,
+        dtype: torch.dtype = torch.bfloat16,
     ) -> None:
+        self._dtype = dtype
         super().__init__(matrices, {"lr": lr, "weight_decay": weight_decay, "momentum": momentum})
 
     @torch.no_grad()
@@ -43,22 +53,34 @@ class StackedMuon(torch.optim.Optimizer):
             means = [self.state[p]["momentum_buffer"] for p in mine]
             torch._foreach_lerp_(means, grads, 1 - group["momentum"])
             ahead = torch._foreach_lerp(grads, means, group["momentum"])
-            steps = orthogonal(ahead)
+            steps = orthogonal(ahead, self._dtype)
             torch._foreach_mul_(mine, 1 - group["lr"] * group["weight_decay"])
             torch._foreach_mul_(steps, [-group["lr"] * 0.2 * max(p.shape) ** 0.5 for p in mine])
             torch._foreach_add_(mine, steps)
 
 
-def orthogonal(matrices: Sequence[torch.Tensor], epsilon: float = 1e-7) -> list[torch.Tensor]:
-    """For each matrix nearly the orthogonal one next to it: five steps of Newton and Schulz, in bfloat16.
+def orthogonal(matrices: Sequence[torch.Tensor], dtype: torch.dtype, epsilon: float = 1e-7) -> list[torch.Tensor]:
+    """For each matrix nearly the orthogonal one next to it: five steps of Newton and Schulz, in `dtype`.
 
-    All are filled up with zeros to one size, which changes nothing of the result.
+    On a GPU all are filled up with zeros to one size, which changes nothing of the result; elsewhere those of one size
+    go together.
     """
+    if matrices[0].is_cuda:
+        return _stacked(matrices, dtype, epsilon)
+    steps: list[torch.Tensor] = list(matrices)
+    for shape in {m.shape for m in matrices}:
+        alike = [k for k, m in enumerate(matrices) if m.shape == shape]
+        for k, step in zip(alike, _stacked([matrices[k] for k in alike], dtype, epsilon), strict=True):
+            steps[k] = step
+    return steps
+
+
+def _stacked(matrices: Sequence[torch.Tensor], dtype: torch.dtype, epsilon: float) -> list[torch.Tensor]:
     rows, columns = (max(m.shape[i] for m in matrices) for i in (0, 1))
-    stack = torch.zeros((len(matrices), rows, columns), dtype=torch.bfloat16, device=matrices[0].device)
+    stack = torch.zeros((len(matrices), rows, columns), dtype=dtype, device=matrices[0].device)
     parts = [stack[k, : m.shape[0], : m.shape[1]] for k, m in enumerate(matrices)]
     torch._foreach_copy_(parts, list(matrices))
-    stack = stack / stack.float().norm(dim=(1, 2), keepdim=True).clamp(min=epsilon).bfloat16()
+    stack = stack / stack.float().norm(dim=(1, 2), keepdim=True).clamp(min=epsilon).to(dtype)
     a, b, c = _COEFFICIENTS
     for _ in range(_STEPS):
         gram = stack @ stack.mT

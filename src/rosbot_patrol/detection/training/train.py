@@ -24,7 +24,7 @@ from tqdm import tqdm
 from rosbot_patrol.detection.darknet_cfg import read_cfg
 from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
 from rosbot_patrol.detection.training.dataset import Pictures, batch_of
-from rosbot_patrol.detection.training.learner import Learner, schedule
+from rosbot_patrol.detection.training.learner import Learner, computes_bf16, schedule
 from rosbot_patrol.detection.training.loss import Truth
 
 
@@ -41,6 +41,8 @@ class Trainer:
         self.learner = Learner(
             self.spec, device, options.rate, muon=options.muon, bf16=options.bf16, compile_it=options.compile
         )
+        if options.bf16 and not computes_bf16(device):
+            sys.stdout.write("computing in float32: this processor has no instructions for bfloat16\n")
         self.steps_each = options.samples // options.batch
         self.total = self.steps_each * options.epochs
         pictures = Pictures.open(options.data, options.name)
@@ -192,7 +194,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--loaders", type=int, default=0, help="processes that make batches; 0: a thread")
-    parser.add_argument("--bf16", action="store_true")
+    parser.add_argument("--bf16", action="store_true", help="compute in bfloat16, where the machine does that itself")
     parser.add_argument("--muon", action="store_true", help="Muon instead of AdamW for the inner convolutions")
     parser.add_argument("--freeze", type=int, default=0, help="so many of the first layers keep their numbers")
     parser.add_argument("--pack", action="store_true", help="read all pictures once and keep them in memory as jpegs")

@@ -13,7 +13,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is installed only in the en
 from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg  # noqa: E402
 from rosbot_patrol.detection.darknet_weights import format_weights, parse_weights, weights_size  # noqa: E402
 from rosbot_patrol.detection.training.grow import grow  # noqa: E402
-from rosbot_patrol.detection.training.learner import Learner, Optimiser, schedule  # noqa: E402
+from rosbot_patrol.detection.training.learner import Learner, Optimiser, computes_bf16, schedule  # noqa: E402
 from rosbot_patrol.detection.training.loss import Truth, yolo_loss, yolo_losses  # noqa: E402
 from rosbot_patrol.detection.training.muon import StackedMuon  # noqa: E402
 from rosbot_patrol.detection.training.network import Darknet  # noqa: E402
@@ -196,12 +196,13 @@ def test_rows_that_only_fill_a_batch_up_change_nothing() -> None:
     assert each.shape == (4,)
 
 
-def test_muon_of_many_matrices_at_once_steps_as_pytorchs_own() -> None:
+@pytest.mark.parametrize(("dtype", "off"), [(torch.bfloat16, 2e-6), (torch.float32, 2e-4)])
+def test_muon_of_many_matrices_at_once_steps_as_pytorchs_own(dtype: torch.dtype, off: float) -> None:
     torch.manual_seed(2)
-    shapes = [(32, 64), (64, 288), (96, 240), (48, 48)]
+    shapes = [(32, 64), (64, 288), (96, 240), (48, 48), (64, 288)]
     ours = [torch.nn.Parameter(torch.randn(shape) * 0.05) for shape in shapes]
     theirs = [torch.nn.Parameter(p.data.clone()) for p in ours]
-    one = StackedMuon(ours, 3e-3, weight_decay=5e-3)
+    one = StackedMuon(ours, 3e-3, weight_decay=5e-3, dtype=dtype)
     other = torch.optim.Muon(theirs, lr=3e-3, weight_decay=5e-3, adjust_lr_fn="match_rms_adamw")
     for _ in range(4):
         for p, q in zip(ours, theirs, strict=True):
@@ -210,7 +211,23 @@ def test_muon_of_many_matrices_at_once_steps_as_pytorchs_own() -> None:
         one.step()
         other.step()
     for p, q in zip(ours, theirs, strict=True):
-        assert torch.allclose(p, q, atol=2e-6)
+        assert torch.allclose(p, q, atol=off)
+
+
+@pytest.mark.parametrize(
+    ("line", "can"),
+    [
+        ("flags\t\t: fpu avx512f avx512_bf16 fsrm", True),
+        ("flags\t\t: fpu amx_bf16", True),
+        ("Features\t: fp asimd bf16", True),
+        ("flags\t\t: fpu avx512f avx512_vnni", False),
+        ("", False),
+    ],
+)
+def test_bfloat16_is_for_a_machine_that_has_it(line: str, can: bool, tmp_path: Path) -> None:
+    (tmp_path / "cpuinfo").write_text(f"processor\t: 0\n{line}\n")
+    assert computes_bf16(torch.device("cpu"), tmp_path / "cpuinfo") is can
+    assert computes_bf16(torch.device("cuda"), tmp_path / "cpuinfo")
 
 
 def test_a_step_of_nothing_is_forgotten() -> None:
