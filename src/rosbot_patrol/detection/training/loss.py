@@ -3,12 +3,8 @@
 Each box is learnt by every anchor whose shape overlaps it by `MATCH`, and by its best one in any case. Predictions that
 overlap a box well but are not made for it, and all that lie on something too hidden to ask for, are left alone.
 Objectness learns how well the box fits (IoU-aware, as in PP-YOLO, Long et al. 2020): a box of the wrong size counts as
-false, so it must not be sure of itself. Where somebody may end here or there (at a desk, or at the feet behind it), an
-overlap as such is best with one of the two, right or wrong; what lacks to `EITHER` counts `HEDGE` times besides, so
-that one in between, right both ways, is better. The two have their middles in cells of their own, each of which hears
-of one alone; so that counts of whatever lies on somebody, whoever it is made for, as far as it is sure. Boxes that
-suppression would take for one are learnt cut apart (`apart.py`) and count `CUT` times; what such a box reaches into the
-other's counts besides, as in "Repulsion Loss", Wang et al. 2018.
+false, so it must not be sure of itself. Boxes that suppression would take for one are learnt cut apart (`apart.py`) and
+count `CUT` times; what such a box reaches into the other's counts besides, as in "Repulsion Loss", Wang et al. 2018.
 """
 
 from __future__ import annotations
@@ -24,13 +20,8 @@ from rosbot_patrol.detection.training.apart import APART, cut_apart, shared_and_
 MATCH = 0.45
 IGNORE_IOU = 0.5
 SURPRISE = 0.5
-LEAST_SURE, SURE_FROM = 0.1, 0.6  # objectness of a box that overlaps by LOOSE or less, and the overlap of a sure one
+LEAST_SURE, SURE_FROM = 0.1, 0.75  # objectness of a box that overlaps by LOOSE or less, and the overlap of a sure one
 LOOSE = 0.45
-EITHER, HEDGE = (
-    0.6,
-    20.0,
-)  # a box is right from an overlap of 0.5 on; between two, each 0.4 of the other, lies one of 0.63
-ON = 0.25  # a box that overlaps nobody by more is made for nobody
 CUT = 6.0  # times as much counts a box that is cut apart from another: so few are, and suppression takes what is not
 
 
@@ -105,10 +96,8 @@ def _head_loss(
     theirs, _ = _overlaps(predicted, truth.boxes[other][:, None].expand_as(predicted))
     cut = (other != torch.arange(len(other), device=raw.device))[:, None]
     amiss = torch.where(cut, CUT * (1 - generalised + (theirs - APART).clamp(min=0.0)), 1 - generalised)
-    amiss = amiss + HEDGE * (EITHER - overlap).clamp(min=0.0)
-    alone, hedged = _elsewhere(head, grid, truth, stride)
     result = {
-        "box": torch.where(take, amiss, none).sum() + HEDGE * hedged,
+        "box": torch.where(take, amiss, none).sum(),
         "kind": torch.where(take, unlike, none).sum(),
     }
     fit = ((overlap.detach() - LOOSE) / (SURE_FROM - LOOSE)).clamp(0.0, 1.0)
@@ -121,7 +110,7 @@ def _head_loss(
     target = fit.new_zeros(batch * anchors * rows * columns + 1)
     target = target.scatter(0, cell.flatten(), surest.flatten())
     target = target[:-1].view(batch, anchors, rows, columns)
-    weight = torch.where(target > 0, 1.0, alone)
+    weight = torch.where(target > 0, 1.0, _weight(head, grid, truth, stride))
     # a little focal: the many cells that are surely empty count less
     logits = grid[:, :, 4]
     surprise = (torch.sigmoid(logits) - target).abs().detach() ** SURPRISE
@@ -130,37 +119,32 @@ def _head_loss(
     return result
 
 
-def _elsewhere(head: Yolo, grid: torch.Tensor, truth: Truth, stride: float) -> tuple[torch.Tensor, torch.Tensor]:
-    """Of all predictions: 0 where one is left alone, else 1; and what lacks to `EITHER` of those on somebody."""
+def _weight(head: Yolo, grid: torch.Tensor, truth: Truth, stride: float) -> torch.Tensor:
+    """0 where a prediction is left alone, else 1."""
     batch, anchors, _, rows, columns = grid.shape
     left = grid.new_zeros(batch, anchors, rows, columns)
     if not len(truth.boxes):
-        return left + 1.0, grid.new_zeros(())
-    device = grid.device
-    y, x = torch.meshgrid(torch.arange(rows, device=device), torch.arange(columns, device=device), indexing="ij")
-    shapes = torch.tensor(head.anchors, device=device)[None, :, :, None, None]
-    centre = (torch.sigmoid(grid[:, :, :2]) + torch.stack([x, y])) * stride
-    size = torch.exp(grid[:, :, 2:4].clamp(max=6)) * shapes
-    centre, size = centre[truth.batch], size[truth.batch]  # (N, anchors, 2, rows, columns)
-    box = truth.boxes[:, None, :, None, None]
-    low = torch.maximum(centre - size / 2, box[:, :, :2] - box[:, :, 2:] / 2)
-    high = torch.minimum(centre + size / 2, box[:, :, :2] + box[:, :, 2:] / 2)
-    shared, own = (high - low).clamp(min=0).prod(dim=2), size.prod(dim=2)
-    overlap = shared / (own + box[:, :, 2:].prod(dim=2) - shared)
-    asked = truth.asked[:, None, None, None]
+        return left + 1.0
     with torch.no_grad():
+        device = grid.device
+        y, x = torch.meshgrid(torch.arange(rows, device=device), torch.arange(columns, device=device), indexing="ij")
+        shapes = torch.tensor(head.anchors, device=device)[None, :, :, None, None]
+        centre = (torch.sigmoid(grid[:, :, :2]) + torch.stack([x, y])) * stride
+        size = torch.exp(grid[:, :, 2:4].clamp(max=6)) * shapes
+        centre, size = centre[truth.batch], size[truth.batch]  # (N, anchors, 2, rows, columns)
+        box = truth.boxes[:, None, :, None, None]
+        low = torch.maximum(centre - size / 2, box[:, :, :2] - box[:, :, 2:] / 2)
+        high = torch.minimum(centre + size / 2, box[:, :, :2] + box[:, :, 2:] / 2)
+        shared, own = (high - low).clamp(min=0).prod(dim=2), size.prod(dim=2)
+        good = shared / (own + box[:, :, 2:].prod(dim=2) - shared) > IGNORE_IOU
         away = (torch.stack([x, y])[None, None] + 0.5) * stride - box[:, :, :2]
         middle = (away.abs() < box[:, :, 2:] / 2 + stride).all(dim=2)
         doubtful = (shared / own.clamp(min=1.0) > 0.3) | middle
-        alone, on = torch.where(asked, overlap > IGNORE_IOU, doubtful), overlap.detach()
+        alone = torch.where(truth.asked[:, None, None, None], good, doubtful)
         if truth.exists is not None:
-            exists = truth.exists[:, None, None, None]
-            alone, on = alone & exists, torch.where(exists, on, 0.0)
+            alone &= truth.exists[:, None, None, None]
         left.index_add_(0, truth.batch, alone.float())
-        whose = truth.batch[:, None, None, None].expand_as(on)
-        most = torch.zeros_like(left).scatter_reduce(0, whose, on, "amax")[truth.batch]
-        sure = torch.where((on == most) & (on > ON) & asked, torch.sigmoid(grid[:, :, 4])[truth.batch], 0.0)
-    return (left == 0.0).float(), (sure * (EITHER - overlap).clamp(min=0.0)).sum()
+    return (left == 0.0).float()
 
 
 def _shape_iou(sizes: torch.Tensor, anchors: torch.Tensor) -> torch.Tensor:

@@ -13,7 +13,7 @@ from rosbot_patrol.detection import decode  # noqa: E402
 from rosbot_patrol.detection.darknet_cfg import read_cfg  # noqa: E402
 from rosbot_patrol.detection.darknet_layers import Yolo  # noqa: E402
 from rosbot_patrol.detection.training.apart import APART, MOST, cut_apart  # noqa: E402
-from rosbot_patrol.detection.training.loss import CUT, EITHER, HEDGE, Truth, yolo_loss  # noqa: E402
+from rosbot_patrol.detection.training.loss import CUT, Truth, yolo_loss  # noqa: E402
 from rosbot_patrol.detection.training.scoring import SUPPRESSION  # noqa: E402
 
 Corners = tuple[float, float, float, float]
@@ -92,21 +92,15 @@ def test_none_at_all_are_fine() -> None:
     assert other.shape == (0,)
 
 
-def _predicting(
-    heads: list[Yolo], boxes: torch.Tensor, cells_of: torch.Tensor, width: int, sure: float = 0.0
-) -> list[torch.Tensor]:
-    """Values by which all anchors of the cell of each of `cells_of` say the box of `boxes` in the same row, and are so
-    sure of it (logit).
-    """
+def _predicting(heads: list[Yolo], boxes: torch.Tensor, cells_of: torch.Tensor, width: int) -> list[torch.Tensor]:
+    """Values by which all anchors of the cell of each of `cells_of` say the box of `boxes` in the same row."""
     values = []
     for head in heads:
         _, rows, columns = head.in_shape
         value = torch.zeros(1, len(head.anchors), 5 + head.classes, rows, columns)
-        value[:, :, 4] = -20.0
         cells = (cells_of[:, :2] / width * columns).long()
         for box, (column, row) in zip(boxes, cells, strict=True):
             value[0, :, :2, row, column] = torch.logit(box[:2] / width * columns - torch.stack([column, row]))
-            value[0, :, 4, row, column] = sure
             value[0, :, 2:4, row, column] = torch.log(box[2:] / torch.tensor(head.anchors))
         values.append(value.flatten(1, 2))
     return values
@@ -136,47 +130,11 @@ def test_the_loss_learns_boxes_cut_and_heeds_them_more() -> None:
     assert float(far["box"]) == pytest.approx(CUT * (float(plain["box"]) + 2.0 * into_the_other), rel=1e-4)
 
 
-def _box_loss(learnt: torch.Tensor, predicted: torch.Tensor, cells_of: torch.Tensor, sure: float = -20.0) -> float:
-    """The box part for one person in each of `learnt`, and predictions in the cells of `cells_of`."""
-    spec = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
-    kinds, asked = torch.zeros(len(learnt), dtype=torch.long), torch.ones(len(learnt), dtype=torch.bool)
-    values = _predicting(spec.heads, predicted, cells_of, spec.width, sure)
-    return float(yolo_loss(spec.heads, values, Truth(learnt, kinds, kinds, asked), spec.width)["box"])
-
-
 def test_a_box_alone_counts_once() -> None:
+    spec = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
+    kinds, asked = torch.zeros(2, dtype=torch.long), torch.ones(2, dtype=torch.bool)
     boxes = torch.tensor([[120.0, 110, 40, 120], [220.0, 110, 40, 120]])
-    assert cut_apart(boxes, torch.zeros(2, dtype=torch.long), torch.ones(2, dtype=torch.bool))[1].tolist() == [0, 1]
-    narrow = boxes * torch.tensor([1.0, 1.0, 0.7, 1.0])
-    assert _box_loss(boxes, narrow, boxes) == pytest.approx(2.0 * 0.3, rel=1e-4)
-
-
-def test_what_an_overlap_lacks_counts_besides() -> None:
-    boxes = torch.tensor([[120.0, 110, 40, 120]])
-    narrow = boxes * torch.tensor([1.0, 1.0, 0.5, 1.0])
-    assert _box_loss(boxes, narrow, boxes) == pytest.approx(2.0 * (0.5 + HEDGE * (EITHER - 0.5)), rel=1e-4)
-
-
-def _from_above(height: float) -> torch.Tensor:
-    """A box of that height [px] whose upper edge stays, shape (1, 4)."""
-    return torch.tensor([[120.0, 86.5 + height / 2, 15, height]])
-
-
-def test_of_somebody_who_ends_here_or_there_a_box_in_between_is_better_than_either() -> None:
-    short, tall, between = _from_above(20.0), _from_above(50.0), _from_above(31.6)
-    of_either = [sum(_box_loss(truth, box, truth) for truth in (short, tall)) for box in (short, tall)]
-    assert sum(_box_loss(truth, between, truth) for truth in (short, tall)) < 0.5 * min(of_either)
-
-
-def test_a_sure_box_on_somebody_is_to_be_right_whoever_it_is_made_for() -> None:
-    tall = torch.tensor([[120.0, 100, 40, 150]])
-    short, between = torch.tensor([[120.0, 60, 40, 60]]), torch.tensor([[120.0, 63, 40, 76]])
-    predicted = {
-        box: _box_loss(tall, torch.cat([tall, box]), torch.cat([tall, short]), 3.0) for box in (short, between)
-    }
-    assert predicted[short] > predicted[between] > 0.1
-    assert _box_loss(tall, torch.cat([tall, short]), torch.cat([tall, short]), -20.0) == pytest.approx(0.0, abs=1e-4)
-    far = torch.tensor([[40.0, 60, 40, 60]])
-    assert _box_loss(tall, torch.cat([tall, far]), torch.cat([tall, far]), 3.0) == pytest.approx(0.0, abs=1e-4)
-    both = torch.cat([tall, far])  # a box on somebody else, who is there, is no box on this one
-    assert _box_loss(both, both, both, 3.0) == pytest.approx(0.0, abs=1e-4)
+    assert cut_apart(boxes, kinds, asked)[1].tolist() == [0, 1]
+    values = _predicting(spec.heads, boxes * torch.tensor([1.0, 1.0, 0.5, 1.0]), boxes, spec.width)
+    part = yolo_loss(spec.heads, values, Truth(boxes, kinds, kinds, asked), spec.width)["box"]
+    assert float(part) == pytest.approx(2.0 * 0.5, rel=1e-4)
