@@ -53,7 +53,7 @@ class StackedMuon(torch.optim.Optimizer):
             means = [self.state[p]["momentum_buffer"] for p in mine]
             torch._foreach_lerp_(means, grads, 1 - group["momentum"])
             ahead = torch._foreach_lerp(grads, means, group["momentum"])
-            steps = orthogonal(ahead, self._dtype)
+            steps = orthogonal(ahead, self._dtype) if ahead[0].is_cuda else orthogonal_by_size(ahead, self._dtype)
             torch._foreach_mul_(mine, 1 - group["lr"] * group["weight_decay"])
             torch._foreach_mul_(steps, [-group["lr"] * 0.2 * max(p.shape) ** 0.5 for p in mine])
             torch._foreach_add_(mine, steps)
@@ -62,20 +62,8 @@ class StackedMuon(torch.optim.Optimizer):
 def orthogonal(matrices: Sequence[torch.Tensor], dtype: torch.dtype, epsilon: float = 1e-7) -> list[torch.Tensor]:
     """For each matrix nearly the orthogonal one next to it: five steps of Newton and Schulz, in `dtype`.
 
-    On a GPU all are filled up with zeros to one size, which changes nothing of the result; elsewhere those of one size
-    go together.
+    All are filled up with zeros to one size, which changes nothing of the result.
     """
-    if matrices[0].is_cuda:
-        return _stacked(matrices, dtype, epsilon)
-    steps: list[torch.Tensor] = list(matrices)
-    for shape in {m.shape for m in matrices}:
-        alike = [k for k, m in enumerate(matrices) if m.shape == shape]
-        for k, step in zip(alike, _stacked([matrices[k] for k in alike], dtype, epsilon), strict=True):
-            steps[k] = step
-    return steps
-
-
-def _stacked(matrices: Sequence[torch.Tensor], dtype: torch.dtype, epsilon: float) -> list[torch.Tensor]:
     rows, columns = (max(m.shape[i] for m in matrices) for i in (0, 1))
     stack = torch.zeros((len(matrices), rows, columns), dtype=dtype, device=matrices[0].device)
     parts = [stack[k, : m.shape[0], : m.shape[1]] for k, m in enumerate(matrices)]
@@ -86,3 +74,13 @@ def _stacked(matrices: Sequence[torch.Tensor], dtype: torch.dtype, epsilon: floa
         gram = stack @ stack.mT
         stack = torch.baddbmm(stack, torch.baddbmm(gram, gram, gram, beta=b, alpha=c), stack, beta=a)
     return [stack[k, : m.shape[0], : m.shape[1]].to(m.dtype) for k, m in enumerate(matrices)]
+
+
+def orthogonal_by_size(matrices: Sequence[torch.Tensor], dtype: torch.dtype) -> list[torch.Tensor]:
+    """The same, those of one size together, so that nothing is filled up."""
+    steps: list[torch.Tensor] = list(matrices)
+    for shape in {m.shape for m in matrices}:
+        alike = [k for k, m in enumerate(matrices) if m.shape == shape]
+        for k, step in zip(alike, orthogonal([matrices[k] for k in alike], dtype), strict=True):
+            steps[k] = step
+    return steps

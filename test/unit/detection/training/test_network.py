@@ -15,7 +15,7 @@ from rosbot_patrol.detection.darknet_weights import format_weights, parse_weight
 from rosbot_patrol.detection.training.grow import grow  # noqa: E402
 from rosbot_patrol.detection.training.learner import Learner, Optimiser, computes_bf16, schedule  # noqa: E402
 from rosbot_patrol.detection.training.loss import Truth, yolo_loss, yolo_losses  # noqa: E402
-from rosbot_patrol.detection.training.muon import StackedMuon  # noqa: E402
+from rosbot_patrol.detection.training.muon import StackedMuon, orthogonal, orthogonal_by_size  # noqa: E402
 from rosbot_patrol.detection.training.network import Darknet  # noqa: E402
 
 SPEC = read_cfg(str(Path(__file__).parents[4] / "models" / "house.cfg"))
@@ -212,6 +212,14 @@ def test_muon_of_many_matrices_at_once_steps_as_pytorchs_own(dtype: torch.dtype,
         other.step()
     for p, q in zip(ours, theirs, strict=True):
         assert torch.allclose(p, q, atol=off)
+
+
+@pytest.mark.parametrize(("dtype", "off"), [(torch.bfloat16, 2e-2), (torch.float32, 1e-5)])
+def test_what_matrices_are_filled_up_with_changes_nothing(dtype: torch.dtype, off: float) -> None:
+    torch.manual_seed(3)
+    matrices = [torch.randn(shape) for shape in [(32, 64), (64, 288), (96, 240), (48, 48), (64, 288)]]
+    for one, other in zip(orthogonal(matrices, dtype), orthogonal_by_size(matrices, dtype), strict=True):
+        assert torch.allclose(one, other, atol=off)
 
 
 @pytest.mark.parametrize(
