@@ -36,6 +36,18 @@ def test_a_picture_of_the_flat_with_rooms_and_sensors(
     assert len(np.unique(np.asarray(image).reshape(-1, 3), axis=0)) > 30
 
 
+def test_a_world_with_missing_files_is_drawn_without_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    box = "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry></collision>"
+    inside = f"<model name='m'><link name='l'>{box}</link></model><include><uri>model://nowhere</uri></include>"
+    (tmp_path / "a.world").write_text(f"<sdf version='1.6'><world name='w'>{inside}</world></sdf>")
+    run(monkeypatch, str(tmp_path / "a.world"), str(tmp_path / "a.png"), "--width", "64")
+    assert (tmp_path / "a.png").is_file()
+    assert "'model://nowhere' is missing" in caplog.text
+    assert "a.world: 1 file cannot be used: 1 model left out" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -69,6 +69,20 @@ def test_topics_frames_and_driving_into_a_wall(ros):
     wait_for(touches, 15.0, "a contact with the wall")
 
 
+def test_a_world_with_missing_files_starts_and_says_so(ros, tmp_path):
+    lost = "<include><uri>model://nowhere</uri></include>"
+    mesh = "<geometry><mesh><uri>gone.stl</uri></mesh></geometry>"
+    wall = f"<model name='w'><link name='l'><collision name='c'>{mesh}</collision></link></model>"
+    (tmp_path / "a.world").write_text(f"<sdf version='1.6'><world name='a'>{lost}{wall}</world></sdf>")
+    probe = ros.probe()
+    probe.tell(subscribe=["/diagnostics", "diagnostic_msgs/DiagnosticArray"])
+    node = ros.node("simulator", URDF, f"_world:={tmp_path}/a.world")
+    node.says("motion sensors", 20.0)
+    assert "2 files cannot be used: 1 model left out, 1 collision left out" in node.output
+    said = "2 files of the world cannot be used"
+    probe.expect(lambda s: s.get("topic") == "/diagnostics" and said in s["status"], 10.0)
+
+
 def test_actors_come_walk_trigger_a_sensor_over_tcp_and_go(ros, tmp_path):
     port = free_port()
     sensors = tmp_path / "sensors.yaml"

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING
 import rospy
 from geometry_msgs.msg import Twist
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
@@ -122,10 +123,11 @@ class Simulator:
             client.start()
         self._window = _open_window(self._engine) if p.gui else None
         self._health = Health("simulation")
+        self._report_world(world)
         self._doors = DoorServices(self._engine, self._requests.ask)
         self._faults = FaultServices(self._engine, self._clients, self._requests.ask, self._health, p.seed)
         rospy.Subscriber("/cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
-        log.info("world '%s': %d bodies, %d motion sensors", world.name, len(world.bodies), len(places))
+        log.info("world '%s': bodies: %d, motion sensors: %d", world.name, len(world.bodies), len(places))
 
     def run(self) -> None:
         """Simulate until shutdown."""
@@ -180,6 +182,12 @@ class Simulator:
     def _set_paused(self, paused: bool) -> None:
         self._paused = paused
         log.info("the simulation %s", "is paused" if paused else "goes on")
+
+    def _report_world(self, world: World) -> None:
+        files = count_of(len(world.lost), "file")
+        text = f"{files} of the world cannot be used" if world.lost else "every file of the world was found"
+        values = {f"file {number}": sentence for number, sentence in enumerate(world.lost, 1)}
+        self._health.set("world", WARN if world.lost else OK, text, values)
 
     def _report(self, factor: float) -> None:
         slow = self._params.rate > 0.0 and factor < 0.9 * self._params.rate and not self._paused

@@ -45,7 +45,7 @@ def load_parts(path: Path) -> tuple[MeshPart, ...]:
         raise WorldError(path, f"the mesh cannot be read: {err.strerror}") from err
     try:
         parts = tuple(part for part in reader(path) if len(part.faces))
-    except (ValueError, IndexError) as err:
+    except (ValueError, IndexError, OverflowError) as err:
         raise WorldError(path, f"the mesh is broken: {err}") from err
     if not parts:
         raise WorldError(path, "the mesh has no triangles")

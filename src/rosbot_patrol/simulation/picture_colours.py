@@ -31,7 +31,7 @@ def mean_colour(path: Path) -> Rgba | None:
     try:
         with Image.open(path) as image:
             red, green, blue, cover = image.convert("RGBA").convert("RGBa").resize((1, 1), Image.Resampling.BOX).split()
-    except (OSError, ValueError) as err:
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as err:  # SyntaxError: a broken png
         log.warning("%s: the texture cannot be read: %s", path, err)
         return None
     weight = max(cover.getpixel((0, 0)), 1)

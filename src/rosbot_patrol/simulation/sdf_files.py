@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os.path
+from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 from xml.etree import ElementTree as ET
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.sdf_values import VERSIONS, Place
 
@@ -46,7 +50,8 @@ class ModelPath:
 
     def look(self, uri: str, base: Path) -> Path | None:
         """As `find`, None where it is nowhere."""
-        return next((path for path in self._candidates(uri, base) if path.exists()), None)
+        # os.path: a name that is too long or a folder that is closed to us is nowhere, and no error
+        return next((path for path in self._candidates(uri, base) if os.path.exists(path)), None)
 
     def _candidates(self, uri: str, base: Path) -> Iterator[Path]:
         for scheme in _SCHEMES:
@@ -68,6 +73,52 @@ class ModelPath:
         yield from (folder / tail for tail in tails for folder in self.folders)
 
 
+Part = Literal["model", "collision", "visual"]
+_EFFECT: dict[Part, str] = {"model": "left out", "collision": "left out", "visual": "shown by collision shapes"}
+
+
+@dataclass
+class LostFiles:
+    """Files that a world names and that cannot be used: Gazebo reports them and goes on, and so does the reader."""
+
+    _sentences: dict[str, str] = field(default_factory=dict)
+    _wanted: Counter[str] = field(default_factory=Counter)
+    _parts: Counter[Part] = field(default_factory=Counter)
+
+    def add(self, uri: str, part: Part, place: Place, error: WorldError) -> None:
+        """Note that a part of the world does without a file.
+
+        Args:
+            uri: the file, as the world writes it.
+            part: what does without it.
+            place: who named it.
+            error: what is wrong with it.
+        """
+        file = uri if ":/" in uri else str(place.path.parent / uri)
+        told = str(error) if error.path == str(place.path) else str(place.error(str(error)))
+        self._sentences.setdefault(file, told)
+        self._wanted[file] += 1
+        self._parts[part] += 1
+
+    def __len__(self) -> int:
+        return len(self._sentences)
+
+    def sentences(self) -> tuple[str, ...]:
+        """One for each file: who wanted it first, what is wrong, and how many more want it."""
+        more = {file: self._wanted[file] - 1 for file in self._sentences}
+        return tuple(
+            told + (f" (wanted in {count_of(more[file], 'more place')})" if more[file] else "")
+            for file, told in self._sentences.items()
+        )
+
+    def summary(self) -> str:
+        """How many files are lost and what that costs, "" if none is."""
+        if not self._sentences:
+            return ""
+        costs = ", ".join(f"{count_of(self._parts[p], p)} {_EFFECT[p]}" for p in _EFFECT if self._parts[p])
+        return f"{count_of(len(self), 'file')} cannot be used: {costs}"
+
+
 def advice(uri: str) -> str:
     """What helps where a uri means nothing, to follow a sentence that says so."""
     if uri.startswith("http"):
@@ -86,18 +137,18 @@ def model_file(found: Path, place: Place) -> Path:
     Raises:
         WorldError: the folder has no SDF file, or its model.config is broken or names one that is missing.
     """
-    if found.is_file():
+    if os.path.isfile(found):
         return found
     config = found / "model.config"
-    if not config.is_file():
+    if not os.path.isfile(config):
         file = found / "model.sdf"
-        if not file.is_file():
+        if not os.path.isfile(file):
             raise place.error(f"{found} is no model, it has neither model.config nor model.sdf")
         return file
     named = _named_in(config)
     readable = [entry for entry in named if entry[0] <= NEWEST]
     file = found / max(readable or named[:1], key=lambda entry: entry[0])[1]
-    if not file.is_file():
+    if not os.path.isfile(file):
         raise WorldError(config, f"names the file '{file.name}', which is missing")
     return file
 

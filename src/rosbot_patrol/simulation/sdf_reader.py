@@ -17,7 +17,7 @@ from rosbot_patrol.simulation.scene import Body, Collision, Matrix, Visual, iden
 from rosbot_patrol.simulation.sdf_actors import ActorPlace, actor_kind, read_actor
 from rosbot_patrol.simulation.sdf_bodies import floor, instead, inverse, kind_of, together
 from rosbot_patrol.simulation.sdf_doors import Hinge, carried_by, read_hinge
-from rosbot_patrol.simulation.sdf_files import ModelPath, advice, model_file
+from rosbot_patrol.simulation.sdf_files import LostFiles, ModelPath, model_file
 from rosbot_patrol.simulation.sdf_frames import Frames
 from rosbot_patrol.simulation.sdf_population import places_of
 from rosbot_patrol.simulation.sdf_shapes import ShapeReader
@@ -52,7 +52,7 @@ class Reader:
         path: the world's file.
         model_path: where models are.
         skipped: what was met and is not read.
-        lost: uri of each mesh that should be seen and cannot be read, and a sentence about the first place.
+        lost: files of models and meshes that cannot be used.
         renamed: "name_1" for what shares its name with another.
         versions: of SDF that are read as if they were others, and a file of each.
         lights: how many there are.
@@ -62,7 +62,7 @@ class Reader:
     path: Path
     model_path: ModelPath
     skipped: set[str] = field(default_factory=set)
-    lost: dict[str, str] = field(default_factory=dict)
+    lost: LostFiles = field(default_factory=LostFiles)
     renamed: list[str] = field(default_factory=list)
     versions: dict[str, Path] = field(default_factory=dict)
     lights: int = 0
@@ -72,7 +72,6 @@ class Reader:
     _state: State = field(default_factory=State)
     _files: dict[Path, ET.Element] = field(default_factory=dict)
     _including: list[Path] = field(default_factory=list)
-    _missing: dict[str, WorldError] = field(default_factory=dict)
     _taken: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -93,7 +92,6 @@ class Reader:
         self._note_skipped(world)
         for child in (*world, *self._state.inserted):
             self._child(child, place, frames, identity(), "")
-        self._check_missing()
         self._check_names()
         return world.get("name", "world")
 
@@ -125,8 +123,6 @@ class Reader:
     def _include(self, element: ET.Element, place: Place, frames: Frames, world_from_outer: Matrix, outer: str) -> None:
         self._note_skipped(element)
         uri = (element.findtext("uri") or "").strip()
-        if not uri:
-            raise place.error("an <include> has no <uri>")
         here = place.inside(f"<include> of {uri}")
         short = re.sub(r"^\w+://", "", uri).strip("/")
         if short == "sun":
@@ -137,31 +133,35 @@ class Reader:
         if self._is_actor(outer + (given or short), (given, short), world_from_model):
             return
         try:
-            file = model_file(self.model_path.find(uri, place.path.parent, here), here)
+            file, found = self._find_included(uri, here)
         except WorldError as err:
             if short == "ground_plane":
                 self.bodies.append(floor(self._fresh(outer + (given or short))))
-                return
-            if self.model_path.look(uri, place.path.parent) is not None:
-                raise
-            self._missing.setdefault(uri, err)
+            else:
+                self.lost.add(uri, "model", here, err)
             return
-        if file in self._including or file == self.path:
+        if file in self._including:
             chain = " -> ".join(p.parent.name for p in (*self._including, file))
             raise here.error(f"the models include each other in a circle: {chain}")
-        self._included(file, element, world_from_model, outer, given, short)
+        self._included(file, found, element, world_from_model, outer, given or found.get("name") or short)
 
-    def _included(
-        self, file: Path, element: ET.Element, world_from_model: Matrix, outer: str, given: str, short: str
-    ) -> None:
+    def _find_included(self, uri: str, place: Place) -> tuple[Path, ET.Element]:
+        """The file that an <include> means, and the model, actor or light in it. Raises WorldError."""
+        if not uri:
+            raise place.error("has no <uri>")
+        file = model_file(self.model_path.find(uri, place.path.parent, place), place)
         root = self._parse(file)
         found = next((root.find(tag) for tag in ("model", "actor", "light") if root.find(tag) is not None), None)
         if found is None:
             raise WorldError(file, "has no <model> element")
+        return file, found
+
+    def _included(
+        self, file: Path, found: ET.Element, element: ET.Element, world_from_model: Matrix, outer: str, name: str
+    ) -> None:
         if found.tag == "light":
-            self.lights += len(root.findall("light"))
+            self.lights += len(self._parse(file).findall("light"))
             return
-        name = given or found.get("name") or short
         inside = Place(file, f"{found.tag} '{name}'")
         placement = element.findtext("placement_frame")
         if placement:
@@ -269,15 +269,6 @@ class Reader:
             self.renamed.append(name)
         self._taken.add(name)
         return name
-
-    def _check_missing(self) -> None:
-        if len(self._missing) == 1:
-            raise next(iter(self._missing.values()))
-        if self._missing:
-            folders = ", ".join(dict.fromkeys(map(str, self.model_path.folders)))
-            names = ", ".join(self._missing)
-            problem = f"{len(self._missing)} models are missing: {names} (looked in {folders})"
-            raise WorldError(self.path, problem + advice(next(iter(self._missing))))
 
     def _check_names(self) -> None:
         names = [b.name for b in self.bodies] + [a.name for a in self.actors] + [d.body.name for d in self.doors]

@@ -15,7 +15,7 @@ from rosbot_patrol.simulation.mesh_files import MeshPart, load_parts, merged
 from rosbot_patrol.simulation.meshes import sphere
 from rosbot_patrol.simulation.picture_colours import Rgba
 from rosbot_patrol.simulation.scene import Body, Collision, Matrix, Shape, ShapeKind, Visual
-from rosbot_patrol.simulation.sdf_files import ModelPath
+from rosbot_patrol.simulation.sdf_files import LostFiles, ModelPath, Part
 from rosbot_patrol.simulation.sdf_looks import Looks, is_unseen
 from rosbot_patrol.simulation.sdf_polylines import polyline_triangles
 from rosbot_patrol.simulation.sdf_roads import read_road
@@ -44,14 +44,14 @@ class ShapeReader:
     Attributes:
         model_path: where model:// is.
         skipped: takes the names of what is not read.
-        lost: takes the uri of each mesh that should be seen and cannot be read, and a sentence about the first such.
+        lost: takes the meshes that cannot be used.
     """
 
     model_path: ModelPath
     skipped: set[str]
-    lost: dict[str, str] = field(default_factory=dict)
+    lost: LostFiles = field(default_factory=LostFiles)
     _looks: Looks = field(init=False)
-    _meshes: dict[Path, tuple[MeshPart, ...]] = field(default_factory=dict)
+    _meshes: dict[Path, tuple[MeshPart, ...] | WorldError] = field(default_factory=dict)
     _merged: dict[tuple[Path, str, bool], tuple[MeshPart, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -69,25 +69,23 @@ class ShapeReader:
         self._note(element)
         if is_unseen(element, place):
             return []
-        if element.find("geometry/mesh") is None:
-            found = self._shapes(element, place, scale, apart=True)
-        else:
-            try:
-                found = self._shapes(element, place, scale, apart=True)
-            except WorldError as err:
-                uri = (element.findtext("geometry/mesh/uri") or "a mesh without <uri>").strip()
-                self.lost.setdefault(uri, str(err))
-                return None
+        found = self._found(element, place, scale, "visual")
+        if found is None:
+            return None
         return [
             Visual(shape=shape, pose=pose @ turn, material=self._looks.material(element, own, place))
             for shape, own, turn in found
         ]
 
     def collisions(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Collision]:
-        """The shape of a <collision>, none where it is of no known shape. Raises WorldError."""
+        """The shape of a <collision>, none where it is of no known shape, or its mesh is missing or broken.
+
+        Raises:
+            WorldError: an element makes no sense.
+        """
         self._note(element)
-        shapes = self._shapes(element, place, scale, apart=False)
-        return [Collision(shape=shape, pose=pose @ turn) for shape, _, turn in shapes]
+        found = self._found(element, place, scale, "collision") or []
+        return [Collision(shape=shape, pose=pose @ turn) for shape, _, turn in found]
 
     def road(self, element: ET.Element, place: Place, name: str) -> Body:
         """A <road> in the look that it names. Raises WorldError."""
@@ -96,6 +94,17 @@ class ShapeReader:
 
     def _note(self, element: ET.Element) -> None:
         self.skipped.update(f"<{c.tag}> of a {element.tag}" for c in element if c.tag not in _KNOWN[element.tag])
+
+    def _found(self, element: ET.Element, place: Place, scale: Scale, part: Part) -> list[_Found] | None:
+        """The shapes of an element, None where its mesh cannot be used: that is noted in `lost`."""
+        mesh = element.find("geometry/mesh")
+        try:
+            return self._shapes(element, place, scale, apart=part == "visual")
+        except WorldError as err:
+            if mesh is None:
+                raise
+            self.lost.add(_uri(mesh) or f"{place.where}, <mesh>", part, place, err)
+            return None
 
     def _shapes(self, element: ET.Element, place: Place, scale: Scale, *, apart: bool) -> list[_Found]:
         """(shape, colour of its file, turn) of an element; the parts of a mesh apart or as one."""
@@ -132,7 +141,7 @@ class ShapeReader:
         return [(Shape(kind="plane", size=(size[0] * scale[0], size[1] * scale[1])), None, turn)]
 
     def _mesh(self, element: ET.Element, place: Place, scale: Scale, *, apart: bool) -> list[tuple[Shape, Rgba | None]]:
-        uri = (element.findtext("uri") or element.findtext("filename") or "").strip()
+        uri = _uri(element)
         if not uri:
             raise place.error("<mesh> has no <uri>")
         file = self.model_path.find(uri, place.path.parent, place.inside("mesh"))
@@ -152,9 +161,7 @@ class ShapeReader:
         return [(Shape(kind="mesh", size=size, mesh=file, vertices=p.vertices, faces=p.faces), p.rgba) for p in parts]
 
     def _parts(self, file: Path, submesh: str, centred: bool, place: Place) -> tuple[MeshPart, ...]:
-        if file not in self._meshes:
-            self._meshes[file] = load_parts(file)
-        parts = self._meshes[file]
+        parts = self._load(file)
         if not submesh:
             return parts
         chosen = tuple(part for part in parts if part.name == submesh)
@@ -166,6 +173,22 @@ class ShapeReader:
             middle = (every.min(axis=0) + every.max(axis=0)) / 2.0
             chosen = tuple(replace(part, vertices=part.vertices - middle) for part in chosen)
         return chosen
+
+    def _load(self, file: Path) -> tuple[MeshPart, ...]:
+        """The parts of a mesh file, read once, also where it is broken. Raises WorldError."""
+        if file not in self._meshes:
+            try:
+                self._meshes[file] = load_parts(file)
+            except WorldError as err:
+                self._meshes[file] = err
+        found = self._meshes[file]
+        if isinstance(found, WorldError):
+            raise found
+        return found
+
+
+def _uri(mesh: ET.Element) -> str:
+    return (mesh.findtext("uri") or mesh.findtext("filename") or "").strip()
 
 
 def _primitive(element: ET.Element, place: Place) -> Shape:

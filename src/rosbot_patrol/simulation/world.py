@@ -7,8 +7,8 @@ and so does an <actor>.
 
 Differs: every model is static (what Gazebo would push aside stands fast here); joints hold, but for a door's hinge
 (`sdf_doors`), which a service moves; lights, plugins, sensors and physics settings are skipped. What is not read is
-named once in a warning. What cannot be found and would stop the robot is an error; what would only be seen is not, and
-is seen as its collision shapes. A world on a raised floor is let down onto the ground (`sdf_floors`).
+named once in a warning. As in Gazebo, a model or mesh that is missing or broken is reported and left out; a visual
+without its mesh is shown as its collision shapes. A world on a raised floor is let down onto the ground (`sdf_floors`).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.simulation.doors import DoorPlace
 from rosbot_patrol.simulation.scene import Body
 from rosbot_patrol.simulation.sdf_actors import ActorPlace
@@ -33,12 +34,17 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """Everything that stands in a world, the actors it begins with, and its doors on hinges."""
+    """Everything that stands in a world, the actors it begins with, and its doors on hinges.
+
+    Attributes:
+        lost: a sentence for each file that the world names and that cannot be used.
+    """
 
     name: str = "empty"
     bodies: tuple[Body, ...] = ()
     actors: tuple[ActorPlace, ...] = ()
     doors: tuple[DoorPlace, ...] = ()
+    lost: tuple[str, ...] = ()
 
 
 def load_world(
@@ -66,20 +72,21 @@ def load_world(
     if height:
         log.info("%s: stands on a floor of %.3f m, which is let down to the height 0", path, height)
         bodies, doors = let_down(bodies, doors, height)
-    return World(name=name, bodies=bodies, actors=tuple(reader.actors), doors=doors)
+    return World(name=name, bodies=bodies, actors=tuple(reader.actors), doors=doors, lost=reader.lost.sentences())
 
 
 def _tell(reader: Reader) -> None:
     """What was left out, in one line of each kind."""
     if reader.lights:
-        log.info("%s: %d lights are not simulated, the camera has its own", reader.path, reader.lights)
+        lights = count_of(reader.lights, "light is", "lights are")
+        log.info("%s: %s not simulated, the camera has its own", reader.path, lights)
     for version, file in reader.versions.items():
         log.warning("%s: SDF version %s, read as %s", file, version, VERSIONS[-1])
     if reader.skipped:
         log.warning("%s: skipped, not simulated here: %s", reader.path, ", ".join(sorted(reader.skipped)))
     if reader.renamed:
         log.warning("%s: names used twice, the later one is called: %s", reader.path, ", ".join(reader.renamed))
+    for sentence in reader.lost.sentences():
+        log.warning("%s", sentence)
     if reader.lost:
-        uris = ", ".join(f"'{uri}'" for uri in reader.lost)
-        first = next(iter(reader.lost.values()))
-        log.warning("%s: shown as their collision shapes, for want of the meshes %s: %s", reader.path, uris, first)
+        log.warning("%s: %s", reader.path, reader.lost.summary())

@@ -241,42 +241,11 @@ def test_an_absolute_path_of_another_s_home_is_found_by_its_end(tmp_path: Path) 
     assert world.bodies[0].collisions[0].shape.mesh == tmp_path / "models" / "shelf" / "meshes" / "shelf.STL"
 
 
-def test_what_only_the_camera_would_see_may_be_missing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    lost = "<geometry><mesh><uri>model://sofa/meshes/sofa.dae</uri></mesh></geometry>"
-    seen = f"<visual name='v'><pose>9 9 9 0 0 0</pose>{lost}</visual>"
-    text = model(f"<collision name='c'>{BOX}</collision>{seen}") + model(seen, name="picture")
-    with caplog.at_level(logging.WARNING):
-        world = read(tmp_path, sdf(text))
-    (visual,) = body_of(world, "thing").visuals
-    assert (visual.shape.kind, visual.shape.size) == ("box", (1.0, 1.0, 1.0))
-    assert not body_of(world, "picture").visuals
-    (record,) = caplog.records
-    assert (
-        "a.world: shown as their collision shapes, for want of the meshes 'model://sofa/meshes/sofa.dae': "
-        in record.getMessage()
-    )
-    assert "visual 'v', mesh: 'model://sofa/meshes/sofa.dae' is missing (looked for " in record.getMessage()
-    assert "name the folder that holds it in GAZEBO_MODEL_PATH" in record.getMessage()
-
-
-def test_missing_models_are_named_all_at_once_with_what_helps(tmp_path: Path) -> None:
-    text = sdf("".join(f"<include><uri>model://{name}</uri></include>" for name in ("pr2", "sun", "house_1", "pr2")))
-    with pytest.raises(WorldError, match=r"2 models are missing: model://pr2, model://house_1 \(looked in ") as caught:
-        read(tmp_path, text)
-    assert str(tmp_path / "models") in str(caught.value)
-    assert "GAZEBO_MODEL_PATH or the parameter model_path" in str(caught.value)
-
-
-def test_models_of_the_web_are_not_fetched(tmp_path: Path) -> None:
-    with pytest.raises(WorldError, match="models of the web are not fetched: download it"):
-        read(tmp_path, sdf("<include><uri>https://fuel.example.org/models/chair</uri></include>"))
-
-
 def test_a_model_of_light_only_is_a_light(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     put(tmp_path, "lantern", "<sdf version='1.5'><light name='lantern' type='point'/></sdf>")
     with caplog.at_level(logging.INFO):
         read(tmp_path, sdf("<include><uri>model://lantern</uri></include>"))
-    assert "1 lights are not simulated" in caplog.text
+    assert "1 light is not simulated" in caplog.text
 
 
 @pytest.mark.parametrize(
