@@ -13,7 +13,7 @@ from std_msgs.msg import String
 from rosbot_patrol.patrol.narration import AlertTelling, Narrator, Telling
 from rosbot_patrol.ros import scenario_watch
 from rosbot_patrol.ros.scenario_watch import ScenarioWatch
-from rosbot_patrol.ros.simulator_scenario import PLAYED
+from rosbot_patrol.simulation.scenario import PLAYED
 
 
 class House:

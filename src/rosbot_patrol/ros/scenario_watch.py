@@ -9,8 +9,7 @@ from std_msgs.msg import String
 
 from rosbot_patrol.patrol.narration import Narrator
 from rosbot_patrol.ros.node import now
-from rosbot_patrol.ros.simulator_scenario import PLAYED
-from rosbot_patrol.simulation.scenario import Expect, Outcome, disappointments, read_scenario
+from rosbot_patrol.simulation.scenario import PLAYED, Expect, Outcome, disappointments, read_scenario
 
 
 class ScenarioWatch:

@@ -13,13 +13,12 @@ from std_msgs.msg import String
 from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine
-from rosbot_patrol.simulation.scenario import Scenario
+from rosbot_patrol.simulation.scenario import PLAYED, Scenario
 from rosbot_patrol.simulation.scenario_player import ScenarioPlayer
 
 log = logging.getLogger(__name__)
 
 WATCH_WAIT = 120.0  # wall time
-PLAYED = "Everything in the scenario has happened."
 
 _EVENTS = {
     PatrolState.DRIVING: "driving",

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from rosbot_patrol.simulation.bullet import pybullet
 from rosbot_patrol.simulation.matrices import Matrix, to_quaternion
 from rosbot_patrol.simulation.meshes import triangles_of
 from rosbot_patrol.simulation.scene import Body, Collision, Shape

@@ -12,10 +12,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pybullet
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
+from rosbot_patrol.simulation.bullet import pybullet
 from rosbot_patrol.simulation.bullet_shapes import bounds_of, shapes_of, single_shape, touchable
 from rosbot_patrol.simulation.matrices import Matrix, to_quaternion
 from rosbot_patrol.simulation.near_bodies import NearBodies

@@ -28,6 +28,7 @@ from rosbot_patrol.yaml_files import read_mapping
 
 T = TypeVar("T")
 
+PLAYED = "Everything in the scenario has happened."  # the last thing that the simulator tells of it
 VERDICTS = ("confirmed", "clear", "unreachable", "unverified")
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.bullet import pybullet
 from rosbot_patrol.simulation.matrices import to_quaternion
 from rosbot_patrol.simulation.meshes import mesh_of
 from rosbot_patrol.simulation.scene import Body, Intrinsics, Matrix, SceneRenderer, Visual

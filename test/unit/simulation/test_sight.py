@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pybullet
 import pytest
 
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.simulation.bullet import pybullet
 from rosbot_patrol.simulation.bullet_shapes import shapes_of
 from rosbot_patrol.simulation.doors import Door, plain_door
 from rosbot_patrol.simulation.engine import STEP

@@ -1,0 +1,30 @@
+"""pybullet, imported without the line about its build that it writes to every console."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from typing import Any
+
+_CHATTER = b"pybullet build time:"
+
+
+def _import_quietly(name: str) -> Any:
+    """Import a module written in C and leave its chatter out; whatever else it writes to stderr is passed on."""
+    try:
+        stderr = os.dup(2)
+    except OSError:  # no stderr, as in a daemon: nobody reads the chatter
+        return importlib.import_module(name)
+    written = os.memfd_create("stderr")
+    os.dup2(written, 2)
+    try:
+        return importlib.import_module(name)
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        lines = os.pread(written, os.fstat(written).st_size, 0).splitlines(keepends=True)
+        os.close(written)
+        os.write(2, b"".join(line for line in lines if not line.startswith(_CHATTER)))
+
+
+pybullet = _import_quietly("pybullet")
