@@ -13,6 +13,7 @@ from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError, WorldError
 from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.params import param
+from rosbot_patrol.ros.by_hand import PATIENCE, NobodyThere, is_launched, require_publisher
 from rosbot_patrol.ros.node import load_params, run_node
 from rosbot_patrol.srv import MoveActor, SpawnActor
 from rosbot_patrol.yaml_files import read_mapping
@@ -63,6 +64,8 @@ def _wait_until_on_guard() -> None:
             on_guard.set()
 
     subscriber = rospy.Subscriber("/patrol/state", PatrolState, look, queue_size=1)
+    if not is_launched():
+        require_publisher(subscriber, "patrol_robot")
     while not rospy.is_shutdown() and not on_guard.wait(0.2):
         pass
     subscriber.unregister()
@@ -74,7 +77,10 @@ def _body() -> None:
     spawn_name, move_name = f"{demo.simulator}/spawn_actor", f"{demo.simulator}/move_actor"
     _wait_until_on_guard()
     rospy.sleep(demo.delay)
-    rospy.wait_for_service(spawn_name)
+    try:
+        rospy.wait_for_service(spawn_name, None if is_launched() else PATIENCE)
+    except rospy.ROSException as err:
+        raise NobodyThere(f"nobody offers {spawn_name}: is the simulator running?") from err
     x, y = walk.path[0]
     placed = rospy.ServiceProxy(spawn_name, SpawnActor)("intruder", "person", demo.look, "", Pose2D(x, y, 0.0))
     if not placed.success:
@@ -89,4 +95,4 @@ def _body() -> None:
 
 def main() -> None:
     """Wait for the guard, let the intruder in, end."""
-    run_node("demo_intruder", _body)
+    run_node("demo_intruder", _body, by_hand=True)

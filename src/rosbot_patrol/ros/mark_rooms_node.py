@@ -36,7 +36,7 @@ from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
 
-REMIND_S = 10.0
+REMIND_S = 5.0
 FRAME = "map"
 
 
@@ -195,4 +195,4 @@ def main() -> None:
     """The program."""
     if {"-h", "--help"} & set(sys.argv[1:]):
         arguments_of(["--help"])
-    run_node("mark_rooms", body)
+    run_node("mark_rooms", body, by_hand=True)

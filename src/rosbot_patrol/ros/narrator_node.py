@@ -21,6 +21,7 @@ from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import Alert, EspTrigger, PatrolState
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.narration import AlertTelling, Narrator, Telling
+from rosbot_patrol.ros.by_hand import is_launched, require_publisher
 from rosbot_patrol.ros.node import load_params, run_node
 from rosbot_patrol.ros.scenario_watch import ScenarioWatch
 
@@ -35,6 +36,9 @@ class NarratorParams:
     missions: int = param(1, lo=1, doc="how many missions to wait for")
     expect_verdict: str = param("", choices=VERDICTS, doc="exit status 3 where the last verdict is another")
     delivery_wait: float = param(30.0, unit="s", lo=0.0, doc="wait this long for the mail of a confirmed intruder")
+    patience: float = param(
+        5.0, unit="s", lo=0.0, doc="typed by hand without time_limit: end if nobody publishes the state; 0: wait"
+    )
     time_limit: float = param(0.0, unit="s", lo=0.0, doc="exit status 4 after this time; 0: none")
     summary_file: str = param("", doc="JSON file for all that was seen; empty: none")
     scenario: str = param("", doc="file of the scenario that is played; empty: none")
@@ -62,6 +66,9 @@ class NarratorNode:
 
     def run(self) -> int:
         """Tell until the end; the exit status."""
+        p = self.params
+        if p.patience and not p.time_limit and not is_launched():
+            require_publisher(self._subscribers[1], "patrol_robot", patience=p.patience)
         if self._scenario is not None:
             while not rospy.is_shutdown() and not all(s.get_num_connections() for s in self._subscribers[1:]):
                 time.sleep(0.05)
@@ -185,7 +192,7 @@ def main() -> None:
         nonlocal status
         status = NarratorNode().run()
 
-    run_node("narrator", body)
+    run_node("narrator", body, by_hand=True)
     rospy.signal_shutdown("the narration is over")
     sys.stdout.flush()
     os._exit(status)

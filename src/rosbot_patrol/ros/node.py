@@ -18,6 +18,7 @@ from rospy.core import is_shutdown_requested
 from rosbot_patrol import params
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.ros import greeting, logs
+from rosbot_patrol.ros.by_hand import require_master
 from rosbot_patrol.ros.priority import Priority, take
 
 T = TypeVar("T")
@@ -26,7 +27,12 @@ log = logging.getLogger(__name__)
 
 
 def run_node(
-    name: str, body: Callable[[], None], *, priority: Priority = Priority.ORDINARY, **init_options: Any
+    name: str,
+    body: Callable[[], None],
+    *,
+    priority: Priority = Priority.ORDINARY,
+    by_hand: bool = False,
+    **init_options: Any,
 ) -> None:
     """Start a node and run `body`; a PatrolError or a bad file is logged in one sentence and the program exits 1.
 
@@ -34,8 +40,11 @@ def run_node(
         name: name of the node where the launch file gives none.
         body: builds and runs it; returns on shutdown.
         priority: among the processes of the machine, as far as the system permits it.
+        by_hand: people type this program: without a ROS master it ends, unless roslaunch started it.
         init_options: further arguments of `rospy.init_node`.
     """
+    if by_hand:
+        require_master(name)
     refused = take(priority)  # before there are other threads: they take after this one
     greeting.install()
     rospy.init_node(name, **init_options)

@@ -20,6 +20,8 @@ from pathlib import Path
 
 import rosgraph
 
+from rosbot_patrol.ros.by_hand import master_problem
+
 HEARD = (
     "/clock", "/tf", "/tf_static", "/scan", "/odom", "/map", "/initialpose", "/motion_trigger", "/battery",
     "/range/fl", "/range/fr", "/range/rl", "/range/rr", "/darknet_ros/bounding_boxes", "/darknet_ros/found_object",
@@ -66,11 +68,7 @@ def _problem(file: Path) -> str:
     free = shutil.disk_usage(file.parent).free // 1_000_000
     if free < LEAST_FREE:
         return f"only {free} MB are free in {file.parent}, {LEAST_FREE} are wanted"
-    if not rosgraph.is_master_online():
-        return (
-            f"no ROS master answers at {rosgraph.get_master_uri()}: start the launch file first, or set ROS_MASTER_URI"
-        )
-    return ""
+    return master_problem()
 
 
 def record(given: argparse.Namespace) -> int:

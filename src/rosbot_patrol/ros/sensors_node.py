@@ -15,6 +15,7 @@ import threading
 import rospy
 
 from rosbot_patrol.msg import SensorState, SensorStates
+from rosbot_patrol.ros.by_hand import PATIENCE, require_master
 from rosbot_patrol.sensors.problems import duration
 
 HEAD = ("id", "room", "state", "heard", "motion", "triggers", "from")
@@ -54,7 +55,9 @@ def main() -> None:
     """Print once, or with --follow whenever something changes."""
     parser = argparse.ArgumentParser(prog="sensors", description="Prints all motion sensors and how they are.")
     parser.add_argument("--follow", action="store_true", help="print again whenever something is told")
-    parser.add_argument("--wait", type=float, default=10.0, metavar="S", help="for sensor_watch (default: %(default)s)")
+    parser.add_argument(
+        "--wait", type=float, default=PATIENCE, metavar="S", help="for sensor_watch (default: %(default)s)"
+    )
     arguments = parser.parse_args(rospy.myargv()[1:])
     status, came = 2, threading.Event()
 
@@ -65,10 +68,11 @@ def main() -> None:
         status = 1 if any(sensor.state not in WELL for sensor in message.sensors) or message.bridges_gone else 0
         came.set()
 
+    require_master("sensors", status=2)
     rospy.init_node("sensors", anonymous=True)
     rospy.Subscriber("/sensors/states", SensorStates, show, queue_size=1)
     if not came.wait(arguments.wait):
-        print(f"nothing on /sensors/states within {arguments.wait:.0f} s: is sensor_watch running?", file=sys.stderr)
+        print(f"nothing on /sensors/states within {arguments.wait:g} s: is sensor_watch running?", file=sys.stderr)
     elif arguments.follow:
         rospy.spin()
     sys.stdout.flush()

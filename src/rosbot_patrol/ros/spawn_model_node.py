@@ -16,8 +16,11 @@ import rospy
 from geometry_msgs.msg import Pose2D
 
 from rosbot_patrol.errors import ParamError
+from rosbot_patrol.ros.by_hand import PATIENCE, NobodyThere, is_launched
 from rosbot_patrol.ros.node import run_node
 from rosbot_patrol.srv import SpawnRobot
+
+SERVICES = ("/gazebo/spawn_robot", "/simulator/spawn_robot")
 
 
 def _parse(argv: list[str]) -> tuple[argparse.Namespace, list[str]]:
@@ -44,9 +47,9 @@ def _description(options: argparse.Namespace) -> str:
 
 def _service() -> str:
     """The running simulator's service, wherever it is named (gazebo, simulator)."""
-    for name in ("/gazebo/spawn_robot", "/simulator/spawn_robot"):
+    for name in SERVICES:
         try:
-            rospy.wait_for_service(name, timeout=0.5)
+            rospy.wait_for_service(name, timeout=PATIENCE / len(SERVICES))
         except rospy.ROSException:
             continue
         return name
@@ -62,7 +65,9 @@ def main() -> None:
             rospy.logwarn("spawn_model: %s has no effect here", " ".join(rest))
         urdf = _description(options)
         service = _service()
-        while not service:
+        if not service and not is_launched():
+            raise NobodyThere(f"neither {' nor '.join(SERVICES)} is offered: is the simulator running?")
+        while not service and not rospy.is_shutdown():
             rospy.loginfo_throttle(5.0, "spawn_model waits for the simulator")
             service = _service()
         answer = rospy.ServiceProxy(service, SpawnRobot)(
@@ -72,4 +77,4 @@ def main() -> None:
             raise ParamError("spawn_model", answer.message)
         rospy.loginfo("spawn_model: %s", answer.message or f"{options.model} is in the world")
 
-    run_node("spawn_model", spawn, anonymous=True)
+    run_node("spawn_model", spawn, by_hand=True, anonymous=True)

@@ -7,6 +7,7 @@ Differs:
 - Without a terminal of its own, as under roslaunch, it says so and waits, instead of ending with an error that
   respawns. roslaunch hands its own terminal on: upstream takes the keys there, also the Ctrl-C that should end the
   launch. In the background of a shell it waits to be brought to the front.
+- Typed by hand, it ends after 5 s without a ROS master.
 - The terminal is put back however the program ends, and a zero velocity is sent.
 """
 
@@ -169,4 +170,4 @@ def body() -> None:
 
 def main() -> None:
     """Run the node."""
-    run_node("teleop_twist_keyboard", body)
+    run_node("teleop_twist_keyboard", body, by_hand=True)

@@ -1,0 +1,80 @@
+"""Programs that people type: where nobody answers they end with a sentence; those that roslaunch starts wait."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from typing import Any
+
+import rosgraph
+import rospy
+
+from rosbot_patrol.errors import PatrolError
+
+PATIENCE = 5.0  # [s]
+
+
+class NobodyThere(PatrolError):
+    """A program that others need to answer is not running."""
+
+
+def is_launched() -> bool:
+    """Whether roslaunch started this program: only roslaunch names a log file."""
+    return any(word.startswith("__log:=") for word in sys.argv)
+
+
+def require_master(program: str, *, patience: float = PATIENCE, status: int = 1) -> None:
+    """End the program with one sentence where no ROS master answers; nothing where roslaunch started it.
+
+    Args:
+        program: its name.
+        patience: how long to wait for the master [s].
+        status: the exit status.
+    """
+    problem = "" if is_launched() else master_problem(patience)
+    if problem:
+        print(f"{program}: {problem}", file=sys.stderr, flush=True)
+        sys.exit(status)
+
+
+def master_problem(patience: float = PATIENCE) -> str:
+    """Why no ROS master can be asked, "" where one answers within `patience` [s]."""
+    uri = ""
+    try:
+        uri = rosgraph.get_master_uri()
+        master = rosgraph.Master("/by_hand", master_uri=uri)
+    except (ValueError, OSError):
+        return f"ROS_MASTER_URI is '{uri}', expected http://HOST:PORT"
+    answered = threading.Event()
+    # On a thread: a host that does not resolve or a port that never answers would hold it for minutes.
+    threading.Thread(target=_ask, args=(master, answered, time.monotonic() + patience), daemon=True).start()
+    if answered.wait(patience):
+        return ""
+    return f"no ROS master answers at {uri}: start the launch file first, or set ROS_MASTER_URI"
+
+
+def _ask(master: Any, answered: threading.Event, until: float) -> None:
+    while time.monotonic() < until:
+        if master.is_online():
+            answered.set()
+            return
+        time.sleep(0.2)
+
+
+def require_publisher(subscriber: rospy.Subscriber, who: str, *, patience: float = PATIENCE) -> None:
+    """Wait until somebody publishes what a program listens to.
+
+    Args:
+        subscriber: of the topic.
+        who: the program that should publish it.
+        patience: how long to wait [s].
+
+    Raises:
+        NobodyThere: nobody does.
+    """
+    until = time.monotonic() + patience
+    while not rospy.is_shutdown() and not subscriber.get_num_connections():
+        if time.monotonic() >= until:
+            raise NobodyThere(f"nobody publishes {subscriber.resolved_name}: is {who} running?")
+        time.sleep(0.05)
