@@ -1,55 +1,100 @@
-"""The log in the background: nobody waits for it, and what is left out is told."""
+"""A log line waits for nobody: rospy's question to the master is answered beforehand."""
 
 import logging
-import threading
 
 import pytest
 
-logs = pytest.importorskip("rosbot_patrol.ros.logs", reason="needs ROS: source the workspace first")
+pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
+
+import rospy
+import rospy.client
+import rospy.impl.paramserver
+import rospy.impl.rosout
+from rospy.msproxy import MasterProxy
+
+from rosbot_patrol.ros import logs
 
 
-class _Slow(logging.Handler):
-    def __init__(self) -> None:
-        super().__init__()
-        self.lines: list[str] = []
-        self.taken, self.go_on = threading.Event(), threading.Event()
+class _Master:
+    """The master's parameters, and the questions that came."""
 
-    def emit(self, record: logging.LogRecord) -> None:
-        self.taken.set()
-        self.go_on.wait(10.0)
-        self.lines.append(record.getMessage())
+    def __init__(self, **given):
+        self.given = {f"/{key}": value for key, value in given.items()}
+        self.asked: list[str] = []
+
+    def getParam(self, _caller, name):
+        self.asked.append(name)
+        return (1, "", self.given[name]) if name in self.given else (-1, "is not set", 0)
+
+    def subscribeParam(self, _caller, _uri, name):
+        self.asked.append(name)
+        return 1, "", self.given.get(name, {})
+
+
+class _Rosout:
+    """Takes what rospy publishes on /rosout, and stands for the node's topics."""
+
+    def __init__(self):
+        self.lines = []
+
+    def publish(self, line):
+        self.lines.append(line)
+
+    @staticmethod
+    def get_topics():
+        return ["/scan"]
+
+
+class _Time:
+    now = rospy.Time
 
 
 @pytest.fixture
-def slow():
-    """The only handler of the package for a while."""
-    package, handler = logging.getLogger("rosbot_patrol"), _Slow()
-    before, level = package.handlers[:], package.level
-    package.handlers[:] = [handler]
-    package.setLevel(logging.INFO)
-    yield handler
-    package.handlers[:] = before
+def start(monkeypatch):
+    """Start logging as a node does; returns the master and what came on /rosout."""
+    package = logging.getLogger("rosbot_patrol")
+    before, level, propagate = package.handlers[:], package.level, package.propagate
+
+    def begin(**given):
+        proxy = MasterProxy("http://localhost:1")
+        proxy.target = _Master(**given)
+        rosout = _Rosout()
+        monkeypatch.setattr(rospy.client, "_param_server", proxy)
+        monkeypatch.setattr(rospy.impl.paramserver, "_param_server_cache", None)
+        monkeypatch.setattr(rospy.impl.rosout, "_rosout_pub", rosout)
+        monkeypatch.setattr(rospy.impl.rosout, "get_topic_manager", lambda: rosout)
+        monkeypatch.setattr(rospy.impl.rosout, "Time", _Time)
+        rospy.impl.rosout.load_rosout_handlers(None)
+        package.handlers[:] = []
+        logs.install()
+        return proxy.target, rosout
+
+    handlers = logging.getLogger("rosout").handlers[:]
+    yield begin
+    logging.getLogger("rosout").handlers[:] = handlers
+    package.handlers[:], package.propagate = before, propagate
     package.setLevel(level)
 
 
-def test_lines_come_in_order_and_what_is_left_out_is_told(slow: _Slow, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(logs, "WAITING", 3)
-    log = logging.getLogger("rosbot_patrol.test")
-    with logs.in_background():
-        log.info("first")
-        assert slow.taken.wait(10.0)
-        for number in range(5):  # three wait, two find no room
-            log.info("line %d of 100%%", number)
-        slow.go_on.set()
-        for _ in range(100):
-            if len(slow.lines) == 4:
-                break
-            threading.Event().wait(0.05)
-        log.info("last")
-    assert slow.lines == [
-        "first",
-        "line 0 of 100%",
-        "line 1 of 100%",
-        "line 2 of 100%",
-        "last (2 lines before this were left out)",
-    ]
+def test_no_line_asks_the_master(start):
+    master, rosout = start()
+    asked = len(master.asked)
+    for number in range(20):
+        logging.getLogger("rosbot_patrol.patrol").warning("line %d", number)
+        rospy.logwarn("line %d of rospy", number)
+    assert len(rosout.lines) == 40
+    assert len(master.asked) == asked == 1
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_parameter_set_before_the_start_counts(start, given):
+    master, rosout = start(rosout_disable_topics_generation=given)
+    logging.getLogger("rosbot_patrol.patrol").warning("a line")
+    assert list(rosout.lines[0].topics) == ([] if given else ["/scan"])
+    assert len(master.asked) == 1
+
+
+def test_other_parameters_are_still_asked_for(start):
+    master, _ = start(use_sim_time=True)
+    assert rospy.get_param("/use_sim_time") is True
+    assert "/use_sim_time" in master.asked

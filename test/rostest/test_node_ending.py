@@ -1,9 +1,11 @@
 """How a node ends on a signal, whatever its main thread does at that moment."""
 
+import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -83,6 +85,7 @@ def test_a_node_that_ends_by_itself_needs_no_signal(ros):
 # One thread of a node fails while its main thread goes on.
 HALF_DEAD = """
 import time
+from pathlib import Path
 import rospy
 from rosbot_patrol.ros.node import Loop, Worker, run_node
 
@@ -116,3 +119,43 @@ def test_a_node_ends_in_peace_when_a_worker_meets_its_shutdown(ros):
     ros.processes.append(node)
     assert node.popen.wait(20.0) == 0, node.output
     assert "failed" not in node.output
+
+
+# Logs once a line comes in, while the master hangs.
+LOGGING = """
+import logging, sys
+import rospy
+from rosbot_patrol.ros.node import run_node
+
+def body():
+    print("at work", flush=True)
+    for line in sys.stdin:
+        logging.getLogger("rosbot_patrol.patrol").warning("heard %s", line.strip())
+        rospy.logwarn("rospy heard %s", line.strip())
+        print("done", line.strip(), flush=True)
+
+run_node("logging", body)
+"""
+
+
+@pytest.fixture
+def hanging_master(ros):
+    """Stop the master's process, as a machine does that swaps; it goes on after the test."""
+    parent = ros.core.popen.pid
+    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    master = next(int(pid) for pid in children if "rosmaster" in Path(f"/proc/{pid}/cmdline").read_text())
+    yield lambda: os.kill(master, signal.SIGSTOP)
+    os.kill(master, signal.SIGCONT)
+
+
+def test_a_log_line_does_not_wait_for_a_master_that_hangs(ros, hanging_master):
+    node = Process([sys.executable, "-c", LOGGING], ros.env, stdin=subprocess.PIPE)
+    ros.processes.append(node)
+    node.says("at work", 20.0)
+    hanging_master()
+    for word in ("one", "two"):
+        node.popen.stdin.write(word + "\n")
+        node.popen.stdin.flush()
+        node.says(f"done {word}", 10.0)
+    assert "rospy heard two" in node.output
+    node.popen.stdin.close()

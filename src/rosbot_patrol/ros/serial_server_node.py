@@ -28,7 +28,6 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.errors import ParamError, ProtocolError
-from rosbot_patrol.ros import logs
 from rosbot_patrol.ros.node import Worker, load_params, run_node
 from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subscription, message_class
 from rosbot_patrol.ros.serial_links import LinkTeller
@@ -218,9 +217,8 @@ def body() -> None:
     Worker(Report(server, ros_side.look_at_sensors, what).run, name="report").start()
     if policy.restricted:
         time.sleep(SETTLING)  # sensors wait meanwhile: what they are told to have arrived shall find its listeners
-    with logs.in_background():
-        server.run()
-        server.close()
+    server.run()
+    server.close()
 
 
 def main() -> None:
