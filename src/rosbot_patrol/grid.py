@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.errors import MapError
 
+RESOLUTIONS = 0.001, 100.0  # [m] smallest and largest edge of a cell; anything else is another unit or no number
+
 
 @dataclass(frozen=True, kw_only=True)
 class GridInfo:
@@ -91,6 +93,28 @@ class Grid:
         if not self.info.contains_cell(ix, iy):
             raise IndexError(f"({x:.2f}, {y:.2f}) is outside the grid")
         return self.cells[iy, ix]
+
+
+def occupancy_grid(info: GridInfo, data: Any, source: str) -> Grid:
+    """An occupancy grid as int8 cells (-1 unknown, 0 to 100) from its cells in one row.
+
+    Args:
+        info: its place and size.
+        data: the cells, lowest row first.
+        source: topic or file, for the error.
+
+    Raises:
+        MapError: cells, size or resolution make no sense.
+    """
+    width, height, edge = info.width, info.height, info.resolution
+    if width < 1 or height < 1:
+        raise MapError(source, f"has {width} x {height} cells, expected at least one")
+    if not RESOLUTIONS[0] <= edge <= RESOLUTIONS[1]:
+        raise MapError(source, f"has cells of {edge:g} m, expected {RESOLUTIONS[0]:g} to {RESOLUTIONS[1]:g} m")
+    cells = np.array(data, dtype=np.int8)
+    if cells.size != width * height:
+        raise MapError(source, f"has {cells.size} cells, expected {width} x {height}")
+    return Grid(info, cells.reshape(info.shape))
 
 
 def cells_of_points(info: GridInfo, points: NDArray[np.float64]) -> NDArray[np.int64]:

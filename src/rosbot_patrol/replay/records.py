@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.errors import MapError
 from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
-from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.grid import Grid, GridInfo, occupancy_grid
 from rosbot_patrol.replay import definitions, raw_ros1
 from rosbot_patrol.replay.transform_tree import Edge
 from rosbot_patrol.scan import LaserScan
@@ -105,10 +106,11 @@ def map_of(message: Any) -> MapRecord | Refused:
         origin_y=origin.y,
         yaw=origin.yaw,
     )
-    cells = np.array(message.data, dtype=np.int8)
-    if cells.size != info.width * info.height:
-        return Refused(f"it has {cells.size} cells, expected {info.width} x {info.height}")
-    return MapRecord(Grid(info, cells.reshape(info.shape)), message.header.frame_id.lstrip("/"))
+    try:
+        grid = occupancy_grid(info, message.data, "map")
+    except MapError as err:
+        return Refused(f"it {err.problem}")
+    return MapRecord(grid, message.header.frame_id.lstrip("/"))
 
 
 def pose_of(message: Any) -> PoseRecord | Refused:

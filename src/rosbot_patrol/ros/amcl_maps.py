@@ -67,9 +67,9 @@ class MapSource:
                 "the map of %s is in frame '%s', expected '%s': it is taken for that", source, frame, self._frame
             )
         try:
-            grid = grid_from_msg(message)
+            grid = grid_from_msg(message, source)
             self._hand_on(grid)
-        except (MapError, ValueError) as err:
+        except MapError as err:
             log.error("the map of %s cannot be used: %s", source, err)
             return False
         info = grid.info

@@ -10,8 +10,9 @@ from geometry_msgs.msg import Pose, PoseStamped, Quaternion, TransformStamped, T
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry, Path
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
+from rosbot_patrol.errors import MapError
 from rosbot_patrol.geometry import Pose2D, Twist2D, quaternion_from_yaw, yaw_from_quaternion
-from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.grid import Grid, GridInfo, occupancy_grid
 from rosbot_patrol.scan import LaserScan
 
 
@@ -132,17 +133,21 @@ def grid_to_msg(grid: Grid, frame: str, stamp: float, load_time: float = 0.0) ->
     return msg
 
 
-def grid_from_msg(msg: OccupancyGrid) -> Grid:
+def grid_from_msg(msg: OccupancyGrid, source: str) -> Grid:
     """An occupancy grid as int8 cells (-1 unknown, 0 to 100); subscribe by `numpy_msg(OccupancyGrid)`.
 
+    Args:
+        msg: the map.
+        source: topic or service that it came by, for the error.
+
     Raises:
-        ValueError: its size or its origin makes no sense.
+        MapError: its size, its origin or its resolution makes no sense.
     """
-    info = grid_info_from_msg(msg.info)
-    cells = np.array(msg.data, dtype=np.int8)
-    if cells.size != info.width * info.height:
-        raise ValueError(f"it has {cells.size} cells, expected {info.width} x {info.height}")
-    return Grid(info, cells.reshape(info.shape))
+    try:
+        info = grid_info_from_msg(msg.info)
+    except ValueError as err:
+        raise MapError(source, f"has an origin that makes no sense: {err}") from err
+    return occupancy_grid(info, msg.data, source)
 
 
 def path_to_msg(poses: np.ndarray, frame: str, stamp: float) -> Path:

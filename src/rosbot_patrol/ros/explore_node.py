@@ -15,7 +15,7 @@ from nav_msgs.msg import OccupancyGrid
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from rosbot_patrol.errors import TransformError
+from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.map_io import write_map
@@ -89,10 +89,12 @@ class Explore:
         if message is None:
             return
         try:
-            self._grid = grid_from_msg(message)
-        except ValueError as err:
-            log.warning("a map is left out that makes no sense: %s", err)
+            grid = grid_from_msg(message, rospy.resolve_name("map"))
+            grid.info.require_aligned("explore")
+        except MapError as err:
+            log.warning("a map is left out: %s", err)
             return
+        self._grid = grid
         self._maps += 1
 
     def _pose(self) -> Pose2D | None:

@@ -27,7 +27,7 @@ from rosbot_patrol.alerts.incident_salvage import open_store
 from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.alerts.map_picture import MapView, Marks, crop_map, draw_map, view_of_marks
 from rosbot_patrol.alerts.retention import RetentionParams, keep_reserve, make_room, prune
-from rosbot_patrol.errors import StoreError
+from rosbot_patrol.errors import MapError, StoreError
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.chronicle import Entry
 from rosbot_patrol.ros import convert
@@ -308,9 +308,9 @@ class IncidentKeeper:
 
     def _on_map(self, message: GridMsg) -> None:  # type: ignore[valid-type]
         try:
-            self._map = crop_map(convert.grid_from_msg(message))
-        except ValueError as err:
-            log.error("the map on /map cannot be drawn: %s", err)
+            self._map = crop_map(convert.grid_from_msg(message, "/map"))
+        except MapError as err:
+            log.error("the map cannot be drawn: %s", err)
 
     # -- the disk
 

@@ -20,7 +20,7 @@ from typing import NoReturn
 import rospy
 from nav_msgs.msg import OccupancyGrid
 
-from rosbot_patrol.errors import MapError, ParamError
+from rosbot_patrol.errors import ParamError
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.map_io import write_map
 from rosbot_patrol.ros.convert import grid_from_msg
@@ -77,10 +77,7 @@ def wait_for_map() -> Grid | None:
     subscriber.unregister()
     message = inbox.get()
     assert message is not None
-    try:
-        return grid_from_msg(message)
-    except ValueError as err:
-        raise MapError(topic, f"the map makes no sense: {err}") from err
+    return grid_from_msg(message, topic)
 
 
 def body() -> None:

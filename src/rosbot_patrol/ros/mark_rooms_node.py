@@ -13,7 +13,6 @@ import argparse
 import logging
 import queue
 import sys
-import threading
 from pathlib import Path
 from typing import NoReturn
 
@@ -31,7 +30,7 @@ from rosbot_patrol.ros.convert import grid_from_msg
 from rosbot_patrol.ros.grids import GridMsg
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.markers_node import QUIET, room_markers
-from rosbot_patrol.ros.node import run_node
+from rosbot_patrol.ros.node import Worker, run_node
 from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
@@ -50,7 +49,7 @@ class _Terminal:
 
     def __init__(self) -> None:
         self._lines: queue.Queue[str | None] = queue.Queue()
-        threading.Thread(target=self._read, name="terminal", daemon=True).start()
+        Worker(self._read, name="terminal").start()
 
     def _read(self) -> None:
         for line in sys.stdin:
@@ -163,10 +162,7 @@ class MarkRooms:
         topic = rospy.resolve_name("map")
         if message is None:
             raise MapError(topic, "no map has been published yet")
-        try:
-            return floor_of(grid_from_msg(message))
-        except ValueError as err:
-            raise MapError(topic, f"the map makes no sense: {err}") from err
+        return floor_of(grid_from_msg(message, topic))
 
     def _show(self) -> None:
         message = MarkerArray()

@@ -100,13 +100,14 @@ class CostmapNode:
         log.info("%s: keep-out mask of %d x %d cells from %s", self.name, *grid.cells.shape[::-1], layer.mask_file)
 
     def _on_map(self, layer: StaticLayer, msg: OccupancyGrid) -> None:
+        topic = rospy.resolve_name(layer.params.map_topic)
         try:
-            grid = grid_from_msg(msg)
+            grid = grid_from_msg(msg, topic)
             with self.lock:
                 layer.set_map(grid)
                 self._map_frames[id(layer)] = msg.header.frame_id.lstrip("/")
-        except (MapError, ValueError) as err:
-            log.error("%s: a map on %s cannot be used: %s", self.name, layer.params.map_topic, err)
+        except MapError as err:
+            log.error("%s: a map on %s cannot be used: %s", self.name, topic, err)
             return
         info = grid.info
         log.info("%s: map of %d x %d cells at %.3f m", self.name, info.width, info.height, info.resolution)

@@ -28,6 +28,7 @@ from rosbot_patrol.patrol.chronicle import Entry
 from rosbot_patrol.patrol.commands import Commands, Ignored, Notice, Release, Word
 from rosbot_patrol.patrol.ignored_log import IgnoredLog
 from rosbot_patrol.ros.incident_keeper import IncidentKeeper
+from rosbot_patrol.ros.node import Worker
 from rosbot_patrol.ros.owner_mail import OwnerPost
 from rosbot_patrol.ros.patrol_images import PictureRing
 
@@ -67,7 +68,7 @@ class AlertDesk:
         """Begin to work."""
         self._post.on_delivery(self._delivered)
         self._post.start()
-        threading.Thread(target=_repeat, args=(self._record_next, self._to_record), name="record", daemon=True).start()
+        Worker(partial(_repeat, self._record_next, self._to_record), name="record").start()
 
     @property
     def is_recorded(self) -> bool:

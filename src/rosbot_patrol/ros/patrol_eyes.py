@@ -31,10 +31,10 @@ from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.witness import off_the_map
 from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.depth_ring import DepthRing, Lenses
-from rosbot_patrol.ros.diagnostics import Health
+from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.grids import GridMsg
 from rosbot_patrol.ros.inputs import Latest
-from rosbot_patrol.ros.node import now
+from rosbot_patrol.ros.node import Worker, now
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.scan import LaserScan, scan_points
 
@@ -75,7 +75,7 @@ class PatrolEyes:
         health: Health,
     ) -> None:
         self._topics, self._rooms, self._transforms = topics, rooms, transforms
-        self._map_frame, self._odom_frame = map_frame, odom_frame
+        self._map_frame, self._odom_frame, self._health = map_frame, odom_frame, health
         self._classes = frozenset(alarm_classes)
         self._lenses = Lenses(topics.camera_info_topic)
         self.depth = DepthRing(topics.depth_topic, topics.depth_info_topic, health)
@@ -84,7 +84,7 @@ class PatrolEyes:
         self._maps: Latest[OccupancyGrid] = Latest()
         self._has_map = threading.Event()
         self.house: RoomRegions | None = None
-        threading.Thread(target=self._part_maps, name="rooms", daemon=True).start()
+        Worker(self._part_maps, name="rooms").start()
         rospy.Subscriber("/map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 24)
 
     # -- frames
@@ -202,9 +202,9 @@ class PatrolEyes:
 
     def _part(self, message: OccupancyGrid) -> None:
         try:
-            house = part_rooms(floor_of(convert.grid_from_msg(message)), self._rooms)
+            house = part_rooms(floor_of(convert.grid_from_msg(message, rospy.resolve_name("/map"))), self._rooms)
         except MapError as err:
-            log.error("rooms cannot be told from the map: %s; shares of floor seen are not known", err)
+            self._refuse(err)
             return
         if self.house is None:
             areas = ", ".join(f"{room.id}: {house.area(room.id):.0f}" for room in self._rooms)
@@ -212,3 +212,11 @@ class PatrolEyes:
             for room_id in house.lost:
                 log.warning("the point of room %d is not on the map's floor: what is seen of it is not known", room_id)
         self.house = house
+        self._health.set("map", OK, f"{len(self._rooms)} rooms on the map")
+
+    def _refuse(self, err: MapError) -> None:
+        """Say that a map is left out, and what that means."""
+        rest = "the rooms of the map before stay" if self.house else "shares of floor seen are not known"
+        text = f"rooms cannot be told from the map: {err}; {rest}"
+        log.error("%s", text)
+        self._health.set("map", WARN if self.house else ERROR, text)

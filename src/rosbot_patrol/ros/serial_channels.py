@@ -13,9 +13,11 @@ from typing import Any
 import genpy
 import roslib.message
 import rospy
+from rospy.exceptions import TransportException
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.msg import EspTrigger
+from rosbot_patrol.ros.node import Worker
 from rosbot_patrol.rosserial.complaints import printable
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_TYPES, TopicInfo
 
@@ -23,6 +25,17 @@ log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 100
 SERVICE_TIMEOUT = 5.0
+
+# What a device, a service or the master can do to a call: none of it may end the bridge.
+_CALL_ERRORS = (
+    ProtocolError,
+    rospy.ServiceException,
+    rospy.ROSException,
+    TransportException,  # the service's program was killed in the middle of a call
+    genpy.SerializationError,
+    OSError,
+    ValueError,  # an answer with a text that is no UTF-8
+)
 
 Send = Callable[[int, bytes], None]
 
@@ -169,7 +182,7 @@ class ServiceCaller:
         self._answer_id: int | None = None
         self._requests: queue.Queue[bytes | None] = queue.Queue(maxsize=16)
         self._proxy = rospy.ServiceProxy(info.name, self._cls)
-        threading.Thread(target=self._run, name=f"calls {info.name}", daemon=True).start()
+        Worker(self._run, name=f"calls {info.name}").start()
 
     def set_request_topic(self, info: TopicInfo) -> None:
         """Where the device's requests come from; raises ProtocolError."""
@@ -202,5 +215,5 @@ class ServiceCaller:
                 answer = self._proxy(request)
                 if self._answer_id is not None:
                     self._send(self._answer_id, serialize(answer))
-            except (ProtocolError, rospy.ServiceException, rospy.ROSException) as err:
-                log.warning("service %s called by a device: %s", self._name, err)
+            except _CALL_ERRORS as err:
+                log.warning("service %s called by a device: %s: %s", self._name, type(err).__name__, err)
