@@ -1,5 +1,6 @@
 """What devices publish, on its way to the subscribers; needs the messages, no master."""
 
+import math
 import socket
 import struct
 
@@ -7,16 +8,19 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from diagnostic_msgs.msg import KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovariance, Twist
 from rosbot_patrol.msg import EspTrigger
-from sensor_msgs.msg import Range
+from sensor_msgs.msg import BatteryState, JointState, Range
 from std_msgs.msg import Bool, Empty, Float32MultiArray, String, Time
+from std_srvs.srv import SetBoolResponse
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.ros import serial_publishers
-from rosbot_patrol.ros.serial_channels import serialize
-from rosbot_patrol.ros.serial_publishers import WAITING, Layout, Outlet, Publishers, layout
+from rosbot_patrol.ros.serial_channels import check_md5, serialize
+from rosbot_patrol.ros.serial_layouts import Layout, VaryingLayout, layout, raw_from, raw_message
+from rosbot_patrol.ros.serial_publishers import WAITING, Outlet, Publishers
+from rosbot_patrol.rosserial.old_types import OLD_TYPES
 from rosbot_patrol.rosserial.topics import TopicInfo
 
 
@@ -33,14 +37,16 @@ def info(name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=Esp
         (PoseWithCovariance, Layout(7 * 8 + 36 * 8)),
         (Time, Layout(8)),
         (Empty, Layout(0)),
-        (String, None),
-        (Float32MultiArray, None),
-        (KeyValue, None),
-        (Range, None),  # its header is numbered by ROS
     ],
 )
 def test_layout_of_message_classes(cls, expected):
     assert layout(cls) == expected
+
+
+@pytest.mark.parametrize("cls", [String, Float32MultiArray, KeyValue, Range])
+def test_messages_with_texts_and_arrays_vary(cls):
+    assert isinstance(layout(cls), VaryingLayout)
+    assert layout(cls).check(serialize(cls()), info()) == serialize(cls())
 
 
 def test_fixed_message_is_checked_by_size_and_its_bools_are_0_or_1():
@@ -160,6 +166,133 @@ def test_message_of_varying_size_is_read_before_it_is_sent(published):
     for wrong in (b"\xff\0\0\0h", b"\x02\0", b"\x01\0\0\0hi"):
         with pytest.raises(ProtocolError, match=f"hello: {len(wrong)} bytes that are no std_msgs/String"):
             publishers.put(text, wrong)
+
+
+LATIN = "Küche".encode("latin-1")
+
+
+def text(data):
+    return struct.pack("<I", len(data)) + data
+
+
+@pytest.mark.parametrize(
+    ("cls", "data"),
+    [
+        (String, text(LATIN)),
+        (String, text(bytes(range(256)))),
+        (String, text(b"\xc3")),  # a character cut off
+        (KeyValue, text(b"\xff") + text(LATIN)),
+        (DiagnosticStatus, b"\1" + text(LATIN) + text(b"\xfe") + text(b"") + struct.pack("<I", 1) + text(LATIN) * 2),
+        (JointState, bytes(12) + text(LATIN) + struct.pack("<I", 2) + text(LATIN) + text(b"\x80") + bytes(12)),
+    ],
+)
+def test_texts_that_are_no_utf8_are_passed_on_as_they_came(published, cls, data):
+    publishers, connection = Publishers(), Connection()
+    topic = info("t", cls._type, cls._md5sum)
+    publishers.open(topic)
+    published["/t"].connections = [connection]
+    publishers.put(topic, data)
+    publishers.flush()
+    came = connection.far.recv(1000)
+    seq = 4 if cls._has_header else 0
+    assert came[4 + seq :] == data[seq:]
+    assert raw_from(cls, data, topic)._buff == data
+
+
+def test_bools_among_texts_are_0_or_1(published):
+    publishers, connection = Publishers(), Connection()
+    answer = info("t", "std_srvs/SetBoolResponse", SetBoolResponse._md5sum)
+    assert raw_from(SetBoolResponse, b"\x80" + text(LATIN), answer)._buff == b"\1" + text(LATIN)
+    battery = info("battery", "sensor_msgs/BatteryState", BatteryState._md5sum)
+    publishers.open(battery)
+    published["/battery"].connections = [connection]
+    data = bytearray(serialize(BatteryState(present=True)))
+    data[-17] = 255  # before two arrays and two texts, all of them empty
+    publishers.put(battery, bytes(data))
+    publishers.flush()
+    assert BatteryState().deserialize(connection.far.recv(200)[4:]).present is True
+
+
+@pytest.mark.parametrize(
+    ("cls", "data"),
+    [
+        (Float32MultiArray, b"\xff\xff\xff\xff" + bytes(8)),
+        (JointState, bytes(12) + text(b"") + b"\xff\xff\xff\xff"),
+        (DiagnosticStatus, b"\0" + text(b"") * 3 + struct.pack("<I", 1 << 31) + text(b"") * 2),
+        (KeyValue, text(b"")),
+        (KeyValue, text(b"") * 3),
+        (String, b""),
+    ],
+)
+def test_lengths_that_make_no_sense_are_refused(cls, data):
+    with pytest.raises(ProtocolError, match=f"t: {len(data)} bytes that are no {cls._type}"):
+        raw_from(cls, data, info("t", cls._type))
+
+
+def test_raw_messages_are_of_the_same_type_for_ros():
+    raw = raw_message(String)
+    assert (raw._type, raw._md5sum, raw._full_text) == (String._type, String._md5sum, String._full_text)
+    assert raw_message(String) is raw
+    assert serialize(raw().deserialize(text(LATIN))) == text(LATIN)
+
+
+# -- definitions of ROS melodic
+
+MELODIC = "476f837fa6771f6e16e3bf4ef96f8770"
+
+
+def melodic_battery(*, cells=(), share=0.0, tail=b"\0" * 8):
+    """A BatteryState as firmware of ROS melodic's time sends it: 12.4 V, LION, no temperatures."""
+    levels = struct.pack("<6f4B", 12.4, 1.0, 2.0, 3.0, 4.0, share, 0, 0, 2, 0)
+    return bytes(12) + text(b"") + levels + struct.pack(f"<I{len(cells)}f", len(cells), *cells) + tail
+
+
+@pytest.mark.parametrize("cells", [(), (4.0, 4.25)])
+def test_battery_of_old_firmware_is_read(published, cells):
+    publishers, connection = Publishers(), Connection()
+    battery = info("battery", "sensor_msgs/BatteryState", MELODIC)
+    publishers.open(battery)
+    published["/battery"].connections = [connection]
+    publishers.put(battery, melodic_battery(cells=cells, tail=text(b"slot") + text(b"7")))
+    publishers.flush()
+    came = BatteryState().deserialize(connection.far.recv(300)[4:])
+    assert came.voltage == pytest.approx(12.4)
+    assert math.isnan(came.temperature)
+    assert (came.current, came.charge, came.capacity, came.design_capacity) == (1.0, 2.0, 3.0, 4.0)
+    assert (came.percentage, came.power_supply_technology, came.present) == (0.0, 2, False)
+    assert (tuple(came.cell_voltage), len(came.cell_temperature)) == (cells, len(cells))
+    assert (came.location, came.serial_number, came.header.seq) == ("slot", "7", 1)
+    (old,) = OLD_TYPES
+    assert old.downgrade(old.upgrade(melodic_battery(cells=cells))) == melodic_battery(cells=cells)
+    assert old.new == BatteryState._md5sum
+
+
+@pytest.mark.parametrize("cut", [0, 10, 14, 20, 40, 47])
+def test_old_battery_that_is_cut_off_is_refused(published, cut):
+    publishers = Publishers()
+    battery = info("battery", "sensor_msgs/BatteryState", MELODIC)
+    publishers.open(battery)
+    with pytest.raises(ProtocolError, match="BatteryState"):
+        publishers.put(battery, melodic_battery()[:cut])
+
+
+def test_old_and_new_firmware_share_a_topic(published):
+    publishers, connection = Publishers(), Connection()
+    old, new = (info("battery", "sensor_msgs/BatteryState", md5) for md5 in (MELODIC, BatteryState._md5sum))
+    publishers.open(old)
+    publishers.open(new)
+    published["/battery"].connections = [connection]
+    publishers.put(old, melodic_battery())
+    publishers.put(new, serialize(BatteryState(voltage=7.0)))
+    publishers.flush()
+    assert len(connection.far.recv(1000)) == 2 * (4 + len(serialize(BatteryState())))
+
+
+def test_the_old_sum_is_of_that_type_only():
+    with pytest.raises(ProtocolError, match="checksum of std_msgs/String does not match"):
+        check_md5(info("hello", "std_msgs/String", MELODIC), String)
+    with pytest.raises(ProtocolError, match="checksum of sensor_msgs/BatteryState does not match"):
+        check_md5(info("battery", "sensor_msgs/BatteryState", "0" * 32), BatteryState)
 
 
 def test_topic_has_one_type(published):

@@ -4,6 +4,7 @@ import os
 import pty
 import signal
 import socket
+import struct
 import time
 import tty
 
@@ -190,6 +191,50 @@ def test_services_and_parameters_of_a_serial_device(ros):
     device.expect(126, b"\x01" + text("lit"))
     assert b"1." in device.expect(TopicId.PARAMETER_REQUEST)[0]
     bridge.says("parameter /no_such is not set")
+
+
+def test_texts_that_are_no_utf8_come_back_as_they_were_sent(ros):
+    """From the device through ROS to the device again: a topic, and a service that it both offers and calls."""
+    device, latin = Device(), len(b"K\xfcche").to_bytes(4, "little") + b"K\xfcche"
+    bridge = ros.node("serial_node.py", device.path)
+    device.expect(TopicId.PUBLISHER)
+    device.send(
+        announce(TopicId.PUBLISHER, 125, "room_name", "std_msgs/String", STRING),
+        announce(TopicId.SUBSCRIBER, 100, "room_name", "std_msgs/String", STRING),
+        announce(TopicId.SERVICE_SERVER_PUBLISHER, 126, "/siren", "std_srvs/SetBool", SET_BOOL_RESPONSE),
+        announce(TopicId.SERVICE_SERVER_SUBSCRIBER, 126, "/siren", "std_srvs/SetBool", SET_BOOL_REQUEST),
+        announce(TopicId.SERVICE_CLIENT_PUBLISHER, 127, "/siren", "std_srvs/SetBool", SET_BOOL_REQUEST),
+        announce(TopicId.SERVICE_CLIENT_SUBSCRIBER, 127, "/siren", "std_srvs/SetBool", SET_BOOL_RESPONSE),
+        encode(TopicId.LOG, b"\2" + latin),
+    )
+    bridge.says("K\ufffdche")
+
+    def heard():
+        device.send(encode(125, latin))
+        return latin in device.received(100)
+
+    wait_for(heard)
+    device.send(encode(127, b"\1"))
+    device.expect(126, b"\1")
+    device.send(encode(126, b"\1" + latin))
+    device.expect(127, b"\1" + latin)
+
+
+def test_battery_of_old_firmware(ros):
+    """A ROSbot's of ROS melodic's time: voltage only, and no temperature in the definition."""
+    probe, device = ros.probe(), Device()
+    probe.tell(subscribe=["/battery", "sensor_msgs/BatteryState"])
+    bridge = ros.node("serial_node.py", device.path)
+    device.expect(TopicId.PUBLISHER)
+    melodic = "476f837fa6771f6e16e3bf4ef96f8770"
+    device.send(announce(TopicId.PUBLISHER, 125, "battery", "sensor_msgs/BatteryState", melodic))
+    bridge.says("battery: sensor_msgs/BatteryState as ROS melodic had it")
+
+    def heard():
+        device.send(encode(125, bytes(16) + struct.pack("<6f4B", 12.5, 0, 0, 0, 0, 0, 0, 0, 2, 0) + bytes(12)))
+        return probe.heard(topic="/battery", voltage=12.5, percentage=0.0, present=False)
+
+    wait_for(heard)
 
 
 def test_device_that_comes_back_with_another_id_hears_its_topic_again(ros):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import logging
 import queue
-import struct
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -18,7 +17,9 @@ from rospy.exceptions import TransportException
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.msg import EspTrigger
 from rosbot_patrol.ros.node import Worker
+from rosbot_patrol.ros.serial_layouts import raw_from, raw_message, raw_service
 from rosbot_patrol.rosserial.complaints import printable
+from rosbot_patrol.rosserial.old_types import find_old_type
 from rosbot_patrol.rosserial.topics import ESP_TRIGGER_TYPES, TopicInfo
 
 log = logging.getLogger(__name__)
@@ -68,6 +69,9 @@ def check_md5(info: TopicInfo, here: Any) -> None:
     """Compare the definitions of device and workspace; raises ProtocolError that shows both."""
     if info.md5 == here._md5sum:
         return
+    if find_old_type(info.message_type, info.md5, here._md5sum):
+        log.info("%s: %s as ROS melodic had it, its bytes are rewritten", info.name, info.message_type)
+        return
     theirs = printable(info.md5, 32)
     raise ProtocolError(
         "",
@@ -93,14 +97,6 @@ def serialize(message: Any) -> bytes:
     return buffer.getvalue()
 
 
-def deserialize(cls: Any, data: bytes, name: str) -> Any:
-    """Bytes as a message; raises ProtocolError."""
-    try:
-        return cls().deserialize(data)
-    except (genpy.DeserializationError, struct.error, UnicodeDecodeError, ValueError) as err:
-        raise ProtocolError("", f"{name}: {len(data)} bytes that are no {cls._type}: {err}") from err
-
-
 class Subscription:
     """What ROS publishes on a topic goes to the device."""
 
@@ -110,7 +106,8 @@ class Subscription:
         self._info = info
         self._send = send
         self._told = False
-        self._subscriber = rospy.Subscriber(info.name, cls, self._callback, queue_size=QUEUE_SIZE)
+        self._old = find_old_type(info.message_type, info.md5, cls._md5sum)
+        self._subscriber = rospy.Subscriber(info.name, raw_message(cls), self._callback, queue_size=QUEUE_SIZE)
 
     def close(self) -> None:
         """Stop."""
@@ -118,7 +115,8 @@ class Subscription:
 
     def _callback(self, message: Any) -> None:
         try:
-            self._send(self._info.topic_id, serialize(message))
+            data: bytes = message._buff
+            self._send(self._info.topic_id, self._old.downgrade(data) if self._old else data)
         except ProtocolError as err:
             if not self._told:
                 self._told = True
@@ -130,7 +128,7 @@ class DeviceService:
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self._cls = service_class(info.message_type)
-        self._name = info.name
+        self._info, self._name = info, info.name
         self._send = send
         self._request_id: int | None = None
         self._answers: queue.Queue[Any] = queue.Queue(maxsize=1)
@@ -146,11 +144,11 @@ class DeviceService:
         check_md5(info, self._cls._request_class)
         self._request_id = info.topic_id
         if self._service is None:
-            self._service = rospy.Service(self._name, self._cls, self._call)
+            self._service = rospy.Service(self._name, raw_service(self._cls), self._call)
 
     def receive(self, data: bytes) -> None:
         """An answer came; raises ProtocolError."""
-        answer = deserialize(self._cls._response_class, data, self._name)
+        answer = raw_from(self._cls._response_class, data, self._info)
         if self._answers.empty():
             self._answers.put_nowait(answer)
 
@@ -165,7 +163,7 @@ class DeviceService:
                 self._answers.get_nowait()
             if self._request_id is None:
                 raise rospy.ServiceException(f"{self._name}: the device has not announced it fully")
-            self._send(self._request_id, serialize(request))
+            self._send(self._request_id, request._buff)
             try:
                 return self._answers.get(timeout=SERVICE_TIMEOUT)
             except queue.Empty as err:
@@ -177,11 +175,11 @@ class ServiceCaller:
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self._cls = service_class(info.message_type)
-        self._name = info.name
+        self._info, self._name = info, info.name
         self._send = send
         self._answer_id: int | None = None
         self._requests: queue.Queue[bytes | None] = queue.Queue(maxsize=16)
-        self._proxy = rospy.ServiceProxy(info.name, self._cls)
+        self._proxy = rospy.ServiceProxy(info.name, raw_service(self._cls))
         Worker(self._run, name=f"calls {info.name}").start()
 
     def set_request_topic(self, info: TopicInfo) -> None:
@@ -211,9 +209,8 @@ class ServiceCaller:
     def _run(self) -> None:
         while (data := self._requests.get()) is not None:
             try:
-                request = deserialize(self._cls._request_class, data, self._name)
-                answer = self._proxy(request)
+                answer = self._proxy(raw_from(self._cls._request_class, data, self._info))
                 if self._answer_id is not None:
-                    self._send(self._answer_id, serialize(answer))
+                    self._send(self._answer_id, answer._buff)
             except _CALL_ERRORS as err:
                 log.warning("service %s called by a device: %s: %s", self._name, type(err).__name__, err)

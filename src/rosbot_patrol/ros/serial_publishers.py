@@ -1,8 +1,8 @@
 """What devices publish, handed to ROS as the bytes that came: no thread, no queue and no message object in between.
 
-A message of fixed size (an EspTrigger has 2 bytes) is checked by its length and sent on as it is; others are read as
-what they claim to be and written again. All of one moment go to a subscriber in one piece. A subscriber that does not
-read holds nobody up: what it has not taken waits, up to a bound, and then the oldest go.
+A message is checked against its definition and sent on as it is; only a header is numbered by ROS. All of one moment go
+to a subscriber in one piece. A subscriber that does not read holds nobody up: what it has not taken waits, up to a
+bound, and then the oldest go.
 
 rospy negotiates with the subscribers; then this writes to their connections itself (`Publisher.impl.connections` of
 rospy 1.16), as rospy would have a thread per subscriber do it, which cost half of the bridge's time and up to 5 ms.
@@ -10,23 +10,19 @@ rospy 1.16), as rospy would have a thread per subscriber do it, which cost half 
 
 from __future__ import annotations
 
-import io
 import logging
-import re
 import socket
 import struct
 import time
 from collections import deque
-from dataclasses import dataclass
 from typing import Any
 
-import genpy
-import roslib.message
 import rospy
-import rospy.msg
 
 from rosbot_patrol.errors import ProtocolError
-from rosbot_patrol.ros.serial_channels import check_md5, deserialize, message_class
+from rosbot_patrol.ros.serial_channels import check_md5, message_class
+from rosbot_patrol.ros.serial_layouts import layout
+from rosbot_patrol.rosserial.old_types import find_old_type
 from rosbot_patrol.rosserial.topics import TopicInfo
 
 log = logging.getLogger(__name__)
@@ -34,61 +30,6 @@ log = logging.getLogger(__name__)
 SETTLING = 1.0  # subscribers hear of a new publisher through the master [s]
 HELD = 1000  # messages kept for them meanwhile
 WAITING = 1 << 20  # bytes kept for a subscriber that does not read
-_ARRAY = re.compile(r"^(.+)\[(\d*)\]$")
-_SIZES = {"time": 8, "duration": 8, "bool": 1, "byte": 1, "char": 1, "float32": 4, "float64": 8}
-_SIZES |= {f"{sign}int{bits}": bits // 8 for sign in ("", "u") for bits in (8, 16, 32, 64)}
-
-
-@dataclass(frozen=True)
-class Layout:
-    """A message type whose messages all have one size.
-
-    Attributes:
-        size: of the message [bytes]; flags: where its bools are.
-    """
-
-    size: int
-    flags: tuple[int, ...] = ()
-
-    def check(self, data: bytes, info: TopicInfo) -> bytes:
-        """The message as it is to be sent, each bool 0 or 1; raises ProtocolError where it has another size."""
-        if len(data) != self.size:
-            raise ProtocolError("", f"{info.name}: {len(data)} bytes, a {info.message_type} has {self.size}")
-        if any(data[at] > 1 for at in self.flags):
-            changed = bytearray(data)
-            for at in self.flags:
-                changed[at] = min(changed[at], 1)
-            return bytes(changed)
-        return data
-
-
-def layout(cls: Any) -> Layout | None:
-    """How a message class lies in memory; None where its size varies or its header is to be numbered by ROS."""
-    if getattr(cls, "_has_header", False):
-        return None
-    flags: list[int] = []
-    size = _measure(cls._slot_types, 0, flags)
-    return None if size is None else Layout(size, tuple(flags))
-
-
-def _measure(types: list[str], at: int, flags: list[int]) -> int | None:
-    """Where these fields end that begin `at`; notes bools."""
-    for name in types:
-        array = _ARRAY.match(name)
-        if name == "string" or (array and not array[2]):
-            return None
-        one = array[1] if array else name
-        for _ in range(int(array[2]) if array else 1):
-            if one in _SIZES:
-                flags += [at] * (one == "bool")
-                at += _SIZES[one]
-                continue
-            inner = roslib.message.get_message_class(one)
-            end = None if inner is None else _measure(inner._slot_types, at, flags)
-            if end is None:
-                return None
-            at = end
-    return at
 
 
 class Outlet:
@@ -155,6 +96,7 @@ class Topic:
         self.cls = cls
         self._name = name
         self._layout = layout(cls)
+        self._has_header = bool(getattr(cls, "_has_header", False))
         self._publisher = rospy.Publisher(name, cls, queue_size=1, tcp_nodelay=True)
         self._publisher.impl.set_queue_size(None)  # connections without rospy's thread
         self._opens_at = time.monotonic() + SETTLING
@@ -165,13 +107,13 @@ class Topic:
 
     def put(self, info: TopicInfo, data: bytes) -> None:
         """Take a message, to be sent by `flush`; raises ProtocolError where it is none of this type."""
-        if self._layout is None:
-            framed = self._rewrite(info, data)
-        else:
-            framed = struct.pack("<I", self._layout.size) + self._layout.check(data, info)
+        old = find_old_type(info.message_type, info.md5, self.cls._md5sum)
+        data = self._layout.check(old.upgrade(data) if old else data, info)
+        if self._has_header:
+            data = self._numbered(data)
         if self._opens_at and len(self._batch) >= HELD:
             del self._batch[0]
-        self._batch.append(framed)
+        self._batch.append(struct.pack("<I", len(data)) + data)
 
     def flush(self, now: float) -> None:
         """Send what was put, and what a subscriber had not taken."""
@@ -199,19 +141,10 @@ class Topic:
                 outlet.connection.close()  # rospy forgets it
         impl.message_data_sent += len(data)
 
-    def _rewrite(self, info: TopicInfo, data: bytes) -> bytes:
-        message = deserialize(self.cls, data, info.name)
+    def _numbered(self, data: bytes) -> bytes:
+        """With the header's number as ROS counts."""
         self._seq += 1
-        buffer = io.BytesIO()
-        try:
-            rospy.msg.serialize_message(buffer, self._seq, message)
-        except (genpy.SerializationError, rospy.ROSException) as err:
-            raise ProtocolError("", f"{info.name}: {err}") from err
-        framed = buffer.getvalue()
-        seq = 4 if getattr(self.cls, "_has_header", False) else 0  # written anew
-        if framed[4 + seq :] != data[seq:]:  # genpy takes a text that is cut off, and leaves what is too much
-            raise ProtocolError("", f"{info.name}: {len(data)} bytes that are no {info.message_type}")
-        return framed
+        return struct.pack("<I", self._seq & 0xFFFFFFFF) + data[4:]
 
 
 class Publishers:
