@@ -18,6 +18,7 @@
     |- ProtocolError      bytes of a peer that make no sense
     |- DetectorError      a network, its weights or a picture
     |- ImageError         the bytes of a picture that make no sense
+    |- SensorError        a sensor's message that cannot be used
     |- AlertError         a notice that could not be delivered
     `- StoreError         incidents that could not be kept or read
 
@@ -164,6 +165,10 @@ class DetectorError(PatrolError):
 
 class ImageError(PatrolError):
     """The bytes of a picture, raw or compressed, that cannot be read."""
+
+
+class SensorError(PatrolError):
+    """A message of a sensor that cannot be used."""
 
 
 class AlertError(PatrolError):

@@ -82,3 +82,8 @@ def scan_points(scan: LaserScan) -> Array:
     hit = scan.is_hit
     lengths, angles = scan.ranges[hit], scan.angles[hit]
     return np.column_stack((lengths * np.cos(angles), lengths * np.sin(angles)))
+
+
+def is_silent_range(distance: float) -> bool:
+    """Whether a range sensor's reading says nothing: NaN, or the negative number of a broken one (-inf is too near)."""
+    return math.isnan(distance) or (math.isfinite(distance) and distance < 0.0)

@@ -203,6 +203,17 @@ def test_range_readings_reach_their_layer(topics):
     assert costmap.grid.at(0.52, 0.02) == LETHAL
 
 
+def test_range_readings_that_name_no_frame_are_refused_in_words(topics):
+    costmap, sources = make()
+    for frame in ("", "/"):
+        topics.send("/range/fl", messages.range_msg(0.4, RangeParams(), 100.0, frame))
+        assert "ranges/range/fl: its messages name no frame: set header.frame_id" in sources[1].trouble(100.0)
+    update(costmap, sources, Frames(), 100.0)
+    assert costmap.grid.at(0.52, 0.02) != LETHAL
+    topics.send("/range/fl", messages.range_msg(0.4, RangeParams(), 100.2, "range_fl"))
+    assert sources[1].trouble(100.2) == ""
+
+
 def test_a_cloud_marks(topics):
     source = {"data_type": "PointCloud2", "topic": "points"}
     costmap = LayeredCostmap(

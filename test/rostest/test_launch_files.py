@@ -88,6 +88,24 @@ def test_simulation_by_default_and_the_robot_where_its_version_is_set() -> None:
     assert {"laser_publisher", "imu_publisher", "camera_publisher", "patrolling_node"} <= set(robot)
 
 
+def test_a_real_rosbot_ekf_brings_the_imus_publisher_itself() -> None:
+    path = ROOT / "launch" / "rosbot_patrol.launch"
+    assert "imu_publisher" not in names(parse(path, "imu_publisher:=false", robot=True))
+    for launch in ("rosbot_all_hardware", "rosbot_gmapping"):
+        assert "imu_publisher" in names(parse(ROOT / "launch" / f"{launch}.launch"))
+    assert "imu_publisher" not in names(parse(ROOT / "drop_in" / "rosbot_ekf" / "launch" / "all.launch"))
+    both = parse(ROOT / "drop_in" / "rosbot_ekf" / "launch" / "all.launch", "rosbot_pro:=true", "mecanum:=true")
+    assert names(both)["missing_rosbot_ekf"] == ("rosbot_patrol", "missing_driver")
+
+
+def test_another_robots_battery() -> None:
+    path = ROOT / "launch" / "rosbot_patrol.launch"
+    given = parse(path, "battery_topic:=battery_state", "battery_voltage_first:=true").params
+    assert given["/patrolling_node/battery_topic"].value == "battery_state"
+    assert given["/patrolling_node/battery_voltage_first"].value is True
+    assert parse(path).params["/patrolling_node/battery_voltage_first"].value is False
+
+
 def test_detector_on_the_pc() -> None:
     robot = names(parse(ROOT / "launch" / "rosbot_patrol.launch", "detector:=pc"))
     assert "darknet_ros" not in robot

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, driven, invert, transform_points
 from rosbot_patrol.params import param
-from rosbot_patrol.scan import LaserScan, scan_points
+from rosbot_patrol.scan import LaserScan, is_silent_range, scan_points
 
 Array = NDArray[np.float64]
 
@@ -110,12 +110,12 @@ class CollisionGuard:
         self._pose, self._stamp = odom_from_base, now
 
     def see_range(self, name: str, reading: RangeReading, now: float, odom_from_base: Pose2D | None = None) -> None:
-        """Take a reading of a range sensor; NaN says nothing."""
-        if math.isnan(reading.distance):
+        """Take a reading of a range sensor; NaN and negative numbers say nothing."""
+        if is_silent_range(reading.distance):
             return
         sensor = reading.base_from_sensor
         distance = max(reading.distance, reading.range_min)
-        nothing = distance >= reading.range_max
+        nothing = reading.distance >= reading.range_max
         seen_to = reading.range_max if nothing else distance
         self._met = [m for m in self._met if not self._is_past(m, sensor, seen_to, now, odom_from_base)]
         before = self._last_met.pop(name, None)

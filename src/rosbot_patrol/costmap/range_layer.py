@@ -19,6 +19,7 @@ from rosbot_patrol.costmap.scrolling import ScrollingCells, fill_outside
 from rosbot_patrol.costmap.sensor_params import RangeSensorParams
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.grid import GridInfo
+from rosbot_patrol.scan import is_silent_range
 
 _HALF = 127  # a probability of a half, of 254
 
@@ -137,13 +138,15 @@ class RangeSensorLayer(Layer):
 
     def _use(self, info: GridInfo, reading: RangeReading, changes: NDArray[np.int64]) -> None:
         distance, is_clear = reading.distance, False
+        if is_silent_range(distance):
+            return
         if reading.is_fixed:
             is_clear, distance = not math.isinf(distance) or distance > 0.0, reading.range_max
         elif distance == -math.inf:
             distance = reading.range_min
         elif distance >= reading.range_max:
             is_clear, distance = True, reading.range_max
-        elif not distance >= reading.range_min:  # NaN too
+        elif distance < reading.range_min:
             return
         if is_clear and not self.params.clear_on_max_reading:
             return

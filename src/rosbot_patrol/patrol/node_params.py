@@ -56,6 +56,7 @@ class InputParams:
     map_frame: str = param("map", doc="frame of the points file")
     pose_timeout: float = param(0.5, unit="s", lo=0.05, doc="an older odom -> base_link is not known")
     scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="an older scan says nothing of obstacles")
+    battery_topic: str = param("/battery", doc="state of the battery (TurtleBot3: battery_state)")
     latched_window: float = param(
         10.0, unit="s", lo=0.0, doc="so long after its start a latched trigger that it had before is not taken again"
     )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
+from rosbot_patrol.patrol.battery import battery_of
 from rosbot_patrol.patrol.inputs import Battery, Box
 from rosbot_patrol.patrol.person_place import Lens
 from rosbot_patrol.replay import raw_ros1
@@ -103,9 +103,8 @@ def _lens(message: Any) -> LensRecord | Refused:
 
 
 def _battery(message: Any) -> Battery:
-    share = float(message.percentage) if 0.0 <= message.percentage <= 1.0 else None
-    voltage = float(message.voltage) if math.isfinite(message.voltage) and message.voltage > 0.0 else None
-    return Battery(share=share, voltage=voltage, is_charging=message.power_supply_status == CHARGING)
+    is_charging = message.power_supply_status == CHARGING
+    return battery_of(message.percentage, message.voltage, is_present=bool(message.present), is_charging=is_charging)
 
 
 def _mode(message: Any) -> ModeRecord:
@@ -161,7 +160,7 @@ KINDS: dict[str, Kind] = {
     ),
     "sensor_msgs/msg/CameraInfo": Kind(_lens, STAMP | {"width": "int", "height": "int"}),
     "sensor_msgs/msg/BatteryState": Kind(
-        _battery, {"percentage": "float", "voltage": "float", "power_supply_status": "int"}
+        _battery, {"percentage": "float", "voltage": "float", "present": "bool", "power_supply_status": "int"}
     ),
     "move_base_msgs/msg/MoveBaseActionGoal": Kind(
         lambda message: GoalRecord(message.goal_id.id),

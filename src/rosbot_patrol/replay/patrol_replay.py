@@ -11,6 +11,7 @@ or stand still, orders by service and action, rounds, mail, what was kept from b
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Collection, Iterable
 from typing import Any
@@ -180,8 +181,7 @@ class PatrolReplay:
             case MapRecord():
                 self._sight.hear_map(content.grid)
             case Battery():
-                charge = content.share, content.voltage, content.is_charging
-                self._battery = Battery(share=charge[0], voltage=charge[1], is_charging=charge[2], at=now)
+                self._battery = dataclasses.replace(content, at=now)
             case heard.ModeRecord():
                 until = now + content.entry_delay if content.entry_delay > 0.0 else None
                 self._guarded = Guarded(

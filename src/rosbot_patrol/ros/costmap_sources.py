@@ -24,12 +24,12 @@ from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.obstacle import ObservationBuffer, ObstacleLayer, observe
 from rosbot_patrol.costmap.range_layer import RangeReading, RangeSensorLayer
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams
-from rosbot_patrol.errors import ImageError, TransformError
+from rosbot_patrol.errors import ImageError, SensorError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.ros.convert import scan_from_msg
 from rosbot_patrol.ros.convert_images import picture_from_msg
 from rosbot_patrol.ros.node import now
-from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.ros.transforms import NO_FRAME, Transforms
 from rosbot_patrol.scan import LaserScan
 
 log = logging.getLogger(__name__)
@@ -71,7 +71,7 @@ class Source(ABC, Generic[T]):
 
     @abstractmethod
     def _decode(self, msg: rospy.Message) -> T | None:
-        """What is kept of a message, None for nothing; raises ImageError."""
+        """What is kept of a message, None for nothing; raises ImageError or SensorError."""
 
     def receive(self, msg: rospy.Message) -> None:
         """Callback of the topic."""
@@ -81,7 +81,7 @@ class Source(ABC, Generic[T]):
             return
         try:
             item = self._decode(msg)
-        except ImageError as err:
+        except (ImageError, SensorError) as err:
             if not self.refused:
                 log.error("%s: %s", self.name, err)
             self.refused = str(err)
@@ -220,6 +220,8 @@ class _Ranges(Source[Range]):
         rospy.Subscriber(topic, Range, self.receive, queue_size=1, tcp_nodelay=True)
 
     def _decode(self, msg: Range) -> Range:
+        if not msg.header.frame_id.strip("/"):
+            raise SensorError(f"its messages name no frame: {NO_FRAME}")
         return msg
 
     def _place(self, item: Range, stamp: float, frame: str, transforms: Transforms, target: str) -> None:

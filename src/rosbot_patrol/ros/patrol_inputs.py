@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
-import math
 import threading
 import time
 from collections import deque
@@ -21,6 +21,7 @@ from rosbot_patrol.alerts.incident import Event
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.msg import EspTrigger, SensorEvent
+from rosbot_patrol.patrol.battery import battery_of
 from rosbot_patrol.patrol.inputs import Battery, Box, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.journal import Journal
 from rosbot_patrol.patrol.node_params import InputParams
@@ -111,7 +112,7 @@ class PatrolInputs:
         rospy.Subscriber("/darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes, queue_size=10)
         rospy.Subscriber("/darknet_ros/found_object", ObjectCount, self._on_count, queue_size=10)
         rospy.Subscriber("/scan", LaserScanMsg, self._on_scan, queue_size=1, buff_size=1 << 18)
-        rospy.Subscriber("/battery", BatteryState, self._on_battery, queue_size=1)
+        rospy.Subscriber(self.params.battery_topic, BatteryState, self._on_battery, queue_size=1)
 
     # -- callbacks store
 
@@ -198,10 +199,9 @@ class PatrolInputs:
         self._scan.set(message, now())
 
     def _on_battery(self, message: BatteryState) -> None:
-        share = message.percentage if 0.0 <= message.percentage <= 1.0 else None
         charging = message.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_CHARGING
-        voltage = message.voltage if math.isfinite(message.voltage) and message.voltage > 0.0 else None
-        self._battery.set(Battery(share=share, voltage=voltage, is_charging=charging, at=now()), now())
+        said = battery_of(message.percentage, message.voltage, is_present=bool(message.present), is_charging=charging)
+        self._battery.set(dataclasses.replace(said, at=now()), now())
 
     # -- a step reads
 

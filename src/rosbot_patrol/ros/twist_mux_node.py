@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import math
 import threading
 import time
 from dataclasses import dataclass
@@ -40,7 +41,7 @@ from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import load_params, now, run_node
 from rosbot_patrol.ros.priority import Priority
-from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.ros.transforms import NO_FRAME, Transforms
 
 log = logging.getLogger(__name__)
 
@@ -100,6 +101,8 @@ class Eyes:
         return True
 
     def _look_low(self, topic: str, message: Range, stamp: float) -> None:
+        if math.isfinite(message.range) and message.range < 0.0:
+            self._complain("%s says %g m, as a broken sensor does: the reading is left out", topic, message.range)
         mount = self._mount(message.header.frame_id, topic)
         if mount is not None:
             reading = RangeReading(message.range, message.min_range, message.max_range, mount)
@@ -108,15 +111,21 @@ class Eyes:
     def _mount(self, frame: str, what: str) -> Pose2D | None:
         """base_from_sensor, None (and said) where it is not known."""
         frame = frame.lstrip("/")
+        if not frame:
+            self._complain("the collision guard cannot place %s: its messages name no frame: %s", what, NO_FRAME)
+            return None
         try:
             if frame not in self._mounts:
                 self._mounts[frame] = self._transforms.lookup(self._params.base_frame, frame)
         except TransformError as err:
-            if time.monotonic() - self._told > REPEAT_LOG:
-                self._told = time.monotonic()
-                log.warning("the collision guard cannot place %s: %s", what, err)
+            self._complain("the collision guard cannot place %s: %s", what, err)
             return None
         return self._mounts[frame]
+
+    def _complain(self, text: str, *args: object) -> None:
+        if time.monotonic() - self._told > REPEAT_LOG:
+            self._told = time.monotonic()
+            log.warning(text, *args)
 
     def limit(self, wish: Twist2D, current: float) -> Verdict:
         """The part of a command that is safe."""

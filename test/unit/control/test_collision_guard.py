@@ -228,6 +228,24 @@ def test_too_near_to_measure_is_near():
     assert guard.limit(AHEAD, 0.1, Pose2D()).twist.vx == 0.0
 
 
+@pytest.mark.parametrize("broken", [-1.0, -0.001, -8190.0, math.nan])
+def test_the_negative_reading_of_a_broken_range_sensor_says_nothing(broken):
+    guard = guard_at(wall_ahead(5.0))
+    hear(guard, broken, times=20)
+    assert guard.limit(AHEAD, 0.1, Pose2D()) == (AHEAD, 1.0, "")
+    hear(guard, 0.06, now=0.2)
+    hear(guard, broken, now=0.4)  # does not clear what it met before
+    assert guard.limit(AHEAD, 0.5, Pose2D()).twist == STOP
+
+
+def test_a_sensor_that_only_tells_nearer_or_not():
+    for said, scale in ((-math.inf, 0.0), (math.inf, 1.0), (-1.0, 1.0)):
+        guard = guard_at(wall_ahead(5.0))
+        for k in range(2):
+            guard.see_range("fl", RangeReading(said, 0.06, 0.06, FRONT_LEFT), 0.2 * k, Pose2D())
+        assert guard.limit(AHEAD, 0.3, Pose2D()).scale == scale
+
+
 def test_behind_counts_for_driving_back():
     guard = guard_at(wall_ahead(5.0))
     hear(guard, 0.05, sensor=REAR_LEFT, name="rl")

@@ -97,9 +97,12 @@ def test_what_was_free_can_be_occupied_again():
 
 
 def test_readings_that_are_none_say_nothing():
-    for wrong in (math.nan, 0.001):
+    for wrong in (math.nan, 0.001, -1.0, -0.03):
         layer = hear(make(clear_on_max_reading=True), wrong).range_layers[0]
         assert (layer.probabilities == 0.5).all()
+    for wrong in (math.nan, -1.0):  # from a sensor that only tells nearer or not
+        fixed = hear(make(clear_on_max_reading=True), wrong, range_min=0.3, range_max=0.3).range_layers[0]
+        assert (fixed.probabilities == 0.5).all()
 
 
 def test_infinities_of_rep_117():

@@ -389,7 +389,7 @@ def test_by_voltage_where_the_share_is_not_told():
     ("given", "said"),
     [
         ({"battery_low": 0.5}, "/n/battery_ok: is 0.4, expected more than battery_low 0.5"),
-        ({"battery_low_voltage": 10.0}, "/n/battery_ok_voltage: is 0, expected more than battery_low_voltage 10"),
+        ({"battery_low_voltage": 12.0}, "/n/battery_ok_voltage: is 11.4, expected more than battery_low_voltage 12"),
     ],
 )
 def test_thresholds_that_contradict_each_other(given, said):
