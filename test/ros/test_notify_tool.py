@@ -115,3 +115,22 @@ def test_no_outbox_is_no_fault(notify):
     status, said = notify("--list")
     assert status == 0
     assert "no node has used it yet" in said
+
+
+def test_each_recipient_is_tried_and_listed_by_itself(notify, outbox):
+    with SmtpServer(recipients={"b@b.org": ["550 5.1.1 no such user"], "c@b.org": ["451 later"]}) as server:
+        channels = {"office": {"type": "smtp", "to": "a@b.org, b@b.org, c@b.org", "port": server.port, "interval": 0}}
+        status, said = notify("--test", "--channel", "office", channels=channels)
+        assert status == 1
+        assert "office:a@b.org: taken after" in said
+        assert "office:b@b.org: Look at the recipient's address." in said
+        assert notify("--test", "--channel", "office:a@b.org", channels=channels)[0] == 0
+        with pytest.raises(ParamError, match=r"did you mean 'office:a@b\.org'"):
+            notify("--test", "--channel", "office:a@b.or", channels=channels)
+        put(outbox, "n1")
+        assert notify("--flush", channels=channels)[0] == 1
+        said = notify("--list")[1]
+    assert "office:a@b.org: a@b.org through the mail server" in said
+    assert "refused the last notice for good: localhost" in said
+    assert "1 wait since" in said
+    assert "451 later" in said

@@ -49,15 +49,26 @@ class Channel:
         transport: how notices leave.
         kinds: of notices that it takes; empty: all.
         pace: how fast.
+        group: what it is called in the configuration, where that gives several recipients, each a channel; else empty.
     """
 
     name: str
     transport: Transport
     kinds: tuple[str, ...] = ()
     pace: Pace = field(default_factory=Pace)
+    group: str = ""
+
+    @property
+    def names(self) -> frozenset[str]:
+        """What it is called: its own name, and its group's where it has one."""
+        return frozenset((self.name, self.group or self.name))
 
     def takes(self, entry: Waiting) -> bool:
         """Whether a notice is for this channel."""
         if entry.channels:
-            return self.name in entry.channels
+            return not self.names.isdisjoint(entry.channels)
         return not self.kinds or entry.kind in self.kinds
+
+    def is_beside(self, other: Channel) -> bool:
+        """Whether both carry to recipients of one channel of the configuration."""
+        return self.name != other.name and bool(self.group) and self.group == other.group

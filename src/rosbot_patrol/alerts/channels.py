@@ -156,7 +156,7 @@ def make_channels(params: MailParams, around: Surroundings, *, prefix: str = "~"
         ParamError: names the parameter, or file and key.
     """
     more = load_channels(Path(params.channels).expanduser(), around) if params.channels else []
-    channels = [] if any(c.name == DEFAULT for c in more) else [_default_channel(params, around, prefix)]
+    channels = [] if any(DEFAULT in c.names for c in more) else _default_channels(params, around, prefix)
     channels += more
     if not any(not channel.kinds or "incident" in channel.kinds for channel in channels):
         raise ParamError(params.channels, "no channel takes the kind 'incident': nobody would be told of an intruder")
@@ -172,10 +172,11 @@ def load_channels(path: Path, around: Surroundings) -> list[Channel]:
     channels = tree.get("channels")
     if not isinstance(channels, dict) or not channels:
         raise ParamError(f"{path}: channels", "expected one group of keys for each channel")
-    return [_channel(str(name), given, f"{path}: channels/", around) for name, given in channels.items()]
+    made = [_channels(str(name), given, f"{path}: channels/", around) for name, given in channels.items()]
+    return [channel for several in made for channel in several]
 
 
-def _channel(name: str, given: Any, prefix: str, around: Surroundings) -> Channel:
+def _channels(name: str, given: Any, prefix: str, around: Surroundings) -> list[Channel]:
     if not _NAME.fullmatch(name):
         raise ParamError(prefix + name, "expected a name of letters, digits, - and _")
     prefix = f"{prefix}{name}/"
@@ -187,12 +188,21 @@ def _channel(name: str, given: Any, prefix: str, around: Surroundings) -> Channe
         expected = f"expected one of {', '.join(SPECS)}"
         raise ParamError(f"{prefix}type", f"is missing, {expected}" if kind is None else f"is {kind!r}, {expected}")
     spec = load_strict(SPECS[kind], given, name=prefix)
-    pace = Pace(interval=spec.interval, first_delay=spec.retry)
-    transport = _Maker(prefix, around).make(spec)
-    return Channel(name=name, transport=transport, kinds=tuple(spec.kinds), pace=pace)
+    return _one_each(name, _Maker(prefix, around).make(spec), spec)
 
 
-def _default_channel(params: MailParams, around: Surroundings, prefix: str) -> Channel:
+def _one_each(name: str, transports: Mapping[str, Transport], spec: ChannelSpec) -> list[Channel]:
+    """A channel for each recipient, so that each has a queue, a back-off and receipts of its own."""
+    pace, kinds = Pace(interval=spec.interval, first_delay=spec.retry), tuple(spec.kinds)
+    if len(transports) == 1:
+        return [Channel(name=name, transport=t, kinds=kinds, pace=pace) for t in transports.values()]
+    return [
+        Channel(name=f"{name}:{recipient}", transport=t, kinds=kinds, pace=pace, group=name)
+        for recipient, t in transports.items()
+    ]
+
+
+def _default_channels(params: MailParams, around: Surroundings, prefix: str) -> list[Channel]:
     names = {
         "to": "email_to", "from": "email_from", "program": "sendmail", "security": "smtp_security",
         "user": "smtp_user", "password_file": "smtp_password_file",
@@ -203,6 +213,7 @@ def _default_channel(params: MailParams, around: Surroundings, prefix: str) -> C
     if kind == "auto":
         kind = "sendmail" if envelope.is_real and find_sendmail(params.sendmail) else "maildir"
     common: dict[str, Any] = {"type": kind, "timeout": params.mail_timeout}
+    common |= {"interval": params.mail_interval, "retry": params.mail_retry}
     common |= {"to": params.email_to, "sender": params.email_from}
     specs: dict[str, ChannelSpec] = {
         "maildir": MaildirSpec(**common, folder=params.maildir),
@@ -218,8 +229,7 @@ def _default_channel(params: MailParams, around: Surroundings, prefix: str) -> C
             ca_file=params.smtp_ca_file,
         ),
     }
-    pace = Pace(interval=params.mail_interval, first_delay=params.mail_retry)
-    return Channel(name=DEFAULT, transport=maker.make(specs[kind]), pace=pace)
+    return _one_each(DEFAULT, maker.make(specs[kind]), specs[kind])
 
 
 class _Maker:
@@ -230,17 +240,17 @@ class _Maker:
     def __init__(self, prefix: str, around: Surroundings, names: Mapping[str, str] | None = None) -> None:
         self._prefix, self._around, self._names = prefix, around, names or self._same
 
-    def make(self, spec: ChannelSpec) -> Transport:
-        """The transport of a channel; raises ParamError."""
+    def make(self, spec: ChannelSpec) -> dict[str, Transport]:
+        """The transports of a channel by recipient, "" where it has none of its own; raises ParamError."""
         if isinstance(spec, MaildirSpec):
             folder = Path(spec.folder).expanduser() if spec.folder else self._around.home / "rosbot_patrol" / "mail"
-            return MaildirTransport(folder, self.envelope(spec.to, spec.sender))
+            return {"": MaildirTransport(folder, self.envelope(spec.to, spec.sender))}
         if isinstance(spec, SendmailSpec):
             return self._sendmail(spec)
         if isinstance(spec, SmtpSpec):
             return self._smtp(spec)
         if isinstance(spec, WebhookSpec):
-            return self._webhook(spec)
+            return {"": self._webhook(spec)}
         raise TypeError(type(spec))
 
     def envelope(self, to: str, sender: str) -> Envelope:
@@ -256,14 +266,14 @@ class _Maker:
             raise ParamError(self._name("to"), f"expected a real address for {kind}, got {to!r}")
         return envelope
 
-    def _sendmail(self, spec: SendmailSpec) -> Transport:
+    def _sendmail(self, spec: SendmailSpec) -> dict[str, Transport]:
         envelope = self._real_envelope(spec.to, spec.sender, "sendmail")
         program = find_sendmail(spec.program)
         if program is None:
             raise ParamError(self._name("program"), f"no program at {spec.program or ' or '.join(SENDMAILS)}")
-        return SendmailTransport(program, envelope, spec.timeout)
+        return {copy.recipient: SendmailTransport(program, copy, spec.timeout) for copy in envelope.copies()}
 
-    def _smtp(self, spec: SmtpSpec) -> Transport:
+    def _smtp(self, spec: SmtpSpec) -> dict[str, Transport]:
         envelope = self._real_envelope(spec.to, spec.sender, "smtp")
         if spec.user and spec.security not in ("starttls", "tls"):
             raise ParamError(
@@ -278,7 +288,7 @@ class _Maker:
             timeout=spec.timeout,
             ca_file=self._ca_file(spec.ca_file),
         )
-        return SmtpTransport(server, envelope)
+        return {copy.recipient: SmtpTransport(server, copy) for copy in envelope.copies()}
 
     def _webhook(self, spec: WebhookSpec) -> Transport:
         secret = spec.secret_file or spec.secret_env

@@ -43,6 +43,7 @@ class _Refusal:
     times: int = 0
     due: float = 0.0
     error: str = ""
+    is_final: bool = False  # the other side said so; else it is our guess
 
 
 class Lane:
@@ -78,6 +79,11 @@ class Lane:
     def refused(self) -> list[tuple[Waiting, str]]:
         """Those that the channel refused for good, and what it said."""
         return [(entry, self._refused[entry.id].error) for entry in self._queue if entry.id in self._refused]
+
+    @property
+    def refused_for_good(self) -> list[tuple[Waiting, str]]:
+        """Of `refused` those that the other side called final; the others it did not want "now" too often."""
+        return [(entry, error) for entry, error in self.refused if self._refused[entry.id].is_final]
 
     def offer(self, waiting: Iterable[Waiting]) -> None:
         """Say what the channel has to take now, oldest first."""
@@ -152,13 +158,14 @@ class Lane:
         """
         self._last_try = now
         self.error = error
+        is_final = permanent
         if answered:
             for entry in batch:
                 self._unwanted[entry.id] = self._unwanted.get(entry.id, 0) + 1
             permanent = permanent or any(entry.id in self._refused for entry in batch)
         if permanent:
             self._is_up(error)
-            return self._refuse(batch, now, error)
+            return self._refuse(batch, now, error, is_final=is_final)
         self._failures += 1
         if self.down_since is None:
             self.down_since = now
@@ -192,13 +199,13 @@ class Lane:
     def _is_doubtful(self, entry: Waiting) -> bool:
         return self._unwanted.get(entry.id, 0) >= DOUBTFUL and entry.id not in self._refused
 
-    def _refuse(self, batch: Sequence[Waiting], now: float, error: str) -> float:
+    def _refuse(self, batch: Sequence[Waiting], now: float, error: str, *, is_final: bool) -> float:
         if len(batch) > 1:  # one of them is to blame: each by itself, then
             self._alone |= {entry.id for entry in batch}
             return 0.0
         state = self._refused.setdefault(batch[0].id, _Refusal())
         state.times += 1
-        state.error = error
+        state.error, state.is_final = error, is_final
         put_off = min(RARELY[0] * 2.0 ** min(state.times - 1, 20), RARELY[1])
         state.due = now + put_off
         return put_off

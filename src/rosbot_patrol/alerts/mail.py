@@ -7,7 +7,7 @@ three header lines and one sentence).
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from email.errors import HeaderParseError
 from email.headerregistry import Address
 from email.message import EmailMessage
@@ -25,10 +25,32 @@ _HOST = re.compile(r"(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!
 
 @dataclass(frozen=True, kw_only=True)
 class Envelope:
-    """Sender and recipients, checked."""
+    """Sender and recipients, checked.
+
+    Attributes:
+        sender: of the mail.
+        to: all recipients, for the mail's header; nobody twice.
+        only: who gets this copy; None where there is but one.
+    """
 
     sender: Address
     to: tuple[Address, ...]
+    only: Address | None = None
+
+    def copies(self) -> list[Envelope]:
+        """One envelope for each recipient: what one of them refuses or delays concerns no other."""
+        return [replace(self, only=address) for address in self.to]
+
+    @property
+    def recipient(self) -> str:
+        """Address of the one recipient of this copy.
+
+        Raises:
+            ValueError: there are several, and none was chosen.
+        """
+        if self.only is None and len(self.to) != 1:
+            raise ValueError(f"expected one recipient, got {len(self.to)}: use `copies`")
+        return (self.only or self.to[0]).addr_spec
 
     @property
     def is_real(self) -> bool:
@@ -37,7 +59,7 @@ class Envelope:
 
 
 def parse_addresses(name: str, text: str) -> tuple[Address, ...]:
-    """The addresses of a parameter: one or several, with commas between.
+    """The addresses of a parameter: one or several, with commas between; each once.
 
     Args:
         name: of the parameter, for the message.
@@ -51,17 +73,21 @@ def parse_addresses(name: str, text: str) -> tuple[Address, ...]:
     if not text.strip():
         return ()
     parts = [part.strip() for part in text.split(",")]
-    found = []
+    found: dict[tuple[str, str], Address] = {}
     for display, spec in getaddresses([text]):
+        if not spec.isascii():
+            hint = "only ASCII letters are possible in it; a domain with others is written as xn--..."
+            raise ParamError(name, f"expected a mail address, got {text!r}: {hint}")
         try:
             is_local = spec in parts and _USER.fullmatch(spec)
             address = Address(display, spec) if is_local else Address(display, addr_spec=spec)
         except (HeaderParseError, ValueError, IndexError) as err:
             raise ParamError(name, f"expected a mail address, got {text!r}") from err
-        if not address.username or address.username.startswith("-") or not address.addr_spec.isascii():
+        if not address.username or address.username.startswith("-"):
             raise ParamError(name, f"expected a mail address, got {text!r}")
-        found.append(address)
-    return tuple(found)
+        # a domain has no case (RFC 5321, 2.4); what stands before it may have
+        found.setdefault((address.username, address.domain.lower()), address)
+    return tuple(found.values())
 
 
 def make_envelope(

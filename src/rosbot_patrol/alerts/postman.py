@@ -8,6 +8,7 @@ or a hang between the two it goes to that channel again, with the same id (as Me
 
 from __future__ import annotations
 
+import hashlib
 import json
 import logging
 import random
@@ -21,6 +22,7 @@ from rosbot_patrol.alerts.channel import Channel, DeliveryError
 from rosbot_patrol.alerts.digest import merge
 from rosbot_patrol.alerts.file_lock import STALE, FileLock
 from rosbot_patrol.alerts.lane import Lane
+from rosbot_patrol.alerts.mail import token
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox, Waiting
 from rosbot_patrol.alerts.receipts import Receipt, Receipts
@@ -55,6 +57,7 @@ class ChannelStatus:
         refused: how many of them it refused for good.
         down_for: so long it has not taken what it should [s]; None: it does.
         error: what it said last, "" where all is well.
+        refusal: why it refused for good what it was asked for last, "" where it took that.
         next_try: in so long [s], None where nothing waits.
     """
 
@@ -66,6 +69,7 @@ class ChannelStatus:
     down_for: float | None
     error: str
     next_try: float | None
+    refusal: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,9 +166,10 @@ class Postman:
             self._write_receipts()
             before = {entry.name for entry in self._waiting}
             self._waiting = self.outbox.waiting()
+            self._settle_refusals()
             self._finish()
             for name, lane in self._lanes.items():
-                lane.offer(e for e in self._waiting if self._is_open(e, name))
+                self._offer(name)
                 if any(entry.name not in before for entry in self._waiting):
                     lane.nudge(self._clocks.now())
             self.outbox.tidy()
@@ -195,10 +200,8 @@ class Postman:
                     answered=err.answered,
                     delay=err.delay,
                 )
-            rest = " for good; it stays in" if err.permanent else "; it waits in"
-            text = (
-                f"{_told(batch)} not taken by '{name}'{rest} {self.outbox.folder}, next try in {put_off:.0f} s: {err}"
-            )
+                rest = self._what_next(name, ids, put_off, err)
+            text = f"{_told(batch)} not taken by '{name}'{rest}: {err}"
             log.error("%s", text)
             return Delivery(
                 channel=name,
@@ -236,7 +239,7 @@ class Postman:
         """Tell of a channel that is down for long, or refuses a notice for good, on the others. Raises OSError."""
         with self._guard:
             for name, lane in self._lanes.items():
-                others = tuple(other for other in self._lanes if other != name and not self._is_down(other))
+                others = self._others(name)
                 if not others:
                     continue
                 if lane.oldest is not None and self._is_down(name):
@@ -266,13 +269,57 @@ class Postman:
         self.hand_over()
 
     def _is_open(self, entry: Waiting, name: str) -> bool:
-        return self.channels[name].takes(entry) and name not in self.receipts.taken.get(entry.id, ())
+        channel = self.channels[name]
+        return channel.takes(entry) and channel.names.isdisjoint(self.receipts.done(entry.id))
+
+    def _offer(self, name: str) -> None:
+        self._lanes[name].offer(e for e in self._waiting if self._is_open(e, name))
+
+    def _what_next(self, name: str, ids: tuple[str, ...], put_off: float, err: DeliveryError) -> str:
+        try:
+            self._settle_refusals()
+            self._finish()
+        except OSError as problem:
+            log.error("that '%s' refused %s cannot be written down: %s; trying on", name, ", ".join(ids), problem)
+        if all(name in self.receipts.refused.get(notice_id, ()) for notice_id in ids):
+            return " for good, and not tried there again"
+        rest = " for good; it stays in" if err.permanent else "; it waits in"
+        return f"{rest} {self.outbox.folder}, next try in {put_off:.0f} s"
+
+    def _settle_refusals(self) -> None:
+        """Ask no recipient again for what it refused for good while another of the same channel took it."""
+        if self._unwritten:  # the disk takes nothing: first what is known already
+            return
+        for name, lane in self._lanes.items():
+            channel = self.channels[name]
+            beside = {other.name for other in self.channels.values() if other.is_beside(channel)}
+            for entry, error in lane.refused_for_good:
+                if beside.isdisjoint(self.receipts.taken.get(entry.id, ())):
+                    continue
+                if others := self._others(name):
+                    self._tell_refused(name, entry, error, others)
+                log.error("notice %s is given up for '%s', others of '%s' have it", entry.id, name, channel.group)
+                self._unwritten.append(self._receipt(channel, [entry], refused=error))
+            self._write_receipts()
+            self._offer(name)
+
+    def _others(self, name: str) -> tuple[str, ...]:
+        """Channels that can tell of a fault: those that take something at the moment."""
+        return tuple(
+            other
+            for other in self._lanes
+            if other != name and not self._is_down(other) and not self._is_refusing_recipient(other)
+        )
+
+    def _is_refusing_recipient(self, name: str) -> bool:
+        refuses = name in self.receipts.refusals or bool(self._lanes[name].refused_for_good)
+        return bool(self.channels[name].group) and refuses
 
     def _finish(self) -> None:
         """Cross out for good what every channel took that is asked."""
         for entry in list(self._waiting):
             if not any(self._is_open(entry, name) for name in self.channels):
-                if entry.id not in self.receipts.taken:
+                if not self.receipts.done(entry.id):
                     log.warning("notice %s is of kind '%s', which no channel takes", entry.id, entry.kind)
                 self.outbox.finish(entry)
                 self._waiting.remove(entry)
@@ -287,20 +334,25 @@ class Postman:
         return notices[0] if len(notices) == 1 else merge(notices)
 
     def _cross_out(self, channel: Channel, lane: Lane, batch: list[Waiting], where: str) -> None:
-        receipt = Receipt(
+        receipt = self._receipt(channel, batch, where=where)
+        lane.delivered(batch, self._clocks.now())
+        self._unwritten.append(receipt)
+        try:
+            self._write_receipts()
+            self._settle_refusals()
+            self._finish()
+        except OSError as err:
+            log.error("the delivery of %s cannot be written down: %s; trying on", ", ".join(receipt.ids), err)
+
+    def _receipt(self, channel: Channel, batch: Sequence[Waiting], *, where: str = "", refused: str = "") -> Receipt:
+        return Receipt(
             channel=channel.name,
             transport=channel.transport.name,
             ids=tuple(entry.id for entry in batch),
             wall=self._clocks.wall(),
             where=where,
+            refused=refused,
         )
-        lane.delivered(batch, self._clocks.now())
-        self._unwritten.append(receipt)
-        try:
-            self._write_receipts()
-            self._finish()
-        except OSError as err:
-            log.error("the delivery of %s cannot be written down: %s; trying on", ", ".join(receipt.ids), err)
 
     def _write_receipts(self) -> None:
         while self._unwritten:
@@ -318,6 +370,7 @@ class Postman:
             down_for=None if lane.down_since is None else now - lane.down_since,
             error=lane.error or (lane.refused[0][1] if lane.refused else ""),
             next_try=lane.wait(now),
+            refusal=self.receipts.refusals.get(name, ""),
         )
 
     def _is_down(self, name: str) -> bool:
@@ -330,14 +383,20 @@ class Postman:
             f"The channel '{name}' ({self.channels[name].transport.describe()}) takes nothing: {lane.error}\n\n"
             f"{len(lane)} notices wait for it, the oldest of {when}. They are kept and tried on."
         )
-        self._tell(f"{oldest.id[:90]}-down-{name[:40]}", f"the channel '{name}' is down", text, others)
+        self._tell(f"{oldest.id[:90]}-down-{_mark(name)}", f"the channel '{name}' is down", text, others)
 
     def _tell_refused(self, name: str, entry: Waiting, error: str, others: tuple[str, ...]) -> None:
+        if name in self.receipts.refusals:  # told with the first, and it has taken nothing since
+            return
+        channel = self.channels[name]
+        rest = "It is kept and tried again now and then; the others pass."
+        if channel.group:
+            rest += " What it refused for good is not sent to it again once another recipient has it."
         text = (
-            f"The channel '{name}' ({self.channels[name].transport.describe()}) refused the notice {entry.id}"
-            f" ({entry.kind}): {error}\n\nIt is kept and tried again now and then; the others pass."
+            f"The channel '{name}' ({channel.transport.describe()}) refused the notice {entry.id}"
+            f" ({entry.kind}): {error}\n\n{rest}"
         )
-        self._tell(f"{entry.id[:90]}-refused-{name[:40]}", f"the channel '{name}' refused a notice", text, others)
+        self._tell(f"{entry.id[:90]}-refused-{_mark(name)}", f"the channel '{name}' refused a notice", text, others)
 
     def _tell(self, notice_id: str, subject: str, text: str, others: tuple[str, ...]) -> None:
         notice = Notice(
@@ -360,6 +419,13 @@ def _send(channel: Channel, notice: Notice) -> str:
     except Exception as err:  # whatever one notice does to a channel, the others have to pass
         log.error("channel '%s' stumbled over notice %s", channel.name, notice.id, exc_info=True)
         raise DeliveryError(f"the channel stumbled over it: {err!r}", permanent=True) from err
+
+
+def _mark(name: str) -> str:
+    """A channel's name as a part of a notice's id."""
+    if len(name) <= 40 and token(name) == name:
+        return name
+    return f"{token(name)[:31]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 def _told(batch: Sequence[Waiting]) -> str:

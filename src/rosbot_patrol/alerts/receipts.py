@@ -1,5 +1,8 @@
 """Who took what: a file to which each delivery adds one line, synced before the next begins.
 
+A recipient that refused a notice for good, while another of the same channel took it, leaves a line too: it is not
+asked again, even after a restart.
+
 Only the process that delivers writes it; others read it along. A line that a crash cut short counts as not written.
 """
 
@@ -19,14 +22,15 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class Receipt:
-    """One delivery.
+    """One delivery, or a refusal that is final.
 
     Attributes:
-        channel: that took it.
+        channel: that took it, or refused it.
         transport: of the channel: smtp, maildir, ...
         ids: of the notices, several where they left as one digest.
         wall: when, seconds since 1970.
         where: the place, for people.
+        refused: why it was refused for good, "" where it was taken.
     """
 
     channel: str
@@ -34,6 +38,7 @@ class Receipt:
     ids: tuple[str, ...]
     wall: float
     where: str
+    refused: str = ""
 
 
 class Receipts:
@@ -41,13 +46,25 @@ class Receipts:
 
     Args:
         path: of the file; need not be there.
+
+    Attributes:
+        taken: the channels that took a notice, by its id.
+        refused: the channels that refused it for good, likewise.
+        refusals: why a channel refused the last notice that it was asked for, by its name.
+        last: when a channel took something last, seconds since 1970.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.taken: dict[str, set[str]] = {}
+        self.refused: dict[str, set[str]] = {}
+        self.refusals: dict[str, str] = {}
         self.last: dict[str, float] = {}
         self._inode, self._offset = -1, 0
+
+    def done(self, notice_id: str) -> set[str]:
+        """The channels that have nothing more to do with a notice."""
+        return self.taken.get(notice_id, set()) | self.refused.get(notice_id, set())
 
     def read_new(self) -> list[Receipt]:
         """What was added since the last call, the whole file in the first. Raises OSError."""
@@ -69,7 +86,8 @@ class Receipts:
     def add(self, receipt: Receipt) -> None:
         """Write a delivery down. Raises OSError where the disk does not take it."""
         self._note(receipt)
-        line = json.dumps(asdict(receipt)).encode("ascii") + b"\n"
+        tree = {name: value for name, value in asdict(receipt).items() if name != "refused" or value}
+        line = json.dumps(tree).encode("ascii") + b"\n"
         handle = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
         try:
             size = os.fstat(handle).st_size
@@ -96,10 +114,14 @@ class Receipts:
 
     def _note(self, receipt: Receipt) -> bool:
         """Remember a delivery; returns whether it is news."""
-        fresh = any(receipt.channel not in self.taken.get(name, ()) for name in receipt.ids)
+        fresh = any(receipt.channel not in self.done(name) for name in receipt.ids)
         for name in receipt.ids:
-            self.taken.setdefault(name, set()).add(receipt.channel)
-        self.last[receipt.channel] = max(receipt.wall, self.last.get(receipt.channel, 0.0))
+            (self.refused if receipt.refused else self.taken).setdefault(name, set()).add(receipt.channel)
+        if receipt.refused:
+            self.refusals[receipt.channel] = receipt.refused
+        else:
+            self.refusals.pop(receipt.channel, None)
+            self.last[receipt.channel] = max(receipt.wall, self.last.get(receipt.channel, 0.0))
         return fresh
 
 
@@ -112,6 +134,7 @@ def _parse(line: bytes) -> Receipt | None:
             ids=tuple(map(str, tree["ids"])),
             wall=float(tree["wall"]),
             where=str(tree["where"]),
+            refused=str(tree.get("refused", "")),
         )
     except (ValueError, KeyError, TypeError):
         if line.strip():

@@ -19,7 +19,7 @@ class SendmailTransport:
 
     Args:
         program: its path.
-        envelope: who to tell.
+        envelope: who to tell; one recipient, as the program answers once for all that it is given.
         timeout: it has to end within [s].
     """
 
@@ -27,17 +27,16 @@ class SendmailTransport:
 
     def __init__(self, program: str, envelope: Envelope, timeout: float) -> None:
         self.program, self._envelope = program, envelope
-        self._sender = envelope.sender.addr_spec
-        self._to = [address.addr_spec for address in envelope.to]
+        self._sender, self._to = envelope.sender.addr_spec, envelope.recipient
         self._timeout = timeout
 
     def describe(self) -> str:
         """Where its mails go."""
-        return f"{', '.join(self._to)} through {self.program}"
+        return f"{self._to} through {self.program}"
 
     def send(self, notice: Notice) -> str:
         """Hand the mail to the program."""
-        command = [self.program, "-i", "-f", self._sender, "--", *self._to]
+        command = [self.program, "-i", "-f", self._sender, "--", self._to]
         data = build_mail(notice, self._envelope).as_bytes(policy=SMTP.clone(linesep="\n"))
         try:
             done = subprocess.run(command, input=data, capture_output=True, timeout=self._timeout, check=False)
@@ -50,7 +49,7 @@ class SendmailTransport:
             raise DeliveryError(
                 f"{self.program} ended with {done.returncode}: {said}", permanent=done.returncode in _PERMANENT_EXITS
             )
-        return ", ".join(self._to)
+        return self._to
 
 
 def find_sendmail(given: str) -> str | None:

@@ -40,30 +40,28 @@ class SmtpTransport:
 
     Args:
         server: where.
-        envelope: who to tell.
+        envelope: who to tell; one recipient, as SMTP answers for each of several by itself.
     """
 
     name = "smtp"
 
     def __init__(self, server: SmtpServer, envelope: Envelope) -> None:
         self._server, self._envelope = server, envelope
-        self._sender = envelope.sender.addr_spec
-        self._to = [address.addr_spec for address in envelope.to]
+        self._sender, self._to = envelope.sender.addr_spec, envelope.recipient
         self._where = f"{server.host}:{server.port}"
 
     def describe(self) -> str:
         """Where its mails go."""
-        return f"{', '.join(self._to)} through the mail server {self._where}"
+        return f"{self._to} through the mail server {self._where}"
 
     def send(self, notice: Notice) -> str:
         """Send the mail."""
         try:
-            refused = self._send(notice)
+            self._send(notice)
         except smtplib.SMTPRecipientsRefused as err:
-            code, text = next(iter(err.recipients.values()))
-            raise DeliveryError(
-                f"{self._where} refused every recipient: {_said(code, text)}", permanent=code >= 500, answered=True
-            ) from err
+            code, text = err.recipients[self._to]
+            problem = f"{self._where} refused the recipient {self._to}: {_said(code, text)}"
+            raise DeliveryError(problem, permanent=code >= 500, answered=True) from err
         except smtplib.SMTPAuthenticationError as err:
             raise DeliveryError(f"{self._where} refused the login: {_said(err.smtp_code, err.smtp_error)}") from err
         except (smtplib.SMTPSenderRefused, smtplib.SMTPDataError) as err:
@@ -73,23 +71,19 @@ class SmtpTransport:
         except (OSError, smtplib.SMTPException, ValueError) as err:
             problem = explain(err, self._where, self._server.timeout)
             raise DeliveryError(f"the mail server {self._where} cannot be used: {problem}") from err
-        if refused:
-            taken = ", ".join(address for address in self._to if address not in refused)
-            return f"{taken} (refused: {', '.join(refused)})"
-        return ", ".join(self._to)
+        return self._to
 
-    def _send(self, notice: Notice) -> dict[str, tuple[int, bytes]]:
+    def _send(self, notice: Notice) -> None:
         mail = build_mail(notice, self._envelope)
         server = self._client()
         with Deadline(WHOLE_EXCHANGE * self._server.timeout, lambda: server.sock):
             try:
                 self._greet(server)
-                refused = server.send_message(mail, from_addr=self._sender, to_addrs=self._to)
-            except (OSError, smtplib.SMTPException):
+                server.send_message(mail, from_addr=self._sender, to_addrs=[self._to])
+            except (OSError, smtplib.SMTPException, ValueError):
                 server.close()
                 raise
         _hang_up(server)
-        return refused
 
     def _client(self) -> smtplib.SMTP:
         name = self._envelope.sender.domain or "localhost"  # smtplib itself would ask the DNS for ours

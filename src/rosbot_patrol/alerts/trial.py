@@ -20,7 +20,7 @@ _WHAT_TO_DO = {
     "STARTTLS": "The server offers no encryption on this port: try security: tls with port 465, or another server.",
     "refused the login": "Look at user and password; many providers want a password for applications.",
     "no answer within": "A firewall or a wrong port keeps silent like this; providers often block port 25, try 587.",
-    "refused every recipient": "Look at the recipients' addresses.",
+    "refused the recipient": "Look at the recipient's address.",
     "redirects are not followed": "Name the address that the server redirects to.",
     "answered 401": "The address wants a token, or another one: token_file.",
     "answered 403": "The server does not take the signature or the token: look at secret_file and token_file.",

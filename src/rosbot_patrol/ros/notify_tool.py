@@ -142,10 +142,10 @@ def _channels(options: argparse.Namespace, folder: Path, around: Surroundings) -
         print(f"Channels {source}.")
         channels = make_channels(known[0].mail if known else MailParams(), around)
     if options.channel:
-        names = [channel.name for channel in channels]
+        names = sorted({name for channel in channels for name in channel.names})
         if options.channel not in names:
             raise ParamError("--channel", unknown_name(options.channel, names))
-        channels = [channel for channel in channels if channel.name == options.channel]
+        channels = [channel for channel in channels if options.channel in channel.names]
     return channels
 
 
@@ -155,7 +155,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     what.add_argument("--test", action="store_true", help="send a test notice through each channel")
     what.add_argument("--list", action="store_true", help="what waits, and why")
     what.add_argument("--flush", action="store_true", help="try all that waits now")
-    parser.add_argument("--channel", default="", help="this one only")
+    parser.add_argument("--channel", default="", help="this one only; with NAME:ADDRESS one of its recipients")
     parser.add_argument("--config", default="", help="channels of this file instead of those of the robot's nodes")
     parser.add_argument("--state-dir", default="", help="the nodes' state_dir; rosbot_patrol in ROS's home")
     return parser.parse_args(arguments)
@@ -169,7 +169,8 @@ def _told_channels(told: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _channel_line(channel: Mapping[str, Any], age: float) -> str:
     line = f"{channel.get('name')}: {channel.get('describe')}"
     if not channel.get("waiting"):
-        return f"{line}: took all"
+        refusal = channel.get("refusal")
+        return f"{line}: refused the last notice for good: {refusal}" if refusal else f"{line}: took all"
     line += f": {channel['waiting']} wait since {_when(channel.get('since') or 0.0)}"
     if channel.get("error"):
         line += f", because {channel['error']}"

@@ -165,14 +165,18 @@ class OwnerPost:
     def _look_on(self) -> None:
         """Another program delivers: hear what it delivered."""
         for receipt in self._postman.receipts.read_new():
+            became = f"refused for good by '{receipt.channel}': {receipt.refused}"
+            if not receipt.refused:
+                became = f"delivered by {receipt.transport}: {receipt.where}"
             self._tell(
                 Delivery(
                     channel=receipt.channel,
                     transport=receipt.transport,
                     ids=receipt.ids,
-                    delivered=True,
+                    delivered=not receipt.refused,
+                    permanent=bool(receipt.refused),
                     where=receipt.where,
-                    text=f"notice {', '.join(receipt.ids)} delivered by {receipt.transport}: {receipt.where}",
+                    text=f"notice {', '.join(receipt.ids)} {became}",
                 )
             )
 

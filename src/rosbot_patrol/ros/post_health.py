@@ -53,7 +53,7 @@ class PostHealth:
             level, text = judge(status)
             self._set(status.name, level, text, {"waiting": status.waiting, "refused": status.refused})
         self._outbox_is(f"{self._who} delivers")
-        state: list[object] = [(s.name, s.waiting, s.since, s.refused, s.error) for s in statuses]
+        state: list[object] = [(s.name, s.waiting, s.since, s.refused, s.error, s.refusal) for s in statuses]
         if state != self._status or time.monotonic() - self._written >= STATUS:
             self._postman.write_status()
             self._status, self._written = state, time.monotonic()
@@ -84,6 +84,8 @@ class PostHealth:
 
 def judge(status: ChannelStatus) -> tuple[int, str]:
     """Level and sentence about a channel for /diagnostics."""
+    if not status.waiting and status.refusal:
+        return WARN, f"the last notice was refused for good: {status.refusal}"
     if not status.waiting:
         return OK, f"notices go to {status.describe}"
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(status.since))

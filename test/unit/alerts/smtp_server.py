@@ -2,13 +2,18 @@
 
 import socket
 import threading
+from email import message_from_bytes
 
 
 class SmtpServer:
-    """`replies` maps a verb (EHLO, MAIL, RCPT, DATA, ".", QUIT) to another reply; None closes the connection."""
+    """`replies` maps a verb (EHLO, MAIL, RCPT, DATA, ".", QUIT) to another reply; None closes the connection.
 
-    def __init__(self, replies=None, silent=False, port=0):
-        self.replies = replies or {}
+    `recipients` maps an address to what RCPT is answered for it, one after the other; the last stays.
+    """
+
+    def __init__(self, replies=None, silent=False, port=0, recipients=None):
+        self.replies, self.recipients = replies or {}, {to: list(said) for to, said in (recipients or {}).items()}
+        self.asked = []  # addresses of RCPT
         self.silent = silent
         self.mails, self.verbs = [], []
         self._socket = socket.create_server(("localhost", port))
@@ -40,6 +45,24 @@ class SmtpServer:
             except (OSError, ValueError):
                 return
 
+    @property
+    def took(self):
+        """(recipient, Message-ID) of each mail."""
+        return [
+            (line[line.index("<") + 1 : line.index(">")], message_from_bytes(data)["Message-ID"])
+            for envelope, data in self.mails
+            for line in envelope
+            if line.lower().startswith("rcpt")
+        ]
+
+    def _to(self, line):
+        address = line[line.index("<") + 1 : line.index(">")]
+        self.asked.append(address)
+        said = self.recipients.get(address)
+        if not said:
+            return self.replies.get("RCPT", "250 ok")
+        return said.pop(0) if len(said) > 1 else said[0]
+
     def _dialogue(self, stream):
         def say(verb, default):
             reply = self.replies.get(verb, default)
@@ -67,6 +90,17 @@ class SmtpServer:
                     self.mails.append((envelope, b"".join(lines)))
                 envelope = []
                 continue
-            if verb in ("MAIL", "RCPT"):
-                envelope.append(line.decode().strip())
+            if verb == "RCPT":
+                reply = self._to(line.decode())
+                if reply is None:
+                    raise OSError
+                stream.write(reply.encode() + b"\r\n")
+                stream.flush()
+                if reply.startswith("421"):
+                    raise OSError
+                if reply.startswith("2"):
+                    envelope.append(line.decode().strip())
+                continue
+            if verb == "MAIL":
+                envelope = [line.decode().strip()]
             say(verb, "221 bye" if verb == "QUIT" else "250 ok")

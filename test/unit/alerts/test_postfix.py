@@ -9,8 +9,11 @@ import pytest
 from postfix_instance import Postfix, why_not
 
 from rosbot_patrol.alerts.channel import DeliveryError
+from rosbot_patrol.alerts.channels import MailParams, Surroundings, make_channels
 from rosbot_patrol.alerts.mail import make_envelope
 from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.postman import Postman
 from rosbot_patrol.alerts.sendmail import SendmailTransport
 from rosbot_patrol.alerts.smtp import SmtpServer, SmtpTransport
 
@@ -92,6 +95,28 @@ def test_nothing_in_a_notice_or_parameter_injects(postfix):
 
 def test_a_user_that_is_not_there_is_refused_for_good(postfix):
     envelope = make_envelope("no.such.user@house.test", "robot@house.test")
-    with pytest.raises(DeliveryError, match=r"refused every recipient: 550 .*User unknown") as caught:
+    with pytest.raises(DeliveryError, match=r"refused the recipient no.such.user@.*: 550 .*User unknown") as caught:
         SmtpTransport(SmtpServer(host="127.0.0.1", port=postfix.port), envelope).send(told("x"))
     assert caught.value.permanent
+
+
+def test_one_of_two_users_that_is_not_there_costs_the_other_nothing(postfix, tmp_path):
+    before = len(mails(postfix, 0))
+    params = MailParams(
+        transport="smtp",
+        email_to=f"no.such.user@house.test, {USER}@house.test",
+        smtp_host="127.0.0.1",
+        smtp_port=postfix.port,
+        mail_interval=0.0,
+    )
+    post = Postman(Outbox(tmp_path), make_channels(params, Surroundings(home=tmp_path, environ={})))
+    post.outbox.put(told("two-users"))
+    assert post.take_over()
+    for name in post.channels:
+        post.deliver(name)
+    post.refresh()
+    found = [mail["Message-ID"] for mail in mails(postfix, before + 1)]
+    assert found.count("<two-users@localhost>") == 1
+    assert "User unknown" in post.statuses()[0].refusal
+    assert [entry.id for entry in post.outbox.waiting() if entry.kind == "incident"] == []
+    post.hand_over()
