@@ -134,8 +134,8 @@ class Clip:
         return pictures
 
     def is_over(self, ring: EvidenceRing) -> bool:
-        """Whether nothing more can come."""
-        return ring.newest is None or ring.newest.stamp >= self.until
+        """Whether nothing more can come: it is complete, or the clock was set back."""
+        return ring.newest is None or not self.taken <= ring.newest.stamp < self.until
 
 
 @dataclass(frozen=True, kw_only=True)

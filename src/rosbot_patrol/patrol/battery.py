@@ -74,11 +74,11 @@ class BatteryWatch:
         """Look at the battery; whether `is_low` has changed.
 
         Args:
-            now: time [s], of the clock of `battery.at`.
+            now: steady time [s], as `battery.at`.
             battery: what it last said.
         """
         was_low = self.is_low
-        if battery is None or abs(now - battery.at) > self._params.battery_timeout:
+        if battery is None or now - battery.at > self._params.battery_timeout:
             self.is_low = False
             self.text = "the battery was low and is silent now" if was_low else ""
         else:

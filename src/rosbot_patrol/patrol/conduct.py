@@ -81,15 +81,14 @@ class Conduct:
         self._homes = 0
         self._report: Report | None = None
         self._inputs = Inputs()
-        self._now = 0.0
 
     # -- its phases
 
     def _start(self, inputs: Inputs, phase: Phase) -> None:
         assert self.mission is not None
-        self.mission.started = self._now
-        self._watch.start(self._now)
-        self._suspects.start(self._now)
+        self.mission.started = self._clock.time
+        self._watch.start(self._clock.time)
+        self._suspects.start(self._clock.time)
         self._close_ups.start()
         self._track.reset()
         self._is_tracking = False
@@ -141,7 +140,7 @@ class Conduct:
         if step.waiting:
             self._say(out, Phase.STARTING if there else Phase.RETURNING, f"waiting for move_base to drive to {where}")
         elif step.reached and there:
-            mission.arrived = self._now
+            mission.arrived = self._clock.time
             out.changed = True
             self._enter(Phase.LOOKING, inputs)
             self._say(out, Phase.LOOKING, f"arrived in {mission.room.title}")
@@ -158,7 +157,7 @@ class Conduct:
         mission, look = self.mission, self._look
         assert mission is not None
         assert look is not None
-        candidate = mission.sightings == 0 and self._watch.candidate(self._now)
+        candidate = mission.sightings == 0 and self._watch.candidate(self._clock.time)
         step = look.step(self._clock.time, inputs, candidate=candidate)
         out.speed, out.goal = step.speed, step.goal
         out.cancel |= step.cancel
@@ -166,7 +165,7 @@ class Conduct:
         if not step.done:
             self._say(out, Phase.LOOKING, f"{step.why}, in {mission.room.title}")
             return
-        mission.looked = self._now
+        mission.looked = self._clock.time
         problem = step.problem or self._views.blind()
         if problem:
             moved = self._views.moved()

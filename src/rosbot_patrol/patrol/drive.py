@@ -68,12 +68,12 @@ class Drive:
 
     def step(self, now: float, link: GoalLink, pose: Pose2D | None) -> DriveStep:
         """Look at the goal's state, and decide."""
-        passed = 0.0 if self._last is None else max(now - self._last, 0.0)
+        passed = 0.0 if self._last is None else now - self._last
         self._last = now
         if not link.is_up:
             return self._wait(passed)
         if self._retry_at is not None:
-            if self._retry_at - self.params.retry_delay <= now < self._retry_at:
+            if now < self._retry_at:
                 return DriveStep()
             self._retry_at = None
         if not self._tag:

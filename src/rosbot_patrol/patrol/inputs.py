@@ -145,6 +145,7 @@ class Frame:
         eye: the camera then, None where its place or its lens is not known.
         counts: False where its boxes could not be measured yet, so that they prove nothing.
         is_same: its picture is the one before, byte for byte: the camera hangs, or has no noise and the room is still.
+        picture: stamp by which the camera's picture is found again [s], None where that is `stamp`.
     """
 
     stamp: float | None = None
@@ -152,6 +153,7 @@ class Frame:
     eye: Eye | None = None
     counts: bool = True
     is_same: bool = False
+    picture: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,7 +205,7 @@ class Guarded:
 
 @dataclass(frozen=True, kw_only=True)
 class Inputs:
-    """One step's inputs.
+    """One step's inputs; stamps and times [s] are of the clock of the step's `now`.
 
     Attributes:
         wall: seconds since 1970, for ids and records only.

@@ -91,7 +91,7 @@ class Look:
             candidate: something is in view that may become an intruder.
             held: another has the wheels for now: measure what it turns, and wait.
         """
-        if self._began is None or now < self._began - 1.0:
+        if self._began is None:
             self._began = now
         if self._turned_at is not None:
             self._turned_at = now if held else self._turned_at
@@ -140,7 +140,7 @@ class Look:
         assert self._turned_at is not None
         self._note_blindness(now, inputs)
         waited = now - self._turned_at
-        done = waited >= self.params.linger or waited < 0.0
+        done = waited >= self.params.linger
         problem = self._problem or self._stuck
         is_stuck = bool(self._stuck) and not self._problem
         return LookStep(done=done, problem=problem, is_stuck=is_stuck, why="waiting for the detector's last pictures")

@@ -27,7 +27,7 @@ class Lookout(Conduct):
         self._close_ups.add_pets(self._views.harmless())
         for given in inputs.frames:
             frame = self._leave_out_close_ups(given)
-            for seen in self._watch.add(self._now, frame):
+            for seen in self._watch.add(self._clock.time, frame):
                 self._suspects.told(seen.measured)
                 self._note(mission, seen, inputs, out)
             for seen in self._weigh(frame):
@@ -42,14 +42,14 @@ class Lookout(Conduct):
             return frame
         boxes, is_left = self._close_ups.sort(frame.stamp, frame.boxes, frame.eye)
         if is_left:
-            self._watch.glimpse(self._now)
+            self._watch.glimpse(self._clock.time)
         return dataclasses.replace(frame, boxes=boxes)
 
     def _weigh(self, frame: Frame) -> tuple[Confirmation, ...]:
         """Weak sights are gathered by place."""
         if not frame.counts or frame.stamp is None or frame.eye is None:
             return ()
-        return self._suspects.add(frame.stamp, frame.eye.pose, self._watch.plausible(frame))
+        return self._suspects.add(frame.stamp, frame.eye.pose, self._watch.plausible(frame), frame.picture)
 
     def _note(self, mission: Mission, seen: Confirmation, inputs: Inputs, out: Commands) -> None:
         """Somebody was confirmed."""
@@ -92,7 +92,7 @@ class Lookout(Conduct):
 
     def _point_at(self, frame: Frame, inputs: Inputs) -> None:
         boxes = self._watch.plausible(frame)
-        if not boxes or (self._watch.lately(self._now) < 2 and not self._track.is_on):
+        if not boxes or (self._watch.lately(self._clock.time) < 2 and not self._track.is_on):
             return  # a single picture stops no drive
         if frame.eye is None:
             return

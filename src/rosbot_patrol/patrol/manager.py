@@ -13,7 +13,7 @@ Differs (CONTRACTS, Settled 4 to 8; A0, quirks):
   the battery or the emergency stop ended it, or a person did.
 - A mission gives one notice, at its first confirmation, and one more for each further person elsewhere (`people`).
 - While a person is in view the robot stops and keeps the camera on them, for a bounded time (`track`).
-- Times are bounded in steady time: a clock that is set ends no drive and no turn.
+- All times and stamps of a mission are steady (`steady`): a clock that is set ends nothing and loses no evidence.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from rosbot_patrol.patrol import recall
 from rosbot_patrol.patrol.battery import BatteryWatch
 from rosbot_patrol.patrol.commands import Commands, Word
 from rosbot_patrol.patrol.conduct import Viewpoints
-from rosbot_patrol.patrol.inputs import Inputs
+from rosbot_patrol.patrol.inputs import Frame, Inputs, ScanView
 from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.orders import Ordered
@@ -65,7 +65,9 @@ class PatrolManager(Ordered):
         super().__init__(
             rooms, params or ManagerParams(), needs_camera=needs_camera, views=views, viewpoints=viewpoints, judge=judge
         )
-        self._heard = {name: Heard() for name in ("detector_at", "camera_at", "camera_changed_at")}
+        self._heard = {name: Heard(self._clock) for name in ("detector_at", "camera_at", "camera_changed_at")}
+        self._battery_heard = Heard(self._clock)
+        self._scan: tuple[ScanView, ScanView] | None = None  # as it came, and in steady time
         self._battery = BatteryWatch(self.params.battery)
         self._same_pictures = SamePictures()
         self._homes_tried = 0
@@ -115,10 +117,10 @@ class PatrolManager(Ordered):
             now: time [s]; may stand still, go back or jump.
             inputs: since the last step.
         """
-        out, self._pending, self._now = self._pending, Commands(), now
-        passed = self._pass_time(now, inputs)
+        out, self._pending = self._pending, Commands()
+        passed = self._pass_time(now)
         inputs = dataclasses.replace(inputs, frames=self._same_pictures.left(inputs.frames))
-        inputs = self._inputs = self._in_steady_time(now, inputs)
+        inputs = self._inputs = self._in_steady_time(inputs)
         time = self._clock.time
         self._own_motion.see(time, inputs.pose, awake=not self._is_blind(inputs))
         self._release(inputs, out)
@@ -150,19 +152,34 @@ class PatrolManager(Ordered):
             self._step_drive(inputs, out)
         return out
 
-    def _pass_time(self, now: float, inputs: Inputs) -> float:
+    def _pass_time(self, now: float) -> float:
         passed = self._clock.step(now)
         if self._clock.jump:
             direction = "back" if self._clock.jump < 0.0 else "forward"
             log.warning("time went %s by %.1f s", direction, abs(self._clock.jump))
-            self._watch.start(now)
         return passed
 
-    def _in_steady_time(self, now: float, inputs: Inputs) -> Inputs:
-        steady: dict[str, Any] = {
-            name: heard.steady(getattr(inputs, name), now, self._clock.time) for name, heard in self._heard.items()
-        }
+    def _in_steady_time(self, inputs: Inputs) -> Inputs:
+        """The inputs, with every stamp in steady time: the only place that knows of another."""
+        steady: dict[str, Any] = {name: heard.steady(getattr(inputs, name)) for name, heard in self._heard.items()}
+        steady["frames"] = tuple(self._steady_frame(frame) for frame in inputs.frames)
+        if inputs.battery is not None:
+            at = self._battery_heard.steady(inputs.battery.at)
+            steady["battery"] = dataclasses.replace(inputs.battery, at=at)
+        if inputs.scan is not None:
+            steady["scan"] = self._steady_scan(inputs.scan)
         return dataclasses.replace(inputs, **steady)
+
+    def _steady_scan(self, view: ScanView) -> ScanView:
+        if self._scan is None or self._scan[0] is not view:
+            scan = dataclasses.replace(view.scan, stamp=self._clock.steady(view.scan.stamp))
+            self._scan = view, dataclasses.replace(view, scan=scan)
+        return self._scan[1]
+
+    def _steady_frame(self, frame: Frame) -> Frame:
+        if frame.stamp is None:
+            return dataclasses.replace(frame, picture=self._clock.now)
+        return dataclasses.replace(frame, stamp=self._clock.steady(frame.stamp), picture=frame.stamp)
 
     def _is_blind(self, inputs: Inputs) -> bool:
         look = self.params.look
@@ -170,7 +187,7 @@ class PatrolManager(Ordered):
         return silent or (self._parts.needs_camera and self._clock.time - inputs.camera_at > look.camera_timeout)
 
     def _take(self, inputs: Inputs, out: Commands) -> None:
-        watching = self._watch.candidate(self._now)
+        watching = self._watch.candidate(self._clock.time)
         taken = self._intake.take(self._clock.time, inputs, self.mission, has_candidate=watching)
         out.changed |= taken.changed
         out.ignored += taken.ignored
@@ -252,7 +269,7 @@ class PatrolManager(Ordered):
     # -- what ends a mission early
 
     def _mind_the_battery(self, inputs: Inputs, out: Commands) -> None:
-        if self._battery.step(self._now, inputs.battery):
+        if self._battery.step(self._clock.time, inputs.battery):
             low = self._battery.is_low
             text = f"the battery is low ({self._battery.text}): the robot goes home and waits there"
             text = text if low else f"the battery is no longer low ({self._battery.text})"

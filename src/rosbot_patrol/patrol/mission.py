@@ -45,7 +45,7 @@ class Mission:
         origin: what called for it; priority: greater goes first; called: when, in seconds since 1970; note: by whom,
             for people.
         phase: DRIVING, LOOKING or RETURNING.
-        started: [s]; arrived, looked: end of the drive and of the look [s], None before.
+        started: steady time [s]; arrived, looked: end of the drive and of the look likewise, None before.
         wall: start in seconds since 1970.
         verdict: None until there is one; reason: of it, one sentence.
         notified: its one notice is on disk.

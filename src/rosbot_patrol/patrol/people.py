@@ -88,7 +88,7 @@ class People:
         p = self.params
         if person.x is None or person.y is None:
             return 0.0
-        walked = min(p.walking_speed * max(now - person.at, 0.0), p.walked_most)
+        walked = min(p.walking_speed * (now - person.at), p.walked_most)
         return _apart(person, measured) - p.same_person - walked - min(measured.error, 1.0) - min(person.error, 1.0)
 
 

@@ -83,11 +83,11 @@ class Spin:
             clearance: nearest obstacle [m], None where nothing tells.
             hold: stand still for now, without counting the time.
         """
-        passed = 0.0 if self._last is None else max(now - self._last, 0.0)
+        passed = 0.0 if self._last is None else now - self._last
         self._last = now
         self._measure(yaw)
         if self._settling is not None:
-            return SpinStep(speed=0.0, done=now - self._settling >= self.params.spin_settle or now < self._settling)
+            return SpinStep(speed=0.0, done=now - self._settling >= self.params.spin_settle)
         if hold:
             return SpinStep(speed=0.0)
         obstacle = self._obstacle(yaw, clearance)

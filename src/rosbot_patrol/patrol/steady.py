@@ -1,56 +1,102 @@
-"""A clock that only goes forward, made from one that may be set: an hour forward or back is no time that has passed."""
+"""A clock that only goes forward, made from one that may be set, and the stamps of that one in its time.
+
+All evidence of a mission lives in steady time: `manager` converts every stamp once, as it comes in, and no other part
+of the patrol knows that a clock can be set. Until the clock is set for the first time both times are the same.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import deque
+from dataclasses import dataclass
 
 LONGEST_STEP = 5.0  # [s] between two steps; more is a clock that was set, or a program that was held
 BACKWARDS = 1.0  # [s]; less is two machines' disagreement
+_PAUSE = 1.0  # [s] a longer step is this program's own pause: what it heard just before does not age by it
+_LATE = 1.0  # [s] what came since the last step is not older than this, whatever its stamp says
+_PERIODS = 20  # settings of the clock that are remembered
+_AGE_COUNTS = 0.1  # a slow detector is likelier than a picture from the future
+
+
+@dataclass(frozen=True)
+class _Period:
+    """A time without a setting of the clock: steady time is clock time less `ahead`, from `since` on [s]."""
+
+    ahead: float
+    since: float
 
 
 class SteadyClock:
-    """Adds up the time between steps.
+    """Time without what the clock was set by.
 
     Attributes:
-        time: since the first step [s].
-        jump: by how much the clock was set just now [s], 0 where it was not.
+        time: steady time [s]: the clock's at the first step, and what has passed since.
+        passed: in the last step [s].
+        jump: by how much the clock was set in the last step [s], 0 where it was not.
     """
 
     def __init__(self) -> None:
         self.time = 0.0
+        self.passed = 0.0
         self.jump = 0.0
-        self._last: float | None = None
+        self.now = 0.0
+        self._has_begun = False
+        self._periods: deque[_Period] = deque([_Period(ahead=0.0, since=-math.inf)], maxlen=_PERIODS)
 
     def step(self, now: float) -> float:
         """Go on to `now` [s]; returns how much time has passed."""
-        gap = 0.0 if self._last is None else now - self._last
-        self._last = now
-        self.jump = gap if not -BACKWARDS <= gap <= LONGEST_STEP else 0.0
-        passed = 0.0 if self.jump else max(gap, 0.0)
-        self.time += passed
-        return passed
+        if not self._has_begun:
+            self._has_begun, self.now, self.time = True, now, now
+        gap, self.now = now - self.now, now
+        self.jump = 0.0 if -BACKWARDS <= gap <= LONGEST_STEP else gap
+        if 0.0 <= gap <= LONGEST_STEP:
+            self.passed = gap
+        else:  # the clock was set: take it that this step was as long as the one before
+            ahead = self._periods[-1].ahead + gap - self.passed
+            self._periods.append(_Period(ahead=ahead, since=self.time))
+        self.time = max(self.time, now - self._periods[-1].ahead)
+        return self.passed
+
+    def steady(self, stamp: float) -> float:
+        """A stamp of the clock, of about now, in steady time [s].
+
+        After the clock was set, a stamp may be of the clock as it is, or as it was before: what was on its way then.
+        The reading that disagrees least with the period that it supposes is taken.
+        """
+        if len(self._periods) == 1 or not math.isfinite(stamp):
+            return stamp
+        best, least, until = stamp, math.inf, self.time
+        for period in reversed(self._periods):
+            reading = stamp - period.ahead
+            outside = max(period.since - reading, reading - until, 0.0)
+            doubt = outside + _AGE_COUNTS * max(self.time - reading, 0.0)
+            if doubt < least:
+                best, least = reading, doubt
+            until = period.since
+        return min(best, self.time)
 
 
 class Heard:
-    """When something was heard last, in the time of a `SteadyClock`, from stamps of the clock that may be set."""
+    """When something was heard last, in steady time.
 
-    def __init__(self) -> None:
+    Args:
+        clock: stepped before each `steady`.
+    """
+
+    def __init__(self, clock: SteadyClock) -> None:
+        self._clock = clock
         self._raw: float | None = None
         self._at = -math.inf
 
-    def steady(self, raw: float, now: float, steady_now: float) -> float:
-        """The stamp in steady time.
-
-        Args:
-            raw: stamp of the newest [s]; infinite ones are handed back.
-            now: by the same clock [s].
-            steady_now: by the steady one [s].
-        """
+    def steady(self, raw: float) -> float:
+        """The stamp of the newest in steady time [s]; to be asked once a step. Infinite stamps are handed back."""
         if not math.isfinite(raw):
             return raw
-        if raw != self._raw:
-            age = max(now - raw, 0.0)
-            # What came since the last step is not older than that, whatever the stamps say.
-            self._at = steady_now - (age if self._raw is None else min(age, 1.0))
-            self._raw = raw
+        if raw == self._raw:
+            if self._clock.passed > _PAUSE:
+                self._at += self._clock.passed
+            return self._at
+        age = max(self._clock.now - raw, 0.0)
+        self._at = self._clock.time - (age if self._raw is None else min(age, _LATE))
+        self._raw = raw
         return self._at

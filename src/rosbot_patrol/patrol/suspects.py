@@ -76,8 +76,8 @@ class Suspect:
     Attributes:
         label: class of object; x, y: place in map [m]; weight: of all that told it.
         sides: from where it was seen.
-        best: the surest box; stamp: of its picture [s]; boxes: all of that picture.
-        seen_at: stamp of the last picture that showed it [s].
+        best: the surest box; picture: the camera's stamp of its picture [s]; boxes: all of that picture.
+        seen_at: when the last picture that showed it was taken [s].
         is_told: it was confirmed; is_grave: from one side it looks like a person, or a little so for long.
     """
 
@@ -86,7 +86,7 @@ class Suspect:
     y: float
     weight: float
     best: Box
-    stamp: float
+    picture: float
     boxes: tuple[Box, ...]
     seen_at: float = -math.inf
     sides: list[Side] = field(default_factory=list)
@@ -119,13 +119,16 @@ class Suspects:
         """Forget all, for a new mission; pictures taken before `now` do not count from here on."""
         self.all, self._newest = [], now
 
-    def add(self, stamp: float, eye: Pose2D, boxes: Iterable[Box]) -> tuple[Confirmation, ...]:
+    def add(
+        self, stamp: float, eye: Pose2D, boxes: Iterable[Box], picture: float | None = None
+    ) -> tuple[Confirmation, ...]:
         """Take the boxes of one picture that may show an intruder; a confirmation for each that has become one.
 
         Args:
-            stamp: of the picture [s].
+            stamp: when the picture was taken [s].
             eye: the camera in map.
             boxes: of the classes that alarm, none of them refused.
+            picture: the camera's own stamp of it [s], None where that is `stamp`.
         """
         if stamp <= self._newest:
             return ()
@@ -135,7 +138,7 @@ class Suspects:
             m = box.measured
             if m is None or m.error > self.params.weak_error:
                 continue
-            suspect = self._take(box, m, stamp, boxes)
+            suspect = self._take(box, m, stamp if picture is None else picture, boxes)
             suspect.seen_at = stamp
             side = self._side(suspect, eye)
             side.scores.append(box.probability)
@@ -157,18 +160,18 @@ class Suspects:
         least = self.params.doubt_pictures
         return [s for s in self.all if not s.is_told and any(len(side.scores) >= least for side in s.sides)]
 
-    def _take(self, box: Box, m: Measured, stamp: float, boxes: tuple[Box, ...]) -> Suspect:
+    def _take(self, box: Box, m: Measured, picture: float, boxes: tuple[Box, ...]) -> Suspect:
         near = [s for s in self.all if s.label == box.label and s.apart(m.x, m.y) <= self.params.weak_apart]
         weight = (_PART if m.is_cut_aside else 1.0) / max(m.error, 0.05) ** 2
         if not near:
-            self.all.append(Suspect(box.label, m.x, m.y, weight, box, stamp, boxes))
+            self.all.append(Suspect(box.label, m.x, m.y, weight, box, picture, boxes))
             return self.all[-1]
         suspect = min(near, key=lambda s: s.apart(m.x, m.y))
         suspect.weight += weight
         suspect.x += (m.x - suspect.x) * weight / suspect.weight
         suspect.y += (m.y - suspect.y) * weight / suspect.weight
         if box.probability > suspect.best.probability:
-            suspect.best, suspect.stamp, suspect.boxes = box, stamp, boxes
+            suspect.best, suspect.picture, suspect.boxes = box, picture, boxes
         return suspect
 
     def _side(self, suspect: Suspect, eye: Pose2D) -> Side:
@@ -196,7 +199,7 @@ class Suspects:
         return Confirmation(
             label=suspect.label,
             probability=statistics.median_low(scores),
-            stamp=suspect.stamp,
+            stamp=suspect.picture,
             boxes=(suspect.best, *others),
             pictures=len(scores),
             measured=suspect.best.measured,

@@ -60,7 +60,7 @@ class Track:
         if self.params.track_time <= 0.0 or now < self._free_at or yaw is None:
             return
         if self._since is None:
-            if not 0.0 <= now - self._seen_at <= self.params.track_pause:
+            if now - self._seen_at > self.params.track_pause:
                 self._spent = 0.0
             self._since = now
         self._seen_at, self._yaw = now, yaw + bearing
@@ -69,9 +69,6 @@ class Track:
         """Turning speed that keeps the person in view [rad/s], None where there is nobody to keep."""
         p = self.params
         if self._since is None or self._yaw is None:
-            return None
-        if now < self._since - 1.0:  # another clock
-            self.reset()
             return None
         held = self._spent + now - self._since
         if held > p.track_time:

@@ -52,7 +52,7 @@ class Confirmation:
     Attributes:
         label: its class.
         probability: median over the pictures that show it.
-        stamp: of the picture that shows it best [s].
+        stamp: the camera's, of the picture that shows it best [s].
         boxes: alarm boxes in that picture, the best first.
         pictures: how many showed it.
         measured: its place and size as they were last measured well, None where nothing tells.
@@ -110,7 +110,8 @@ class Watch:
         boxes = [box for box in frame.boxes if self._is_likely(box)]
         refusals = {box: self.judge.refusal(box) for box in boxes}
         self.refusals.update(why for why in refusals.values() if why)
-        view = _View(arrived=now, stamp=stamp, boxes=tuple(box for box in boxes if not refusals[box]))
+        picture = stamp if frame.picture is None else frame.picture
+        view = _View(arrived=now, stamp=stamp, picture=picture, boxes=tuple(box for box in boxes if not refusals[box]))
         self._views.append(view)
         while now - self._views[0].arrived > self.params.max_age:
             self._views.popleft()
@@ -127,7 +128,7 @@ class Watch:
     def candidate(self, now: float, recent: float = 0.6) -> bool:
         """Whether a picture that came lately shows something that may become an intruder."""
         seen = [view.arrived for view in self._views if view.boxes]
-        return any(abs(now - at) <= recent for at in (*seen, *self._glimpses))
+        return any(now - at <= recent for at in (*seen, *self._glimpses))
 
     def plausible(self, frame: Frame) -> list[Box]:
         """Boxes of a picture that may show an intruder, the surest first."""
@@ -137,7 +138,7 @@ class Watch:
     def lately(self, now: float, recent: float = 3.0) -> int:
         """How many of the last three pictures, if they came lately, show something that may become an intruder."""
         seen = [view.arrived for view in list(self._views)[-3:] if view.boxes]
-        return sum(abs(now - at) <= recent for at in (*seen, *self._glimpses))
+        return sum(now - at <= recent for at in (*seen, *self._glimpses))
 
     def _is_likely(self, box: Box) -> bool:
         if box.label not in self._classes or not 0.0 < box.probability <= 1.0:
@@ -172,7 +173,7 @@ class Watch:
             Confirmation(
                 label=best.label,
                 probability=sure,
-                stamp=view.stamp,
+                stamp=view.picture,
                 boxes=(best, *others),
                 pictures=len(shown),
                 measured=measured,
@@ -191,6 +192,7 @@ class Watch:
 class _View:
     arrived: float
     stamp: float
+    picture: float
     boxes: tuple[Box, ...]
 
 

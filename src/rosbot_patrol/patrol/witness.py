@@ -96,9 +96,7 @@ class Witness:
     def see(self, scan: LaserScan, map_from_laser: Pose2D, floor: Floor) -> None:
         """Take a scan; `moved` holds what moved farthest since `start`."""
         p, now = self.params, scan.stamp
-        if now < self._last - 1.0:
-            self.things.clear()
-        elif now < self._last + p.witness_period:
+        if now < self._last + p.witness_period:
             return
         self._last = now
         points = scan_points(scan)

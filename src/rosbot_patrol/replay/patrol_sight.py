@@ -88,7 +88,7 @@ class PatrolSight:
         try:
             pose = self._tree.pose(self._frames.map_frame, scan.frame_id, scan.stamp)
         except TransformError:
-            return self._scan if self._scan is not None and scan.stamp - self._scan.scan.stamp < 0.5 else None
+            return self._scan if self._scan is not None and abs(scan.stamp - self._scan.scan.stamp) < 0.5 else None
         self._scan = ScanView(scan=scan, map_from_laser=pose)
         return self._scan
 

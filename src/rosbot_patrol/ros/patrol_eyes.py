@@ -173,7 +173,9 @@ class PatrolEyes:
         try:
             pose = self._transforms.lookup(self._map_frame, scan.frame_id, scan.stamp)
         except TransformError:
-            return self._scan[1] if self._scan is not None and scan.stamp - self._scan[1].scan.stamp < 0.5 else None
+            return (
+                self._scan[1] if self._scan is not None and abs(scan.stamp - self._scan[1].scan.stamp) < 0.5 else None
+            )
         view = ScanView(scan=scan, map_from_laser=pose)
         self._scan = message, view
         return view

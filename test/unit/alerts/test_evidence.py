@@ -84,6 +84,17 @@ def test_without_pictures_a_clip_is_over_at_once():
     assert Clip.around("a", 1.0, EvidenceParams()).is_over(ring)
 
 
+@pytest.mark.parametrize("by", [60.0, 3600.0])
+def test_a_clip_ends_where_the_clock_is_set_back(by):
+    ring = EvidenceRing(seconds=3.0, rate=5.0, max_bytes=1e9)
+    clip = Clip.around("a", 5000.0, EvidenceParams())
+    fill(ring, 4998.0, 5001.0)
+    assert clip.take(ring)
+    assert not clip.is_over(ring)
+    ring.add(raw(5001.0 - by))
+    assert clip.is_over(ring)
+
+
 def test_the_best_are_sure_large_and_sharp():
     stamps = itertools.count(0.0, 2.0)
 

@@ -7,7 +7,7 @@ from patrol_world import ROOMS, World, looking, phase
 
 from rosbot_patrol.patrol.inputs import GoalLink, GoalState, Guarded
 from rosbot_patrol.patrol.manager import PatrolManager
-from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.mission import Phase, Verdict
 from rosbot_patrol.patrol.queueing import MissionQueue
 from rosbot_patrol.patrol.request import Request, request_to_plain
 from rosbot_patrol.patrol.settings import ManagerParams
@@ -310,13 +310,16 @@ def test_memory_of_a_room_that_is_gone():
     assert manager.queue.rooms == (1,)
 
 
-def test_time_that_goes_back_in_mid_mission_does_not_end_it():
-    world = World()
+@pytest.mark.parametrize("jump", [-80.0, -2.0, 2.0, 3600.0])
+@pytest.mark.parametrize("is_anybody_there", [True, False])
+def test_a_clock_that_is_set_in_mid_mission_changes_no_verdict(jump, is_anybody_there):
+    world = World(person_when=lambda w: is_anybody_there and looking(w) and w.yaw > 4.0)
     world.triggers = [2]
-    world.run(looking)
-    world.now -= 80.0
+    world.run(lambda w: looking(w) and w.yaw > 1.0)
+    world.now += jump
     world.run(lambda w: w.ended)
-    assert world.ended[0].verdict is not None
+    assert world.ended[0].verdict is (Verdict.CONFIRMED if is_anybody_there else Verdict.CLEAR)
+    assert len(world.notices) == is_anybody_there
 
 
 def test_abandon_leaves_nothing_to_go_on_with():

@@ -139,10 +139,3 @@ def test_a_hold_stands_still_and_costs_no_time():
     assert step.problem == ""
     assert base.now > 60
     assert abs(math.degrees(abs(base.turned)) - 360) < 6
-
-
-def test_time_that_goes_back_does_no_harm():
-    spin = Spin(math.tau)
-    spin.step(100.0, 0.0)
-    step = spin.step(1.0, 0.1)
-    assert not step.done

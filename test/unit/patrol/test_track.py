@@ -95,10 +95,3 @@ def test_without_a_heading_it_stands() -> None:
     assert not track.is_on
     track.see(0.0, 1.0, 0.0)
     assert track.step(0.1, None) == 0.0
-
-
-def test_time_that_goes_back_lets_go() -> None:
-    track = Track()
-    track.see(100.0, 1.0, 0.0)
-    assert track.step(3.0, 0.0) is None
-    assert not track.is_on

@@ -58,12 +58,6 @@ def test_a_robot_that_is_lost_tells_nothing() -> None:
     assert witness.moved is None
 
 
-def test_clock_that_goes_back_begins_anew() -> None:
-    witness = play(lambda t: [(3.5, 0.8 + 0.5 * t, 0.12)], seconds=0.4)
-    witness.see(scan_over(FLOOR, Pose2D(2.0, 2.0, 0.0), 1.0, [(3.5, 2.0, 0.12)]), Pose2D(2.0, 2.0, 0.0), FLOOR)
-    assert witness.moved is None
-
-
 def test_points_on_open_floor_are_off_the_map() -> None:
     points = np.array([[2.0, 2.0], [0.55, 2.0], [4.74, 3.5], [-3.0, 1.0]])
     assert off_the_map(FLOOR, points, 0.3).tolist() == [[2.0, 2.0]]
