@@ -18,10 +18,11 @@ import dataclasses
 import difflib
 import logging
 import math
+import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 from rosbot_patrol.errors import ParamError
 
@@ -30,6 +31,8 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _META = "rosbot_patrol.param"
+
+Clamps = Literal["", "both", "above"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -43,6 +46,9 @@ class ParamInfo:
     doc: str = ""
     name: str = ""
     check: Callable[[Any], str | None] | None = None
+    clamps: Clamps = ""
+    ignores_nan: bool = False
+    reads_text: bool = False
 
 
 def param(
@@ -55,6 +61,9 @@ def param(
     doc: str = "",
     name: str = "",
     check: Callable[[Any], str | None] | None = None,
+    clamps: Clamps = "",
+    ignores_nan: bool = False,
+    reads_text: bool = False,
 ) -> Any:
     """Declare one parameter as a dataclass field.
 
@@ -67,8 +76,15 @@ def param(
         doc: one line for the README's table.
         name: upstream's name where it is no Python name or differs from the field's.
         check: returns what is wrong with a value, or None.
+        clamps: which bounds a value beyond them becomes, with a warning, as upstream's dynamic_reconfigure does at
+            start; for the parameters of its .cfg files. "above": less than `lo` is an error, as nothing works there.
+        ignores_nan: NaN becomes the default, with a warning.
+        reads_text: a text that holds a whole number is one, as of Python's int().
     """
-    info = ParamInfo(unit=unit, lo=lo, hi=hi, choices=tuple(choices), doc=doc, name=name, check=check)
+    info = ParamInfo(
+        unit=unit, lo=lo, hi=hi, choices=tuple(choices), doc=doc, name=name, check=check,
+        clamps=clamps, ignores_nan=ignores_nan, reads_text=reads_text,
+    )  # fmt: skip
     metadata = {_META: info}
     if isinstance(default, (list, dict)):
         frozen = default
@@ -97,7 +113,9 @@ def load(cls: type[T], tree: Mapping[str, Any], *, name: str = "~", ignore: Iter
         info: ParamInfo = field.metadata.get(_META, ParamInfo())
         key = info.name or field.name
         known.add(key)
-        if key in tree:
+        if key in tree and info.ignores_nan and _is_nan(tree[key]):
+            log.warning("%s is NaN, its default %s is taken", name + key, field.default)
+        elif key in tree:
             values[field.name] = _convert(hints[field.name], tree[key], info, name + key)
         elif _is_required(field):
             raise ParamError(name + key, f"is missing, expected {_describe(hints[field.name], info)}")
@@ -165,8 +183,28 @@ def _convert(hint: Any, value: Any, info: ParamInfo, name: str) -> Any:
     if dataclasses.is_dataclass(hint):
         return load(hint, value, name=name + "/")  # type: ignore[arg-type]
     value = _typed(hint, value, name, info)
+    if info.clamps:
+        value = _clamped(value, info, name)
     _check_bounds(value, info, name)
     return value
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+def _clamped(value: Any, info: ParamInfo, name: str) -> Any:
+    """The value, or the bound that it lies beyond, which is said."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return value
+    used = value
+    if info.clamps == "both" and info.lo is not None and value < info.lo:
+        used = type(value)(info.lo)
+    if info.hi is not None and value > info.hi:
+        used = type(value)(info.hi)
+    if used != value:
+        log.warning("%s is %s, which is out of bounds: %s is taken", name, value, used)
+    return used
 
 
 def _typed(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
@@ -187,6 +225,8 @@ def _typed(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
         if isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value):
             return float(value)
     elif hint is int:
+        if info.reads_text and isinstance(value, str) and re.fullmatch(r"\s*[-+]?\d+\s*", value):
+            return int(value)
         if isinstance(value, int) and not isinstance(value, bool):
             return value
         if isinstance(value, float) and value.is_integer():

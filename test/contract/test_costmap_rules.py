@@ -57,6 +57,7 @@ def obstacle_map(*, layer=None, source=None, **costmap):
         "origin_y": -3.0,
         "width": 6.0,
         "height": 6.0,
+        "resolution": 0.1,
         "footprint": SQUARE,
         **costmap,
     }
@@ -215,7 +216,7 @@ def test_layers_are_combined(merge, rule):
     assert master.tolist() == expected
 
 
-@pytest.mark.parametrize(("method", "seen"), [(0, LETHAL), (1, LETHAL), (99, FREE)])
+@pytest.mark.parametrize(("method", "seen"), [(0, LETHAL), (1, LETHAL), (2, FREE), (99, FREE), (-1, FREE)])
 def test_the_combination_method_is_the_layers(method, seen):
     """obstacle_layer.cpp, updateCosts: 0 overwrites, 1 takes the maximum, anything else writes nothing."""
     costmap = obstacle_map(layer={"combination_method": method})

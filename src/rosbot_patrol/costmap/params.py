@@ -18,19 +18,23 @@ class CostmapParams:
 
     global_frame: str = param("map", doc="frame the costmap lies in")
     robot_base_frame: str = param("base_link", doc="the robot's frame")
-    transform_tolerance: float = param(0.3, unit="s", lo=0.0, doc="how old the robot's pose may be")
-    update_frequency: float = param(5.0, unit="Hz", lo=0.0, hi=100.0, doc="how often costs are updated")
-    publish_frequency: float = param(0.0, unit="Hz", lo=0.0, hi=100.0, doc="how often it is shown; 0 is never")
-    width: float = param(10.0, unit="m", lo=0.0, doc="extent in x where no map gives it")
-    height: float = param(10.0, unit="m", lo=0.0, doc="extent in y where no map gives it")
-    resolution: float = param(0.1, unit="m", lo=0.001, hi=50.0, doc="edge of a cell")
+    transform_tolerance: float = param(
+        0.3, unit="s", lo=0.0, hi=10.0, clamps="both", doc="how old the robot's pose may be"
+    )
+    update_frequency: float = param(5.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="how often costs are updated")
+    publish_frequency: float = param(
+        0.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="how often it is shown; 0 is never"
+    )
+    width: float = param(10.0, unit="m", lo=0.0, clamps="both", doc="extent in x where no map gives it")
+    height: float = param(10.0, unit="m", lo=0.0, clamps="both", doc="extent in y where no map gives it")
+    resolution: float = param(0.05, unit="m", lo=0.001, hi=50.0, clamps="above", doc="edge of a cell")
     origin_x: float = param(0.0, unit="m", doc="left edge; a rolling window follows the robot instead")
     origin_y: float = param(0.0, unit="m", doc="lower edge")
     rolling_window: bool = param(False, doc="keep the robot in the middle")
     track_unknown_space: bool = param(False, doc="tell unknown cells from free ones")
     always_send_full_costmap: bool = param(False, doc="publish whole grids, no updates")
     footprint: Any = param("[]", doc="corners of the robot [[x, y], ...]")
-    robot_radius: float = param(0.46, unit="m", lo=0.0, doc="used where there is no footprint")
+    robot_radius: float = param(0.46, unit="m", lo=0.0, hi=10.0, clamps="both", doc="used where there is no footprint")
     footprint_padding: float = param(0.01, unit="m", doc="added to each corner")
 
 
@@ -44,7 +48,7 @@ class StaticParams:
     subscribe_to_updates: bool = param(False, doc="listen to <map_topic>_updates")
     track_unknown_space: bool = param(True)
     use_maximum: bool = param(False, doc="combine by maximum instead of overwriting")
-    lethal_cost_threshold: int = param(100, lo=0, hi=255)
+    lethal_cost_threshold: int = param(100, lo=0, hi=100, clamps="both")
     unknown_cost_value: int = param(-1, lo=-128, hi=255)
     trinary_costmap: bool = param(True)
 
@@ -56,8 +60,8 @@ class ObstacleParams:
     enabled: bool = param(True)
     track_unknown_space: bool = param(False, doc="the costmap's own where not given")
     footprint_clearing_enabled: bool = param(True, doc="cells under the robot are free")
-    combination_method: int = param(1, choices=(0, 1, 99), doc="0 overwrites, 1 maximum, 99 nothing")
-    max_obstacle_height: float = param(2.0, unit="m")
+    combination_method: int = param(1, doc="0 overwrites, 1 maximum, any other nothing (upstream: 99)")
+    max_obstacle_height: float = param(2.0, unit="m", lo=0.0, hi=50.0, clamps="both")
     transform_tolerance: float = param(0.2, unit="s", lo=0.0)
     observation_sources: str = param("", doc="names of sources, separated by spaces")
     forget_unseen_after: float = param(
@@ -81,11 +85,17 @@ class ObstacleParams:
 class VoxelParams(ObstacleParams):
     """Parameters of costmap_2d::VoxelLayer, which with planar scans is an obstacle layer."""
 
-    origin_z: float = param(0.0, unit="m", doc="height of the lowest voxel")
-    z_resolution: float = param(0.2, unit="m", lo=0.0, doc="height of a voxel")
-    z_voxels: int = param(10, lo=0, hi=16, doc="voxels in a column; points above the column are not marked")
-    unknown_threshold: int = param(15, lo=0, hi=16, doc="accepted, has no effect: cells that beams passed are free")
-    mark_threshold: int = param(0, lo=0, hi=16, doc="more voxels than this mark a cell; a planar scan has one")
+    origin_z: float = param(0.0, unit="m", lo=0.0, clamps="both", doc="height of the lowest voxel")
+    z_resolution: float = param(0.2, unit="m", lo=0.0, hi=50.0, clamps="both", doc="height of a voxel")
+    z_voxels: int = param(
+        10, lo=0, hi=16, clamps="both", doc="voxels in a column; points above the column are not marked"
+    )
+    unknown_threshold: int = param(
+        15, lo=0, hi=16, clamps="both", doc="accepted, has no effect: cells that beams passed are free"
+    )
+    mark_threshold: int = param(
+        0, lo=0, hi=16, clamps="both", doc="more voxels than this mark a cell; a planar scan has one"
+    )
     publish_voxel_map: bool = param(False, doc="accepted, has no effect: there are no voxels to show")
 
 
@@ -105,8 +115,8 @@ class InflationParams:
     """Parameters of costmap_2d::InflationLayer."""
 
     enabled: bool = param(True)
-    inflation_radius: float = param(0.55, unit="m", lo=0.0, hi=50.0)
-    cost_scaling_factor: float = param(10.0, unit="1/m", lo=0.0, hi=100.0)
+    inflation_radius: float = param(0.55, unit="m", lo=0.0, hi=50.0, clamps="both")
+    cost_scaling_factor: float = param(10.0, unit="1/m", lo=0.0, hi=100.0, clamps="both")
     inflate_unknown: bool = param(False)
 
 

@@ -61,16 +61,20 @@ class RangeSensorParams:
     enabled: bool = param(True)
     ns: str = param("", doc="put before each topic")
     topics: tuple[str, ...] = param(("/sonar",), doc="of sensor_msgs/Range")
-    no_readings_timeout: float = param(0.0, unit="s", lo=0.0, doc="no reading for so long stops the robot; 0 is never")
+    no_readings_timeout: float = param(
+        0.0, unit="s", lo=0.0, clamps="both", doc="no reading for so long stops the robot; 0 is never"
+    )
     input_sensor_type: str = param(
         "ALL",
         choices=("ALL", "VARIABLE", "FIXED"),
         doc="FIXED: only readings of sensors that tell nearer or not (min_range = max_range); VARIABLE: only others",
     )
-    clear_threshold: float = param(0.2, lo=0.0, hi=1.0, doc="cells less probably occupied are free")
-    mark_threshold: float = param(0.8, lo=0.0, hi=1.0, doc="cells more probably occupied are lethal")
+    clear_threshold: float = param(0.2, lo=0.0, hi=1.0, clamps="both", doc="cells less probably occupied are free")
+    mark_threshold: float = param(0.8, lo=0.0, hi=1.0, clamps="both", doc="cells more probably occupied are lethal")
     clear_on_max_reading: bool = param(False, doc="a reading of max_range clears the cone; else it says nothing")
-    inflate_cone: float = param(1.0, lo=0.0, hi=1.0, doc="1 updates all around the cone, less only inside it")
+    inflate_cone: float = param(
+        1.0, lo=0.0, hi=1.0, clamps="both", doc="1 updates all around the cone, less only inside it"
+    )
     phi: float = param(1.2, unit="m", lo=0.0, doc="distance from which on readings count half")
     use_decay: bool = param(False, doc="forget marks that have not been seen for pixel_decay")
     pixel_decay: float = param(10.0, unit="s", lo=0.0, doc="how long a mark stays then")

@@ -15,14 +15,24 @@ class MoveBaseParams:
 
     base_global_planner: str = param("navfn/NavfnROS", doc="plug-in that plans")
     base_local_planner: str = param("base_local_planner/TrajectoryPlannerROS", doc="plug-in that drives")
-    controller_frequency: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="control cycles a second")
-    planner_frequency: float = param(0.0, unit="Hz", lo=0.0, hi=100.0, doc="plans a second; 0 plans on demand")
-    planner_patience: float = param(5.0, unit="s", lo=0.0, doc="how long to try for a plan before recovering")
-    controller_patience: float = param(15.0, unit="s", lo=0.0, doc="the same for a velocity")
-    max_planning_retries: int = param(-1, lo=-1, doc="failures before recovering, -1 is no limit")
-    oscillation_timeout: float = param(0.0, unit="s", lo=0.0, doc="how long to move on the spot, 0 is for ever")
-    oscillation_distance: float = param(0.5, unit="m", lo=0.0, doc="motion that counts as progress")
-    conservative_reset_dist: float = param(3.0, unit="m", lo=0.0, doc="square kept by the first clearing")
+    controller_frequency: float = param(
+        20.0, unit="Hz", lo=0.1, hi=100.0, clamps="above", doc="control cycles a second"
+    )
+    planner_frequency: float = param(
+        0.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="plans a second; 0 plans on demand"
+    )
+    planner_patience: float = param(
+        5.0, unit="s", lo=0.0, clamps="both", doc="how long to try for a plan before recovering"
+    )
+    controller_patience: float = param(15.0, unit="s", lo=0.0, clamps="both", doc="the same for a velocity")
+    max_planning_retries: int = param(-1, lo=-1, clamps="both", doc="failures before recovering, -1 is no limit")
+    oscillation_timeout: float = param(
+        0.0, unit="s", lo=0.0, clamps="both", doc="how long to move on the spot, 0 is for ever"
+    )
+    oscillation_distance: float = param(0.5, unit="m", lo=0.0, clamps="both", doc="motion that counts as progress")
+    conservative_reset_dist: float = param(
+        3.0, unit="m", lo=0.0, clamps="both", doc="square kept by the first clearing"
+    )
     clearing_radius: float = param(
         -1.0, unit="m", doc="the second clearing keeps four times this; circumscribed_radius where not given"
     )

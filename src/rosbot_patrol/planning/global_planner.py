@@ -38,18 +38,24 @@ class GlobalPlannerParams:
 
     allow_unknown: bool = param(True, doc="plan through unknown cells")
     default_tolerance: float = param(0.0, unit="m", lo=0.0, doc="how far from the goal a plan may end")
-    lethal_cost: int = param(253, lo=2, hi=255, doc="cells of this cost less one and more cannot be crossed")
-    neutral_cost: int = param(50, lo=1, hi=255, doc="what crossing a free cell costs")
-    cost_factor: float = param(3.0, lo=0.01, hi=5.0, doc="what each unit of a cell's cost adds")
+    lethal_cost: int = param(
+        253, lo=2, hi=255, clamps="both", doc="cells of this cost less one and more cannot be crossed"
+    )
+    neutral_cost: int = param(50, lo=1, hi=255, clamps="both", doc="what crossing a free cell costs")
+    cost_factor: float = param(3.0, lo=0.01, hi=5.0, clamps="both", doc="what each unit of a cell's cost adds")
     use_grid_path: bool = param(False, doc="plans step from cell to cell, in eight directions")
     outline_map: bool = param(True, doc="the outermost cells are obstacles; false for a rolling window")
     orientation_mode: int = param(
-        0,
-        choices=range(7),
+        1,
+        lo=0,
+        hi=6,
+        clamps="both",
         doc="headings: 0 none, 1 along the path, 2 interpolated, 3 along it and interpolated at the end, 4 backwards, "
         "5 leftwards, 6 rightwards",
     )
-    orientation_window_size: int = param(1, lo=1, hi=255, doc="points on each side that a heading is taken from")
+    orientation_window_size: int = param(
+        1, lo=1, hi=255, clamps="both", doc="points on each side that a heading is taken from"
+    )
     use_dijkstra: bool = param(True, doc=_NO_EFFECT)
     use_quadratic: bool = param(True, doc=_NO_EFFECT)
     old_navfn_behavior: bool = param(False, doc=_NO_EFFECT)

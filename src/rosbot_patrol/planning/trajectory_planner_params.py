@@ -35,31 +35,47 @@ def _wrong_speeds(value: Any) -> str | None:
 class TrajectoryPlannerParams:
     """Parameters of TrajectoryPlannerROS; names and defaults as upstream."""
 
-    max_vel_x: float = param(0.55, unit="m/s", lo=0.0, doc="top forward speed")
-    min_vel_x: float = param(0.0, unit="m/s", lo=0.0, doc="slowest forward speed that moves the base")
-    max_vel_theta: float = param(1.0, unit="rad/s", lo=0.0, doc="top turning speed")
-    min_vel_theta: float = param(-1.0, unit="rad/s", hi=0.0, doc="top turning speed to the right")
-    min_in_place_vel_theta: float = param(0.4, unit="rad/s", lo=0.0, doc="slowest turn on the spot that moves the base")
-    max_rotational_vel: float = param(1.0, unit="rad/s", lo=0.0, doc="top speed when turning to the goal's heading")
-    acc_lim_x: float = param(2.5, unit="m/s^2", lo=0.0, hi=20.0, doc="forward acceleration")
-    acc_lim_y: float = param(2.5, unit="m/s^2", lo=0.0, hi=20.0, doc="sideways acceleration (holonomic_robot)")
-    acc_lim_theta: float = param(3.2, unit="rad/s^2", lo=0.0, hi=20.0, doc="turning acceleration")
-    sim_time: float = param(1.7, unit="s", lo=0.1, hi=10.0, doc="how far ahead is simulated")
-    sim_granularity: float = param(0.025, unit="m", lo=0.001, hi=5.0, doc="longest step of the simulation")
-    angular_sim_granularity: float = param(0.025, unit="rad", lo=0.001, hi=1.5708, doc="the same for turning")
-    vx_samples: int = param(20, lo=1, hi=300, doc="forward speeds tried")
-    vtheta_samples: int = param(20, lo=1, hi=300, doc="turning speeds tried")
-    path_distance_bias: float = param(0.6, lo=0.0, doc="weight of staying on the plan")
-    goal_distance_bias: float = param(0.8, lo=0.0, doc="weight of getting on")
-    occdist_scale: float = param(0.01, lo=0.0, doc="weight of staying away from obstacles")
-    meter_scoring: bool = param(False, doc="distances in metres instead of cells")
-    heading_lookahead: float = param(0.325, unit="m", lo=0.0, hi=5.0, doc="point ahead at which alignment is judged")
-    oscillation_reset_dist: float = param(
-        0.05, unit="m", lo=0.0, hi=5.0, doc="motion after which directions may change again"
+    max_vel_x: float = param(0.55, unit="m/s", lo=0.0, hi=20.0, clamps="both", doc="top forward speed")
+    min_vel_x: float = param(
+        0.0, unit="m/s", lo=0.0, hi=20.0, clamps="both", doc="slowest forward speed that moves the base"
     )
-    escape_vel: float = param(-0.1, unit="m/s", lo=-2.0, hi=0.0, doc="speed of backing up; 0: never")
-    escape_reset_dist: float = param(0.1, unit="m", lo=0.0, hi=5.0, doc="how far it backs up")
-    escape_reset_theta: float = param(math.pi / 2, unit="rad", lo=0.0, hi=5.0, doc="or how far it turns meanwhile")
+    max_vel_theta: float = param(1.0, unit="rad/s", lo=0.0, hi=20.0, clamps="both", doc="top turning speed")
+    min_vel_theta: float = param(
+        -1.0, unit="rad/s", lo=-20.0, hi=0.0, clamps="both", doc="top turning speed to the right"
+    )
+    min_in_place_vel_theta: float = param(
+        0.4, unit="rad/s", lo=0.0, hi=20.0, clamps="both", doc="slowest turn on the spot that moves the base"
+    )
+    max_rotational_vel: float = param(1.0, unit="rad/s", lo=0.0, doc="top speed when turning to the goal's heading")
+    acc_lim_x: float = param(2.5, unit="m/s^2", lo=0.0, hi=20.0, clamps="both", doc="forward acceleration")
+    acc_lim_y: float = param(
+        2.5, unit="m/s^2", lo=0.0, hi=20.0, clamps="both", doc="sideways acceleration (holonomic_robot)"
+    )
+    acc_lim_theta: float = param(3.2, unit="rad/s^2", lo=0.0, hi=20.0, clamps="both", doc="turning acceleration")
+    sim_time: float = param(1.7, unit="s", lo=0.1, hi=10.0, clamps="both", doc="how far ahead is simulated")
+    sim_granularity: float = param(
+        0.025, unit="m", lo=0.001, hi=5.0, clamps="both", doc="longest step of the simulation"
+    )
+    angular_sim_granularity: float = param(
+        0.025, unit="rad", lo=0.001, hi=1.5708, clamps="both", doc="the same for turning"
+    )
+    vx_samples: int = param(20, lo=1, hi=300, clamps="both", doc="forward speeds tried")
+    vtheta_samples: int = param(20, lo=1, hi=300, clamps="both", doc="turning speeds tried")
+    path_distance_bias: float = param(0.6, lo=0.0, hi=5.0, clamps="both", doc="weight of staying on the plan")
+    goal_distance_bias: float = param(0.8, lo=0.0, hi=5.0, clamps="both", doc="weight of getting on")
+    occdist_scale: float = param(0.01, lo=0.0, hi=5.0, clamps="both", doc="weight of staying away from obstacles")
+    meter_scoring: bool = param(False, doc="distances in metres instead of cells")
+    heading_lookahead: float = param(
+        0.325, unit="m", lo=0.0, hi=5.0, clamps="both", doc="point ahead at which alignment is judged"
+    )
+    oscillation_reset_dist: float = param(
+        0.05, unit="m", lo=0.0, hi=5.0, clamps="both", doc="motion after which directions may change again"
+    )
+    escape_vel: float = param(-0.1, unit="m/s", lo=-2.0, hi=0.0, clamps="both", doc="speed of backing up; 0: never")
+    escape_reset_dist: float = param(0.1, unit="m", lo=0.0, hi=5.0, clamps="both", doc="how far it backs up")
+    escape_reset_theta: float = param(
+        math.pi / 2, unit="rad", lo=0.0, hi=5.0, clamps="both", doc="or how far it turns meanwhile"
+    )
     xy_goal_tolerance: float = param(0.10, unit="m", lo=0.0, doc="how near to the goal is there")
     yaw_goal_tolerance: float = param(0.05, unit="rad", lo=0.0, doc="how near to its heading is right")
     latch_xy_goal_tolerance: bool = param(False, doc="once there, only turn")
@@ -73,7 +89,7 @@ class TrajectoryPlannerParams:
     dwa: bool = param(False, doc="sample only speeds that one control cycle can reach")
     heading_scoring: bool = param(False, doc="judge the heading towards the plan instead of the end of the trajectory")
     heading_scoring_timestep: float = param(
-        0.1, unit="s", lo=0.0, hi=1.0, doc="when it is judged, with heading_scoring"
+        0.1, unit="s", lo=0.0, hi=1.0, clamps="both", doc="when it is judged, with heading_scoring"
     )
     simple_attractor: bool = param(False, doc="head straight for the local goal, whatever the plan")
     stop_time_buffer: float = param(0.2, unit="s", lo=0.0, doc="time to spare when braking before an obstacle")

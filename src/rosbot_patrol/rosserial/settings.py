@@ -26,13 +26,13 @@ class SerialNodeParams:
     """Parameters of serial_node."""
 
     port: str = param(DEFAULT_PORT, doc="serial device, or 'tcp' for a TCP server")
-    baud: int = param(57600, lo=50, hi=4_000_000, unit="baud", doc="speed of the serial device")
+    baud: int = param(57600, lo=50, hi=4_000_000, unit="baud", reads_text=True, doc="speed of the serial device")
     tcp_port: int = param(
-        DEFAULT_TCP_PORT, lo=0, hi=65535, doc="TCP port; without it /rosserial_embeddedlinux/tcp_port"
+        DEFAULT_TCP_PORT, lo=0, hi=65535, reads_text=True, doc="TCP port; without it /rosserial_embeddedlinux/tcp_port"
     )
     fork_server: bool = param(False, doc="accepted and not needed: one process serves all clients")
     fix_pyserial_for_test: bool = param(False, doc="accepted and not needed: pseudo-terminals work as they are")
-    tcp_ports: tuple[int, ...] = param((), lo=0, hi=65535, doc="further TCP ports of the same process")
+    tcp_ports: tuple[int, ...] = param((), lo=0, hi=65535, reads_text=True, doc="further TCP ports of the same process")
     host: str = param("", doc="address to listen on; empty: every address, IPv4 and IPv6")
     restrict: str = param("tcp", choices=("tcp", "always", "never"), doc="where the allow_ lists hold")
     allow_publish: tuple[str, ...] = param(MOTION_TRIGGER_RULES, doc="'TOPIC TYPE' that devices may publish")

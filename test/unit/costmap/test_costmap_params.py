@@ -59,7 +59,10 @@ def test_the_tutorials_simulation_has_twelve_million_cells():
         ({"resolution": "fine"}, "resolution"),
         ({"resolution": 0.0}, "resolution"),
         ({"plugins": [{"name": "i", "type": "InflationLayer"}], "i": 3}, "i"),
-        ({"plugins": [{"name": "i", "type": "InflationLayer"}], "i": {"inflation_radius": -1}}, "i/inflation_radius"),
+        (
+            {"plugins": [{"name": "i", "type": "InflationLayer"}], "i": {"inflation_radius": "big"}},
+            "i/inflation_radius",
+        ),
     ],
 )
 def test_a_wrong_value_is_named(tree, part):

@@ -25,7 +25,7 @@ def hall():
 def test_upstreams_defaults():
     p = GlobalPlannerParams()
     assert (p.lethal_cost, p.neutral_cost, p.cost_factor) == (253, 50, 3.0)
-    assert (p.allow_unknown, p.use_grid_path, p.orientation_mode, p.orientation_window_size) == (True, False, 0, 1)
+    assert (p.allow_unknown, p.use_grid_path, p.orientation_mode, p.orientation_window_size) == (True, False, 1, 1)
 
 
 def test_prices_follow_upstreams_formula():
@@ -73,8 +73,8 @@ def test_parameters_come_by_name_and_are_checked():
     planner = make_global_planner("global_planner/GlobalPlanner", {"GlobalPlanner": {"orientation_mode": 1}})
     path = planner.plan(hall(), START, GOAL)
     assert path[0, 2] == pytest.approx(math.atan2(1.0, 2.0), abs=0.02)
-    with pytest.raises(ParamError, match="orientation_mode"):
-        make_global_planner("GlobalPlanner", {"GlobalPlanner": {"orientation_mode": 7}})
+    clamped = make_global_planner("GlobalPlanner", {"GlobalPlanner": {"orientation_mode": 7, "lethal_cost": 300}})
+    assert (clamped.params.orientation_mode, clamped.params.lethal_cost) == (6, 255)
     with pytest.raises(ParamError, match="lethal_cost"):
         make_global_planner("GlobalPlanner", {"GlobalPlanner": {"lethal_cost": "high"}})
 
@@ -87,7 +87,7 @@ def test_parameters_change_in_use():
     path = planner.plan(hall(), START, Pose2D(2.55, 0.05))
     assert abs(path[0, 2]) > math.pi / 2
     with pytest.raises(ParamError, match="~GlobalPlanner/cost_factor"):
-        planner.reconfigure({"cost_factor": 9.0}, name="~GlobalPlanner/")
+        planner.reconfigure({"cost_factor": "dear"}, name="~GlobalPlanner/")
     with pytest.raises(ParamError, match="use_grid_path"):
         planner.reconfigure({"use_grid_path": True})
     assert planner.params == changed
