@@ -16,11 +16,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+from urllib.parse import urlsplit
 
 from rosbot_patrol.alerts.channel import Channel, Transport
 from rosbot_patrol.alerts.lane import Pace
 from rosbot_patrol.alerts.mail import Envelope, make_envelope
 from rosbot_patrol.alerts.maildir import MaildirTransport
+from rosbot_patrol.alerts.network_words import is_loopback
 from rosbot_patrol.alerts.secrets_on_disk import read_secret, refuse_secrets
 from rosbot_patrol.alerts.sendmail import SENDMAILS, SendmailTransport, find_sendmail
 from rosbot_patrol.alerts.smtp import SmtpServer, SmtpTransport
@@ -71,6 +73,7 @@ class MailParams:
         "", doc="file with the password, readable by its owner only; else the environment's " + PASSWORD_VARIABLE
     )
     smtp_ca_file: str = param("", doc="certificates to trust, where the mail server's is none of the system's")
+    smtp_allow_plaintext: bool = param(False, doc="send the login without TLS (smtp_security: none) to another machine")
     channels: str = param("", doc="file of further channels (docs/alerts.md); empty: none")
     notify_verdicts: list[str] = param(
         [],
@@ -121,19 +124,21 @@ class SmtpSpec(ChannelSpec):
     password_file: str = param("", doc="file with the password, of mode 600")
     password_env: str = param("", doc="variable of the environment with the password")
     ca_file: str = param("", doc="certificates to trust, where the server's is none of the system's")
+    allow_plaintext: bool = param(False, doc="send the login without TLS (security: none) to another machine")
 
 
 @dataclass(frozen=True, kw_only=True)
 class WebhookSpec(ChannelSpec):
     """A web address that takes JSON."""
 
-    url: str = param(doc="http or https", check=check_url)
+    url: str = param(doc="http or https; path and query are kept secret", check=check_url)
     picture: bool = param(True, doc="send the picture, in base64")
     secret_file: str = param("", doc="file with the secret of the signature, of mode 600")
     secret_env: str = param("", doc="variable of the environment with that secret")
     token_file: str = param("", doc="file with a bearer token, of mode 600")
     token_env: str = param("", doc="variable of the environment with that token")
     ca_file: str = param("", doc="certificates to trust, where the server's is none of the system's")
+    allow_plaintext: bool = param(False, doc="send the token over plain http to another machine")
 
 
 SPECS: Mapping[str, type[ChannelSpec]] = {
@@ -165,7 +170,7 @@ def make_channels(params: MailParams, around: Surroundings, *, prefix: str = "~"
 
 def load_channels(path: Path, around: Surroundings) -> list[Channel]:
     """The channels of a file; raises ParamError."""
-    tree = read_mapping(path, keys="channels")
+    tree = read_mapping(path, keys="channels", is_secret=True)  # the addresses of webhooks are secrets
     for key in tree:
         if key != "channels":
             raise ParamError(f"{path}: {key}", unknown_name(str(key), ["channels"]))
@@ -181,14 +186,23 @@ def _channels(name: str, given: Any, prefix: str, around: Surroundings) -> list[
         raise ParamError(prefix + name, "expected a name of letters, digits, - and _")
     prefix = f"{prefix}{name}/"
     if not isinstance(given, dict):
-        raise ParamError(prefix, f"expected a group of keys, got {given!r}")
+        raise ParamError(prefix, f"expected a group of keys, got {_shown(given)}")
     refuse_secrets(given, name=prefix, place="in this file")
     kind = given.get("type")
     if not isinstance(kind, str) or kind not in SPECS:
         expected = f"expected one of {', '.join(SPECS)}"
-        raise ParamError(f"{prefix}type", f"is missing, {expected}" if kind is None else f"is {kind!r}, {expected}")
+        problem = f"is missing, {expected}" if kind is None else f"is {_shown(kind)}, {expected}"
+        raise ParamError(f"{prefix}type", problem)
+    if not isinstance(given.get("url", ""), str):
+        raise ParamError(f"{prefix}url", f"expected a text, got {_shown(given['url'])}")
     spec = load_strict(SPECS[kind], given, name=prefix)
-    return _one_each(name, _Maker(prefix, around).make(spec), spec)
+    return _one_each(name, _Maker(prefix, around).make(spec, name), spec)
+
+
+def _shown(value: Any) -> str:
+    """A value of the file as it may be shown: what could hold a web address by its type only."""
+    is_short = isinstance(value, (str, int, float, type(None))) and "/" not in str(value)
+    return repr(value)[:40] if is_short else f"something else ({type(value).__name__})"
 
 
 def _one_each(name: str, transports: Mapping[str, Transport], spec: ChannelSpec) -> list[Channel]:
@@ -205,7 +219,7 @@ def _one_each(name: str, transports: Mapping[str, Transport], spec: ChannelSpec)
 def _default_channels(params: MailParams, around: Surroundings, prefix: str) -> list[Channel]:
     names = {
         "to": "email_to", "from": "email_from", "program": "sendmail", "security": "smtp_security",
-        "user": "smtp_user", "password_file": "smtp_password_file",
+        "user": "smtp_user", "password_file": "smtp_password_file", "allow_plaintext": "smtp_allow_plaintext",
     }  # fmt: skip
     maker = _Maker(prefix, around, names)
     envelope = maker.envelope(params.email_to, params.email_from)
@@ -227,9 +241,10 @@ def _default_channels(params: MailParams, around: Surroundings, prefix: str) -> 
             password_file=params.smtp_password_file,
             password_env=PASSWORD_VARIABLE,
             ca_file=params.smtp_ca_file,
+            allow_plaintext=params.smtp_allow_plaintext,
         ),
     }
-    return _one_each(DEFAULT, maker.make(specs[kind]), specs[kind])
+    return _one_each(DEFAULT, maker.make(specs[kind], DEFAULT), specs[kind])
 
 
 class _Maker:
@@ -240,7 +255,7 @@ class _Maker:
     def __init__(self, prefix: str, around: Surroundings, names: Mapping[str, str] | None = None) -> None:
         self._prefix, self._around, self._names = prefix, around, names or self._same
 
-    def make(self, spec: ChannelSpec) -> dict[str, Transport]:
+    def make(self, spec: ChannelSpec, name: str) -> dict[str, Transport]:
         """The transports of a channel by recipient, "" where it has none of its own; raises ParamError."""
         if isinstance(spec, MaildirSpec):
             folder = Path(spec.folder).expanduser() if spec.folder else self._around.home / "rosbot_patrol" / "mail"
@@ -250,7 +265,7 @@ class _Maker:
         if isinstance(spec, SmtpSpec):
             return self._smtp(spec)
         if isinstance(spec, WebhookSpec):
-            return {"": self._webhook(spec)}
+            return {"": self._webhook(spec, name)}
         raise TypeError(type(spec))
 
     def envelope(self, to: str, sender: str) -> Envelope:
@@ -276,9 +291,7 @@ class _Maker:
     def _smtp(self, spec: SmtpSpec) -> dict[str, Transport]:
         envelope = self._real_envelope(spec.to, spec.sender, "smtp")
         if spec.user and spec.security not in ("starttls", "tls"):
-            raise ParamError(
-                self._name("security"), f"expected starttls or tls where {self._names.get('user', 'user')} is given"
-            )
+            self._check_plain_login(spec)
         server = SmtpServer(
             host=spec.host,
             port=spec.port,
@@ -290,11 +303,28 @@ class _Maker:
         )
         return {copy.recipient: SmtpTransport(server, copy) for copy in envelope.copies()}
 
-    def _webhook(self, spec: WebhookSpec) -> Transport:
+    def _check_plain_login(self, spec: SmtpSpec) -> None:
+        allow = self._names.get("allow_plaintext", "allow_plaintext")
+        if spec.security == "none" and (spec.allow_plaintext or is_loopback(spec.host)):
+            return
+        problem = f"expected starttls or tls where {self._names.get('user', 'user')} is given"
+        if spec.security == "none":
+            problem += f": without, everybody on the way reads the login; {allow}: true sends it all the same"
+        raise ParamError(self._name("security"), problem)
+
+    def _webhook(self, spec: WebhookSpec, name: str) -> Transport:
         secret = spec.secret_file or spec.secret_env
         token = spec.token_file or spec.token_env
+        parts = urlsplit(spec.url)
+        if token and parts.scheme == "http" and not (spec.allow_plaintext or is_loopback(parts.hostname or "")):
+            raise ParamError(
+                self._name("url"),
+                f"expected https://{parts.netloc}/... where a token is given: over http everybody on the way reads it;"
+                " allow_plaintext: true sends it all the same",
+            )
         address = WebAddress(
             url=spec.url,
+            name=name,
             secret=self._secret("secret", spec.secret_file, spec.secret_env) if secret else "",
             token=self._secret("token", spec.token_file, spec.token_env) if token else "",
             with_picture=spec.picture,

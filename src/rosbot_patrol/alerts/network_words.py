@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import http.client
+import ipaddress
 import smtplib
 import socket
 import ssl
@@ -14,13 +15,14 @@ from types import TracebackType
 WHOLE_EXCHANGE = 4.0  # a whole exchange may take so many times the time-out of one answer
 
 
-def explain(err: BaseException, where: str, timeout: float) -> str:
+def explain(err: BaseException, where: str, timeout: float, *, mask: Callable[[str], str] = str) -> str:
     """One clause, without a full stop.
 
     Args:
         err: what was raised.
         where: host and port.
         timeout: that was given for each answer [s].
+        mask: takes secrets out of what the other side wrote.
     """
     host = where.rpartition(":")[0]
     if isinstance(err, socket.gaierror):
@@ -30,14 +32,27 @@ def explain(err: BaseException, where: str, timeout: float) -> str:
     if isinstance(err, TimeoutError) or isinstance(err.__context__, TimeoutError):  # smtplib says "closed"
         return f"no answer within {timeout:g} s"
     if isinstance(err, ssl.SSLError):
-        return f"it does not speak TLS as it should ({err.reason or err}); is that its TLS port?"
+        return f"it does not speak TLS as it should ({err.reason or mask(str(err))}); is that its TLS port?"
     if isinstance(err, ConnectionRefusedError):
         return f"[Errno {errno.ECONNREFUSED}] Connection refused: nothing listens there"
     if isinstance(err, smtplib.SMTPNotSupportedError):
-        return f"it does not offer what is asked for: {_tidy(err)}"
+        return f"it does not offer what is asked for: {_tidy(err, mask)}"
     if isinstance(err, (smtplib.SMTPServerDisconnected, http.client.RemoteDisconnected, ConnectionResetError)):
-        return f"it closed the connection ({_tidy(err)})"
-    return _tidy(err)
+        return f"it closed the connection ({_tidy(err, mask)})"
+    return _tidy(err, mask)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether what goes to a host stays on this machine."""
+    name = host.strip("[]").rstrip(".").lower()
+    if name == "localhost" or name.endswith(".localhost"):  # RFC 6761, 6.3
+        return True
+    try:
+        address = ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    mapped = getattr(address, "ipv4_mapped", None)
+    return bool((mapped or address).is_loopback)
 
 
 class Deadline:
@@ -75,5 +90,5 @@ class Deadline:
                 return  # it is closed already
 
 
-def _tidy(err: BaseException) -> str:
-    return " ".join(str(err).split())[:300] or type(err).__name__
+def _tidy(err: BaseException, mask: Callable[[str], str]) -> str:
+    return mask(" ".join(str(err).split()))[:300] or type(err).__name__

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.alerts.channel import DeliveryError
 from rosbot_patrol.alerts.mail import Envelope, build_mail
+from rosbot_patrol.alerts.masking import Mask
 from rosbot_patrol.alerts.network_words import WHOLE_EXCHANGE, Deadline, explain
 from rosbot_patrol.alerts.notice import Notice
 
@@ -49,6 +50,7 @@ class SmtpTransport:
         self._server, self._envelope = server, envelope
         self._sender, self._to = envelope.sender.addr_spec, envelope.recipient
         self._where = f"{server.host}:{server.port}"
+        self._mask = Mask([server.password, *map(_coded, (server.password, _plain(server.user, server.password)))])
 
     def describe(self) -> str:
         """Where its mails go."""
@@ -60,18 +62,23 @@ class SmtpTransport:
             self._send(notice)
         except smtplib.SMTPRecipientsRefused as err:
             code, text = err.recipients[self._to]
-            problem = f"{self._where} refused the recipient {self._to}: {_said(code, text)}"
+            problem = f"{self._where} refused the recipient {self._to}: {self._said(code, text)}"
             raise DeliveryError(problem, permanent=code >= 500, answered=True) from err
         except smtplib.SMTPAuthenticationError as err:
-            raise DeliveryError(f"{self._where} refused the login: {_said(err.smtp_code, err.smtp_error)}") from err
+            said = self._said(err.smtp_code, err.smtp_error)
+            raise DeliveryError(f"{self._where} refused the login: {said}") from err
         except (smtplib.SMTPSenderRefused, smtplib.SMTPDataError) as err:
-            said = _said(err.smtp_code, err.smtp_error)
+            said = self._said(err.smtp_code, err.smtp_error)
             permanent = err.smtp_code >= 500
             raise DeliveryError(f"{self._where} refused the mail: {said}", permanent=permanent, answered=True) from err
         except (OSError, smtplib.SMTPException, ValueError) as err:
-            problem = explain(err, self._where, self._server.timeout)
+            problem = explain(err, self._where, self._server.timeout, mask=self._mask)
             raise DeliveryError(f"the mail server {self._where} cannot be used: {problem}") from err
         return self._to
+
+    def _said(self, code: int, text: bytes | str) -> str:
+        words = text.decode("utf-8", "replace") if isinstance(text, bytes) else text
+        return f"{code} {self._mask(' '.join(words.split()))}"
 
     def _send(self, notice: Notice) -> None:
         mail = build_mail(notice, self._envelope)
@@ -116,10 +123,17 @@ def _login(server: smtplib.SMTP, user: str, password: str) -> None:
     if "PLAIN" not in server.esmtp_features.get("auth", "").upper().split():
         server.login(user, password)
         return
-    answer = base64.b64encode(f"\0{user}\0{password}".encode()).decode("ascii")
-    code, text = server.docmd("AUTH", f"PLAIN {answer}")
+    code, text = server.docmd("AUTH", f"PLAIN {_coded(_plain(user, password))}")
     if code not in (235, 503):  # 503: it takes us for logged in already
         raise smtplib.SMTPAuthenticationError(code, text)
+
+
+def _plain(user: str, password: str) -> str:
+    return f"\0{user}\0{password}" if user else ""
+
+
+def _coded(text: str) -> str:
+    return base64.b64encode(text.encode()).decode("ascii")
 
 
 def _hang_up(server: smtplib.SMTP) -> None:
@@ -138,11 +152,6 @@ def _any_certificate() -> ssl.SSLContext:
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE
     return context
-
-
-def _said(code: int, text: bytes | str) -> str:
-    words = text.decode("utf-8", "replace") if isinstance(text, bytes) else text
-    return f"{code} {' '.join(words.split())}"
 
 
 def resolve(host: str, port: int) -> list[str]:

@@ -24,9 +24,11 @@ from urllib.parse import urlsplit
 
 from rosbot_patrol.alerts.channel import DeliveryError
 from rosbot_patrol.alerts.mail import plain_text
+from rosbot_patrol.alerts.masking import Mask, masked_url, url_secrets
 from rosbot_patrol.alerts.network_words import WHOLE_EXCHANGE, Deadline, explain
 from rosbot_patrol.alerts.notice import Notice
 
+SHOWN = 300  # [characters] of an answer
 _THIS_NOTICES_FAULT = {400, 409, 411, 413, 415, 422, 431}
 
 
@@ -35,7 +37,8 @@ class WebAddress:
     """Where to, and what goes along.
 
     Attributes:
-        url: http or https.
+        url: http or https; its path and query are secrets, and are shown nowhere.
+        name: of the channel, by which the address is told apart where it is shown.
         secret: of the signature; "" for none.
         token: for `Authorization: Bearer`; "" for none.
         with_picture: send the picture, in base64.
@@ -44,6 +47,7 @@ class WebAddress:
     """
 
     url: str
+    name: str = ""
     secret: str = ""
     token: str = ""
     with_picture: bool = True
@@ -58,8 +62,8 @@ def check_url(url: str) -> str | None:
     try:
         parts = urlsplit(url)
         port = parts.port
-    except ValueError as err:
-        return f"is no web address: {err}"
+    except ValueError:  # what it says repeats a part of the address
+        return "is no web address: its host or port cannot be read"
     if parts.scheme not in ("http", "https") or not parts.hostname:
         return "is no web address, expected http://... or https://..."
     if parts.username is not None or parts.password is not None:
@@ -84,10 +88,12 @@ class WebhookTransport:
         self._parts = urlsplit(address.url)
         self._tls = self._parts.scheme == "https"
         self._where = f"{self._parts.hostname}:{self._parts.port or (443 if self._tls else 80)}"
+        self._mask = Mask([*url_secrets(address.url), address.token, address.secret])
 
     def describe(self) -> str:
-        """Where its notices go; without the query, which may hold a key."""
-        return f"the webhook {self._parts.scheme}://{self._where}{self._parts.path}"
+        """Where its notices go; without path and query, which are often the key."""
+        name = f" '{self._address.name}'" if self._address.name else ""
+        return f"the webhook{name} at {masked_url(self._address.url)}"
 
     def send(self, notice: Notice) -> str:
         """Post the notice."""
@@ -95,8 +101,8 @@ class WebhookTransport:
         try:
             status, reason, said, retry_after = self._post(notice.id, body)
         except (OSError, http.client.HTTPException, ValueError) as err:
-            problem = explain(err, self._where, self._address.timeout)
-            raise DeliveryError(f"{self.describe()} cannot be used: {problem}") from err
+            problem = explain(err, self._where, self._address.timeout, mask=self._mask)
+            raise DeliveryError(f"{self.describe()} cannot be used: {problem}") from None
         answer = " ".join(f"{status} {reason} {said}".split())
         if 200 <= status < 300:
             return f"{self.describe()} ({status} {reason})".replace(" )", ")")
@@ -117,9 +123,11 @@ class WebhookTransport:
                 target = f"{path}?{self._parts.query}" if self._parts.query else path
                 connection.request("POST", target, body, self._headers(notice_id, body))
                 answer = connection.getresponse()
-                said = answer.read(300).decode("utf-8", "replace")
+                data = answer.read(SHOWN + 4 * self._mask.longest)  # so that no secret is cut and then not found
+                said = self._mask(data.decode("utf-8", "replace"))[:SHOWN]
                 after = answer.getheader("Retry-After", "")
-                return answer.status, answer.reason, _printable(said), float(after) if after.isdigit() else None
+                delay = float(after) if after.isdigit() else None
+                return answer.status, self._mask(answer.reason), _printable(said), delay
             finally:
                 connection.close()
 

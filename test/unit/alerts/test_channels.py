@@ -184,3 +184,51 @@ def test_programs_that_were_told_different_things_are_named(tmp_path):
     assert differences(tmp_path, "/sensor_watch", mine) == []
     (said,) = differences(tmp_path, "/sensor_watch", MailParams(transport="smtp", email_to="a@b.org"))
     assert said == "/patrolling_node has other values than /sensor_watch for transport: one delivers for both"
+
+
+HOOK = {"type": "webhook", "url": "http://hass.example.org/x", "token_env": "TOKEN"}
+LOGIN = {"type": "smtp", "to": "a@b.org", "host": "mail", "user": "u", "password_env": "TOKEN", "security": "none"}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (HOOK, "channels/a/url: expected https://hass.example.org/... where a token is given"),
+        ({**HOOK, "url": "http://10.0.0.2:8123/x"}, "expected https://10.0.0.2:8123/... where a token"),
+        ({**HOOK, "url": "http://localhost.evil.org/x"}, "expected https://localhost.evil.org/..."),
+        ({**HOOK, "url": "http://[::ffff:10.0.0.1]/x"}, "expected https://"),
+        ({**HOOK, "url": "http://127.0.0.1.nip.io/x"}, "expected https://"),
+        (LOGIN, "channels/a/security: expected starttls or tls where user is given: without, everybody on the way"),
+        ({**LOGIN, "security": "auto", "host": "localhost"}, "security: expected starttls or tls where user is given"),
+        ({**LOGIN, "security": "auto", "allow_plaintext": True}, "security: expected starttls or tls where user"),
+    ],
+)
+def test_no_token_or_login_leaves_the_machine_in_clear_text(tmp_path, given, said):
+    with pytest.raises(ParamError) as caught:
+        choose(tmp_path, {"TOKEN": "geheim"}, channels=str(file(tmp_path, {"a": given})))
+    assert said in str(caught.value)
+    assert "allow_plaintext: true" in str(caught.value) or given.get("security") == "auto"
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {**HOOK, "allow_plaintext": True},
+        {**HOOK, "url": "https://hass.example.org/x"},
+        {"type": "webhook", "url": "http://hass.example.org/x", "secret_env": "TOKEN"},  # it is not sent
+        *({**HOOK, "url": f"http://{host}/x"} for host in ("localhost", "LOCALHOST.:80", "127.8.9.1", "[::1]:81")),
+        {**LOGIN, "allow_plaintext": True},
+        {**LOGIN, "host": "127.0.0.1"},
+        {**LOGIN, "host": "::1"},
+    ],
+)
+def test_what_stays_here_or_is_asked_for_goes_in_clear_text(tmp_path, given):
+    assert len(choose(tmp_path, {"TOKEN": "geheim"}, channels=str(file(tmp_path, {"a": given})))) == 2
+
+
+def test_the_tutorials_parameters_ask_for_clear_text_by_a_name_of_their_own(tmp_path):
+    given = {"transport": "smtp", "email_to": "a@b.org", "smtp_host": "mail", "smtp_user": "u", "smtp_security": "none"}
+    variable = {"ROSBOT_PATROL_SMTP_PASSWORD": "geheim"}
+    with pytest.raises(ParamError, match=r"~smtp_security: .*smtp_allow_plaintext: true sends it all the same"):
+        choose(tmp_path, variable, **given)
+    assert choose(tmp_path, variable, **given, smtp_allow_plaintext=True)[0].transport.name == "smtp"
