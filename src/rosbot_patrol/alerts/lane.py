@@ -64,6 +64,7 @@ class Lane:
         self._last = self._last_urgent = last
         self._failures = 0
         self._blocked_until = self._last_try = float("-inf")
+        self._asked_until = float("-inf")  # by the other side, which wants to hear nothing before
         self.down_since: float | None = None
         self.error = ""
 
@@ -172,6 +173,7 @@ class Lane:
         put_off = self._jittered(self._pace.first_delay * 2.0 ** min(self._failures - 1, 30))
         if delay is not None:
             put_off = max(put_off, min(delay, self._pace.max_delay))
+            self._asked_until = now + min(delay, self._pace.max_delay)
         self._blocked_until = now + put_off
         return put_off
 
@@ -180,9 +182,9 @@ class Lane:
 
         Args:
             now: time [s].
-            all_: what was refused, too, and without a pause since the last try.
+            all_: what was refused, too, and without a pause since the last try, even one that the other side asked for.
         """
-        soonest = now if all_ else max(now, self._last_try + self._pace.first_delay)
+        soonest = now if all_ else max(now, self._last_try + self._pace.first_delay, self._asked_until)
         self._blocked_until = min(self._blocked_until, soonest)
         if all_:
             for state in self._refused.values():
@@ -211,7 +213,7 @@ class Lane:
         return put_off
 
     def _is_up(self, error: str = "") -> None:
-        self._failures, self._blocked_until = 0, float("-inf")
+        self._failures, self._blocked_until, self._asked_until = 0, float("-inf"), float("-inf")
         self.down_since, self.error = None, error
 
     def _jittered(self, delay: float) -> float:

@@ -16,6 +16,7 @@ import hashlib
 import hmac
 import http.client
 import json
+import logging
 import ssl
 import time
 from collections.abc import Callable
@@ -23,10 +24,14 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from rosbot_patrol.alerts.channel import DeliveryError
+from rosbot_patrol.alerts.lane import Pace
 from rosbot_patrol.alerts.mail import plain_text
 from rosbot_patrol.alerts.masking import Mask, masked_url, url_secrets
 from rosbot_patrol.alerts.network_words import WHOLE_EXCHANGE, Deadline, explain
 from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.retry_after import parse_retry_after
+
+log = logging.getLogger(__name__)
 
 SHOWN = 300  # [characters] of an answer
 _THIS_NOTICES_FAULT = {400, 409, 411, 413, 415, 422, 431}
@@ -88,6 +93,7 @@ class WebhookTransport:
         self._parts = urlsplit(address.url)
         self._tls = self._parts.scheme == "https"
         self._where = f"{self._parts.hostname}:{self._parts.port or (443 if self._tls else 80)}"
+        self._has_told_of_pause = False
         self._mask = Mask([*url_secrets(address.url), address.token, address.secret])
 
     def describe(self) -> str:
@@ -99,23 +105,37 @@ class WebhookTransport:
         """Post the notice."""
         body = document(notice, with_picture=self._address.with_picture)
         try:
-            status, reason, said, retry_after = self._post(notice.id, body)
+            status, reason, said, pause = self._post(notice.id, body)
         except (OSError, http.client.HTTPException, ValueError) as err:
             problem = explain(err, self._where, self._address.timeout, mask=self._mask)
             raise DeliveryError(f"{self.describe()} cannot be used: {problem}") from None
         answer = " ".join(f"{status} {reason} {said}".split())
         if 200 <= status < 300:
             return f"{self.describe()} ({status} {reason})".replace(" )", ")")
+        delay = self._delay(pause)
         if 300 <= status < 400:
-            raise DeliveryError(f"{self.describe()} answered {answer}: redirects are not followed, name the final url")
+            answer += ": redirects are not followed, name the final url"
+        if delay is not None and delay > Pace.max_delay:
+            answer += f"; it asks for a pause of {delay:.0f} s, the longest one here is {Pace.max_delay:.0f} s"
+        is_for_now = status == 413 and delay is not None  # too large for the moment (RFC 9110, 15.5.14)
         raise DeliveryError(
             f"{self.describe()} answered {answer}",
-            permanent=status in _THIS_NOTICES_FAULT,
-            answered=status >= 500,
-            delay=retry_after,
+            permanent=status in _THIS_NOTICES_FAULT and not is_for_now,
+            answered=status >= 500 or is_for_now,
+            delay=delay,
         )
 
-    def _post(self, notice_id: str, body: bytes) -> tuple[int, str, str, float | None]:
+    def _delay(self, pause: str) -> float | None:
+        try:
+            return parse_retry_after(pause, self._wall())
+        except ValueError:
+            if not self._has_told_of_pause:
+                self._has_told_of_pause = True
+                words = "asks for a pause (Retry-After) that is neither seconds nor a date, using our own: %r"
+                log.warning(f"%s {words}", self.describe(), self._mask(pause)[:80])
+            return None
+
+    def _post(self, notice_id: str, body: bytes) -> tuple[int, str, str, str]:
         connection = self._connection()
         with Deadline(WHOLE_EXCHANGE * self._address.timeout, lambda: connection.sock):
             try:
@@ -125,9 +145,8 @@ class WebhookTransport:
                 answer = connection.getresponse()
                 data = answer.read(SHOWN + 4 * self._mask.longest)  # so that no secret is cut and then not found
                 said = self._mask(data.decode("utf-8", "replace"))[:SHOWN]
-                after = answer.getheader("Retry-After", "")
-                delay = float(after) if after.isdigit() else None
-                return answer.status, self._mask(answer.reason), _printable(said), delay
+                pause = answer.headers.get("Retry-After", "")  # the first where there are several
+                return answer.status, self._mask(answer.reason), _printable(said), pause
             finally:
                 connection.close()
 

@@ -69,6 +69,25 @@ def test_the_other_sides_wish_is_heeded_within_bounds():
     assert made.failed(made.due(120.0), 120.0, "503", delay=1e9) == 900.0
 
 
+def test_the_other_sides_wish_outlasts_a_new_notice_but_not_somebody_who_asks():
+    made = lane("a", first_delay=5.0)
+    made.failed(made.due(0.0), 0.0, "429", delay=64.57)
+    made.nudge(10.0)
+    assert made.due(64.5) == []
+    assert [e.id for e in made.due(64.57)] == ["a"]
+    made.nudge(11.0, all_=True)
+    assert [e.id for e in made.due(11.0)] == ["a"]
+    made.failed(made.due(65.0), 65.0, "no server")  # the old wish is over
+    made.nudge(70.0)
+    assert made.due(70.0)
+
+
+def test_a_wish_shorter_than_our_own_pause_changes_nothing():
+    made = lane("a", first_delay=5.0)
+    assert made.failed(made.due(0.0), 0.0, "429", delay=0.0) == 5.0
+    assert made.failed(made.due(5.0), 5.0, "429", delay=3.0) == 10.0
+
+
 def test_a_new_notice_tries_again_but_does_not_hammer():
     made, now = lane("a", first_delay=5.0), 0.0
     for _ in range(8):

@@ -91,6 +91,20 @@ def test_a_known_signature():
         ((429, {"Retry-After": "120"}, b""), False, 120.0, "answered 429"),
         ((500, {}, b""), False, None, "answered 500"),
         ((503, {"Retry-After": "soon"}, b""), False, None, "answered 503"),
+        ((429, {"Retry-After": "64.57"}, b""), False, 64.57, "answered 429"),
+        ((429, {"Retry-After": "Mon, 21 Sep 2026 14:14:21 GMT"}, b""), False, 60.5, "answered 429"),
+        ((503, {"Retry-After": "Monday, 21-Sep-26 14:14:21 GMT"}, b""), False, 60.5, "answered 503"),
+        ((503, {"Retry-After": "Mon Sep 21 14:14:21 2026"}, b""), False, 60.5, "answered 503"),
+        ((503, {"Retry-After": "Mon, 21 Sep 2026 13:00:00 GMT"}, b""), False, 0.0, "answered 503"),
+        ((503, {"Retry-After": "-3"}, b""), False, 0.0, "answered 503"),
+        ((503, {"Retry-After": ""}, b""), False, None, "answered 503"),
+        ((301, {"Retry-After": "7"}, b""), False, 7.0, "redirects are not followed"),
+        ((404, {"Retry-After": "8"}, b""), False, 8.0, "answered 404"),
+        ((413, {"Retry-After": "9"}, b""), False, 9.0, "answered 413"),  # for now
+        ((413, {"Retry-After": "soon"}, b""), True, None, "answered 413"),
+        ((400, {"Retry-After": "9"}, b""), True, 9.0, "answered 400"),
+        ((429, {"Retry-After": "86400"}, b""), False, 86400.0, "a pause of 86400 s, the longest one here is 900 s"),
+        ((503, {"Retry-After": "9" * 400}, b""), False, float("inf"), "a pause of inf s, the longest one here"),
     ],
 )
 def test_what_is_not_taken_is_said(web, reply, permanent, delay, said):
@@ -100,6 +114,33 @@ def test_what_is_not_taken_is_said(web, reply, permanent, delay, said):
     assert (caught.value.permanent, caught.value.delay) == (permanent, delay)
     assert len(web.got) == 1
     assert "key=1" not in str(caught.value)
+
+
+def test_a_pause_that_cannot_be_read_is_said_once_and_shows_no_secret(web, caplog):
+    web.reply = (503, {"Retry-After": "\u00b2 for /api/webhook/patrol?key=1"}, b"")
+    made = hook(web.url, name="phone")
+    for _ in range(3):
+        with pytest.raises(DeliveryError, match="answered 503"):
+            made.send(notice("i-1"))
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert "the webhook 'phone' at" in said
+    assert "neither seconds nor a date, using our own: '\u00b2 for ...'" in said
+
+
+def test_the_first_of_several_pauses_counts():
+    """Where a proxy adds its own."""
+    with socket.create_server(("localhost", 0)) as server:
+
+        def serve():
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(65536)
+                connection.sendall(b"HTTP/1.1 503 no\r\nRetry-After: 7\r\nRetry-After: 9\r\nContent-Length: 0\r\n\r\n")
+
+        threading.Thread(target=serve, daemon=True).start()
+        with pytest.raises(DeliveryError) as caught:
+            hook(f"http://localhost:{server.getsockname()[1]}/").send(notice("i-1"))
+    assert caught.value.delay == 7.0
 
 
 def test_https_trusts_the_certificate_that_is_named_and_no_other(web, tmp_path):
