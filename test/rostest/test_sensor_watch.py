@@ -146,7 +146,9 @@ def test_patrol_and_watch_tell_of_each_other_when_one_hangs(ros, tmp_path):
     probe = ros.probe()
     for topic in (EVENTS, DIAGNOSTICS):
         probe.tell(subscribe=topic)
+    (tmp_path / "state").mkdir(mode=0o755)
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], patrol_after=3.0, start_grace=60.0)
+    watch.node.says("could be read by others of this machine; no more")
     patrol = ros.node(
         "patrol_robot",
         "__name:=patrolling_node",
@@ -177,6 +179,8 @@ def test_patrol_and_watch_tell_of_each_other_when_one_hangs(ros, tmp_path):
     watch.node.popen.send_signal(signal.SIGCONT)
     watch.mail("the sensors' watch again well", 30.0)
     watch.node.says("this program hung: /patrolling_node")
+    places = (tmp_path / "state", *(tmp_path / "state").rglob("*"), *(tmp_path / "mail").rglob("*"))
+    assert [str(path) for path in places if path.stat().st_mode & 0o077] == []
 
 
 def test_who_else_speaks(ros, tmp_path):

@@ -28,6 +28,7 @@ from rosbot_patrol.alerts.retention import RetentionParams, prune
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.ros.node import ros_home
+from rosbot_patrol.ros.private_files import use_private_umask
 
 _UNITS = {"m": 60.0, "h": 3600.0, "d": 86_400.0, "w": 604_800.0}
 _ALL = 1_000_000_000
@@ -36,6 +37,7 @@ _ALL = 1_000_000_000
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command."""
     given = _parser().parse_args(arguments)
+    use_private_umask()
     state_dir = (given.state_dir or ros_home() / "rosbot_patrol").expanduser()
     try:
         IncidentStore(state_dir, read_only=True).close_database()  # no command makes one where there is none

@@ -29,12 +29,14 @@ from rosbot_patrol.alerts.settings_file import read_settings, state_of
 from rosbot_patrol.alerts.trial import trial_notice, try_channel
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import unknown_name
+from rosbot_patrol.ros.private_files import use_private_umask
 
 FLUSH_WAIT = 90.0  # [s] for the node that delivers
 
 
 def main() -> None:
     """Run the program."""
+    use_private_umask()
     arguments = [a for a in sys.argv[1:] if not a.startswith("__") and ":=" not in a]
     logging.getLogger("rosbot_patrol.alerts.postman").disabled = True  # what it says is printed
     try:

@@ -69,6 +69,7 @@ from rosbot_patrol.ros.patrol_settings import (
     load_or_say,
 )
 from rosbot_patrol.ros.people_markers import PeopleMarkers
+from rosbot_patrol.ros.private_files import keep_private
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.sensors.sensor_file import load_sensors
 
@@ -89,6 +90,7 @@ class PatrolNode:
         names = {room.id: room.name for room in rooms}
         self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
         folder = Path(self.params.state_dir).expanduser() if self.params.state_dir else ros_home() / "rosbot_patrol"
+        keep_private(folder)
         self.health = Health()
         evidence = load_flat(EvidenceParams, tree)
         self.pictures = PictureRing(self.params.image_topic, evidence)

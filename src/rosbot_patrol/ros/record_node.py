@@ -21,6 +21,7 @@ from pathlib import Path
 import rosgraph
 
 from rosbot_patrol.ros.by_hand import master_problem
+from rosbot_patrol.ros.private_files import UMASK
 
 HEARD = (
     "/clock", "/tf", "/tf_static", "/scan", "/odom", "/map", "/initialpose", "/motion_trigger", "/battery",
@@ -83,7 +84,7 @@ def record(given: argparse.Namespace) -> int:
     missing = [name for name in wanted if name not in published]
     if missing:
         print(f"nobody publishes yet: {', '.join(missing)}", flush=True)
-    process = subprocess.Popen(command(file, wanted, duration=given.duration))
+    process = subprocess.Popen(command(file, wanted, duration=given.duration), umask=UMASK)  # it shows a home
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: process.send_signal(signal.SIGINT))
     status = process.wait()

@@ -31,6 +31,7 @@ from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.ros.diagnostics import Health
 from rosbot_patrol.ros.node import Worker, load_params, ros_home, run_node, sender_of
 from rosbot_patrol.ros.owner_mail import RETRY, OwnerPost, refuse_passwords
+from rosbot_patrol.ros.private_files import keep_private
 from rosbot_patrol.ros.sensor_reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.ros.serial_links import links_from_msg
 from rosbot_patrol.sensors.looks import Looks
@@ -88,6 +89,7 @@ class SensorWatch:
         params = load_group(SensorWatchParams, tree)
         sensors = load_list(params)
         folder = Path(params.state_dir).expanduser() if params.state_dir else ros_home() / "rosbot_patrol"
+        keep_private(folder)
         self._memory = folder / "sensors.json"
         self._health = Health("motion sensors")
         self._post = OwnerPost(load_group(MailParams, tree), folder, self._health)
