@@ -2,6 +2,7 @@
 """A small real move_base for tests: an actionlib server that glides the robot to its goal, and turns it by /cmd_vel.
 
 Parameters: ~speed [m/s], ~refuse [list of rounded "x,y" goals that it aborts].
+Topic /test/lost (std_msgs/Bool): whether the localisation is dead, so that nothing tells map -> odom.
 """
 
 import math
@@ -12,6 +13,7 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Twist
 from move_base_msgs.msg import MoveBaseAction, MoveBaseResult
+from std_msgs.msg import Bool
 
 
 class Robot:
@@ -22,13 +24,18 @@ class Robot:
         self.wheels_heard = rospy.Time(0)
         self.lock = threading.Lock()
         self.tf = tf2_ros.TransformBroadcaster()
+        self.is_lost = False
         rospy.Subscriber("/cmd_vel", Twist, self.drive, queue_size=1)
+        rospy.Subscriber("/test/lost", Bool, self.lose, queue_size=1)
         rospy.Timer(rospy.Duration(0.02), self.tick)
         self.server = actionlib.SimpleActionServer("move_base", MoveBaseAction, self.go, auto_start=False)
         self.server.start()
 
     def drive(self, twist):
         self.wz, self.wheels_heard = twist.angular.z, rospy.Time.now()
+
+    def lose(self, message):
+        self.is_lost = message.data
 
     def tick(self, event):
         now = rospy.Time.now()
@@ -40,6 +47,8 @@ class Robot:
             half = self.yaw / 2.0
             rotation = Quaternion(0.0, 0.0, math.sin(half), math.cos(half))
         for parent, child, place in (("map", "odom", None), ("odom", "base_link", rotation)):
+            if parent == "map" and self.is_lost:
+                continue
             message = TransformStamped(child_frame_id=child)
             message.header.frame_id, message.header.stamp = parent, now
             message.transform.rotation = place or Quaternion(0, 0, 0, 1)

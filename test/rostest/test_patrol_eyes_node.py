@@ -114,3 +114,27 @@ def test_a_picture_on_the_wall_is_clear_and_said(house, sight):
     assert last.last_verdict == "clear", last.why
     assert "it is flat" in last.why
     assert house.mails() == []
+
+
+def test_a_localisation_that_dies_ends_the_turn_towards_somebody(house, sight):
+    """Whom the fake camera sees never comes to the picture's middle: the robot turns for as long as it follows them."""
+    from std_msgs.msg import Bool
+
+    lost = rospy.Publisher("/test/lost", Bool, queue_size=1, latch=True)
+    house.start_move_base()
+    house.start_patrol(look_around="spin", track={"track_time": 60.0})
+    wait_until(lambda: "floor of the rooms" in house.log(house.patrol), 30, "the rooms")
+    house.person = True
+    house.send(2)
+    wait_until(lambda: house.states and "keeping the camera" in house.states[-1].why, 30, "the turn")
+    lost.publish(Bool(data=True))
+    began = time.monotonic()
+    wait_until(lambda: "no longer follows whom it sees" in house.log(house.patrol), 10, "its end")
+    assert time.monotonic() - began < 5.0
+    assert "does the localisation (amcl) still run?" in house.log(house.patrol)
+    count = len(house.states)
+    last = house.wait_for_mission()
+    lost.unregister()
+    assert not any("keeping the camera" in state.why for state in house.states[count + 1 :])
+    assert last.last_verdict == "confirmed"
+    assert house.twists[-1] == 0.0

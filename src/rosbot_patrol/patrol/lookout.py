@@ -94,14 +94,19 @@ class Lookout(Conduct):
         boxes = self._watch.plausible(frame)
         if not boxes or (self._watch.lately(self._clock.time) < 2 and not self._track.is_on):
             return  # a single picture stops no drive
-        if frame.eye is None:
+        if frame.eye is None or inputs.pose is None or inputs.yaw is None:
             return
         column = (boxes[0].xmin + boxes[0].xmax) / 2.0
-        self._track.see(self._clock.time, frame.eye.bearing(column), frame.eye.pose.yaw)
+        in_odom = frame.eye.pose.yaw - inputs.pose.yaw + inputs.yaw  # odom goes on where the map's part does not
+        self._track.see(self._clock.time, frame.eye.bearing(column), in_odom)
 
     def _keep_in_view(self, inputs: Inputs, out: Commands) -> bool:
         """Turn towards whom the camera has in view; what the robot was about waits."""
-        speed = self._track.step(self._clock.time, inputs.pose.yaw if inputs.pose else None)
+        lost = " and ".join(["its pose in the map"] * (inputs.pose is None) + ["its heading"] * (inputs.yaw is None))
+        if lost and self._track.is_on:
+            log.warning("the camera no longer follows whom it sees: the robot does not know %s", lost)
+            self._track.release(self._clock.time)
+        speed = self._track.step(self._clock.time, inputs.yaw)
         mission, was_tracking = self.mission, self._is_tracking
         assert mission is not None
         self._is_tracking = speed is not None

@@ -55,6 +55,9 @@ class InputParams:
     odom_frame: str = param("odom", doc="frame in which a turn is measured")
     map_frame: str = param("map", doc="frame of the points file")
     pose_timeout: float = param(0.5, unit="s", lo=0.05, doc="an older odom -> base_link is not known")
+    map_timeout: float = param(
+        2.0, unit="s", lo=0.1, doc="maximum age of map -> odom, which amcl repeats with each scan; older: no pose"
+    )
     scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="an older scan says nothing of obstacles")
     battery_topic: str = param("/battery", doc="state of the battery (TurtleBot3: battery_state)")
     latched_window: float = param(

@@ -39,6 +39,11 @@ class Track:
         self._free_at = -math.inf
         self._spent = 0.0  # on those who were lost and found since the last pause [s]
 
+    def release(self, now: float) -> None:
+        """Let go of whom it keeps in view, if anybody; the time spent still counts."""
+        if self._since is not None:
+            self._let_go(free_at=now, spent=self._spent + now - self._since)
+
     @property
     def is_on(self) -> bool:
         """Whether it has hold of somebody."""
@@ -66,7 +71,12 @@ class Track:
         self._seen_at, self._yaw = now, yaw + bearing
 
     def step(self, now: float, yaw: float | None) -> float | None:
-        """Turning speed that keeps the person in view [rad/s], None where there is nobody to keep."""
+        """Turning speed that keeps the person in view [rad/s], None where there is nobody to keep.
+
+        Args:
+            now: time [s].
+            yaw: heading of the robot in odom now [rad], None where it is not known: it stands still.
+        """
         p = self.params
         if self._since is None or self._yaw is None:
             return None

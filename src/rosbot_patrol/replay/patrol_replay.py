@@ -19,13 +19,14 @@ from typing import Any
 import numpy as np
 
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import Pose2D, transform_points
+from rosbot_patrol.geometry import transform_points
 from rosbot_patrol.patrol.eyes import Eyes
 from rosbot_patrol.patrol.inputs import Battery, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.manager import PatrolManager
 from rosbot_patrol.patrol.node_params import InputParams, NodeParams
 from rosbot_patrol.patrol.request import Origin, Request
+from rosbot_patrol.patrol.robot_place import RobotPlace
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.settings import ManagerParams
 from rosbot_patrol.replay import patrol_records as heard
@@ -98,6 +99,7 @@ class PatrolReplay:
         self._tree = TransformTree()
         for edge in static:
             self._tree.add(edge, is_static=True)
+        self._place = RobotPlace(self._tree, frames)
         self._sight = PatrolSight(node.eyes, frames, rooms, node.alarm_classes, self._tree)
         self._link = BagLink()
         self._log = PatrolLog()
@@ -228,8 +230,8 @@ class PatrolReplay:
             triggers=calls,
             requests=requests,
             frames=self._sight.take(now, is_busy=is_busy),
-            yaw=self._yaw(now),
-            pose=self._pose(),
+            yaw=self._place.yaw(now),
+            pose=self._place.pose(now),
             clearance=self._clearance(scan),
             link=self._link.state(now),
             detector_at=self._detector_at,
@@ -244,19 +246,6 @@ class PatrolReplay:
     def _fresh_scan(self, now: float) -> LaserScan | None:
         is_fresh = self._scan is not None and now - self._scan[1] <= self._frames.scan_timeout
         return self._scan[0] if self._scan is not None and is_fresh else None
-
-    def _yaw(self, now: float) -> float | None:
-        try:
-            found, stamp = self._tree.newest(self._frames.odom_frame, self._frames.base_frame)
-        except TransformError:
-            return None
-        return found.pose.yaw if abs(now - stamp) <= self._frames.pose_timeout else None
-
-    def _pose(self) -> Pose2D | None:
-        try:
-            return self._tree.pose(self._frames.map_frame, self._frames.base_frame)
-        except TransformError:
-            return None
 
     def _clearance(self, scan: LaserScan | None) -> float | None:
         """From the robot's centre to the nearest thing [m]; reckoned once for each scan."""

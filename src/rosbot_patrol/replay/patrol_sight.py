@@ -19,6 +19,7 @@ from rosbot_patrol.patrol.floor import floor_of
 from rosbot_patrol.patrol.inputs import Eye, Frame, ScanView
 from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
 from rosbot_patrol.patrol.person_place import Lens, View, measure
+from rosbot_patrol.patrol.robot_place import RobotPlace
 from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.witness import off_the_map
@@ -58,6 +59,7 @@ class PatrolSight:
         tree: TransformTree,
     ) -> None:
         self._topics, self._frames, self._rooms, self._tree = topics, frames, rooms, tree
+        self._place = RobotPlace(tree, frames)
         self._classes = frozenset(alarm_classes)
         self._camera: LensRecord | None = None
         self._waiting: deque[_Pending] = deque(maxlen=50)
@@ -125,6 +127,7 @@ class PatrolSight:
             pose = matrix_of(self._tree.lookup(world, frame, stamp))
         except TransformError:
             try:  # the map's part of it comes later than odometry
+                self._place.map_from_odom(stamp)  # raises where it is too old
                 pose = matrix_of(self._tree.lookup(world, odom)) @ matrix_of(self._tree.lookup(odom, frame, stamp))
             except TransformError:
                 return None

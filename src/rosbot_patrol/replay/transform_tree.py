@@ -111,6 +111,11 @@ class TransformTree:
         """The planar part of `lookup`; raises as that does."""
         return self.lookup(target, source, stamp).pose
 
+    def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
+        """The planar part of `newest`."""
+        found, stamp = self.newest(target, source)
+        return found.pose, stamp
+
     def mount(self, base: str, laser: str) -> Mount:
         """How a laser sits on the robot.
 

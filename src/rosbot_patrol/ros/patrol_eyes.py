@@ -24,8 +24,9 @@ from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points, wrap_angles
 from rosbot_patrol.patrol.floor import floor_of
 from rosbot_patrol.patrol.inputs import Box, Eye, Frame, ScanView
-from rosbot_patrol.patrol.node_params import EyesTopics
+from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
 from rosbot_patrol.patrol.person_place import View, measure
+from rosbot_patrol.patrol.robot_place import RobotPlace
 from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.witness import off_the_map
@@ -59,7 +60,7 @@ class PatrolEyes:
         rooms: of the points file.
         alarm_classes: boxes of others are not measured.
         transforms: the node's tf listener.
-        map_frame: frame of the map; odom_frame: frame in which a moment's pose is known at once.
+        frames: names of the robot's frames, and how old their transforms may be.
         health: where to say how it goes.
     """
 
@@ -70,12 +71,13 @@ class PatrolEyes:
         alarm_classes: Iterable[str],
         transforms: Transforms,
         *,
-        map_frame: str,
-        odom_frame: str,
+        frames: InputParams,
         health: Health,
     ) -> None:
         self._topics, self._rooms, self._transforms = topics, rooms, transforms
-        self._map_frame, self._odom_frame, self._health = map_frame, odom_frame, health
+        self._map_frame, self._odom_frame = frames.map_frame, frames.odom_frame
+        self._place = RobotPlace(transforms, frames)
+        self.health = health
         self._classes = frozenset(alarm_classes)
         self._lenses = Lenses(topics.camera_info_topic)
         self.depth = DepthRing(topics.depth_topic, topics.depth_info_topic, health)
@@ -155,6 +157,7 @@ class PatrolEyes:
         except TransformError:
             try:  # the map's part of it comes later than odometry
                 odom_from_camera = self._transforms.lookup_matrix(self._odom_frame, frame, stamp)
+                self._place.map_from_odom(stamp)  # raises where it is too old
                 pose = self._transforms.lookup_matrix(self._map_frame, self._odom_frame, 0.0) @ odom_from_camera
             except TransformError:
                 return None
@@ -214,11 +217,11 @@ class PatrolEyes:
             for room_id in house.lost:
                 log.warning("the point of room %d is not on the map's floor: what is seen of it is not known", room_id)
         self.house = house
-        self._health.set("map", OK, f"{len(self._rooms)} rooms on the map")
+        self.health.set("map", OK, f"{len(self._rooms)} rooms on the map")
 
     def _refuse(self, err: MapError) -> None:
         """Say that a map is left out, and what that means."""
         rest = "the rooms of the map before stay" if self.house else "shares of floor seen are not known"
         text = f"rooms cannot be told from the map: {err}; {rest}"
         log.error("%s", text)
-        self._health.set("map", WARN if self.house else ERROR, text)
+        self.health.set("map", WARN if self.house else ERROR, text)

@@ -27,9 +27,11 @@ from rosbot_patrol.patrol.journal import Journal
 from rosbot_patrol.patrol.node_params import InputParams
 from rosbot_patrol.patrol.repeats import Repeats
 from rosbot_patrol.patrol.request import Origin, Request
+from rosbot_patrol.patrol.robot_place import RobotPlace
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.store import PatrolStore
 from rosbot_patrol.ros import convert
+from rosbot_patrol.ros.diagnostics import OK, WARN
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import now
 from rosbot_patrol.ros.patrol_eyes import PatrolEyes
@@ -99,6 +101,8 @@ class PatrolInputs:
         self._first_heard: set[str] = set()
         self._refused = Repeats()
         self._has_latched = False
+        self._place = RobotPlace(transforms, params)
+        self._is_lost: bool | None = None
 
     def ask(self, request: Request) -> None:
         """Take a request from elsewhere."""
@@ -222,8 +226,8 @@ class PatrolInputs:
             triggers=self._take_calls(),
             requests=tuple(drain(self._requests)),
             frames=tuple(self.eyes.take(is_busy=is_busy)),
-            yaw=self._yaw(time_now),
-            pose=self._pose(),
+            yaw=self._place.yaw(time_now),
+            pose=self._pose(time_now),
             clearance=self._clearance(scan),
             scan=view,
             house=self.eyes.house,
@@ -262,18 +266,14 @@ class PatrolInputs:
         with self._lock:
             self._journal.drop(taken)
 
-    def _yaw(self, time_now: float) -> float | None:
-        try:
-            pose, stamp = self.transforms.lookup_stamped(self.params.odom_frame, self.params.base_frame)
-        except TransformError:
-            return None
-        return pose.yaw if abs(time_now - stamp) <= self.params.pose_timeout else None
-
-    def _pose(self) -> Pose2D | None:
-        try:
-            return self.transforms.lookup(self.params.map_frame, self.params.base_frame)
-        except TransformError:
-            return None
+    def _pose(self, time_now: float) -> Pose2D | None:
+        pose = self._place.pose(time_now)
+        if (pose is None) != self._is_lost or self._is_lost is None:
+            self._is_lost = pose is None
+            level, text = (WARN, self._place.problem) if pose is None else (OK, "the robot's pose is known")
+            self.eyes.health.set("pose", level, text)
+            (log.warning if pose is None else log.info)("%s", text)
+        return pose
 
     def _fresh_scan(self, time_now: float) -> LaserScanMsg | None:
         return self._scan.get() if self._scan.fresh(time_now, self.params.scan_timeout) else None

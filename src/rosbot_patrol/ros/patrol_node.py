@@ -133,8 +133,7 @@ class PatrolNode:
             rooms,
             self.params.alarm_classes,
             transforms,
-            map_frame=inputs.map_frame,
-            odom_frame=inputs.odom_frame,
+            frames=inputs,
             health=self.health,
         )
         self.inputs = PatrolInputs(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -11,7 +12,9 @@ from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.patrol.eyes import Eyes, SightParams
 from rosbot_patrol.patrol.inputs import GoalState, Inputs
 from rosbot_patrol.patrol.judge import Judge, Known
+from rosbot_patrol.patrol.manager import ManagerParams
 from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.track import TrackParams
 from rosbot_patrol.patrol.viewpoints import ViewpointParams
 
 
@@ -181,6 +184,59 @@ def test_one_who_walks_in_the_room_is_kept_in_view() -> None:
     (told,) = [notice.mission.place for notice in world.notices]
     world.until(lambda w: bool(w.ended))
     assert world.ended[0].place == told  # the record says what the mail says, however far they walk
+
+
+class Unlocalised:
+    """A manager whose robot's place in the map is not known from a step on, nor what stands where in its pictures."""
+
+    def __init__(self, manager) -> None:
+        self._manager, self.is_lost = manager, False
+
+    def __getattr__(self, name):
+        return getattr(self._manager, name)
+
+    def step(self, now, inputs):
+        if self.is_lost:
+            frames = tuple(dataclasses.replace(frame, eye=None) for frame in inputs.frames)
+            inputs = dataclasses.replace(inputs, pose=None, scan=None, frames=frames)
+        return self._manager.step(now, inputs)
+
+
+def test_a_turn_towards_somebody_ends_where_the_pose_in_the_map_is_lost(caplog: pytest.LogCaptureFixture) -> None:
+    world = World(walks)
+    world.manager = lost = Unlocalised(world.manager)
+    world.triggers = (1,)
+    world.until(lambda w: w.manager._is_tracking)
+    lost.is_lost = True
+    world.step()
+    assert not world.manager._is_tracking
+    assert "no longer follows whom it sees: the robot does not know its pose in the map" in caplog.text
+    world.until(lambda w: bool(w.ended))
+    assert world.ended[0].verdict.value == "confirmed"
+
+
+def test_whom_the_robot_turns_to_is_found_by_odometry_alone() -> None:
+    """A correction of the map's heading by the localisation in mid turn does not lead the camera astray."""
+    world = World(walks, params=ManagerParams(track=TrackParams(track_time=30.0)))
+    step, off = world.manager.step, [0.0]
+
+    def turned(now, inputs):
+        pose = inputs.pose._replace(yaw=wrap_angle(inputs.pose.yaw + off[0]))
+        frames = tuple(
+            dataclasses.replace(f, eye=dataclasses.replace(f.eye, pose=f.eye.pose._replace(yaw=pose.yaw)))
+            for f in inputs.frames
+        )
+        return step(now, dataclasses.replace(inputs, pose=pose, frames=frames, scan=None))
+
+    world.manager.step = turned
+    world.triggers = (1,)
+    world.until(lambda w: w.manager._is_tracking)
+    off[0] = 0.6
+    for _ in range(60):
+        world.step()
+        x, y = world.people(world.now)[0]
+        bearing = wrap_angle(math.atan2(y - world.pose.y, x - world.pose.x) - world.pose.yaw)
+        assert abs(bearing) < WIDTH / 2
 
 
 @pytest.mark.parametrize("distance", [2.0, 0.0])
