@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -38,6 +39,8 @@ class _Shelf:
 class Album:
     """Collects for several records at once.
 
+    One thread, the keeper's, collects. `note` and `is_waiting` are for other threads, too.
+
     Args:
         params: how much.
     """
@@ -46,26 +49,31 @@ class Album:
         self.params = params
         self._shelves: dict[str, _Shelf] = {}
         self._sightings: deque[Sighting] = deque(maxlen=200)
+        self._guard = threading.Lock()  # of the sightings and of which shelves there are
         self.problems: set[str] = set()
 
     @property
     def is_waiting(self) -> bool:
         """Whether pictures are still to come for a sighting."""
-        return any(shelf.clip is not None for shelf in self._shelves.values())
+        with self._guard:
+            return any(shelf.clip is not None for shelf in self._shelves.values())
 
     def begin(self, incident_id: str) -> None:
         """A mission begins."""
-        self._shelves.setdefault(incident_id, _Shelf())
+        with self._guard:
+            self._shelves.setdefault(incident_id, _Shelf())
 
     def sight(self, incident_id: str, stamp: float) -> None:
         """Somebody was seen: the seconds about it are wanted, the first time."""
-        shelf = self._shelves.setdefault(incident_id, _Shelf())
+        self.begin(incident_id)
+        shelf = self._shelves[incident_id]
         if shelf.clip is None and shelf.count == 0:
             shelf.clip = Clip.around(incident_id, stamp, self.params)
 
     def note(self, sighting: Sighting) -> None:
         """What a detector saw."""
-        self._sightings.append(sighting)
+        with self._guard:
+            self._sightings.append(sighting)
 
     def is_over(self, incident_id: str, ring: EvidenceRing) -> bool:
         """Whether nothing more comes for a record."""
@@ -111,7 +119,8 @@ class Album:
 
     def finish(self, incident_id: str) -> list[NewFile]:
         """The best pictures, with boxes; forgets the record."""
-        shelf = self._shelves.pop(incident_id, None)
+        with self._guard:
+            shelf = self._shelves.pop(incident_id, None)
         if shelf is None:
             return []
         files = []
@@ -122,7 +131,8 @@ class Album:
         return files
 
     def _judge(self, shelf: _Shelf, picture: Picture, plain: bytes) -> None:
-        seen = next((s for s in self._sightings if abs(s.stamp - picture.stamp) <= _SAME), None)
+        with self._guard:
+            seen = next((s for s in self._sightings if abs(s.stamp - picture.stamp) <= _SAME), None)
         if seen is None or not seen.boxes:
             return
         largest = max(seen.boxes, key=lambda b: abs(b.xmax - b.xmin) * abs(b.ymax - b.ymin))

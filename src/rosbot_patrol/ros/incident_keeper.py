@@ -33,6 +33,7 @@ from rosbot_patrol.patrol.chronicle import Entry
 from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.grids import GridMsg
+from rosbot_patrol.ros.node import Worker
 from rosbot_patrol.ros.patrol_images import PictureRing
 
 log = logging.getLogger(__name__)
@@ -114,7 +115,7 @@ class IncidentKeeper:
         """
         self._running = tuple(running)
         rospy.Subscriber("/map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 23)
-        threading.Thread(target=self._run, name="incidents", daemon=True).start()
+        Worker(self._run, name="incidents").start()
 
     # -- what the patrol hands over; returns at once
 
@@ -144,9 +145,6 @@ class IncidentKeeper:
         if not entries:
             return
         self._entries.extend(entries)
-        while len(self._entries) > _MOST:
-            self._entries.popleft()
-            self._lost += 1
         self._wake.set()
 
     def put_picture(self, incident_id: str, file: NewFile) -> None:
@@ -176,6 +174,9 @@ class IncidentKeeper:
 
     def step(self) -> float:
         """Write what there is, whatever the disk says; returns how long to wait for the next step [s]."""
+        while len(self._entries) > _MOST:  # on this thread: another would take away what is being written
+            self._entries.popleft()
+            self._lost += 1
         try:
             return self._work()
         except StoreError as err:
