@@ -3,6 +3,9 @@
 Two can hold it: the service (a person or a program that means this robot) and the topic (a button on the robot, or
 whatever else feeds the base's lock). A button that says "not pressed" ten times a second releases only what it held
 itself; the service releases both, as whoever calls it means just that: a button that is still pressed says so again.
+
+What is kept on the disk holds unless it says plainly that nobody pressed: the file is absent, or it is `{"held_by": []}`
+and nothing else. A damaged file differs from that, since a held one has at least nine bytes more.
 """
 
 from __future__ import annotations
@@ -16,10 +19,11 @@ from rosbot_patrol.files import write_atomic
 log = logging.getLogger(__name__)
 
 SERVICE, TOPIC = "service", "topic"
+_FILE = "file"
 _WORDS = {
     SERVICE: "the emergency stop was pressed (service /patrol/emergency_stop)",
     TOPIC: "the emergency stop was pressed (topic /e_stop)",
-    "file": "the emergency stop holds, as what was kept of it cannot be read",
+    _FILE: "the emergency stop holds, as what was kept of it cannot be read",
 }
 
 
@@ -67,10 +71,17 @@ class EmergencyStop:
 
     def _read(self) -> set[str]:
         try:
-            held = json.loads(self._path.read_text(encoding="utf-8"))["held_by"]
-            return {name for name in held if name in _WORDS}
-        except FileNotFoundError:
+            tree = json.loads(self._path.read_bytes())
+        except (FileNotFoundError, NotADirectoryError):  # no such file: it was never pressed
             return set()
-        except (OSError, ValueError, KeyError, TypeError) as err:
-            log.error("%s cannot be read (%s): the robot stands still until the stop is released", self._path, err)
-            return {"file"}
+        except (OSError, ValueError, RecursionError) as err:
+            return self._doubt(str(err))
+        if tree == {"held_by": []}:
+            return set()
+        held = tree.get("held_by") if isinstance(tree, dict) else None
+        known = {name for name in held if name in (SERVICE, TOPIC)} if isinstance(held, list) else set()
+        return known if tree == {"held_by": sorted(known)} else known | self._doubt("it is no list of who pressed")
+
+    def _doubt(self, problem: str) -> set[str]:
+        log.error("%s cannot be read (%s): the robot stands still until the stop is released", self._path, problem)
+        return {_FILE}
