@@ -4,8 +4,8 @@ Two can hold it: the service (a person or a program that means this robot) and t
 whatever else feeds the base's lock). A button that says "not pressed" ten times a second releases only what it held
 itself; the service releases both, as whoever calls it means just that: a button that is still pressed says so again.
 
-What is kept on the disk holds unless it says plainly that nobody pressed: the file is absent, or it is `{"held_by": []}`
-and nothing else. A damaged file differs from that, since a held one has at least nine bytes more.
+What is kept on the disk holds unless it says plainly that nobody pressed: the file is absent, or it is
+`{"held_by": []}` and nothing else. No small damage makes that of a held one, which has at least seven bytes more.
 """
 
 from __future__ import annotations

@@ -64,9 +64,28 @@ def test_no_damage_to_a_held_stop_releases_it(tmp_path, by):
 
 @pytest.mark.parametrize(
     "content",
-    [b"", b"{", b"[]", b"null", b"0", b'""', b"{}", b'{"held_by": 3}', b'{"held_by": {}}', b'{"held_by": ""}']
-    + [b'{"held_by": null}', b'{"held_by": [null]}', b'{"held_by": [[]]}', b'{"held_by": ["nobody"]}', b"\xff\xfe"]
-    + [b'{"held_by": [], "also": 1}', b'{"held_by": false}', b"[" * 100_000, b'{"held_by": [{}]}', bytes(40)],
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b"0",
+        b'""',
+        b"{}",
+        b'{"held_by": 3}',
+        b'{"held_by": {}}',
+        b'{"held_by": ""}',
+        b'{"held_by": null}',
+        b'{"held_by": [null]}',
+        b'{"held_by": [[]]}',
+        b'{"held_by": ["nobody"]}',
+        b"\xff\xfe",
+        b'{"held_by": [], "also": 1}',
+        b'{"held_by": false}',
+        b"[" * 100_000,
+        b'{"held_by": [{}]}',
+        bytes(40),
+    ],
 )
 def test_what_cannot_be_read_holds(tmp_path, content, caplog):
     (tmp_path / "stop.json").write_bytes(content)
