@@ -37,7 +37,9 @@ def notify(tmp_path, monkeypatch, capsys):
 
 @pytest.fixture
 def outbox(tmp_path):
-    return Outbox(tmp_path / "rosbot_patrol" / "outbox")
+    outbox = Outbox(tmp_path / "rosbot_patrol" / "outbox")
+    outbox.make()
+    return outbox
 
 
 def put(outbox, *names):

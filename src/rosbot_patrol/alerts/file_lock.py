@@ -64,10 +64,10 @@ class FileLock:
             self.beat()
             return True
         self.release()
-        handle = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
+        handle, can_beat = _open(self.path)
         if not _try_lock(handle):
             os.close(handle)
-            return self._is_stale() and self._seize()
+            return can_beat and self._is_stale() and self._seize()
         if not self._is_at_path(handle):  # another has put a new one in its place at this moment
             os.close(handle)
             return False
@@ -170,6 +170,47 @@ class FileLock:
             os.pwrite(handle, f"{self._who} (process {os.getpid()})\n".encode(), 0)
         except OSError:
             return
+
+
+class NoLock:
+    """The lock of what no other process can reach: always held."""
+
+    path, seized_from = Path("memory"), ""
+    is_held, is_lost = True, False
+
+    def take(self) -> bool:
+        """It is held."""
+        return True
+
+    def beat(self) -> None:
+        """Nobody waits for a sign of life."""
+
+    def beating(self) -> contextlib.AbstractContextManager[None]:
+        """As `beat`."""
+        return contextlib.nullcontext()
+
+    def release(self) -> None:
+        """It stays held."""
+
+    def holder(self) -> str:
+        """Nobody wrote into it."""
+        return ""
+
+
+def _open(path: Path) -> tuple[int, bool]:
+    """Open the lock's file, for reading only where the disk takes nothing: it can be locked all the same.
+
+    Returns:
+        The handle, and whether its holder could give signs of life.
+    """
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT, 0o644), True
+    except OSError as err:
+        if err.errno not in (errno.EROFS, errno.EACCES):
+            raise
+        with contextlib.suppress(FileNotFoundError):
+            return os.open(path, os.O_RDONLY), False
+        raise
 
 
 def _try_lock(handle: int) -> bool:

@@ -29,6 +29,7 @@ _NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|eml)"
 _SCRATCH = re.compile(r"\..*\.(?P<pid>\d+)\.tmp")
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 RESERVE = 2 << 20  # [bytes]
+_PROBE = 4096  # [bytes]: an empty file finds its place on a full disk
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,11 +51,23 @@ class Waiting:
     channels: tuple[str, ...] = field(default=())
 
 
+def waiting_of(name: str, notice: Notice) -> Waiting:
+    """What a lane has to know of a notice in the file of this name."""
+    return Waiting(
+        name=name,
+        id=notice.id,
+        kind=notice.kind,
+        wall=notice.wall,
+        is_urgent=notice.is_urgent,
+        channels=notice.channels,
+    )
+
+
 class Outbox:
     """The folder of waiting notices.
 
     Args:
-        folder: is made where missing.
+        folder: is made by the first `put`, or by `make`.
         keep: so many delivered notices stay in `sent`.
     """
 
@@ -64,6 +77,9 @@ class Outbox:
         self._known: dict[str, Waiting] = {}
         self._left_alone: set[str] = set()
         self._order = 0
+
+    def make(self) -> None:
+        """Make the folder where it is missing. Raises OSError."""
         self.sent.mkdir(parents=True, exist_ok=True)
 
     def has(self, notice_id: str) -> bool:
@@ -92,6 +108,7 @@ class Outbox:
         Raises:
             OSError: the disk does not take it: nothing is kept then.
         """
+        self.make()
         names = self._all_names()
         if any(found["id"] == notice.id for found in names):
             return False
@@ -99,17 +116,23 @@ class Outbox:
         path = self.folder / f"{self._order:012d}-{notice.id}.notice"
         data = notice.to_bytes()
         try:
-            write_atomic(path, data)
+            self._write(path, data)
         except OSError as err:
-            if err.errno not in DISK_FULL or not self._make_room(len(data)):
+            if not path.exists():
                 raise
-            log.error("the disk is full: the notice took of what is kept free for it")
-            write_atomic(path, data)
+            log.error("%s may not outlive a power cut: %s", path, err)  # whoever delivers sees it from now on
         return True
+
+    def probe(self) -> None:
+        """Write something and take it away again. Raises OSError where the disk does not take it."""
+        self.make()
+        path = self.folder / "probe"
+        write_atomic(path, bytes(_PROBE))
+        path.unlink(missing_ok=True)
 
     def waiting(self) -> list[Waiting]:
         """What waits now, oldest first. A file that is no notice is set aside. Raises OSError."""
-        names = sorted(e.name for e in os.scandir(self.folder) if e.name.endswith(".notice"))
+        names = sorted(e.name for e in _scan(self.folder) if e.name.endswith(".notice"))
         self._known = {name: self._known[name] for name in names if name in self._known}
         for name in names:
             if name not in self._known and name not in self._left_alone:
@@ -127,6 +150,7 @@ class Outbox:
 
     def finish(self, entry: Waiting) -> None:
         """Move a notice that every channel took to `sent`. Raises OSError."""
+        self.make()
         try:
             (self.folder / entry.name).replace(self.sent / entry.name)
         except FileNotFoundError:
@@ -141,7 +165,8 @@ class Outbox:
 
     def tidy(self) -> None:
         """Remove old notices and scratch files, keep the reserve; for the process that delivers. Raises OSError."""
-        for name in sorted(e.name for e in os.scandir(self.sent))[: -self._keep]:
+        self.make()
+        for name in sorted(e.name for e in _scan(self.sent))[: -self._keep]:
             (self.sent / name).unlink(missing_ok=True)
         for scratch in (*self.folder.glob(".*.tmp"), *self.sent.glob(".*.tmp")):
             if _is_left_over(scratch):
@@ -152,8 +177,8 @@ class Outbox:
 
     def _all_names(self) -> list[re.Match[str]]:
         # those that wait first: a notice that moves to `sent` meanwhile is seen at least once
-        waiting = [entry.name for entry in os.scandir(self.folder)]
-        names = waiting + [entry.name for entry in os.scandir(self.sent)]
+        waiting = [entry.name for entry in _scan(self.folder)]
+        names = waiting + [entry.name for entry in _scan(self.sent)]
         return [found for name in names if (found := _NAME.fullmatch(name))]
 
     def _look_at(self, name: str) -> None:
@@ -168,19 +193,21 @@ class Outbox:
             else:
                 log.error("%s %s: set aside as %s", self.folder / name, err, self.set_aside(name))
             return
-        self._known[name] = Waiting(
-            name=name,
-            id=notice.id,
-            kind=notice.kind,
-            wall=notice.wall,
-            is_urgent=notice.is_urgent,
-            channels=notice.channels,
-        )
+        self._known[name] = waiting_of(name, notice)
+
+    def _write(self, path: Path, data: bytes) -> None:
+        try:
+            write_atomic(path, data)
+        except OSError as err:
+            if err.errno not in DISK_FULL or not self._make_room(len(data)):
+                raise
+            log.error("the disk is full: the notice took of what is kept free for it")
+            write_atomic(path, data)
 
     def _make_room(self, size: int) -> bool:
         """Free space on a full disk: of what was delivered, then of the reserve; returns whether there was some."""
         freed = 0
-        for name in sorted(e.name for e in os.scandir(self.sent))[:-20]:
+        for name in sorted(e.name for e in _scan(self.sent))[:-20]:
             freed += (self.sent / name).stat().st_size
             (self.sent / name).unlink(missing_ok=True)
         reserve = self.folder / "reserve"
@@ -202,6 +229,14 @@ class Outbox:
         finally:
             os.close(handle)
         sync_folder(self.folder)
+
+
+def _scan(folder: Path) -> list[os.DirEntry[str]]:
+    """What is in a folder; nothing where it was not made yet."""
+    try:
+        return list(os.scandir(folder))
+    except FileNotFoundError:
+        return []
 
 
 def _is_left_over(scratch: Path) -> bool:

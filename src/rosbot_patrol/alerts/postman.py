@@ -20,9 +20,10 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.channel import Channel, DeliveryError
 from rosbot_patrol.alerts.digest import merge
-from rosbot_patrol.alerts.file_lock import STALE, FileLock
+from rosbot_patrol.alerts.file_lock import STALE, FileLock, NoLock
 from rosbot_patrol.alerts.lane import Lane
 from rosbot_patrol.alerts.mail import token
+from rosbot_patrol.alerts.memory_outbox import MemoryOutbox
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox, Waiting
 from rosbot_patrol.alerts.receipts import Receipt, Receipts
@@ -84,7 +85,7 @@ class Postman:
     """Owns the channels, and, where it holds the lock, the deliveries.
 
     Args:
-        outbox: notices on disk.
+        outbox: notices on disk; those in memory are this process's alone.
         channels: ways out.
         who: this process, for people.
         clocks: time.
@@ -96,7 +97,7 @@ class Postman:
 
     def __init__(
         self,
-        outbox: Outbox,
+        outbox: Outbox | MemoryOutbox,
         channels: Sequence[Channel],
         *,
         who: str = "",
@@ -108,9 +109,12 @@ class Postman:
     ) -> None:
         self.outbox = outbox
         self.channels = {channel.name: channel for channel in channels}
-        self.receipts = Receipts(outbox.folder / "taken.jsonl")
         self._clocks = clocks or Clocks()
-        self.lock = FileLock(outbox.folder / "lock", who, stale_after=stale_after, clock=self._clocks.now)
+        self.receipts = Receipts(None)
+        self.lock: FileLock | NoLock = NoLock()
+        if isinstance(outbox, Outbox):
+            self.receipts = Receipts(outbox.folder / "taken.jsonl")
+            self.lock = FileLock(outbox.folder / "lock", who, stale_after=stale_after, clock=self._clocks.now)
         self._rng = random.Random(seed)
         self._legacy, self._down_after, self._stale_after = legacy, down_after, stale_after
         self._lanes: dict[str, Lane] = {}
@@ -139,12 +143,13 @@ class Postman:
             if self.is_delivering:
                 self.lock.beat()
                 return True
+            self.outbox.make()
             if not self.lock.take():
                 return False
             if self.lock.seized_from:
                 who, silent = self.lock.seized_from, self._stale_after
                 log.error("%s, which delivered the notices, gave no sign of life for %.0f s: taking over", who, silent)
-            adopt_mails(self.outbox, self._legacy)
+            self._adopt()
             self.receipts.read_new()
             now, wall = self._clocks.now(), self._clocks.wall()
             for name, channel in self.channels.items():
@@ -163,15 +168,16 @@ class Postman:
     def refresh(self) -> None:
         """Look at what waits on disk; only where this process delivers. Raises OSError."""
         with self._guard:
-            self._write_receipts()
             before = {entry.name for entry in self._waiting}
             self._waiting = self.outbox.waiting()
-            self._settle_refusals()
-            self._finish()
+            self.receipts.read_new()  # after the look at the folder: another program writes receipts before the notice
             for name, lane in self._lanes.items():
                 self._offer(name)
                 if any(entry.name not in before for entry in self._waiting):
                     lane.nudge(self._clocks.now())
+            self._write_receipts()  # the lanes first: they need no disk that takes anything
+            self._settle_refusals()
+            self._finish()
             self.outbox.tidy()
 
     def deliver(self, name: str) -> Delivery | None:
@@ -268,6 +274,14 @@ class Postman:
             log.error("%s was removed, by which others know who delivers: making it anew", self.lock.path)
         self.hand_over()
 
+    def _adopt(self) -> None:
+        if not isinstance(self.outbox, Outbox):
+            return
+        try:
+            adopt_mails(self.outbox, self._legacy)
+        except OSError as err:
+            log.error("the mails that the version before left waiting cannot be taken over now: %s", err)
+
     def _is_open(self, entry: Waiting, name: str) -> bool:
         channel = self.channels[name]
         return channel.takes(entry) and channel.names.isdisjoint(self.receipts.done(entry.id))
@@ -336,6 +350,7 @@ class Postman:
     def _cross_out(self, channel: Channel, lane: Lane, batch: list[Waiting], where: str) -> None:
         receipt = self._receipt(channel, batch, where=where)
         lane.delivered(batch, self._clocks.now())
+        self.receipts.note(receipt)
         self._unwritten.append(receipt)
         try:
             self._write_receipts()

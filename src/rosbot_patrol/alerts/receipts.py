@@ -45,7 +45,7 @@ class Receipts:
     """The file of deliveries.
 
     Args:
-        path: of the file; need not be there.
+        path: of the file; need not be there. None: deliveries are kept in `added` only.
 
     Attributes:
         taken: the channels that took a notice, by its id.
@@ -54,8 +54,9 @@ class Receipts:
         last: when a channel took something last, seconds since 1970.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | None) -> None:
         self.path = path
+        self.added: list[Receipt] = []
         self.taken: dict[str, set[str]] = {}
         self.refused: dict[str, set[str]] = {}
         self.refusals: dict[str, str] = {}
@@ -68,24 +69,29 @@ class Receipts:
 
     def read_new(self) -> list[Receipt]:
         """What was added since the last call, the whole file in the first. Raises OSError."""
+        if self.path is None:
+            return []
         try:
             file = self.path.open("rb")
         except FileNotFoundError:
             return []
         with file:
-            inode = os.fstat(file.fileno()).st_ino
-            if inode != self._inode:  # the first time, or it was written anew
-                self._inode, self._offset = inode, 0
+            found = os.fstat(file.fileno())
+            if found.st_ino != self._inode or found.st_size < self._offset:  # the first time, or it was written anew
+                self._inode, self._offset = found.st_ino, 0
             file.seek(self._offset)
             data = file.read()
         whole = data[: data.rfind(b"\n") + 1]
         self._offset += len(whole)
-        found = [r for r in map(_parse, whole.splitlines()) if r is not None]
-        return [r for r in found if self._note(r)]
+        receipts = [r for r in map(_parse, whole.splitlines()) if r is not None]
+        return [r for r in receipts if self.note(r)]
 
     def add(self, receipt: Receipt) -> None:
         """Write a delivery down. Raises OSError where the disk does not take it."""
-        self._note(receipt)
+        self.note(receipt)
+        if self.path is None:
+            self.added.append(receipt)
+            return
         tree = {name: value for name, value in asdict(receipt).items() if name != "refused" or value}
         line = json.dumps(tree).encode("ascii") + b"\n"
         handle = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
@@ -103,6 +109,8 @@ class Receipts:
     def compact(self, keep: Iterable[str], *, lines: int = 500) -> None:
         """Write the file anew with the last `lines` and what was taken of `keep`. Raises OSError."""
         wanted = set(keep)
+        if self.path is None:
+            return
         try:
             found = self.path.read_bytes().splitlines()
         except FileNotFoundError:
@@ -112,7 +120,7 @@ class Receipts:
         if len(kept) < len(early):
             write_atomic(self.path, b"".join(line + b"\n" for line in kept + found[-lines:]))
 
-    def _note(self, receipt: Receipt) -> bool:
+    def note(self, receipt: Receipt) -> bool:
         """Remember a delivery; returns whether it is news."""
         fresh = any(receipt.channel not in self.done(name) for name in receipt.ids)
         for name in receipt.ids:

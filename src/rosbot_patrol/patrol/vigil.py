@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
@@ -17,18 +18,21 @@ class Vigil:
         wall: seconds since 1970, now: from here on calls are heard.
         most: a gap that is longer than that is not looked into [s].
 
-    Raises:
-        OSError: the file cannot be made.
+    Attributes:
+        problem: why the file cannot be read or made, "" where it can; `step` tries on.
     """
 
     def __init__(self, path: Path, wall: float, most: float = 3600.0) -> None:
-        self._path, self._began, self._touched = path, wall, wall
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._gone: float | None = path.stat().st_mtime if path.exists() else None
-        if self._gone is not None and not 0.0 <= wall - self._gone <= most:
-            self._gone = None  # for too long, or the clock was set
-        path.touch()
-        os.utime(path, (wall, wall))
+        self._path, self._began, self._touched = path, wall, -math.inf
+        self._gone: float | None = None
+        self.problem = ""
+        try:
+            gone = path.stat().st_mtime if path.exists() else -math.inf
+            if 0.0 <= wall - gone <= most:  # else for too long, or the clock was set
+                self._gone = gone
+            self.step(wall)
+        except OSError as err:
+            self.problem = str(err)
 
     @property
     def has_gap(self) -> bool:
@@ -39,6 +43,8 @@ class Vigil:
         """Give a sign of life where one is due. Raises OSError."""
         if not 0.0 <= wall - self._touched < _EVERY:
             self._touched = wall
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._path.touch()
             os.utime(self._path, (wall, wall))
 
     def end(self) -> None:

@@ -32,6 +32,10 @@ class MissedCalls:
     def __init__(self, path: Path, ask: Callable[[Request], None], room_of: Callable[[int], int | None]) -> None:
         self._ask, self._room_of = ask, room_of
         self._vigil = Vigil(path, time.time())
+        if self._vigil.problem:
+            log.error(
+                "%s cannot be used: %s; calls of the time before the start may be missed", path, self._vigil.problem
+            )
         self._refused = Repeats(600.0)
         self._began = time.monotonic()
         self._heard = 0

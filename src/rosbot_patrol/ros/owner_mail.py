@@ -1,6 +1,8 @@
 """Notices to the owner from any node: on disk when `put` returns, delivered by threads of the node that has the lock.
 
 All nodes with the same state_dir share one outbox; one of them delivers for all, and another takes over when it ends.
+What the disk does not take is sent from memory by the node that has it. The owner is told that the disk is gone, and
+when it is back.
 """
 
 from __future__ import annotations
@@ -18,12 +20,15 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.alerts.channels import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.disk_watch import DiskWatch
 from rosbot_patrol.alerts.network_state import network_mark
 from rosbot_patrol.alerts.notice import Notice
-from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.outbox import DISK_FULL, Outbox
 from rosbot_patrol.alerts.postman import Delivery, Postman
 from rosbot_patrol.alerts.secrets_on_disk import refuse_secrets
 from rosbot_patrol.alerts.settings_file import Settings, write_settings
+from rosbot_patrol.alerts.spare_post import SparePost
+from rosbot_patrol.patrol.repeats import Repeats
 from rosbot_patrol.ros.diagnostics import Health
 from rosbot_patrol.ros.node import Worker, ros_home
 from rosbot_patrol.ros.post_health import PostHealth
@@ -32,6 +37,7 @@ log = logging.getLogger(__name__)
 
 LOOK = 0.2  # [s] between looks at the folder, in which other programs put
 RETRY = 5.0  # [s] where the disk does not take something
+PROBE = 30.0  # [s] between two looks whether it would
 HOUSEKEEPING = 2.0  # [s]
 
 
@@ -54,6 +60,11 @@ class OwnerPost:
         self._wakes = {channel.name: threading.Event() for channel in channels}
         self._wake = threading.Event()
         self._listeners: list[Callable[[Delivery], None]] = []
+        self._spare = SparePost(channels)
+        self._disk = DiskWatch(state_dir)
+        self._probed = float("-inf")
+        self._is_others = self._is_proved = False
+        self._refused = Repeats(60.0)
         self._putting = threading.Lock()
         self._kept: deque[Notice] = deque()
         self._seen_mtime = 0
@@ -75,30 +86,54 @@ class OwnerPost:
         self._listeners.append(listener)
 
     def has(self, notice_id: str) -> bool:
-        """Whether a notice of this id waits or was delivered."""
-        return self._outbox.has(notice_id)
+        """Whether a notice of this id waits or was delivered, as far as memory and disk can tell."""
+        if self._spare.find(notice_id) is not None:
+            return True
+        try:
+            return self._outbox.has(notice_id)
+        except OSError as err:
+            self._disk_failed(err)
+            return False
 
     def find(self, notice_id: str) -> Notice | None:
         """A notice that waits or was delivered, None where there is none. Raises OSError, ValueError."""
-        return self._outbox.find(notice_id)
+        return self._spare.find(notice_id) or self._outbox.find(notice_id)
 
-    def put(self, notice: Notice) -> None:
+    def put(self, notice: Notice) -> bool:
         """Keep a notice until it is delivered.
 
-        Raises:
-            OSError: the disk does not take it; said on /diagnostics.
+        Where the disk does not take it, it is sent from memory, and written as soon as that can be.
+
+        Returns:
+            Whether it is on the disk.
         """
-        try:
-            with self._putting:
+        with self._putting:
+            if self._spare.find(notice.id) is not None:
+                return False
+            try:
                 self._outbox.put(notice)
-        except OSError as err:
-            self._reporter.say_trouble(f"the outbox cannot be written: {err}")
-            raise
-        self._reporter.trouble = ""
+            except OSError as err:
+                log.error("notice %s cannot be written to %s: %s; it is sent from memory", notice.id, self.place, err)
+                self._disk_failed(err)
+                self._spare.put(notice)
+                self._wake_all()
+                return False
         self._wake.set()
+        return True
+
+    @property
+    def is_written(self) -> bool:
+        """Whether every notice that was put is on the disk."""
+        return not len(self._spare)
+
+    @property
+    def is_disk_full(self) -> bool:
+        """Whether notices wait for room on the disk."""
+        error = self._disk.error
+        return not self.is_written and error is not None and error.errno in DISK_FULL
 
     def keep(self, notice: Notice) -> None:
-        """Put a notice as soon as the disk takes it; returns at once."""
+        """As `put`, on another thread; returns at once."""
         self._kept.append(notice)
         self._wake.set()
 
@@ -109,14 +144,15 @@ class OwnerPost:
 
     def start(self) -> None:
         """Begin to deliver, or to wait for the turn."""
-        waiting = len(self._outbox.waiting())
-        log.info("notices go to %s%s", self.describe(), f"; {waiting} wait from before" if waiting else "")
         settings = Settings(who=self._who, pid=os.getpid(), wall=time.time(), mail=self._mail)
+        waiting = 0
         try:
-            write_settings(self._outbox.folder, settings)
+            waiting = len(self._outbox.waiting())
             self._postman.receipts.read_new()
+            write_settings(self._outbox.folder, settings)
         except OSError as err:
-            log.error("%s: %s", self.place, err)
+            self._disk_failed(err)
+        log.info("notices go to %s%s", self.describe(), f"; {waiting} wait from before" if waiting else "")
         Worker(self._supervise, name="post").start()
         for name in self._postman.channels:
             Worker(lambda name=name: self._carry(name), name=f"post: {name}").start()  # type: ignore[misc]
@@ -124,35 +160,69 @@ class OwnerPost:
     # -- the thread that looks
 
     def _supervise(self) -> None:
-        is_unwell = False
         while not rospy.is_shutdown():
-            try:
-                self._look()
-                if is_unwell:
-                    is_unwell, self._reporter.trouble = False, ""
-                pause = LOOK
-            except OSError as err:
-                log.error("the outbox %s cannot be used: %s", self.place, err)
-                self._reporter.say_trouble(f"the outbox cannot be used: {err}")
-                is_unwell, pause = True, RETRY
+            pause, self._is_proved = LOOK, False
+            for part in (self._look_at_disk, self._look, self._keep_house):
+                try:
+                    part()
+                except OSError as err:
+                    self._disk_failed(err)
+                    pause, self._is_proved = RETRY, False
+            if self._is_proved:
+                self._disk.worked()
+            self._tell_of_disk()
             self._wake.wait(pause)
             self._wake.clear()
 
-    def _look(self) -> None:
+    def _look_at_disk(self) -> None:
+        """Write what is in memory only; where there is nothing, see now and then whether something could be written."""
         while self._kept:
             self.put(self._kept[0])
             self._kept.popleft()
+        waits = not self.is_written or self._disk.error is not None
+        if time.monotonic() - self._probed < (RETRY if waits else PROBE):
+            return
+        self._probed = time.monotonic()
+        if self.is_written:
+            self._outbox.probe()
+        elif not self._settle():
+            self._probed += 1.0 - RETRY  # a channel is busy
+            return
+        self._is_proved = True
+
+    def _settle(self) -> bool:
+        count = len(self._spare)
+        with self._putting:
+            if not self._spare.settle(self._outbox, self._postman.receipts):
+                return False
+        log.warning("the disk takes notices again: %d that were in memory are in %s now", count, self.place)
+        return True
+
+    def _disk_failed(self, err: OSError) -> None:
+        self._disk.failed(err, time.monotonic(), time.time())
+        if self._refused.is_news(err.errno or 0, time.monotonic()):
+            log.error("the outbox %s cannot be used: %s; trying on every %.0f s", self.place, err, RETRY)
+        self._reporter.say_trouble(f"the outbox cannot be written: {err}; notices are sent from memory")
+
+    def _tell_of_disk(self) -> None:
+        if self._disk.error is None:
+            self._reporter.trouble = ""
+        notice = self._disk.notice(time.monotonic(), time.time())
+        if notice is not None and not self._is_others:
+            log.warning("notice to the owner: %s", notice.subject)
+            self.put(notice)
+
+    def _look(self) -> None:
         was_delivering = self._postman.is_delivering
         if not was_delivering:
             self._look_on()
-        if not self._postman.take_over():
+        self._is_others = False  # to tell that the disk is gone, unless the lock says who does
+        self._is_others = not self._postman.take_over()
+        if self._is_others:
             pass
         elif not was_delivering or self._has_changed():
             self._postman.refresh()
             self._wake_all()
-        if time.monotonic() - self._housekept >= HOUSEKEEPING:
-            self._housekept = time.monotonic()
-            self._keep_house()
 
     def _has_changed(self) -> bool:
         mtime = os.stat(self._outbox.folder).st_mtime_ns
@@ -185,32 +255,34 @@ class OwnerPost:
             wake.set()
 
     def _keep_house(self) -> None:
+        if time.monotonic() - self._housekept < HOUSEKEEPING:
+            return
+        self._housekept = time.monotonic()
+        self._spare.tell_faults()
+        self._reporter.report_spare(self._spare.statuses())
+        self._try_again_where_it_helps()
         if self._postman.is_delivering:
-            self._try_again_where_it_helps()
             self._postman.tell_faults()
         self._reporter.report()
 
     def _try_again_where_it_helps(self) -> None:
         flush = self._outbox.folder / "flush"
-        is_asked = flush.exists()
-        mark = network_mark() if self._postman.has_trouble else self._network
+        is_asked = self._postman.is_delivering and flush.exists()
+        has_trouble = self._postman.has_trouble or not self.is_written
+        mark = network_mark() if has_trouble else self._network
         if is_asked or mark != self._network:
+            self._spare.nudge()
             self._postman.nudge(all_=is_asked)
-            flush.unlink(missing_ok=True)
             self._network = mark
             self._wake_all()
+            flush.unlink(missing_ok=True)
 
     # -- a thread for each channel
 
     def _carry(self, name: str) -> None:
         wake = self._wakes[name]
         while not rospy.is_shutdown():
-            try:
-                done = self._postman.deliver(name)
-                pause = self._postman.pause(name)
-            except OSError as err:
-                log.error("the outbox %s cannot be used: %s", self.place, err)
-                done, pause = None, RETRY
+            done, pause = self._send(name)
             if done is not None:
                 self._tell(done)
                 self._housekept = float("-inf")  # say it
@@ -218,6 +290,18 @@ class OwnerPost:
             else:
                 wake.wait(pause)
                 wake.clear()
+
+    def _send(self, name: str) -> tuple[Delivery | None, float]:
+        """Send what is due on a channel; returns what it was, and how long to wait where nothing is [s]."""
+        done = self._spare.deliver(name)
+        pause = self._spare.pause(name)
+        if done is not None:
+            return done, 0.0
+        try:
+            return self._postman.deliver(name), min(pause, self._postman.pause(name))
+        except OSError as err:
+            self._disk_failed(err)
+            return None, min(pause, RETRY)
 
     def _tell(self, delivery: Delivery) -> None:
         for listener in self._listeners:

@@ -7,10 +7,12 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 
 import rospy
 
+from rosbot_patrol.alerts.damaged import replacement
 from rosbot_patrol.alerts.held import HeldNotices
 from rosbot_patrol.alerts.incident import Event, Incident
 from rosbot_patrol.alerts.incident_database import FOLDER
@@ -18,7 +20,6 @@ from rosbot_patrol.alerts.incident_files import NewFile
 from rosbot_patrol.alerts.incident_store import recall_incident
 from rosbot_patrol.alerts.mail import one_line, token
 from rosbot_patrol.alerts.notice import Notice as PostNotice
-from rosbot_patrol.alerts.outbox import DISK_FULL
 from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
 from rosbot_patrol.alerts.postman import Delivery
 from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
@@ -27,6 +28,7 @@ from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.chronicle import Entry
 from rosbot_patrol.patrol.commands import Commands, Ignored, Notice, Release, Word
 from rosbot_patrol.patrol.ignored_log import IgnoredLog
+from rosbot_patrol.ros.diagnostics import ERROR, OK, Health
 from rosbot_patrol.ros.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.node import Worker
 from rosbot_patrol.ros.owner_mail import OwnerPost
@@ -45,6 +47,7 @@ class AlertDesk:
         post: keeps notices and delivers them.
         pictures: the camera's last pictures.
         keeper: of the records.
+        health: where to say how it goes.
     """
 
     def __init__(
@@ -52,11 +55,15 @@ class AlertDesk:
         post: OwnerPost,
         pictures: PictureRing,
         keeper: IncidentKeeper,
+        health: Health,
     ) -> None:
-        self._post, self._pictures, self._keeper = post, pictures, keeper
+        self._post, self._pictures, self._keeper, self._health = post, pictures, keeper, health
         self._held = HeldNotices(keeper.state_dir / "held")
         self._ignored = IgnoredLog(keeper.state_dir / "ignored.jsonl")
-        self._jobs: deque[Callable[[], bool]] = deque()
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._unwritten: list[Callable[[], None]] = []
+        self._listing = threading.Lock()
+        self._retry_at = 0.0
         self._memory: Callable[[], None] | None = None
         self._memory_due = 0.0
         self._to_record = threading.Event()
@@ -77,7 +84,11 @@ class AlertDesk:
 
     def is_held(self, incident: str) -> bool:
         """Whether the notice of this incident waits for the entry delay."""
-        return self._held.has(token(incident))
+        try:
+            return self._held.has(token(incident))
+        except OSError as err:
+            log.error("the notice about %s cannot be looked for: %s", incident, err)
+            return False
 
     def told(self, incident: str) -> PostNotice | None:
         """The notice of an incident from before the program's start, None where there is none."""
@@ -86,6 +97,13 @@ class AlertDesk:
         except (OSError, ValueError) as err:
             log.error("the notice about %s cannot be read: %s", incident, err)
             return None
+
+    def write_later(self, write: Callable[[], None]) -> None:
+        """Try again and again what the disk did not take: `write` raises OSError until it does; returns at once."""
+        with self._listing:
+            if write not in self._unwritten:
+                self._unwritten.append(write)
+        self._to_record.set()
 
     def recall(self, incident: str, notice: PostNotice) -> None:
         """Complete the record of a mission whose notice is older than what the patrol remembers."""
@@ -142,24 +160,45 @@ class AlertDesk:
     def _record_next(self) -> float:
         """Write one thing; returns how long to wait for the next [s]."""
         if self._jobs:
-            if not self._jobs[0]():
-                return DISK_RETRY
+            job = self._jobs[0]
+            try:
+                job()
+            except Exception:  # the other jobs first
+                self._jobs.rotate(-1)
+                raise
             self._jobs.popleft()
-            self._keeper.give_way(False)
             return 0.0
+        self._write_again()
+        self._keeper.give_way(self._post.is_disk_full)
         save = self._memory
         if save is None:
-            return 60.0
+            return DISK_RETRY if self._unwritten or not self._post.is_written else 60.0
+        if self._unwritten or not self._post.is_written:
+            return 1.0
         if not self._keeper.is_written and time.monotonic() < self._memory_due:
             return 0.02
         return 0.0 if self._remember(save) else DISK_RETRY
+
+    def _write_again(self) -> None:
+        if time.monotonic() < self._retry_at:
+            return
+        with self._listing:
+            waiting = list(self._unwritten)
+        for write in waiting:
+            with suppress(OSError):  # which was said when it came
+                write()
+                with self._listing:
+                    self._unwritten.remove(write)
+        self._retry_at = time.monotonic() + DISK_RETRY
 
     def _remember(self, save: Callable[[], None]) -> bool:
         try:
             save()
         except OSError as err:
             log.error("the patrol's state cannot be kept: %s; trying on", err)
+            self._health.set("memory", ERROR, f"the patrol's state cannot be kept: {err}")
             return False
+        self._health.set("memory", OK, "the patrol's state is kept")
         if self._memory is save:
             self._memory = None
         return True
@@ -171,69 +210,73 @@ class AlertDesk:
                 if incident is not None:
                     self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
-    def _record(self, incident: Incident, notice: Notice) -> bool:
-        """Bring a notice to the disk; whether that is done."""
-        if self._post.has(incident.id) or self._held.has(incident.id):  # the program was killed after it was written
-            return True
+    def _record(self, incident: Incident, notice: Notice) -> None:
+        """Bring a notice to the disk, or, where that takes nothing, to the post's memory, from which it is sent."""
+        if self._post.has(incident.id) or self.is_held(incident.id):  # the program was killed after it was written
+            return
         picture, note = self._picture(notice)
         place = str(self._held.folder) if notice.is_held else self._post.place
-        put = self._held.put if notice.is_held else self._post.put
         with self._telling:
-            try:
-                put(incident_notice(incident, picture, picture_note=note))
-            except OSError as err:
-                log.error("the alert '%s' cannot be written to %s: %s; trying on", incident.sentence, place, err)
-                self._keeper.give_way(err.errno in DISK_FULL)
-                return False
             self._told[incident.id] = incident
+            is_on_disk = (self._hold if notice.is_held else self._post.put)(
+                incident_notice(incident, picture, picture_note=note)
+            )
             self._publish(incident, transport="", location=place, text=incident.sentence)
-        waits = ", where it waits for the entry delay" if notice.is_held else ""
-        log.warning("ALERT: %s; the notice is on disk%s", incident.sentence, waits)
+        where = "is on disk" if is_on_disk else "is in memory only, as the disk does not take it"
+        waits = " and waits for the entry delay" if notice.is_held else ""
+        log.warning("ALERT: %s; the notice %s%s", incident.sentence, where, waits)
         if picture is not None:
             caption = "sent with the notice"
             file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=notice.seen.stamp, caption=caption)
             self._keeper.put_picture(incident.id, file)
+
+    def _hold(self, notice: PostNotice) -> bool:
+        """Keep a notice for the entry delay; whether it is on the disk."""
+        try:
+            self._held.put(notice)
+        except OSError as err:
+            log.error("the notice %s cannot be written to %s: %s; trying on", notice.id, self._held.folder, err)
+            self.write_later(self._held.save)
+            return False
         return True
 
-    def _release(self, release: Release) -> bool:
-        """Send a notice that waited, or drop it; whether that is done."""
+    def _release(self, release: Release) -> None:
+        """Send a notice that waited, or drop it."""
+        notice_id = token(release.mission)
         try:
-            notice = self._held.get(token(release.mission))
-            if notice is not None and not release.is_dropped:
-                self._post.put(notice)
-            self._held.remove(token(release.mission))
+            notice = self._held.get(notice_id)
         except (OSError, ValueError) as err:
-            log.error("the notice about %s that waited cannot be used: %s; trying on", release.mission, err)
-            self._keeper.give_way(isinstance(err, OSError) and err.errno in DISK_FULL)
-            return False
+            log.error("the notice about %s that waited cannot be used: %s", release.mission, err)
+            notice = replacement(self._keeper.state_dir, notice_id, time.time())
+        if notice is not None and not release.is_dropped:
+            self._post.put(notice)
+        try:
+            self._held.remove(notice_id)
+        except OSError as err:
+            log.error("the notice about %s that waited cannot be removed: %s; trying on", release.mission, err)
+            self.write_later(partial(self._held.remove, notice_id))
         text = f"the notice is {'dropped' if release.is_dropped else 'sent'}: {release.why}"
         log.warning("%s (%s)", text, release.mission)
         event = Event(wall=time.time(), kind="notice", text=text)
         self._keeper.put([Entry(incident=release.mission, events=(event,))])
-        return True
 
-    def _tell(self, word: Word, wall: float) -> bool:
-        """Tell the owner something that is no intruder; whether that is done."""
-        notice = PostNotice(
-            id=token(f"{word.kind}-{wall:.3f}"),
-            wall=wall,
-            kind="fault",
-            subject=f"rosbot patrol: {word.kind}{' again well' if word.is_over else ''}",
-            text=f"{word.text[:1].upper()}{word.text[1:]}.",
+    def _tell(self, word: Word, wall: float) -> None:
+        """Tell the owner something that is no intruder."""
+        self._post.put(
+            PostNotice(
+                id=token(f"{word.kind}-{wall:.3f}"),
+                wall=wall,
+                kind="fault",
+                subject=f"rosbot patrol: {word.kind}{' again well' if word.is_over else ''}",
+                text=f"{word.text[:1].upper()}{word.text[1:]}.",
+            )
         )
-        try:
-            self._post.put(notice)
-        except OSError as err:
-            log.error("'%s' cannot be written to %s: %s; trying on", word.text, self._post.place, err)
-            return False
-        return True
 
-    def _note_ignored(self, calls: tuple[Ignored, ...]) -> bool:
+    def _note_ignored(self, calls: tuple[Ignored, ...]) -> None:
         try:
             self._ignored.add(calls)
         except OSError as err:
             log.error("calls that start no mission cannot be written down: %s", err)
-        return True
 
     def _picture(self, notice: Notice) -> tuple[bytes | None, str]:
         if not self._pictures.is_wanted:

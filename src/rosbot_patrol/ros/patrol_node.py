@@ -34,7 +34,7 @@ from rosbot_patrol.alerts.retention import RetentionParams
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.arming import Arming, ArmingRules, load_rules, read_memory
 from rosbot_patrol.patrol.chronicle import Chronicle
-from rosbot_patrol.patrol.commands import Commands
+from rosbot_patrol.patrol.commands import Commands, Word
 from rosbot_patrol.patrol.emergency import EmergencyStop
 from rosbot_patrol.patrol.eyes import Eyes
 from rosbot_patrol.patrol.inputs import Box, Inputs
@@ -104,7 +104,7 @@ class PatrolNode:
             records=load_flat(RecordParams, tree),
             on_verdict=lambda incident: self.desk.tell_verdict(incident),
         )
-        self.desk = AlertDesk(OwnerPost(mail, folder, self.health), self.pictures, self.keeper)
+        self.desk = AlertDesk(OwnerPost(mail, folder, self.health), self.pictures, self.keeper, self.health)
         self.store = PatrolStore(folder / "patrol.json", str(rospy.get_param("/run_id", "")), str(rooms.source))
         self.rules = load_or_say(load_rules, self.params.arming, rooms, ArmingRules(), self.health)
         rounds, zone = load_or_say(load_schedule, self.params.schedule, rooms, NO_ROUNDS, self.health)
@@ -127,6 +127,7 @@ class PatrolNode:
         self._stepping = threading.Lock()
         self._loop = Loop(self.params.rate, self._step, name="patrol")
         journal = Journal(folder / "calls.jsonl", self.store.taken)
+        self._lost_calls = journal.damage
         transforms = Transforms()
         eyes = PatrolEyes(
             self.params.eyes,
@@ -151,9 +152,10 @@ class PatrolNode:
         self._schedule_changed = False
         self.move_base = MoveBase(inputs.map_frame)
         self._wheels, self._state, self._pulse = Wheels(), StatePublisher(self.health), Pulse()
-        self._stop_switch = StopSwitch(EmergencyStop(folder / "stop.json"), self.move_base, self._wheels.publisher)
+        stop = EmergencyStop(folder / "stop.json")
+        self._stop_switch = StopSwitch(stop, self.move_base, self._wheels.publisher, self.desk.write_later)
         kept = folder / "arming.json"
-        self._arming = ArmingDesk(Arming(self.rules, read_memory(kept)), kept)
+        self._arming = ArmingDesk(Arming(self.rules, read_memory(kept)), kept, self.desk.write_later)
         self._orders = Orders(self.manager, rooms, self._stepping)
         self._actions = PatrolActions(self.manager, rooms)
 
@@ -168,6 +170,9 @@ class PatrolNode:
         for mission_id in running:
             self._recall_notice(mission_id)
         self.desk.start()
+        if self._lost_calls:
+            log.error("%s", self._lost_calls)
+            self.desk.follow(Commands(words=(Word(kind="calls lost", text=self._lost_calls),)))
         self.inputs.start()
         self.missed.start()
         self.neighbour.start()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import rospy
@@ -37,10 +38,18 @@ class StopSwitch:
         stop: whether it is held.
         move_base: whose goals are given up.
         cmd_vel: where zero velocity goes at once.
+        write_later: takes what the disk did not, and tries it until it does.
     """
 
-    def __init__(self, stop: EmergencyStop, move_base: MoveBase, cmd_vel: rospy.Publisher) -> None:
+    def __init__(
+        self,
+        stop: EmergencyStop,
+        move_base: MoveBase,
+        cmd_vel: rospy.Publisher,
+        write_later: Callable[[Callable[[], None]], None],
+    ) -> None:
         self._stop, self._move_base, self._cmd_vel = stop, move_base, cmd_vel
+        self._write_later = write_later
         self._lock = threading.Lock()
         self._told = float("-inf")
         self._topic = rospy.Publisher("/e_stop", Bool, queue_size=5, latch=True)
@@ -93,9 +102,14 @@ class StopSwitch:
             try:
                 self._stop.save()
             except OSError as err:
-                log.error("the emergency stop cannot be kept: %s", err)
+                log.error("the emergency stop cannot be kept: %s; trying on", err)
+                self._write_later(self._save)
                 return str(err)
         return ""
+
+    def _save(self) -> None:
+        with self._lock:
+            self._stop.save()
 
 
 class ArmingDesk:
@@ -104,10 +118,11 @@ class ArmingDesk:
     Args:
         arming: the mode.
         path: where it is kept.
+        write_later: takes what the disk did not, and tries it until it does.
     """
 
-    def __init__(self, arming: Arming, path: Path) -> None:
-        self._arming, self._path = arming, path
+    def __init__(self, arming: Arming, path: Path, write_later: Callable[[Callable[[], None]], None]) -> None:
+        self._arming, self._path, self._write_later = arming, path, write_later
         self._lock = threading.Lock()
         self._told: Guarded | None = None
         self._publisher = rospy.Publisher("/patrol/arming", ArmingMsg, queue_size=5, latch=True)
@@ -132,9 +147,14 @@ class ArmingDesk:
                 try:
                     write_memory(self._path, self._arming)
                 except OSError as err:
-                    log.error("the mode cannot be kept: %s", err)
+                    log.error("the mode cannot be kept: %s; trying on", err)
+                    self._write_later(self._save)
                     text += NOTED + str(err)
         return ArmResponse(accepted=accepted, message=text)
+
+    def _save(self) -> None:
+        with self._lock:
+            write_memory(self._path, self._arming)
 
     def _publish(self, guarded: Guarded, wall: float) -> None:
         message = ArmingMsg(mode=guarded.mode, all_rooms=guarded.rooms is None, quiet=guarded.is_quiet)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from rosbot_patrol.alerts.channels import MailParams
@@ -27,6 +28,7 @@ class PostHealth:
     def __init__(self, who: str, mail: MailParams, postman: Postman, health: Health) -> None:
         self._who, self._mail, self._postman, self._health = who, mail, postman, health
         self._parts: set[str] = set()
+        self._spare_parts: set[str] = set()
         self._differ = ""
         self._compared = self._written = float("-inf")
         self._status: list[object] = []
@@ -46,6 +48,16 @@ class PostHealth:
         """The outbox takes nothing: say so until `trouble` is "" again."""
         self.trouble = what
         self._set("outbox", ERROR, what)
+
+    def report_spare(self, statuses: Sequence[ChannelStatus]) -> None:
+        """Say how the channels do with what they have to take from memory."""
+        found = {f"{status.name} (from memory)": status for status in statuses}
+        for part in self._spare_parts - set(found):
+            self._health.drop(part)
+        self._spare_parts = set(found)
+        for part, status in found.items():
+            level, text = judge(status)
+            self._health.set(part, level, text, {"waiting": status.waiting, "refused": status.refused})
 
     def _report_channels(self) -> None:
         statuses = self._postman.statuses()

@@ -97,7 +97,7 @@ class SensorWatch:
         self._notices = Notices(load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory))
         self._looks = Looks(load_group(LookTimes, tree))
         self._reports = Reports(self._health)
-        self._unwritten: Notice | None = None
+        self._unwritten = False
         self._retry_at = 0.0
         where = f"{len(sensors)} sensors of {sensors.source}" if sensors.has_file else "whatever sensor is heard"
         log.info("watching %s", where)
@@ -174,25 +174,23 @@ class SensorWatch:
 
     def _tell_owner(self, statuses: list[SensorStatus]) -> None:
         now = time.monotonic()
-        if self._unwritten is None:
-            self._unwritten = self._notices.update(self._watch, statuses, now, time.time())
-            if self._unwritten is None:
-                return
-            log.warning("notice to the owner: %s", self._unwritten.subject)
-        if now < self._retry_at:
-            return
-        try:
-            self._post.put(to_post(self._unwritten))
-        except OSError as err:
-            subject, place = self._unwritten.subject, self._post.place
-            log.error("the notice '%s' cannot be written to %s: %s; trying on", subject, place, err)
-            self._retry_at = now + RETRY
-            return
-        self._unwritten = None
+        notice = self._notices.update(self._watch, statuses, now, time.time())
+        if notice is not None:
+            log.warning("notice to the owner: %s", notice.subject)
+            self._post.put(to_post(notice))
+            self._unwritten, self._retry_at = True, now
+        if self._unwritten and now >= self._retry_at and self._post.is_written:
+            self._remember(now)
+
+    def _remember(self, now: float) -> None:
+        """Keep what was told, once the notices are on the disk themselves."""
         try:
             write_atomic(self._memory, json.dumps(self._notices.snapshot(), indent=1).encode())
         except OSError as err:
-            log.error("what was told cannot be kept in %s: %s; it is told again after a restart", self._memory, err)
+            log.error("what was told cannot be kept in %s: %s; trying on", self._memory, err)
+            self._retry_at = now + RETRY
+        else:
+            self._unwritten = False
 
 
 def to_post(notice: Notice) -> PostNotice:

@@ -39,5 +39,11 @@ def test_a_clock_that_was_set_and_a_long_night_are_no_gap(tmp_path: Path, wall: 
 
 def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
+    vigil = Vigil(tmp_path / "file" / "alive", 1000.0)
+    assert "file" in vigil.problem
+    assert not vigil.has_gap
     with pytest.raises(OSError, match="file"):
-        Vigil(tmp_path / "file" / "alive", 1000.0)
+        vigil.step(1001.5)
+    (tmp_path / "file").unlink()  # the disk is back
+    vigil.step(1003.0)
+    assert Vigil(tmp_path / "file" / "alive", 1010.0).missed(1005.0)
