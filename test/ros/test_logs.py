@@ -15,6 +15,20 @@ from rospy.msproxy import MasterProxy
 from rosbot_patrol.ros import logs
 
 
+def test_a_kind_of_line_comes_once_in_a_while_and_tells_how_often_it_was_held_back() -> None:
+    repeats = logs.LineThrottle(10.0)
+    said = [repeats.due("no trajectory", 0.3 * k) for k in range(40)]
+    assert [text for text in said if text is not None] == ["", " (and 33 times before)"]
+    assert repeats.due("no map", 5.0) == ""
+
+
+def test_a_clock_that_goes_back_holds_nothing_back() -> None:
+    repeats = logs.LineThrottle(10.0)
+    assert repeats.due("no map", 100.0) == ""
+    assert repeats.due("no map", 101.0) is None
+    assert repeats.due("no map", 3.0) == " (and 1 time before)"
+
+
 class _Master:
     """The master's parameters, and the questions that came."""
 

@@ -101,6 +101,11 @@ class Navigator:
         """The goal that is worked on, in the global costmap's frame."""
         return self._context.goal if self._context else None
 
+    @property
+    def plan_failure(self) -> str:
+        """Reason why the last plan for this goal failed, "" if it did not; the log has it already."""
+        return self._context.failures[-1] if self._context and self._context.failures else ""
+
     def configure(self, params: MoveBaseParams, recoveries: Sequence[Recovery]) -> None:
         """Other parameters from the next step on; a behaviour that is running ends first."""
         self.params = params
@@ -254,7 +259,7 @@ class Navigator:
                 log.error("%s %s", progress.trigger.value, "; ".join(context.failures[-1:]))
                 return self._finish(progress.trigger.value, succeeded=False)
             progress.running = self._recoveries[progress.recovery_index]
-            log.warning("recovery %d of %d: %s", progress.recovery_index + 1, count, progress.running.name)
+            log.info("recovery %d of %d: %s", progress.recovery_index + 1, count, progress.running.name)
             progress.running.start(view.recovery)
             return Command(
                 twist=STOP,

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import logging
+import math
 
 import rospy
 from rospy.impl.paramserver import get_param_server_cache
+
+from rosbot_patrol.counts import count_of
 
 _OMIT_TOPICS = "/rosout_disable_topics_generation"
 
@@ -17,6 +20,28 @@ class _ToRosout(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         self._rosout.handle(record)
+
+
+class LineThrottle:
+    """Lets each kind of line through once in a while and counts those between, so that no line buries the others.
+
+    Args:
+        period: shortest time between two lines of a kind [s].
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._said: dict[str, float] = {}
+        self._held_back: dict[str, int] = {}
+
+    def due(self, kind: str, now: float) -> str | None:
+        """What to append to a line of that kind, how often it was held back since the last; None: hold it back."""
+        if 0.0 <= now - self._said.get(kind, -math.inf) < self._period:
+            self._held_back[kind] = self._held_back.get(kind, 0) + 1
+            return None
+        self._said[kind] = now
+        more = self._held_back.pop(kind, 0)
+        return f" (and {count_of(more, 'time')} before)" if more else ""
 
 
 def install() -> None:

@@ -27,11 +27,13 @@ from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.ros.convert import grid_from_msg, grid_to_msg, time_to_msg
 from rosbot_patrol.ros.costmap_sources import Source, subscribe_sources
+from rosbot_patrol.ros.logs import LineThrottle
 from rosbot_patrol.ros.node import Loop
 from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
 
+_REPEAT_S = 10.0  # between two lines about one problem
 _START_GRACE_S = 3.0  # wall time in which a transform that is not there yet is no fault
 
 
@@ -59,6 +61,7 @@ class CostmapNode:
         self._born = time.monotonic()
         self._transforms = transforms
         self._said: str = ""
+        self._repeats = LineThrottle(_REPEAT_S)
         self._sources: list[Source] = []
         self._map_frames: dict[int, str] = {}
         self._map_subscribers: dict[int, rospy.Subscriber] = {}
@@ -187,8 +190,9 @@ class CostmapNode:
         kind = problem.split(":")[0]
         if problem and self.updates == 0 and time.monotonic() - self._born < _START_GRACE_S:
             return  # the other nodes are starting too
-        if problem and kind != self._said:
-            log.warning("%s: %s", self.name, problem)
+        more = self._repeats.due(kind, time.monotonic()) if problem and kind != self._said else None
+        if more is not None:
+            log.warning("%s: %s%s", self.name, problem, more)
         self._said = kind
 
     def _place_maps(self) -> None:

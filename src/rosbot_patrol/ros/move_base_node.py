@@ -28,7 +28,7 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import ParamError, PlanningError, TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
-from rosbot_patrol.navigation.interfaces import NavigatorView, State
+from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome, State
 from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.planning.interfaces import LocalView, Recovery, RecoveryView
@@ -36,6 +36,7 @@ from rosbot_patrol.planning.registry import make_global_planner, make_local_plan
 from rosbot_patrol.ros.convert import path_to_msg, twist_from_msg
 from rosbot_patrol.ros.heap import give_back_large_blocks
 from rosbot_patrol.ros.inputs import Latest
+from rosbot_patrol.ros.logs import LineThrottle
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
 from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_goal
 from rosbot_patrol.ros.move_base_outputs import HealthTeller, Outputs
@@ -48,6 +49,8 @@ from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
 
+_REPEAT_S = 10.0  # between two lines of one kind
+_NORMAL = ("waiting", "planning after", "recovering")  # reasons that belong to a drive
 _CLOCK_NOISE = 1e-4  # of differences of times as floats [s]
 
 
@@ -88,6 +91,7 @@ class MoveBaseNode:
         self._velocity: Latest[Twist2D] = Latest()
         self._slow_cycles = 0
         self._said = ""
+        self._repeats = LineThrottle(_REPEAT_S)
         self._control = Loop(p.controller_frequency, self.step, name="control")
         self._advertise()
         self._offer_tuning()
@@ -242,7 +246,7 @@ class MoveBaseNode:
         else:
             command = self._navigator.step(time, view)
         self._outputs.publish(command, self._controller, time)
-        self._say(problem or command.reason, succeeded=command.outcome is not None and command.outcome.succeeded)
+        self._say(problem or command.reason, command.outcome)
         if view is not None:
             self._goals.feedback(view.recovery.pose_global, time)
         if command.outcome is not None:
@@ -250,11 +254,16 @@ class MoveBaseNode:
         self._watch_rate(time)
         self._tell(time)
 
-    def _say(self, reason: str, *, succeeded: bool) -> None:
+    def _say(self, reason: str, outcome: Outcome | None) -> None:
+        """Log why the base does not simply drive; the end of a goal always, another reason once in a while."""
         kind = reason.split(":")[0]  # what follows has figures that change
-        if kind != self._said and reason not in ("driving", "planning", ""):
-            (log.info if succeeded else log.warning)("%s", reason)
+        is_told = reason == self._navigator.plan_failure or kind.startswith("recovery ")  # by the navigator
+        is_new = kind not in ("", "driving", "planning", self._said) and not is_told
         self._said = kind
+        more = "" if outcome is not None else self._repeats.due(kind, now()) if is_new else None
+        if more is not None:
+            is_normal = outcome.succeeded if outcome is not None else kind.startswith(_NORMAL)
+            log.log(logging.INFO if is_normal else logging.WARNING, "%s%s", reason, more)
 
     def _departed(self) -> str:
         """Which other node that it cannot drive without has gone, in a sentence; else empty."""
@@ -307,11 +316,14 @@ class MoveBaseNode:
         took = now() - time
         if took > 1.0 / self.params.controller_frequency + _CLOCK_NOISE:
             self._slow_cycles += 1
-            log.warning(
-                "Control loop missed its desired rate of %.4fHz... the loop actually took %.4f seconds",
-                self.params.controller_frequency,
-                took,
-            )
+            more = self._repeats.due("slow cycle", time)
+            if more is not None:
+                log.warning(
+                    "Control loop missed its desired rate of %.4fHz... the loop actually took %.4f seconds%s",
+                    self.params.controller_frequency,
+                    took,
+                    more,
+                )
 
     def _tell(self, time: float) -> None:
         self._health.tell(time, self._navigator.state, self._navigator.reason, self._slow_cycles)
