@@ -11,7 +11,7 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 from rosbot_patrol.alerts.incident import Event, Incident
 from rosbot_patrol.alerts.incident_files import NewFile
 from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.ros.incidents_tool import main
+from rosbot_patrol.ros.incidents_tool import _command_first, _parser, main
 
 
 @pytest.fixture(autouse=True)
@@ -65,6 +65,48 @@ def test_lists_and_searches(call, words, found):
     lines = out.splitlines()
     assert [line.split()[0] for line in lines[1:]] == found if found else lines == ["no incidents"]
     assert "\x1b" not in out
+
+
+COMMANDS = [["list"], ["search", "motion"], ["show", "m1"], ["report", "m1"], ["export", "m1", "m1.zip"], ["verify"]]
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, ["prune"]], ids=lambda words: words[0])
+def test_options_stand_before_or_after_the_command(house, capsys, command, tmp_path_factory, monkeypatch):
+    monkeypatch.chdir(tmp_path_factory.mktemp("here"))
+    option, said = ["--state-dir", str(house)], []
+    for words in ([*option, *command], [*command, *option], [command[0], *option, *command[1:]]):
+        with pytest.raises(SystemExit) as ended:
+            main(words)
+        assert ended.value.code == 0
+        said.append(capsys.readouterr().out)
+    assert said[0] == said[1] == said[2]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--room", "1", "list"], ["--json", "list", "--room", "1"], ["--state-dir=search", "list", "--limit", "1"]],
+)
+def test_options_of_a_command_may_come_first(words):
+    assert _parser().parse_args(_command_first(words)).command == "list"
+
+
+def test_the_help_of_each_command_names_the_folder(capsys):
+    for command in (*(words[0] for words in COMMANDS), "prune"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        assert "--state-dir FOLDER" in capsys.readouterr().out
+
+
+def test_one_of_a_kind_is_singular(tmp_path, capsys):
+    with IncidentStore(tmp_path, wall=1.0) as store:
+        store.begin(Incident(id="m", wall=1_790_000_000.0, room_id=1, room_name="hall", share_seen=1.0))
+        store.close("m", wall=1_790_000_060.0, verdict="clear")
+    for words in (["verify"], ["show", "m"]):
+        with pytest.raises(SystemExit):
+            main([*words, "--state-dir", str(tmp_path)])
+    out = capsys.readouterr().out
+    assert "all fits: 1 record, 0 files, 0 removed" in out
+    assert "100 % of the room's floor was seen" in out
 
 
 def test_what_makes_no_sense_is_said(call, tmp_path):

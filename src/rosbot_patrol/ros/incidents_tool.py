@@ -2,7 +2,8 @@
 
 rosrun rosbot_patrol incidents list [--room N] [--verdict V] [--since WHEN] [--text WORDS]
 
-Needs no roscore; all but `prune` only read, also while the patrol writes.
+Options may stand before or after the command.
+Needs no roscore. All but `prune` only read, also while the patrol writes.
 Exit status: 0 where all is well, 1 where a check fails or something is not there, 2 where the call makes no sense.
 """
 
@@ -25,6 +26,7 @@ from rosbot_patrol.alerts.incident_report import make_report
 from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.alerts.incident_verify import verify
 from rosbot_patrol.alerts.retention import RetentionParams, prune
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.ros.node import ros_home
@@ -32,11 +34,13 @@ from rosbot_patrol.ros.private_files import use_private_umask
 
 _UNITS = {"m": 60.0, "h": 3600.0, "d": 86_400.0, "w": 604_800.0}
 _ALL = 1_000_000_000
+_COMMANDS = ("list", "search", "show", "report", "export", "verify", "prune")
+_FLAGS = ("--json", "--all", "--no-files", "-h", "--help")  # options without a value
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command."""
-    given = _parser().parse_args(arguments)
+    given = _parser().parse_args(_command_first(list(sys.argv[1:] if arguments is None else arguments)))
     use_private_umask()
     state_dir = (given.state_dir or ros_home() / "rosbot_patrol").expanduser()
     try:
@@ -54,12 +58,30 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(status)
 
 
+def _command_first(words: list[str]) -> list[str]:
+    """The same words with the command in front, since argparse takes a command's options only after it."""
+    for i, word in enumerate(words):
+        before = words[i - 1] if i else ""
+        is_value = before.startswith("-") and before not in _FLAGS and "=" not in before
+        if word in _COMMANDS and not is_value:
+            return [word, *words[:i], *words[i + 1 :]]
+    return words
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="incidents", description="What the patrol has on record.")
-    parser.add_argument("--state-dir", type=Path, metavar="FOLDER", help="the patrol's (default: ~/.ros/rosbot_patrol)")
+    shared = argparse.ArgumentParser(add_help=False)
+    shared.add_argument(
+        "--state-dir",
+        type=Path,
+        default=argparse.SUPPRESS,
+        metavar="FOLDER",
+        help="the patrol's (default: ~/.ros/rosbot_patrol)",
+    )
+    parser = argparse.ArgumentParser(prog="incidents", description="What the patrol has on record.", parents=[shared])
+    parser.set_defaults(state_dir=None)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, run, text in (("list", _list, "the newest incidents"), ("search", _list, "incidents with these words")):
-        command = commands.add_parser(name, help=text)
+        command = commands.add_parser(name, help=text, parents=[shared])
         if name == "search":
             command.add_argument("text", nargs="+", help="words, or how they begin")
         else:
@@ -71,24 +93,24 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--limit", type=_count, default=50, metavar="N", help="at most (default: %(default)s)")
         command.add_argument("--json", action="store_true", help="one JSON object a line")
         command.set_defaults(run=run)
-    command = commands.add_parser("show", help="one incident")
+    command = commands.add_parser("show", help="one incident", parents=[shared])
     command.add_argument("id")
     command.add_argument("--json", action="store_true")
     command.set_defaults(run=_show)
-    command = commands.add_parser("report", help="write an incident's report as one HTML file")
+    command = commands.add_parser("report", help="write an incident's report as one HTML file", parents=[shared])
     command.add_argument("id", nargs="?")
     command.add_argument("--all", action="store_true", help="of every incident")
     command.add_argument("--out", type=Path, default=Path(), metavar="FOLDER", help="where to (default: here)")
     command.set_defaults(run=_report)
-    command = commands.add_parser("export", help="write record, pictures and report into a zip file")
+    command = commands.add_parser("export", help="write record, pictures and report into a zip file", parents=[shared])
     command.add_argument("id")
     command.add_argument("file", type=Path)
     command.set_defaults(run=_export)
-    command = commands.add_parser("verify", help="check that nothing was changed or removed")
+    command = commands.add_parser("verify", help="check that nothing was changed or removed", parents=[shared])
     command.add_argument("--no-files", action="store_true", help="leave the pictures out")
     command.add_argument("--expect", default="", metavar="HASH", help="of a report; it has to be in the chain")
     command.set_defaults(run=_verify)
-    command = commands.add_parser("prune", help="remove what is older or more than may be kept")
+    command = commands.add_parser("prune", help="remove what is older or more than may be kept", parents=[shared])
     for field in ("keep_clear_days", "keep_days", "keep_mb", "keep_free_mb"):
         default = getattr(RetentionParams(), field)
         option = "--" + field.replace("_", "-")
@@ -170,7 +192,7 @@ def _show(store: IncidentStore, given: argparse.Namespace) -> int:
     lines = [incident.sentence, f"began {clock_text(incident.wall)}, verdict {incident.verdict or 'open'}"]
     lines += [f"  {phase} {seconds:.1f} s" for phase, seconds in incident.durations()]
     if incident.share_seen is not None:
-        lines.append(f"{100 * incident.share_seen:.0f} % of the room's floor were seen")
+        lines.append(f"{100 * incident.share_seen:.0f} % of the room's floor was seen")
     if incident.person is not None:
         lines.append("the person stood at x {:.2f} m, y {:.2f} m".format(*incident.person))
     for event in (*incident.events, *store.amendments(incident.id)):
@@ -216,7 +238,8 @@ def _verify(store: IncidentStore, given: argparse.Namespace) -> int:
     done = verify(store, files=not given.no_files, expect=given.expect)
     for problem in done.problems:
         print(problem)
-    counts = f"{done.records} records, {done.files} files, {done.removed} removed by retention, {done.open} open"
+    records, files = count_of(done.records, "record"), count_of(done.files, "file")
+    counts = f"{records}, {files}, {done.removed} removed by retention, {done.open} open"
     print(f"{'all fits' if done.fits else 'DOES NOT FIT'}: {counts}; the chain ends with {done.head}")
     return 0 if done.fits else 1
 
