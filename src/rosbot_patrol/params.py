@@ -24,6 +24,7 @@ import typing
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Literal, TypeVar
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError
 
 log = logging.getLogger(__name__)
@@ -246,7 +247,7 @@ def _sequence(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
     else:
         inner = list(args)
         if len(inner) != len(value):
-            raise ParamError(name, f"expected {len(inner)} values, got {len(value)}: {value!r}")
+            raise ParamError(name, f"expected {count_of(len(inner), 'value')}, got {len(value)}: {value!r}")
     items = [_element(h, v, f"{name}[{i}]", info) for i, (h, v) in enumerate(zip(inner, value, strict=True))]
     return kind(items)
 

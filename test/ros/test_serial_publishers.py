@@ -15,6 +15,7 @@ from sensor_msgs.msg import BatteryState, JointState, Range
 from std_msgs.msg import Bool, Empty, Float32MultiArray, String, Time
 from std_srvs.srv import SetBoolResponse
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.ros import serial_publishers
 from rosbot_patrol.ros.serial_channels import check_md5, serialize
@@ -54,7 +55,9 @@ def test_fixed_message_is_checked_by_size_and_its_bools_are_0_or_1():
     assert trigger.check(b"\x07\x01", info()) == b"\x07\x01"
     assert trigger.check(b"\x07\x80", info()) == b"\x07\x01"
     for data in (b"", b"\x07", b"\x07\x01\x00"):
-        with pytest.raises(ProtocolError, match=f"motion_trigger: {len(data)} bytes, a rosbot_patrol/EspTrigger has 2"):
+        with pytest.raises(
+            ProtocolError, match=f"motion_trigger: {count_of(len(data), 'byte')}, a rosbot_patrol/EspTrigger has 2"
+        ):
             trigger.check(data, info())
 
 

@@ -19,6 +19,7 @@ from rosbot_patrol.alerts.incident_database import errors_of, transaction
 from rosbot_patrol.alerts.incident_files import REPORT
 from rosbot_patrol.alerts.incident_rows import close_incident, insert_event, insert_file, insert_incident
 from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.counts import count_of
 
 
 def repair(store: IncidentStore, *, wall: float) -> list[str]:
@@ -41,10 +42,13 @@ def repair(store: IncidentStore, *, wall: float) -> list[str]:
         said.append(f"incident {incident_id} had been removed; its files are gone now, too")
     migrated = [incident_id for incident_id in sorted(strays - removed) if _migrate(store, incident_id, wall)]
     if migrated:
-        said.append(f"{len(migrated)} incidents of an older version were taken into the database")
+        one, many = "incident of an older version was", "incidents of an older version were"
+        said.append(f"{count_of(len(migrated), one, many)} taken into the database")
     unknown = strays - removed - set(migrated)
     if unknown and not store.later_version:
-        said.append(f"{len(unknown)} folders in {store.folder.root} have no record here and are left alone")
+        root = store.folder.root
+        one, many = f"folder in {root} has no record here and is", f"folders in {root} have no record here and are"
+        said.append(f"{count_of(len(unknown), one, many)} left alone")
     return said
 
 

@@ -29,6 +29,7 @@ from rosbot_patrol.alerts.incident_rows import (
     insert_incident,
 )
 from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import sync_folder
 
@@ -80,8 +81,8 @@ def _begin_anew(state_dir: Path, problem: StoreError, wall: float) -> tuple[Inci
         fresh.replace(path)
         sync_folder(state_dir)
     return IncidentStore(state_dir, wall=wall), (
-        f"{path} {problem.problem}; it was set aside as {aside.name}, a new one begun, and {copied}"
-        f" incident{'s' if copied != 1 else ''} copied that could still be read"
+        f"{path} {problem.problem}; it was set aside as {aside.name}, a new one begun,"
+        f" and {count_of(copied, 'incident')} copied that could still be read"
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from PIL import Image, ImageDraw
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import AlertError
 
 _RED = (230, 30, 30)
@@ -85,7 +86,8 @@ def _decode_encoded(picture: EncodedPicture) -> Image.Image:
     try:
         return Image.open(io.BytesIO(picture.data)).convert("RGB")
     except (OSError, SyntaxError, Image.DecompressionBombError) as err:
-        raise AlertError(f"a compressed picture of {len(picture.data)} bytes cannot be read: {err}") from err
+        size = count_of(len(picture.data), "byte")
+        raise AlertError(f"a compressed picture of {size} cannot be read: {err}") from err
 
 
 def _decode(picture: RawPicture) -> Image.Image:
@@ -96,7 +98,8 @@ def _decode(picture: RawPicture) -> Image.Image:
     rows = picture.height * picture.step
     if min(picture.width, picture.height) < 1 or picture.step < picture.width * pixel or len(picture.data) < rows:
         raise AlertError(
-            f"a picture of {picture.width} x {picture.height} {picture.encoding} came with {len(picture.data)} bytes"
+            f"a picture of {picture.width} x {picture.height} {picture.encoding} came with "
+            f"{count_of(len(picture.data), 'byte')}"
         )
     size = (picture.width, picture.height)
     image = Image.frombytes(mode, size, picture.data, "raw", raw_mode, picture.step)

@@ -28,6 +28,7 @@ from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox, Waiting
 from rosbot_patrol.alerts.receipts import Receipt, Receipts
 from rosbot_patrol.alerts.upgrade import adopt_mails
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import write_atomic
 
 log = logging.getLogger(__name__)
@@ -396,7 +397,8 @@ class Postman:
         when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(oldest.wall))
         text = (
             f"The channel '{name}' ({self.channels[name].transport.describe()}) takes nothing: {lane.error}\n\n"
-            f"{len(lane)} notices wait for it, the oldest of {when}. They are kept and tried on."
+            f"{count_of(len(lane), 'notice waits', 'notices wait')} for it, the oldest of {when}. "
+            f"{'It is' if len(lane) == 1 else 'They are'} kept and tried on."
         )
         self._tell(f"{oldest.id[:90]}-down-{_mark(name)}", f"the channel '{name}' is down", text, others)
 

@@ -16,6 +16,7 @@ from PIL import Image
 from rosbot_patrol.alerts.chain import Link
 from rosbot_patrol.alerts.incident import Event, Incident, StoredFile, clock_text
 from rosbot_patrol.alerts.report_style import STYLE
+from rosbot_patrol.counts import count_of
 
 _THUMB = (208, 156)  # [px]
 _MAX_LARGE = 4  # pictures in full size
@@ -82,7 +83,8 @@ def _facts(incident: Incident) -> str:
         rows.append(
             (
                 "Seen",
-                f"{incident.object_class}, probability {incident.probability:.2f} over {incident.pictures} pictures",
+                f"{incident.object_class}, probability {incident.probability:.2f} over "
+                f"{count_of(incident.pictures, 'picture')}",
             )
         )
     if incident.confirmed is not None:
@@ -177,7 +179,8 @@ def _hashes(incident: Incident, link: Link | None) -> str:
         chained = f"Record {link.n} of the chain, SHA-256 <code>{own}</code>, after <code>{previous}</code>."
     rows = ((_text(f.name), f.size, _text(f.sha256)) for f in incident.files)
     files = "".join(f"<tr><td>{name}</td><td>{size}</td><td><code>{sha}</code></td></tr>" for name, size, sha in rows)
-    table = f"<details><summary>{len(incident.files)} files</summary><table>{files}</table></details>" if files else ""
+    count = count_of(len(incident.files), "file")
+    table = f"<details><summary>{count}</summary><table>{files}</table></details>" if files else ""
     check = "<code>rosrun rosbot_patrol incidents verify</code> checks all of it."
     return f"""<h2>Proof</h2><p class="faint">{chained}</p>{table}
 <footer><p>Incident {_text(incident.id)}. {check}</p></footer>"""

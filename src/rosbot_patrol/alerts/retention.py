@@ -15,6 +15,7 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.incident_database import errors_of
 from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.params import param
 
@@ -52,7 +53,7 @@ class Pruned:
     def sentence(self) -> str:
         """For people."""
         count = len(self.ids)
-        return f"{count} old incident{'s' if count != 1 else ''} ({self.bytes / MB:.1f} MB) removed: {self.why}"
+        return f"{count_of(count, 'old incident')} ({self.bytes / MB:.1f} MB) removed: {self.why}"
 
 
 def prune(store: IncidentStore, params: RetentionParams, *, wall: float) -> Pruned:

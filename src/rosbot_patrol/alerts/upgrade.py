@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.counts import count_of
 
 log = logging.getLogger(__name__)
 
@@ -42,7 +43,8 @@ def adopt_mails(outbox: Outbox, folders: Iterable[Path]) -> int:
             hidden.unlink()
             count += 1
     if count:
-        log.info("%d mails that the version before left waiting are in the outbox now", count)
+        one, many = "mail that the version before left waiting is", "mails that the version before left waiting are"
+        log.info("%s in the outbox now", count_of(count, one, many))
     return count
 
 

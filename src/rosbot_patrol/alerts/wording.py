@@ -7,6 +7,7 @@ import time
 from rosbot_patrol.alerts.incident import Incident
 from rosbot_patrol.alerts.mail import token
 from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.counts import count_of
 
 SUBJECT = "rosbot patrol node"
 FIRST_SENTENCE = "I have found something strange it could be invader"
@@ -70,7 +71,8 @@ _VERDICTS = {
 
 def _facts(incident: Incident, picture_note: str) -> tuple[tuple[str, str], ...]:
     when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(_moment(incident)))
-    seen = f"{incident.object_class}, probability {incident.probability:.2f}, in {incident.pictures} pictures"
+    pictures = count_of(incident.pictures, "picture")
+    seen = f"{incident.object_class}, probability {incident.probability:.2f}, in {pictures}"
     rows = [
         ("Room", f"{incident.room_id} ({incident.room_name})"),
         ("Time", f"{when} (robot's clock {incident.ros_time:.1f} s)"),

@@ -17,6 +17,7 @@ from typing import Any
 from rosbot_patrol.campaign.crash_plan import ALL
 from rosbot_patrol.campaign.intervals import wilson
 from rosbot_patrol.campaign.plan import CLEAR
+from rosbot_patrol.counts import count_of
 
 CLOCK_SLACK = 1.0  # between the clocks of two programs [s]
 
@@ -120,7 +121,7 @@ class Books:
         mail_low, mail_high = wilson(one, self.confirmed)
         verdicts = ", ".join(f"{name} {count}" for name, count in sorted(self.answered.items()))
         lines = [
-            f"{kills} kills: {', '.join(f'{name} {count}' for name, count in sorted(self.kills.items()))}",
+            f"{count_of(kills, 'kill')}: {', '.join(f'{name} {count}' for name, count in sorted(self.kills.items()))}",
             f"at these moments: {', '.join(f'{name} {count}' for name, count in sorted(self.moments.items()))}",
             f"calls with a verdict: {answered} of {self.calls} ({low:.1%} to {high:.1%}); {verdicts}",
             f"somebody in the room, and yet clear: {len(self.overlooked)} of {self.watched}",
@@ -170,7 +171,7 @@ def balance(
     for mail in mails:
         by_incident.setdefault(mail.incident, set()).add(mail.message_id)
     strangers = [
-        f"incident {record.id} has {len(by_incident.get(record.id, ()))} mails"
+        f"incident {record.id} has {count_of(len(by_incident.get(record.id, ())), 'mail')}"
         for record in confirmed
         if len(by_incident.get(record.id, ())) != 1
     ]

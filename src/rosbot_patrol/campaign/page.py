@@ -9,6 +9,7 @@ from string import Template
 from rosbot_patrol.campaign.charts import share_chart, spread_chart
 from rosbot_patrol.campaign.record import Result
 from rosbot_patrol.campaign.table import HEADINGS, Share, by_kind, row, shares
+from rosbot_patrol.counts import count_of
 
 PLACE_AIM, SHARE_AIM = 0.3, 0.05  # aims of place [m] and of share
 _WHEN = {
@@ -75,7 +76,7 @@ def page(results: Sequence[Result], command: Callable[[Result], str], *, subtitl
     counted = shares(results)
     failed = [result for result in results if result.failures]
     return _PAGE.substitute(
-        title=f"A campaign of {len(results)} patrols",
+        title=f"A campaign of {count_of(len(results), 'patrol')}",
         subtitle=escape(subtitle),
         tiles="".join(_tiles(results, counted)),
         all=share_chart([counted[0], *counted[2:]]) + share_chart([counted[1]], good=0.0),

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.campaign.plan import CONFIRMED
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.files import write_atomic
 
@@ -105,7 +106,7 @@ class Result:
         if not (self.missed or self.false_alarm or self.problem) and not self.was_there and not is_right:
             found.append(f"{self.verdict or 'no verdict'} in a room without anybody")
         if self.verdict == CONFIRMED and not self.has_its_mails:
-            found.append(f"{self.mails} mails")
+            found.append(count_of(self.mails, "mail"))
         touched = self.touches or sorted(set(self.contacts))
         found += [f"touched {'; '.join(touched)}"] if self.contacts else []
         found += ["not home"] if self.home is False else []

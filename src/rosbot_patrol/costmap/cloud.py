@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.costmap.observation import Observation
 from rosbot_patrol.costmap.sensor_params import SourceParams
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ImageError
 
 Array = NDArray[np.float64]
@@ -55,7 +56,7 @@ def cloud_points(data: bytes, layout: CloudLayout, stride: int = 1) -> Array:
     if c.width and c.height and (max(ends) > c.point_step or c.row_step < c.width * c.point_step):
         raise ImageError(f"a cloud of {c.width} points a row in steps of {c.point_step} and {c.row_step} bytes")
     if len(data) < c.row_step * c.height:
-        raise ImageError(f"a cloud of {len(data)} bytes, expected {c.row_step} x {c.height}")
+        raise ImageError(f"a cloud of {count_of(len(data), 'byte')}, expected {c.row_step} x {c.height}")
     order = ">" if c.is_bigendian else "<"
     start = stride // 2 if min(c.width, c.height) > stride else 0
     along = slice(start, None, stride)

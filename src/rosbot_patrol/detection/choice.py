@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import logging
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.detection.detector import Detector, load_detector
 
@@ -22,5 +23,5 @@ def make_detector(params: DarknetParams, own_models: str) -> Detector:
     cfg, weights = params.network_files(own_models)
     names = params.yolo_model.detection_classes.names
     detector = load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
-    log.info("%s, %d classes, by %s", cfg, len(detector.names), detector.runtime)
+    log.info("%s, %s, by %s", cfg, count_of(len(detector.names), "class", "classes"), detector.runtime)
     return detector

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import simplejpeg
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.images.encodings import ENCODINGS, Picture
 from rosbot_patrol.params import param
@@ -127,9 +128,10 @@ def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flag) if data else None
     except cv2.error as err:  # such as a header that speaks of a billion pixels
-        raise ImageError(f"{len(data)} bytes of the format '{text}' cannot be decoded: {err}") from err
+        raise ImageError(f"{count_of(len(data), 'byte')} of the format '{text}' cannot be decoded: {err}") from err
     if pixels is None:
-        raise ImageError(f"{len(data)} bytes of the format '{text}' are no picture that can be read")
+        one, many = f"byte of the format '{text}' is", f"bytes of the format '{text}' are"
+        raise ImageError(f"{count_of(len(data), one, many)} no picture that can be read")
     return _restore(pixels.reshape(*pixels.shape[:2], -1), encoding, mode)
 
 

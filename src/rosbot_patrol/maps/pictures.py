@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError
 
 _CHANNELS = {b"P2": 1, b"P3": 3, b"P5": 1, b"P6": 3}
@@ -57,14 +58,15 @@ def _read_netpbm(path: Path, data: bytes) -> NDArray[np.uint8]:
 def _binary_values(path: Path, body: bytes, count: int, largest: int) -> NDArray[Any]:
     kind = np.dtype(np.uint8) if largest < 256 else np.dtype(">u2")
     if len(body) < count * kind.itemsize:
-        raise MapError(path, f"the picture is cut short: {len(body)} bytes of pixels, expected {count * kind.itemsize}")
+        found = count_of(len(body), "byte")
+        raise MapError(path, f"the picture is cut short: {found} of pixels, expected {count * kind.itemsize}")
     return np.frombuffer(body, dtype=kind, count=count).copy()
 
 
 def _text_values(path: Path, body: bytes, count: int) -> NDArray[Any]:
     words = re.sub(rb"#[^\n]*", b"", body).split()
     if len(words) < count:
-        raise MapError(path, f"the picture is cut short: {len(words)} pixel values, expected {count}")
+        raise MapError(path, f"the picture is cut short: {count_of(len(words), 'pixel value')}, expected {count}")
     try:
         return np.array([int(w) for w in words[:count]], dtype=np.int64)
     except ValueError as err:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rosbot_patrol.alerts.incident import Event, Incident
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.commands import Commands, Notice
 from rosbot_patrol.patrol.mission import Mission
@@ -189,6 +190,6 @@ def _seen(wall: float, notice: Notice) -> Entry:
         "pictures": seen.pictures,
         "pose": (pose.x, pose.y, pose.yaw) if pose else None,
     }
-    text = f"{seen.label} seen, probability {seen.probability:.2f} over {seen.pictures} pictures"
+    text = f"{seen.label} seen, probability {seen.probability:.2f} over {count_of(seen.pictures, 'picture')}"
     event = Event(wall=wall, kind="seen", text=text, data={"stamp": seen.stamp})
     return Entry(incident=mission.id, changes=changes, events=(event,))

@@ -7,6 +7,7 @@ import logging
 import math
 from dataclasses import dataclass
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.params import param
@@ -137,12 +138,13 @@ class Explorer:
             return self._drive_home(now, tuple(found))
         self._target = open_[0]
         self._send(now, self._target.goal)
-        log.info("%.0f m2 of floor known, %d borders; %s", self.area, len(open_), self._about)
+        log.info("%.0f m2 of floor known, %s; %s", self.area, count_of(len(open_), "border"), self._about)
         return Step(goal=self._goal, text=self._about, frontiers=tuple(found))
 
     def _drive_home(self, now: float, found: tuple[Frontier, ...]) -> Step:
         assert self._home is not None
-        log.info("no border is left: %.0f m2 of floor known, %d borders were left out", self.area, len(self.left_out))
+        left = count_of(len(self.left_out), "border was", "borders were")
+        log.info("no border is left: %.0f m2 of floor known, %s left out", self.area, left)
         self._goes_home, self._target = True, None
         self._send(now, self._home)
         return Step(goal=self._goal, text="explored, driving home", frontiers=found)

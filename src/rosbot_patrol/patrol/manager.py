@@ -300,7 +300,9 @@ class PatrolManager(Ordered):
     def _drop_the_old(self, inputs: Inputs, out: Commands) -> None:
         """What was called for so long before a restart that a look would come too late."""
         oldest = inputs.wall - self.params.resume_max_age
-        why = f"the patrol was down for more than {self.params.resume_max_age / 3600.0:g} hours"
+        hours = self.params.resume_max_age / 3600.0
+        duration = "an hour" if hours == 1.0 else f"{hours:g} hours"
+        why = f"the patrol was down for more than {duration}"
         old = [request for request in self.queue if request.wall < oldest]
         kept = self.queue.drop()
         self._give_up(old, why, out)

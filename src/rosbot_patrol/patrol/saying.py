@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.patrol.commands import Report
 from rosbot_patrol.patrol.mission import Mission, Phase
 from rosbot_patrol.patrol.queueing import MissionQueue
@@ -21,7 +22,7 @@ def verdict(mission: Mission) -> str:
 def sighting(mission: Mission, seen: Confirmation, room: str = "") -> str:
     """That somebody was seen; `room` is the one in which they are, where that is known."""
     where = _WHERE.get(mission.phase, "on the way back from")
-    sure = f"probability {seen.probability:.2f} over {seen.pictures} pictures"
+    sure = f"probability {seen.probability:.2f} over {count_of(seen.pictures, 'picture')}"
     place = ""
     if seen.measured is not None:
         about = "about " if seen.measured.error > 0.5 else ""
@@ -45,7 +46,7 @@ def suspects(found: Iterable[Suspect]) -> tuple[str, ...]:
     texts = []
     for suspect in found:
         sides = [
-            f"{len(side.scores)} pictures at {side.score:.2f} from ({side.eye.x:.1f}, {side.eye.y:.1f})"
+            f"{count_of(len(side.scores), 'picture')} at {side.score:.2f} from ({side.eye.x:.1f}, {side.eye.y:.1f})"
             for side in suspect.sides
         ]
         about = f"{suspect.label} at ({suspect.x:.2f}, {suspect.y:.2f})"

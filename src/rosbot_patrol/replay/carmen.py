@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert, wrap_angle
 from rosbot_patrol.scan import LaserScan
@@ -115,13 +116,13 @@ def _robot_laser(words: list[str], range_max: float) -> LoggedScan:
 def _count(word: str) -> int:
     count = int(word)
     if count < 2:
-        raise ValueError(f"{count} beams, expected 2 at least")
+        raise ValueError(f"{count_of(count, 'beam')}, expected 2 at least")
     return count
 
 
 def _require(words: list[str], count: int) -> None:
     if len(words) < count:
-        raise ValueError(f"it has {len(words)} words, expected {count} at least")
+        raise ValueError(f"it has {count_of(len(words), 'word')}, expected {count} at least")
 
 
 def _numbers(words: list[str]) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import wrap_angles
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.replay.results import STAMP, Result, Table
@@ -206,7 +207,8 @@ def _compare_column(
     if math.isinf(field.tolerance) or not len(wrong):
         return []
     first, worst = int(wrong[0]), int(np.argmax(errors))
-    text = f"{len(wrong)} of {len(errors)} rows differ{_allowed(field.tolerance, field.unit)}; first at "
+    rows = count_of(len(errors), "row differs", "rows differ")
+    text = f"{len(wrong)} of {rows}{_allowed(field.tolerance, field.unit)}; first at "
     text += f"{times[first]:.3f} s (stored {_shown(stored[first])}, now {_shown(found[first])})"
     if np.isfinite(errors[worst]):
         text += f", worst by {_shown(errors[worst])}{_unit(field.unit)} at {times[worst]:.3f} s"

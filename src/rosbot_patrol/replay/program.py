@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import BagError, ParamError, PatrolError
 from rosbot_patrol.maps.map_io import write_map
 from rosbot_patrol.replay.bag import Bag
@@ -156,7 +157,7 @@ def _judge(case: Case, result: Result, options: argparse.Namespace) -> int:
     stored = load_result(case.expected) if options.check or (is_case and options.record is None) else None
     if options.plots:
         written = write_plots(options.plots, result, stored, case.fields)
-        _say(options, f"{len(written)} pictures in {options.plots}")
+        _say(options, f"{count_of(len(written), 'picture')} in {options.plots}")
     return SAME if stored is None else _compared(case, stored, result, options)
 
 

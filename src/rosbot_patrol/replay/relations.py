@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import wrap_angles
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ def relation_errors(estimate: Array, reference: Array, pairs: Pairs) -> Relation
         ValueError: the two have not the same number of poses, or there are no pairs.
     """
     if estimate.shape != reference.shape:
-        raise ValueError(f"{len(estimate)} poses against {len(reference)} of the reference")
+        raise ValueError(f"{count_of(len(estimate), 'pose')} against {len(reference)} of the reference")
     if not len(pairs):
         raise ValueError("there are no pairs to compare")
     ours, theirs = moves_between(estimate, pairs), moves_between(reference, pairs)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ResultError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.grid import Grid, GridInfo
@@ -75,7 +76,7 @@ class Rows:
     def add(self, *values: Any) -> None:
         """Add a row: floats, ints, bools or texts, in the order of the names."""
         if len(values) != len(self._names):
-            raise ValueError(f"{len(values)} values for {len(self._names)} columns")
+            raise ValueError(f"{count_of(len(values), 'value')} for {count_of(len(self._names), 'column')}")
         self._rows.append(values)
 
     def table(self) -> Table:

@@ -15,6 +15,7 @@ from nav_msgs.msg import OccupancyGrid
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
@@ -105,9 +106,9 @@ class Explore:
 
     def _end(self) -> None:
         log.info(
-            "explored: %.0f m2 of floor, %d borders were out of reach",
+            "explored: %.0f m2 of floor, %s out of reach",
             self._explorer.area,
-            len(self._explorer.left_out),
+            count_of(len(self._explorer.left_out), "border was", "borders were"),
         )
         if self._given.save_map and self._grid is not None:
             pgm, text = write_map(self._given.save_map, self._grid)

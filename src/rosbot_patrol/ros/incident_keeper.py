@@ -27,6 +27,7 @@ from rosbot_patrol.alerts.incident_salvage import open_store
 from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.alerts.map_picture import MapView, Marks, crop_map, draw_map, view_of_marks
 from rosbot_patrol.alerts.retention import RetentionParams, keep_reserve, make_room, prune
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError, StoreError
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.chronicle import Entry
@@ -252,7 +253,7 @@ class IncidentKeeper:
             changes["path"] = kept.path + entry.path
         events = entry.events
         if self._lost:
-            text = f"{self._lost} entries were lost while the disk took nothing"
+            text = f"{count_of(self._lost, 'entry was', 'entries were')} lost while the disk took nothing"
             events = (Event(wall=time.time(), kind="fault", text=text), *events)
         store.record(entry.incident, add=events, **changes)
         self._lost = 0
@@ -336,7 +337,7 @@ class IncidentKeeper:
                 log.error("no room could be made for incidents: %s", worse)
             else:
                 log.warning("incidents: %s", done.sentence)
-                what = f"the disk is full: {len(done.ids)} old incidents were removed"
+                what = f"the disk is full: {count_of(len(done.ids), 'old incident was', 'old incidents were')} removed"
                 self._health.set("incidents", WARN if done.ids else ERROR, what)
                 return 0.1 if done.ids else DISK_RETRY
         self._health.set("incidents", ERROR, f"incidents cannot be written: {err}")

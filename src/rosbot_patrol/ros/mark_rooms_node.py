@@ -21,6 +21,7 @@ from geometry_msgs.msg import PointStamped
 from nav_msgs.msg import OccupancyGrid
 from visualization_msgs.msg import MarkerArray
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError, ParamError, TransformError
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.patrol.floor import Floor, floor_of
@@ -105,7 +106,7 @@ class MarkRooms:
             if not self._take(click):
                 break
         print(
-            f"\n{len(self._marks.rooms)} points in {self._path}; the launch takes them by"
+            f"\n{count_of(len(self._marks.rooms), 'point')} in {self._path}; the launch takes them by"
             f" path_to_params:={self._path.resolve()}"
         )
 

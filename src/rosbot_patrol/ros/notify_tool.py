@@ -27,6 +27,7 @@ from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.postman import Postman
 from rosbot_patrol.alerts.settings_file import read_settings, state_of
 from rosbot_patrol.alerts.trial import trial_notice, try_channel
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import unknown_name
 from rosbot_patrol.ros.private_files import use_private_umask
@@ -173,7 +174,8 @@ def _channel_line(channel: Mapping[str, Any], age: float) -> str:
     if not channel.get("waiting"):
         refusal = channel.get("refusal")
         return f"{line}: refused the last notice for good: {refusal}" if refusal else f"{line}: took all"
-    line += f": {channel['waiting']} wait since {_when(channel.get('since') or 0.0)}"
+    waits = count_of(int(channel["waiting"]), "waits", "wait")
+    line += f": {waits} since {_when(channel.get('since') or 0.0)}"
     if channel.get("error"):
         line += f", because {channel['error']}"
     if channel.get("next_try") is not None:
@@ -182,7 +184,7 @@ def _channel_line(channel: Mapping[str, Any], age: float) -> str:
 
 
 def _count(number: int) -> str:
-    return "1 notice waits" if number == 1 else f"{number or 'No'} notices wait"
+    return count_of(number, "notice waits", "notices wait", none="No")
 
 
 def _when(wall: float) -> str:

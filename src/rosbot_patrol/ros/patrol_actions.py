@@ -9,6 +9,7 @@ from typing import Any
 
 import actionlib
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.msg import PatrolAction, PatrolFeedback, PatrolResult
 from rosbot_patrol.patrol.commands import Report
 from rosbot_patrol.patrol.manager import PatrolManager
@@ -112,5 +113,5 @@ def _result(goal: _Open) -> PatrolResult:
         result.reasons.append(mission.reason if mission else CANCELLED)
     found = [str(room) for room, verdict in zip(goal.rooms, result.verdicts, strict=True) if verdict == "confirmed"]
     somebody = f"somebody is in room {', '.join(found)}" if found else "nobody was confirmed"
-    result.text = f"{len(goal.ended)} of {len(goal.rooms)} rooms have a verdict: {somebody}"
+    result.text = f"{len(goal.ended)} of {count_of(len(goal.rooms), 'room has', 'rooms have')} a verdict: {somebody}"
     return result

@@ -31,6 +31,7 @@ from rosbot_patrol.alerts.mail import one_line
 from rosbot_patrol.alerts.notice import Notice as PostNotice
 from rosbot_patrol.alerts.picture import LabelledBox
 from rosbot_patrol.alerts.retention import RetentionParams
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.arming import Arming, ArmingRules, load_rules, read_memory
 from rosbot_patrol.patrol.chronicle import Chronicle
@@ -120,7 +121,8 @@ class PatrolNode:
             viewpoints=views.instead,
             judge=Judge(self.params.judge, load_known(self.params.known_objects)),
         )
-        log.info("%d rooms in %s, %d rounds in the schedule", len(rooms), rooms.source, len(rounds))
+        how_many, how_often = count_of(len(rooms), "room"), count_of(len(rounds), "round")
+        log.info("%s in %s, %s in the schedule", how_many, rooms.source, how_often)
         self._make_ends(load_flat(InputParams, tree), rooms, folder)
 
     def _make_ends(self, inputs: InputParams, rooms: Rooms, folder: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.alerts.postman import ChannelStatus, Postman
 from rosbot_patrol.alerts.settings_file import differences, state_of
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN, Health
 
 OVERDUE = 120.0  # [s] after which a notice that nobody delivers is a fault
@@ -78,7 +79,8 @@ class PostHealth:
         late = [entry for entry in outbox.waiting() if time.time() - entry.wall > OVERDUE]
         told = state_of(outbox.folder) or {} if late else {}
         if late and time.time() - float(told.get("wall", 0.0)) > OVERDUE:
-            text = f"{len(late)} notices wait, and {holder}, which has to deliver them, does nothing"
+            waits = count_of(len(late), "notice waits", "notices wait")
+            text = f"{waits}, and {holder}, which has to deliver them, does nothing"
             self._set("outbox", ERROR, text)
         else:
             self._outbox_is(f"{holder} delivers")
@@ -101,7 +103,7 @@ def judge(status: ChannelStatus) -> tuple[int, str]:
     if not status.waiting:
         return OK, f"notices go to {status.describe}"
     since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(status.since))
-    waits = f"{status.waiting} notices wait" if status.waiting > 1 else "1 notice waits"
+    waits = count_of(status.waiting, "notice waits", "notices wait")
     if not status.error:
         return OK, f"{waits} for {status.describe}, since {since}"
     refused = f", {status.refused} of them refused for good" if status.refused else ""

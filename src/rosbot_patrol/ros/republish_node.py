@@ -24,6 +24,7 @@ import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
 from rosbot_patrol import params as parameters
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ImageError, ParamError
 from rosbot_patrol.images.compressed import CompressedParams, compress
 from rosbot_patrol.images.compressed_depth import CompressedDepthParams, compress_depth
@@ -76,7 +77,7 @@ def parse_arguments(arguments: Sequence[str]) -> tuple[str, tuple[str, ...]]:
     """
     words = [word for word in arguments if word.strip()]
     if not 1 <= len(words) <= 2:
-        raise ParamError("republish", f"got {len(words)} arguments; {USAGE}")
+        raise ParamError("republish", f"got {count_of(len(words), 'argument')}; {USAGE}")
     for word in words:
         if word not in TRANSPORTS:
             raise ParamError("republish", f"the transport '{word}' is not known here; {USAGE}")

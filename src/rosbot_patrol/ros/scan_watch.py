@@ -6,6 +6,7 @@ import logging
 
 import rospy
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.node import now
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.scan import LaserScan, scan_problem
@@ -41,7 +42,8 @@ class ScanWatch:
             return False
         before, self._beams[scan.frame_id] = self._beams.get(scan.frame_id, beams), beams
         if beams != before:
-            rospy.logwarn_throttle(10.0, f"{name}: it has {beams} beams, {before} before; it is taken as it is")
+            many = count_of(beams, "beam")
+            rospy.logwarn_throttle(10.0, f"{name}: it has {many}, {before} before; it is taken as it is")
         return True
 
     def tend(self, current: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rospy
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.msg import SensorEvent, SensorState, SensorStates
 from rosbot_patrol.ros.diagnostics import ERROR, OK, STALE, WARN, Health
 from rosbot_patrol.sensors.looks import Look
@@ -44,10 +45,10 @@ def summary(statuses: list[SensorStatus], watch: Supervisor) -> tuple[int, str]:
     gone = [name for name, is_there in watch.bridges().items() if not is_there]
     waiting = sum(s.waiting for s in expected)
     well = sum(not s.problems and not s.waiting for s in expected)
-    text = f"{well} of {len(expected)} sensors are well"
+    text = f"{well} of {count_of(len(expected), 'sensor is', 'sensors are')} well"
     text += f", not: {', '.join(bad[:20])}{', ...' if len(bad) > 20 else ''}" if bad else ""
     text += f", {waiting} not heard yet" if waiting else ""
-    text += f", {len(unknown)} unknown ids: {', '.join(unknown[:10])}" if unknown else ""
+    text += f", {count_of(len(unknown), 'unknown id')}: {', '.join(unknown[:10])}" if unknown else ""
     text += f", bridges gone: {', '.join(gone)}" if gone else ""
     return (WARN if bad or unknown or gone else OK), text
 

@@ -24,6 +24,7 @@ from std_msgs.msg import Empty
 
 from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.alerts.notice import Notice as PostNotice
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
@@ -99,7 +100,8 @@ class SensorWatch:
         self._reports = Reports(self._health)
         self._unwritten = False
         self._retry_at = 0.0
-        where = f"{len(sensors)} sensors of {sensors.source}" if sensors.has_file else "whatever sensor is heard"
+        named = f"{count_of(len(sensors), 'sensor')} of {sensors.source}"
+        where = named if sensors.has_file else "whatever sensor is heard"
         log.info("watching %s", where)
 
     def run(self) -> None:

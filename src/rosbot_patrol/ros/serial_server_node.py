@@ -27,6 +27,7 @@ from typing import Any
 
 import rospy
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError, ProtocolError
 from rosbot_patrol.ros.node import Worker, load_params, run_node
 from rosbot_patrol.ros.serial_channels import DeviceService, ServiceCaller, Subscription, message_class
@@ -207,7 +208,11 @@ def body() -> None:
         ports = server.listen(params.all_tcp_ports, params.host)
         what = "TCP port " + ", ".join(map(str, ports))
         ros_side.links.start()
-        log.info("waiting for sensors%s on %s", f" with one of {len(policy.keys)} keys" if policy.keys else "", what)
+        log.info(
+            "waiting for sensors%s on %s",
+            f" with one of {count_of(len(policy.keys), 'key')}" if policy.keys else "",
+            what,
+        )
     else:
         server.attach(params.port, params.baud)
         what = params.port

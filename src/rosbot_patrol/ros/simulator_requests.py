@@ -11,6 +11,7 @@ from typing import Any
 import rospy
 from std_srvs.srv import Empty, EmptyResponse, Trigger, TriggerResponse
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import PatrolError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.ros.packages import package_finder
@@ -100,7 +101,7 @@ class Requests:
 
     def _step(self, request: StepSimulationRequest) -> StepSimulationResponse:
         if not 0 < request.ticks <= _MOST_TICKS:
-            problem = f"cannot step {request.ticks} ticks, expected 1 to {_MOST_TICKS}"
+            problem = f"cannot step {count_of(request.ticks, 'tick')}, expected 1 to {_MOST_TICKS}"
             return StepSimulationResponse(success=False, message=problem)
         try:
             self.ask(lambda: self._advance(request.ticks))

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable
 from typing import Protocol
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.client import Client
 from rosbot_patrol.rosserial.complaints import printable
@@ -142,7 +143,8 @@ class Dispatcher:
         name = event.info.name.lstrip("/")
         try:
             if event.kind == TopicId.PUBLISHER and self._has_all_names(name):
-                raise ProtocolError("", f"publisher {name!r}: {len(self._names)} topics have been made already")
+                made = count_of(len(self._names), "topic has", "topics have")
+                raise ProtocolError("", f"publisher {name!r}: {made} been made already")
             self._handler.open(client, event.kind, event.info)
         except ProtocolError as err:
             client.session.reject(event.kind, event.info)

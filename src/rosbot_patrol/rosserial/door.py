@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.rosserial.budget import Budget
 from rosbot_patrol.rosserial.client import Client
 
@@ -68,11 +69,13 @@ class Door:
         if len(crowd.strangers) >= limits.strangers:
             return None, own
         if 0 < limits.per_address <= crowd.count:
-            return (None, own) if own is not None else (f"{crowd.count} clients of its address are connected", None)
+            many = count_of(crowd.count, "client of its address is", "clients of its address are")
+            return (None, own) if own is not None else (f"{many} connected", None)
         if self._count < limits.clients:
             return None, None
         stranger = own or next(iter(self._strangers), None)
-        return (None, stranger) if stranger is not None else (f"{self._count} clients are connected", None)
+        many = count_of(self._count, "client is", "clients are")
+        return (None, stranger) if stranger is not None else (f"{many} connected", None)
 
     def enter(self, client: Client, now: float) -> None:
         """A connection has been taken; it is a stranger."""

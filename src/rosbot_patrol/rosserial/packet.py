@@ -13,6 +13,7 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ProtocolError
 
 SYNC = b"\xff\xfe"
@@ -137,7 +138,8 @@ class Parser:
     def _bad_sum(body: bytes | bytearray) -> str:
         topic_id = body[0] | body[1] << 8
         right = checksum(body[:-1])
-        return f"{len(body) - 3} bytes for topic id {topic_id} with checksum {body[-1]:02x}, it would be {right:02x}"
+        size = count_of(len(body) - 3, "byte")
+        return f"{size} for topic id {topic_id} with checksum {body[-1]:02x}, it would be {right:02x}"
 
     def _resync(self, start: int) -> int:
         self._skip(1)

@@ -16,6 +16,7 @@ import hmac
 import secrets
 from collections.abc import Mapping
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.packet import encode
 from rosbot_patrol.rosserial.topics import TopicId
@@ -67,7 +68,7 @@ class Gate:
             ProtocolError: it proves nothing.
         """
         if len(data) != _PROOF_SIZE or data[:1] != VERSION:
-            raise ProtocolError("", f"{len(data)} bytes that are no proof of version 1")
+            raise ProtocolError("", f"{count_of(len(data), 'byte that is', 'bytes that are')} no proof of version 1")
         sensor_id, device_nonce, mac = data[1], data[2 : 2 + DEVICE_NONCE_SIZE], data[2 + DEVICE_NONCE_SIZE :]
         key = self._keys.get(sensor_id)
         # without a key the same is computed in vain: how long it takes does not tell which ids there are
@@ -102,7 +103,9 @@ class Prover:
             ProtocolError: it is no challenge.
         """
         if len(challenge) != 1 + SERVER_NONCE_SIZE or challenge[:1] != VERSION:
-            raise ProtocolError("", f"{len(challenge)} bytes that are no challenge of version 1")
+            raise ProtocolError(
+                "", f"{count_of(len(challenge), 'byte that is', 'bytes that are')} no challenge of version 1"
+            )
         server_nonce = challenge[1:]
         nonce = secrets.token_bytes(DEVICE_NONCE_SIZE) if nonce is None else nonce
         self._expected = VERSION + bridge_mac(self._key, server_nonce, nonce, self._sensor_id)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.packet import encode
 
@@ -73,7 +74,7 @@ class _Reader:
         try:
             values = struct.unpack_from(layout, self._data, self._at)
         except struct.error as err:
-            raise ProtocolError("", f"a message of {len(self._data)} bytes ends too early") from err
+            raise ProtocolError("", f"a message of {count_of(len(self._data), 'byte')} ends too early") from err
         self._at += struct.calcsize(layout)
         return values
 
@@ -81,7 +82,9 @@ class _Reader:
         (length,) = self.take("<I")
         end = self._at + length
         if end > len(self._data):
-            raise ProtocolError("", f"a text of {length} bytes does not fit into its message of {len(self._data)}")
+            raise ProtocolError(
+                "", f"a text of {count_of(length, 'byte')} does not fit into its message of {len(self._data)}"
+            )
         text = self._data[self._at : end]
         self._at = end
         return text.decode("utf-8", errors="replace")
@@ -144,7 +147,7 @@ def pack_esp_trigger(sensor_id: int, move: bool) -> bytes:
 def unpack_esp_trigger(data: bytes) -> tuple[int, bool]:
     """Read rosbot_patrol/EspTrigger: sensor id, and whether something moves; raises ProtocolError."""
     if len(data) != 2:
-        raise ProtocolError("", f"an EspTrigger of {len(data)} bytes, expected 2")
+        raise ProtocolError("", f"an EspTrigger of {count_of(len(data), 'byte')}, expected 2")
     return data[0], data[1] != 0
 
 

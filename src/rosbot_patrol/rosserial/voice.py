@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from rosbot_patrol.counts import count_of
+
 
 class Voice:
     """The sensors of one connection.
@@ -45,4 +47,4 @@ class Voice:
             return f"it has proved to be sensor {self.proven_id}"
         if self._allowed is not None and trigger[0] not in self._allowed:
             return "the list has it as another sensor, or as none (~allow_sensors)"
-        return f"it speaks for {len(self._heard)} others already"
+        return f"it speaks for {count_of(len(self._heard), 'other')} already"

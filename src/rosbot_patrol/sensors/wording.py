@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.sensors.problems import Kind, duration
 
 MAX_LISTED = 20  # of one kind in one notice
@@ -77,7 +78,9 @@ def subject(items: Sequence[Item]) -> str:
         parts.append(f"{len(wrong)} motion sensors are silent")
     elif Kind.PATROL_GONE in kinds:
         gone = next(item for item in wrong if item.kind is Kind.PATROL_GONE)
-        parts.append(f"{gone.title} {_ONE_IS[Kind.PATROL_GONE]}, and {len(wrong) - 1} more are not well")
+        parts.append(
+            f"{gone.title} {_ONE_IS[Kind.PATROL_GONE]}, and {count_of(len(wrong) - 1, 'more is', 'more are')} not well"
+        )
     elif wrong:
         parts.append(f"{len(wrong)} things are wrong with the motion sensors")
     if len(well) == 1:
@@ -107,7 +110,7 @@ def text(items: Sequence[Item], *, watched: int, well: int) -> str:
     back = [item for item in items if item.kind is None]
     if back:
         blocks.append([_line(item) for item in back[:MAX_LISTED]] + _rest(len(back)))
-    blocks.append([f"{well} of {watched} motion sensors are well."])
+    blocks.append([f"{well} of {count_of(watched, 'motion sensor is', 'motion sensors are')} well."])
     return "\n\n".join("\n".join(lines) for lines in blocks) + "\n"
 
 

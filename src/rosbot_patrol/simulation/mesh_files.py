@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.mesh_collada import read_dae
 from rosbot_patrol.simulation.mesh_parts import MeshPart, Triangles, compact, merged
@@ -67,9 +68,9 @@ def _read_stl(path: Path) -> list[MeshPart]:
         words = [line.split() for line in data.decode("ascii", "replace").splitlines()]
         corners = np.array([[float(v) for v in w[1:4]] for w in words if w and w[0] == "vertex"]).reshape(-1, 3)
     else:
-        raise ValueError(f"{len(data)} bytes do not fit {count} triangles")
+        raise ValueError(f"{count_of(len(data), 'byte does', 'bytes do')} not fit {count_of(count, 'triangle')}")
     if len(corners) % 3:
-        raise ValueError(f"{len(corners)} corners are no whole number of triangles")
+        raise ValueError(f"{count_of(len(corners), 'corner is', 'corners are')} no whole number of triangles")
     return [MeshPart("", corners, np.arange(len(corners)).reshape(-1, 3))]
 
 

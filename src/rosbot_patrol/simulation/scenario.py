@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rosbot_patrol import params
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
@@ -307,13 +308,9 @@ def disappointments(expect: Expect, outcome: Outcome) -> list[str]:
             was = f"it was {told}" if told else "no mission to it has ended"
             found.append(f"The verdict for room {room} should have been {verdict}; {was}.")
     if expect.missions is not None and outcome.missions != expect.missions:
-        found.append(f"{_count(expect.missions, 'mission')} should have ended; there were {outcome.missions}.")
+        found.append(f"{count_of(expect.missions, 'mission')} should have ended; there were {outcome.missions}.")
     if expect.mails is not None and outcome.mails != expect.mails:
-        found.append(f"{_count(expect.mails, 'mail')} should have been written; there were {outcome.mails}.")
+        found.append(f"{count_of(expect.mails, 'mail')} should have been written; there were {outcome.mails}.")
     if expect.home and not outcome.is_home:
         found.append("The robot should have been home.")
     return found
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + ("" if number == 1 else "s")

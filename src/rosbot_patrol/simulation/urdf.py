@@ -14,6 +14,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.matrices import from_xyz_rpy
 from rosbot_patrol.simulation.mesh_files import load_parts
@@ -183,7 +184,7 @@ class _Reader:
         except ValueError:
             values = ()
         if len(values) != count or not all(map(math.isfinite, values)):
-            raise WorldError(self.source, f"{where}: expected {count} numbers, got '{text}'")
+            raise WorldError(self.source, f"{where}: expected {count_of(count, 'number')}, got '{text}'")
         return values
 
     def _visuals(self, element: ET.Element, link: str) -> list[Visual]:

@@ -14,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, angle_difference, distance, wrap_angle
 from rosbot_patrol.simulation.figures import MODELS, make_figure
@@ -161,7 +162,7 @@ class Walker:
         if not path or not all(map(math.isfinite, numbers)):
             raise WorldError(f"actor '{self.name}'", "needs a path of at least one point, of finite numbers")
         if speed <= 0.0 and (len(path) > 1 or speed < 0.0):
-            raise WorldError(f"actor '{self.name}'", f"cannot walk {len(path)} points at {speed} m/s")
+            raise WorldError(f"actor '{self.name}'", f"cannot walk {count_of(len(path), 'point')} at {speed} m/s")
         self._check(speed, pause)
         self._roaming = None
         self._waits = self._pace = 0.0

@@ -125,7 +125,7 @@ def test_broken_yaml_is_named(tmp_path: Path, yaml: str, says: str) -> None:
         (b"P5\n3", "cut short or broken: its header has no height"),
         (b"P5\n0 2\n255\n", "header is broken"),
         (b"P5\n99999 99999\n255\n", "header is broken"),
-        (b"P2\n2 1\n255\n7", "cut short: 1 pixel values, expected 2"),
+        (b"P2\n2 1\n255\n7", "cut short: 1 pixel value, expected 2"),
         (b"P2\n2 1\n255\n7 x", "no number"),
         (b"", "no picture"),
         (b"GIF or whatever", "no picture"),

@@ -54,7 +54,7 @@ def test_a_log_may_be_packed(tmp_path: Path) -> None:
     [
         ("FLASER 4 1.0 2.0", "line 2, FLASER, makes no sense: it has 4 words, expected 15"),
         (FRONT.replace("2.5", "two"), "line 2, FLASER, makes no sense: could not convert"),
-        (FRONT.replace("FLASER 4", "FLASER 1"), "1 beams, expected 2 at least"),
+        (FRONT.replace("FLASER 4", "FLASER 1"), "1 beam, expected 2 at least"),
         (FRONT.replace("-1.0", "nan"), "is no pose"),
         ("FLASER", "line 2, FLASER"),
     ],

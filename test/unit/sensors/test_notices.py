@@ -53,7 +53,7 @@ def test_told_once_and_again_when_it_is_well():
     )
     assert ", 70 s ago.\n" in notice.text
     assert "What to do: see that it has power and Wi-Fi" in notice.text
-    assert notice.text.endswith("\n\n0 of 1 motion sensors are well.\n")
+    assert notice.text.endswith("\n\n0 of 1 motion sensor is well.\n")
     owner.wake(3)
     assert owner.run(60) == []
     (notice,) = owner.run(4000)
