@@ -6,11 +6,15 @@ Functions named `*_poses` take arrays of shape (N, 3): x, y, yaw.
 
 from __future__ import annotations
 
+import logging
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 
@@ -107,13 +111,30 @@ def quaternion_from_yaw(yaw: float) -> tuple[float, float, float, float]:
     return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
 
 
-def yaw_from_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Heading of an orientation (roll and pitch are dropped); any length but zero.
+def yaw_from_quaternion(x: float, y: float, z: float, w: float, *, what: str = "an orientation") -> float:
+    """Heading of an orientation (roll and pitch are dropped) of any length.
+
+    One of length 0 has heading 0: Python fills new messages with zeros. That is said once for each `what`.
+
+    Args:
+        x: part of the quaternion, as are y, z and w.
+        y: likewise.
+        z: likewise.
+        w: likewise.
+        what: whose orientation it is, for the warning.
 
     Raises:
-        ValueError: the quaternion has no length or is not finite.
+        ValueError: the quaternion is not finite.
     """
     norm = x * x + y * y + z * z + w * w
-    if not math.isfinite(norm) or norm < 1e-12:
+    if not math.isfinite(norm):
         raise ValueError(f"({x}, {y}, {z}, {w}) is no orientation")
+    if norm < 1e-12:
+        _say_zeros(what)
+        return 0.0
     return math.atan2(2.0 * (w * z + x * y) / norm, 1.0 - 2.0 * (y * y + z * z) / norm)
+
+
+@cache
+def _say_zeros(what: str) -> None:
+    log.warning("%s is (0, 0, 0, 0), no quaternion: a heading of 0 is taken; its sender should set w to 1", what)

@@ -42,6 +42,21 @@ def test_map_saver_waits_on_the_topic_it_is_given(ros, first, tmp_path):
     assert (tmp_path / "late.pgm").exists()
 
 
+def test_a_map_as_python_makes_it_is_saved(ros, tmp_path):
+    """Its origin's orientation is (0, 0, 0, 0)."""
+    probe = ros.probe()
+    probe.tell(advertise=["/made", "nav_msgs/OccupancyGrid"])
+    saver = ros.node("map_saver", "-f", str(tmp_path / "made"), "map:=/made")
+
+    def is_saved():
+        probe.tell(publish=["/made", {"info": {"resolution": 0.05, "width": 2, "height": 1}, "data": [0, 100]}])
+        return saver.popen.poll() is not None
+
+    wait_for(is_saved, 20.0, "the end of map_saver")
+    saver.says("a map's origin is (0, 0, 0, 0), no quaternion: a heading of 0 is taken")
+    assert "origin: [0.000000, 0.000000, 0.000000]" in (tmp_path / "made.yaml").read_text()
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [

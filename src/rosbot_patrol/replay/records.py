@@ -95,7 +95,7 @@ def _edge(message: Any) -> Edge:
 
 def map_of(message: Any) -> MapRecord | Refused:
     """nav_msgs/OccupancyGrid; refused where its size or its origin makes no sense."""
-    origin = _pose(message.info.origin)
+    origin = _pose(message.info.origin, "the orientation of a map's origin in the bag")
     if isinstance(origin, Refused):
         return origin
     info = GridInfo(
@@ -115,7 +115,7 @@ def map_of(message: Any) -> MapRecord | Refused:
 
 def pose_of(message: Any) -> PoseRecord | Refused:
     """geometry_msgs/PoseWithCovarianceStamped; refused where it is no pose."""
-    pose = _pose(message.pose.pose)
+    pose = _pose(message.pose.pose, "the orientation of a pose in the bag")
     if isinstance(pose, Refused):
         return pose
     header = message.header
@@ -123,12 +123,12 @@ def pose_of(message: Any) -> PoseRecord | Refused:
     return PoseRecord(header.frame_id.lstrip("/"), stamp_of(header.stamp), pose, covariance)
 
 
-def _pose(message: Any) -> Pose2D | Refused:
+def _pose(message: Any, what: str) -> Pose2D | Refused:
     p, q = message.position, message.orientation
     if not (math.isfinite(p.x) and math.isfinite(p.y)):
         return Refused(f"({p.x}, {p.y}) is no position")
     try:
-        return Pose2D(float(p.x), float(p.y), yaw_from_quaternion(q.x, q.y, q.z, q.w))
+        return Pose2D(float(p.x), float(p.y), yaw_from_quaternion(q.x, q.y, q.z, q.w, what=what))
     except ValueError as err:
         return Refused(str(err))
 

@@ -134,7 +134,7 @@ class AmclNode:
     def _initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         try:
             taken = taken_pose(
-                pose2d_from_pose(message.pose.pose),
+                pose2d_from_pose(message.pose.pose, "the orientation of an initial pose"),
                 np.array(message.pose.covariance),
                 frame=message.header.frame_id.lstrip("/"),
                 stamp=message.header.stamp.to_sec(),

@@ -29,12 +29,12 @@ def pose2d_to_pose(pose: Pose2D) -> Pose:
     return msg
 
 
-def pose2d_from_pose(msg: Pose) -> Pose2D:
-    """The planar part of a pose; ValueError where the quaternion has no length or something is not finite."""
+def pose2d_from_pose(msg: Pose, what: str = "a pose's orientation") -> Pose2D:
+    """The planar part of a pose; ValueError where something is not finite. `what` is for the warning of a zero one."""
     if not (math.isfinite(msg.position.x) and math.isfinite(msg.position.y)):
         raise ValueError(f"({msg.position.x}, {msg.position.y}) is no position")
     q = msg.orientation
-    return Pose2D(msg.position.x, msg.position.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
+    return Pose2D(msg.position.x, msg.position.y, yaw_from_quaternion(q.x, q.y, q.z, q.w, what=what))
 
 
 def pose_to_msg(pose: Pose2D, frame: str, stamp: float) -> PoseStamped:
@@ -64,7 +64,8 @@ def twist_from_msg(msg: Twist) -> Twist2D:
 
 def odometry_from_msg(msg: Odometry) -> tuple[Pose2D, Twist2D, float]:
     """Pose, velocity and stamp [s]."""
-    return pose2d_from_pose(msg.pose.pose), twist_from_msg(msg.twist.twist), msg.header.stamp.to_sec()
+    pose = pose2d_from_pose(msg.pose.pose, "the odometry's orientation")
+    return pose, twist_from_msg(msg.twist.twist), msg.header.stamp.to_sec()
 
 
 def transform_to_msg(parent_from_child: Pose2D, parent: str, child: str, stamp: float) -> TransformStamped:
@@ -113,7 +114,7 @@ def grid_info_to_msg(info: GridInfo, load_time: float = 0.0) -> MapMetaData:
 
 def grid_info_from_msg(msg: MapMetaData) -> GridInfo:
     """A grid's place and size."""
-    origin = pose2d_from_pose(msg.origin)
+    origin = pose2d_from_pose(msg.origin, "the orientation of a map's origin")
     return GridInfo(
         resolution=float(msg.resolution),
         width=int(msg.width),

@@ -14,7 +14,7 @@ from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedb
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.navigation.interfaces import BAD_QUATERNION, Outcome
-from rosbot_patrol.ros.convert import pose_to_msg
+from rosbot_patrol.ros.convert import pose2d_from_pose, pose_to_msg
 from rosbot_patrol.ros.transforms import Transforms
 
 log = logging.getLogger(__name__)
@@ -22,6 +22,19 @@ log = logging.getLogger(__name__)
 
 class GoalRefusedError(Exception):
     """A goal that cannot be worked on; its text is the action's result text."""
+
+
+def read_pose(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
+    """A pose of make_plan in a frame: as upstream, whatever its orientation.
+
+    Raises:
+        GoalRefusedError: something of it is not finite, or its frame is not known.
+    """
+    try:
+        pose = pose2d_from_pose(msg.pose, "the orientation of a pose for make_plan")
+    except ValueError as err:
+        raise GoalRefusedError(str(err)) from err
+    return _in_frame(pose, msg.header.frame_id.lstrip("/"), frame, transforms)
 
 
 def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
@@ -40,11 +53,14 @@ def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
     if not (math.isfinite(p.x) and math.isfinite(p.y)):
         raise GoalRefusedError(f"Aborting on goal because it was sent with an invalid position ({p.x}, {p.y})")
     yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y) / length, 1.0 - 2.0 * (q.y * q.y + q.z * q.z) / length)
-    goal, source = Pose2D(p.x, p.y, yaw), msg.header.frame_id.lstrip("/")
+    return _in_frame(Pose2D(p.x, p.y, yaw), msg.header.frame_id.lstrip("/"), frame, transforms)
+
+
+def _in_frame(pose: Pose2D, source: str, frame: str, transforms: Transforms) -> Pose2D:
     if source == frame:
-        return goal
+        return pose
     try:
-        return transforms.lookup(frame, source) @ goal
+        return transforms.lookup(frame, source) @ pose
     except TransformError as err:
         log.error("a goal in frame '%s' cannot be used: %s", source, err)
         text = "The goal pose passed to this planner must be in the {} frame. It is instead in the {} frame."

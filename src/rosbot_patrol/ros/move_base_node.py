@@ -38,7 +38,7 @@ from rosbot_patrol.ros.heap import give_back_large_blocks
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.logs import LineThrottle
 from rosbot_patrol.ros.move_base_costmap import CostmapNode
-from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_goal
+from rosbot_patrol.ros.move_base_goals import GoalRefusedError, GoalServer, read_pose
 from rosbot_patrol.ros.move_base_outputs import HealthTeller, Outputs
 from rosbot_patrol.ros.move_base_plans import ThreadedPlans
 from rosbot_patrol.ros.move_base_tuning import Tuning
@@ -195,10 +195,10 @@ class MoveBaseNode:
     def _on_planner_make_plan(self, request: GetPlanRequest) -> GetPlanResponse | None:
         try:
             if request.start.header.frame_id:
-                start = read_goal(request.start, self._global.frame, self._transforms)
+                start = read_pose(request.start, self._global.frame, self._transforms)
             else:
                 start = self._global.robot_pose(now())
-            goal = read_goal(request.goal, self._global.frame, self._transforms)
+            goal = read_pose(request.goal, self._global.frame, self._transforms)
         except (GoalRefusedError, TransformError) as err:
             log.error("make_plan: %s", err)
             return None

@@ -110,11 +110,21 @@ def test_a_map_or_pose_that_makes_no_sense_is_refused_and_reading_goes_on(tmp_pa
     grid = maker.map(GRID)
     grid.info.width = 7
     pose = maker.initial_pose(BEGIN, Pose2D())
-    pose.pose.pose.orientation.w = 0.0
+    pose.pose.pose.orientation.w = math.nan
     path = write_bag(tmp_path / "made.bag", [(BEGIN, "/map", grid), (BEGIN + 1.0, "/initialpose", pose)])
     first, second = (each.content for each in read(path, "/map", "/initialpose"))
     assert first == records.Refused("it has 6 cells, expected 7 x 2")
     assert "is no orientation" in second.problem
+
+
+def test_orientations_of_zeros_are_a_heading_of_0(tmp_path: Path) -> None:
+    maker = Maker()
+    grid, pose = maker.map(GRID), maker.initial_pose(BEGIN, Pose2D(1.0, 2.0))
+    grid.info.origin.orientation.w = pose.pose.pose.orientation.w = 0.0
+    path = write_bag(tmp_path / "made.bag", [(BEGIN, "/map", grid), (BEGIN + 1.0, "/initialpose", pose)])
+    first, second = (each.content for each in read(path, "/map", "/initialpose"))
+    assert (first.grid.info.origin_x, first.grid.info.yaw) == (GRID.info.origin_x, 0.0)
+    assert second.pose == Pose2D(1.0, 2.0)
 
 
 def refused(path: Path, *topics: str) -> str:
