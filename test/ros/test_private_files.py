@@ -77,7 +77,7 @@ def test_what_was_open_is_closed_with_one_line(tmp_path, caplog):
     assert open_to_others(folder) == []
     assert mode(folder / "held" / "b.notice") == 0o4600
     (said,) = [record.getMessage() for record in caplog.records]
-    assert said == f"{len(OURS) + 10} files and folders in {folder} could be read by others of this machine; no more"
+    assert said == f"other users could read {len(OURS) + 10} of the files and folders in {folder}; no more"
     keep_private(folder)
     assert len(caplog.records) == 1
     assert all((folder / name).read_text() == "x" for name in OURS)
@@ -144,7 +144,7 @@ def test_what_cannot_be_changed_is_said_and_the_program_goes_on(tmp_path, caplog
 
     monkeypatch.setattr(Path, "chmod", chmod)
     keep_private(tmp_path)
-    assert "1 files can be read by others of this machine" in caplog.text
+    assert f"other users can still read 1 of the files in {tmp_path}" in caplog.text
     assert "patrol.json: Operation not permitted" in caplog.text
     assert mode(tmp_path / "stop.json") == 0o600
 

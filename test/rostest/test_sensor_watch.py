@@ -148,7 +148,7 @@ def test_patrol_and_watch_tell_of_each_other_when_one_hangs(ros, tmp_path):
         probe.tell(subscribe=topic)
     (tmp_path / "state").mkdir(mode=0o755)
     watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}], patrol_after=3.0, start_grace=60.0)
-    watch.node.says("could be read by others of this machine; no more")
+    watch.node.says("of the files and folders in")
     patrol = ros.node(
         "patrol_robot",
         "__name:=patrolling_node",

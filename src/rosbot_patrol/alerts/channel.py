@@ -19,13 +19,21 @@ class DeliveryError(AlertError):
         permanent: it is this notice's fault: others may pass.
         answered: the other side was there and did not want it now: it may be this notice's fault after all.
         delay: that the other side asked for [s].
+        of_recipient: with `permanent`: it is the recipient's fault, whatever the notice is.
     """
 
     def __init__(
-        self, problem: str, *, permanent: bool = False, answered: bool = False, delay: float | None = None
+        self,
+        problem: str,
+        *,
+        permanent: bool = False,
+        answered: bool = False,
+        delay: float | None = None,
+        of_recipient: bool = False,
     ) -> None:
         super().__init__(problem)
         self.permanent, self.answered, self.delay = permanent, answered, delay
+        self.of_recipient = of_recipient
 
 
 class Transport(Protocol):
@@ -49,6 +57,7 @@ class Channel:
         transport: how notices leave.
         kinds: of notices that it takes; empty: all.
         pace: how fast.
+        recipient: address that it carries to, where its channel in the configuration may have several.
         group: what it is called in the configuration, where that gives several recipients, each a channel; else empty.
     """
 
@@ -56,12 +65,14 @@ class Channel:
     transport: Transport
     kinds: tuple[str, ...] = ()
     pace: Pace = field(default_factory=Pace)
+    recipient: str = ""
     group: str = ""
 
     @property
     def names(self) -> frozenset[str]:
-        """What it is called: its own name, and its group's where it has one."""
-        return frozenset((self.name, self.group or self.name))
+        """What it is called now, and with other recipients beside it: NAME and NAME:ADDRESS."""
+        base = self.group or self.name
+        return frozenset((self.name, base, f"{base}:{self.recipient}" if self.recipient else base))
 
     def takes(self, entry: Waiting) -> bool:
         """Whether a notice is for this channel."""

@@ -23,7 +23,7 @@ from rosbot_patrol.alerts.lane import Pace
 from rosbot_patrol.alerts.mail import Envelope, make_envelope
 from rosbot_patrol.alerts.maildir import MaildirTransport
 from rosbot_patrol.alerts.network_words import is_loopback
-from rosbot_patrol.alerts.secrets_on_disk import read_secret, refuse_secrets
+from rosbot_patrol.alerts.secrets_on_disk import read_secret, refuse_secrets, warn_where_open
 from rosbot_patrol.alerts.sendmail import SENDMAILS, SendmailTransport, find_sendmail
 from rosbot_patrol.alerts.smtp import SmtpServer, SmtpTransport
 from rosbot_patrol.alerts.webhook import WebAddress, WebhookTransport, check_url
@@ -178,7 +178,10 @@ def load_channels(path: Path, around: Surroundings) -> list[Channel]:
     if not isinstance(channels, dict) or not channels:
         raise ParamError(f"{path}: channels", "expected one group of keys for each channel")
     made = [_channels(str(name), given, f"{path}: channels/", around) for name, given in channels.items()]
-    return [channel for several in made for channel in several]
+    found = [channel for several in made for channel in several]
+    if any(channel.transport.name == WebhookTransport.name for channel in found):
+        warn_where_open(path, "the address of a webhook")
+    return found
 
 
 def _channels(name: str, given: Any, prefix: str, around: Surroundings) -> list[Channel]:
@@ -209,10 +212,10 @@ def _one_each(name: str, transports: Mapping[str, Transport], spec: ChannelSpec)
     """A channel for each recipient, so that each has a queue, a back-off and receipts of its own."""
     pace, kinds = Pace(interval=spec.interval, first_delay=spec.retry), tuple(spec.kinds)
     if len(transports) == 1:
-        return [Channel(name=name, transport=t, kinds=kinds, pace=pace) for t in transports.values()]
+        return [Channel(name=name, transport=t, kinds=kinds, pace=pace, recipient=to) for to, t in transports.items()]
     return [
-        Channel(name=f"{name}:{recipient}", transport=t, kinds=kinds, pace=pace, group=name)
-        for recipient, t in transports.items()
+        Channel(name=f"{name}:{to}", transport=t, kinds=kinds, pace=pace, recipient=to, group=name)
+        for to, t in transports.items()
     ]
 
 

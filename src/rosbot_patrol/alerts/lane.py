@@ -146,6 +146,7 @@ class Lane:
         permanent: bool = False,
         answered: bool = False,
         delay: float | None = None,
+        of_recipient: bool = False,
     ) -> float:
         """A message was not taken; returns how long it is put off [s].
 
@@ -156,6 +157,8 @@ class Lane:
             permanent: the fault is this message's, the others may pass.
             answered: the other side was there and did not want it now.
             delay: that the other side asked for [s].
+            of_recipient: with `permanent`: the fault is the recipient's. So a digest is not taken apart, and the next
+                message waits for `interval`: servers lock out who asks for unknown users again and again.
         """
         self._last_try = now
         self.error = error
@@ -166,6 +169,9 @@ class Lane:
             permanent = permanent or any(entry.id in self._refused for entry in batch)
         if permanent:
             self._is_up(error)
+            if of_recipient:
+                self._blocked_until = now + self._pace.interval
+                return max(self._refuse([entry], now, error, is_final=is_final) for entry in batch)
             return self._refuse(batch, now, error, is_final=is_final)
         self._failures += 1
         if self.down_since is None:

@@ -206,6 +206,7 @@ class Postman:
                     permanent=err.permanent,
                     answered=err.answered,
                     delay=err.delay,
+                    of_recipient=err.of_recipient,
                 )
                 rest = self._what_next(name, ids, put_off, err)
             text = f"{_told(batch)} not taken by '{name}'{rest}: {err}"

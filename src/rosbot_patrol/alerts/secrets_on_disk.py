@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.errors import ParamError
+
+log = logging.getLogger(__name__)
 
 _SECRET = re.compile(r"(?:^|_)(?:password|passwd|passphrase|secret|token|api_?key)$", re.IGNORECASE)
 
@@ -63,6 +67,13 @@ def read_secret(name: str, file: str, variable: str, environ: Mapping[str, str])
     if not lines or not lines[0]:
         raise ParamError(name, f"{path} is empty")
     return _one_line(lines[0], name, str(path))
+
+
+def warn_where_open(path: Path, what: str) -> None:
+    """Say that others can read a file with something secret in it; one that is gone is said elsewhere."""
+    with contextlib.suppress(OSError):
+        if path.stat().st_mode & 0o077:
+            log.warning("%s can be read by other users, and holds %s: chmod 600 %s", path, what, path)
 
 
 def _one_line(value: str, name: str, source: str) -> str:

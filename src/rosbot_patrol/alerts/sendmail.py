@@ -11,7 +11,8 @@ from rosbot_patrol.alerts.mail import Envelope, build_mail
 from rosbot_patrol.alerts.notice import Notice
 
 SENDMAILS = ("/usr/sbin/sendmail", "/usr/lib/sendmail")
-_PERMANENT_EXITS = {65, 67, 68}  # sysexits.h: data error, no such user, no such host
+_OF_RECIPIENT = {67, 68}  # sysexits.h: no such user, no such host
+_PERMANENT_EXITS = {65, *_OF_RECIPIENT}  # 65: data error
 
 
 class SendmailTransport:
@@ -47,7 +48,9 @@ class SendmailTransport:
         if done.returncode != 0:
             said = " ".join(done.stderr.decode("utf-8", "replace").split())[-300:] or "without a word"
             raise DeliveryError(
-                f"{self.program} ended with {done.returncode}: {said}", permanent=done.returncode in _PERMANENT_EXITS
+                f"{self.program} ended with {done.returncode}: {said}",
+                permanent=done.returncode in _PERMANENT_EXITS,
+                of_recipient=done.returncode in _OF_RECIPIENT,
             )
         return self._to
 

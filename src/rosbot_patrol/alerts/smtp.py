@@ -63,7 +63,7 @@ class SmtpTransport:
         except smtplib.SMTPRecipientsRefused as err:
             code, text = err.recipients[self._to]
             problem = f"{self._where} refused the recipient {self._to}: {self._said(code, text)}"
-            raise DeliveryError(problem, permanent=code >= 500, answered=True) from err
+            raise DeliveryError(problem, permanent=code >= 500, answered=True, of_recipient=True) from err
         except smtplib.SMTPAuthenticationError as err:
             said = self._said(err.smtp_code, err.smtp_error)
             raise DeliveryError(f"{self._where} refused the login: {said}") from err

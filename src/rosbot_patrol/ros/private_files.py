@@ -39,7 +39,7 @@ def keep_private(state_dir: Path) -> None:
     except FileNotFoundError:
         return
     except OSError as err:
-        log.error("%s cannot be looked through: %s; others of this machine may read it", state_dir, err)
+        log.error("%s cannot be looked through: %s; other users may read it", state_dir, err)
         return
     if foreign and _is_open(state_dir):
         words = "is not the patrol's alone (%s), so others can look into it: give the patrol a folder of its own"
@@ -57,9 +57,9 @@ def _tighten(state_dir: Path, loose: list[Path]) -> None:
         except OSError as err:
             problems.append(f"{path}: {err.strerror}")
     if problems:
-        log.error("%d files can be read by others of this machine: %s", len(problems), problems[0])
+        log.error("other users can still read %d of the files in %s: %s", len(problems), state_dir, problems[0])
     if done := len(loose) - len(problems):
-        log.warning("%d files and folders in %s could be read by others of this machine; no more", done, state_dir)
+        log.warning("other users could read %d of the files and folders in %s; no more", done, state_dir)
 
 
 def _sort(state_dir: Path) -> tuple[list[Path], list[str]]:

@@ -226,6 +226,15 @@ def test_what_stays_here_or_is_asked_for_goes_in_clear_text(tmp_path, given):
     assert len(choose(tmp_path, {"TOKEN": "geheim"}, channels=str(file(tmp_path, {"a": given})))) == 2
 
 
+@pytest.mark.parametrize(("given", "mode", "is_said"), [(WEB, 0o644, True), (WEB, 0o600, False), (LOGIN, 0o644, False)])
+def test_a_file_with_a_webhook_that_others_can_read_is_said(tmp_path, caplog, given, mode, is_said):
+    path = file(tmp_path, {"a": {**given, "host": "localhost"} if given is LOGIN else given})
+    path.chmod(mode)
+    load_channels(path, around(tmp_path, TOKEN="x"))
+    said = f"{path} can be read by other users, and holds the address of a webhook: chmod 600"
+    assert (said in caplog.text) == is_said
+
+
 def test_the_tutorials_parameters_ask_for_clear_text_by_a_name_of_their_own(tmp_path):
     given = {"transport": "smtp", "email_to": "a@b.org", "smtp_host": "mail", "smtp_user": "u", "smtp_security": "none"}
     variable = {"ROSBOT_PATROL_SMTP_PASSWORD": "geheim"}

@@ -148,6 +148,15 @@ def test_a_digest_that_is_refused_is_taken_apart():
     assert drain(made) == ["s1", "s2", "s3"]
 
 
+def test_a_digest_to_a_recipient_that_is_refused_is_one_try_and_the_next_waits_for_the_interval():
+    made = lane("s1", "s2", "s3", interval=10.0)
+    assert made.failed(made.due(0.0), 0.0, "550 no such user", permanent=True, of_recipient=True) == 900.0
+    assert len(made.refused_for_good) == 3
+    made.offer(entries("s1", "s2", "s3", "i1"))
+    assert made.due(9.0) == []
+    assert [e.id for e in made.due(10.0)] == ["i1"]
+
+
 def test_nothing_to_do_is_no_time():
     assert lane().wait(5.0) is None
 

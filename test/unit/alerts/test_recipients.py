@@ -1,5 +1,7 @@
 """Each recipient has a state of its own: what one delays or refuses concerns no other. Scripted SMTP server."""
 
+from dataclasses import replace
+
 import pytest
 from post import Time, deliver_all, notice
 from smtp_server import SmtpServer
@@ -255,7 +257,33 @@ def test_the_receipts_of_the_version_before_hold_for_all_recipients(house):
 def test_one_recipient_is_the_channel_itself(house):
     made, _ = house({}, to=(A,))
     assert list(made.post.channels) == ["mail"]
-    assert made.post.channels["mail"].names == {"mail"}
+    assert made.post.channels["mail"].names == {"mail", f"mail:{A}"}
+
+
+def test_taking_the_bad_address_away_sends_the_good_one_nothing_twice(house):
+    """What an owner does who reads that an address is not taken."""
+    made, server = house({B: [LATER]})
+    made.put("n1")
+    made.run()
+    made.params = replace(made.params, email_to=A)
+    made.restart()
+    assert list(made.post.channels) == ["mail"]
+    made.run(60.0)
+    assert ids(server, A) == ["n1"]
+    assert made.waiting == []
+    made.params = replace(made.params, email_to=f"{A}, {C}")  # and another in its place
+    made.restart()
+    made.put("n2")
+    made.run(60.0)
+    assert (ids(server, A), ids(server, C)) == (["n1", "n2"], ["n2"])
+
+
+def test_a_bad_address_is_asked_once_for_a_digest(house):
+    made, server = house({B: [NEVER]})
+    made.put(*(f"s{i}" for i in range(50)), kind="sensor")
+    made.run(3600.0, step=30.0)
+    assert server.asked.count(B) == 1
+    assert made.waiting == []
 
 
 def test_an_address_that_stands_twice_gets_one_copy(house):
