@@ -9,7 +9,7 @@ from rosbot_patrol.geometry import Pose2D, distance
 from rosbot_patrol.patrol import saying
 from rosbot_patrol.patrol.close_ups import CloseUps
 from rosbot_patrol.patrol.commands import Commands, Report
-from rosbot_patrol.patrol.drive import Drive
+from rosbot_patrol.patrol.drive import Drive, DriveStep
 from rosbot_patrol.patrol.inputs import Inputs
 from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.mission import Mission, Phase, Verdict
@@ -133,6 +133,10 @@ class Conduct:
         assert mission is not None
         assert trip is not None
         there = mission.phase is Phase.DRIVING
+        lost = "" if there else self._base_problem(inputs)
+        if lost:
+            self._end(out, f"not at home ({lost})")
+            return
         step = trip.step(self._clock.time, inputs.link, inputs.pose)
         out.goal = step.goal
         out.cancel |= step.cancel
@@ -225,9 +229,15 @@ class Conduct:
         self._homes += 1
         self._home = Drive(f"home/{self._homes}", self.rooms.base.pose, self.params.drive)
 
+    def _base_problem(self, inputs: Inputs) -> str:
+        """Why the robot cannot come home, "" where it can."""
+        lost = inputs.house.refusal(self.rooms.base) if inputs.house is not None else ""
+        return f"{self.rooms.base.title}: {lost}" if lost else ""
+
     def _step_home(self, time: float, inputs: Inputs, out: Commands) -> None:
         assert self._home is not None
-        step = self._home.step(time, inputs.link, inputs.pose)
+        lost = self._base_problem(inputs)
+        step = DriveStep(problem=lost) if lost else self._home.step(time, inputs.link, inputs.pose)
         out.goal = step.goal
         out.cancel |= step.cancel
         if step.reached or step.problem:

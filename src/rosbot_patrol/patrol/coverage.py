@@ -123,9 +123,9 @@ class Coverage:
 
     @property
     def share(self) -> float:
-        """Of the room's floor that was seen, 0 to 1; 1 where the room has none."""
+        """Of the room's floor that was seen, 0 to 1; 0 where the room has none."""
         floor = int((~self._gone).sum())
-        return 1.0 if not floor else 1.0 - int((~self._gone[self._left]).sum()) / floor
+        return 0.0 if not floor else 1.0 - int((~self._gone[self._left]).sum()) / floor
 
     @property
     def area(self) -> float:

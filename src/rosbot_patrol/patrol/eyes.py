@@ -213,8 +213,8 @@ class Eyes:
         return min(max(view.turn + (ahead if ahead > -_LATE else ahead + math.tau), 0.0), math.tau)
 
     def share(self) -> float | None:
-        """Of the room's floor that was seen, None where there is no map or no camera that tells what it sees."""
-        if self.coverage is None or not self._has_eye:
+        """Of the room's floor that was seen, None where no map shows any or no camera tells what it sees."""
+        if self.coverage is None or not self.coverage.area or not self._has_eye:
             return None
         return max(self.coverage.share, self._seen_before)
 

@@ -18,6 +18,8 @@ from rosbot_patrol.patrol.rooms import Room, Rooms
 
 log = logging.getLogger(__name__)
 
+_OFF_MAP = 600.0  # [s] between two missions by sensors to a room that cannot be looked at: each ends at once
+
 
 @dataclass(kw_only=True)
 class Taken:
@@ -43,7 +45,7 @@ class Intake:
     def __init__(self, rooms: Rooms, queue: MissionQueue, priorities: PriorityParams, own_motion: OwnMotion) -> None:
         self.count = 0
         self._rooms, self._queue, self._priorities, self._own_motion = rooms, queue, priorities, own_motion
-        self._repeats, self._set_aside = Repeats(), Repeats()
+        self._repeats, self._set_aside, self._off_map = Repeats(), Repeats(), Repeats(_OFF_MAP)
 
     def take(self, now: float, inputs: Inputs, mission: Mission | None, *, has_candidate: bool) -> Taken:
         """Take a step's calls.
@@ -120,6 +122,8 @@ class Intake:
         guarded = inputs.guarded
         if not guarded.counts(room.id):
             why = guarded.why or f"{room.title} is not guarded in the mode {guarded.mode}"
+        elif _is_off_map(room, inputs) and not self._off_map.is_news(room.id, now):
+            why = "its point is not on the map's floor, as was told a moment ago"
         elif not has_candidate and self._own_motion.explains(room, now):
             why = "the robot itself went past its sensor"
             if mission and self._set_aside.is_news(-1 - room.id, now):
@@ -137,6 +141,10 @@ class Intake:
         is_new = self._queue.find(room.id) is None
         self._add(Request(room_id=room.id, wall=inputs.wall), mission)
         taken.changed |= is_new
+
+
+def _is_off_map(room: Room, inputs: Inputs) -> bool:
+    return inputs.house is not None and room.id in inputs.house.lost
 
 
 def _answers(mission: Mission | None, room: Room) -> bool:

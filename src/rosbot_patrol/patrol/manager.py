@@ -8,7 +8,8 @@ Differs (CONTRACTS, Settled 4 to 8; A0, quirks):
   one entry a room, the most urgent first (`queueing`); which of them are answered already, are the robot's own doing or
   are not armed, `intake` decides. From a mission that is on its way home the robot goes on to the next room at once.
 - A room whose point cannot be reached is looked at from another viewpoint (`phases`); one that has none that can be is
-  reported as unreachable, and the robot does not turn elsewhere. A room that the points file lacks is refused.
+  reported as unreachable, and the robot does not turn elsewhere. A room that the points file lacks is refused; one with
+  a point off the map's floor is unverified, without a drive.
 - Every mission ends in a verdict: confirmed, clear, unreachable, or unverified where detector, camera or turn failed,
   the battery or the emergency stop ended it, or a person did.
 - A mission gives one notice, at its first confirmation, and one more for each further person elsewhere (`people`).
@@ -139,6 +140,7 @@ class PatrolManager(Ordered):
         if self.mission is None:
             self._rest(time, inputs, out)
             return out
+        self._leave_out_off_the_map(inputs, out)
         self._count(passed, inputs)
         self._watch_frames(inputs, out)
         if self.mission.phase is not Phase.RETURNING:
@@ -267,6 +269,21 @@ class PatrolManager(Ordered):
         )
 
     # -- what ends a mission early
+
+    def _leave_out_off_the_map(self, inputs: Inputs, out: Commands) -> None:
+        """A room with a point off the map: the robot would look at another place and call that one clear."""
+        mission = self.mission
+        if mission is None or inputs.house is None or mission.phase is Phase.RETURNING:
+            return
+        problem = inputs.house.refusal(mission.room)
+        if not problem:
+            return
+        self._decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at: {problem}")
+        if mission.origin is Origin.TRIGGER:
+            text = f"motion in {mission.room.title}, which cannot be looked at: {problem}"
+            out.words += (Word(kind=f"room {mission.room.id}", text=text),)
+        out.cancel = True
+        self._turn_home(inputs, out)
 
     def _mind_the_battery(self, inputs: Inputs, out: Commands) -> None:
         if self._battery.step(self._clock.time, inputs.battery):

@@ -2,7 +2,8 @@
 
 Each room grows from its point over the widest floor first and through narrow places last (the watershed of Meyer 1992
 on the clearance), so that two rooms meet at the door between them. Rooms of one hall meet half-way. A part of the house
-without a room point falls to the room whose floor leads there by the widest way.
+without a room point falls to the room whose floor leads there by the widest way. A room whose point is not on the floor
+(off the map, in a wall, in what is unknown) has none: the nearest floor may be another room's, or that beyond a wall.
 """
 
 from __future__ import annotations
@@ -14,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.patrol.floor import Floor, Mask
-from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.patrol.rooms import Room, Rooms
 
 NOBODYS = -1
 _LEVEL = 0.05  # between two levels of the flood [m]
-_POINT_REACH = 1.0  # so far a room's point may lie from the floor, as a point on a table does [m]
 _STEPS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
 
@@ -28,11 +28,20 @@ class RoomRegions:
     Attributes:
         floor: of the map.
         labels: id of the room that a cell belongs to, NOBODYS where there is no floor or no way to it.
-        lost: ids of the rooms whose point is not on the map's floor.
+        lost: ids of the rooms with a point off the map's floor.
     """
 
     def __init__(self, floor: Floor, labels: NDArray[np.int16], lost: tuple[int, ...]) -> None:
         self.floor, self.labels, self.lost = floor, labels, lost
+
+    def refusal(self, room: Room) -> str:
+        """Why a room cannot be looked at, "" where it can."""
+        if room.id not in self.lost:
+            return ""
+        return (
+            f"its point ({room.pose.x:.2f}, {room.pose.y:.2f}) is not on free floor of the map; correct"
+            f" rooms/room{room.id} in the points file, or the map"
+        )
 
     def mask(self, room_id: int) -> Mask:
         """The room's floor."""
@@ -55,10 +64,12 @@ def part_rooms(floor: Floor, rooms: Rooms) -> RoomRegions:
     levels = np.ceil(floor.clearance / _LEVEL - 1e-9).astype(int)
     seeds, lost = [], []
     for room in rooms:
-        cell = floor.nearest(floor.free, room.pose.x, room.pose.y, _POINT_REACH)
-        if cell is None:
+        xs, ys = np.array([room.pose.x]), np.array([room.pose.y])
+        if not floor.are_free(xs, ys)[0]:
             lost.append(room.id)
             continue
+        ix, iy, _ = floor.indices(xs, ys)
+        cell = int(ix[0]), int(iy[0])
         seeds += [(room.id, ix, iy) for ix, iy in _climb(levels, *cell) if labels[iy, ix] == NOBODYS]
         labels[cell[1], cell[0]] = room.id
     _flood(levels, labels, seeds)

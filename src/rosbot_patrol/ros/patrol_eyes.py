@@ -214,10 +214,10 @@ class PatrolEyes:
         if self.house is None:
             areas = ", ".join(f"{room.id}: {house.area(room.id):.0f}" for room in self._rooms)
             log.info("floor of the rooms [m2]: %s", areas)
-            for room_id in house.lost:
-                log.warning("the point of room %d is not on the map's floor: what is seen of it is not known", room_id)
+        if self.house is None or self.house.lost != house.lost:
+            self._tell_lost(house)
         self.house = house
-        self.health.set("map", OK, f"{len(self._rooms)} rooms on the map")
+        self.health.set("map", OK, "the map can be used")
 
     def _refuse(self, err: MapError) -> None:
         """Say that a map is left out, and what that means."""
@@ -225,3 +225,13 @@ class PatrolEyes:
         text = f"rooms cannot be told from the map: {err}; {rest}"
         log.error("%s", text)
         self.health.set("map", WARN if self.house else ERROR, text)
+
+    def _tell_lost(self, house: RoomRegions) -> None:
+        """Rooms that the patrol refuses, by name."""
+        lost = [f"{room.title}: {house.refusal(room)}" for room in self._rooms if room.id in house.lost]
+        for text in lost:
+            log.error("%s, %s", text, "until then it is not looked at")
+        if self._rooms.base.id in house.lost:
+            log.error("the robot stays where its missions end, as its base is not on the map")
+        level, text = (ERROR, "; ".join(lost)) if lost else (OK, "all rooms are on the map")
+        self.health.set("rooms", level, text)

@@ -15,7 +15,8 @@ from rosbot_patrol.patrol.inputs import Box, Eye, Frame, GoalLink, GoalState, In
 from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.mission import Phase
-from rosbot_patrol.patrol.room_regions import part_rooms
+from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
+from rosbot_patrol.patrol.rooms import Rooms
 
 WIDTH = 1.047
 HOUSE = (
@@ -60,13 +61,16 @@ class World:
         memory: dict | None = None,
         camera: bool = True,
         refused: Callable[[Pose2D], bool] = lambda pose: False,
+        rooms: Rooms = ROOMS,
     ) -> None:
         self.views = Eyes(eyes)
+        self.house: RoomRegions | None = REGIONS if rooms is ROOMS else part_rooms(FLOOR, rooms)
         self.manager = PatrolManager(
-            ROOMS, params, views=self.views, viewpoints=self.views.instead, judge=judge, memory=memory
+            rooms, params, views=self.views, viewpoints=self.views.instead, judge=judge, memory=memory
         )
         self.people, self.camera, self.refused = people, camera, refused
         self.now, self.pose = 100.0, ROOMS.base.pose
+        self.words, self.ignored = [], []
         self.view: ScanView | None = None
         self.link = GoalLink(is_up=True)
         self.camera_at = self.now
@@ -128,7 +132,7 @@ class World:
                 detector_at=self.now,
                 camera_at=self.camera_at,
                 scan=self.view,
-                house=REGIONS,
+                house=self.house,
             ),
         )
         self.triggers = ()
@@ -145,6 +149,8 @@ class World:
             self.pose = self.pose._replace(yaw=wrap_angle(self.pose.yaw + out.speed * 0.08))
         self.notices += out.notices
         self.ended += out.ended
+        self.words += out.words
+        self.ignored += out.ignored
         self.reports += [out.report] if out.report else []
         self.now += 0.08
 
@@ -162,6 +168,12 @@ class World:
     def mission(self, room: int = 1, limit: float = 200.0):
         self.triggers = (room,)
         return self.until(lambda w: bool(w.ended), limit).ended[-1]
+
+    def mission_after(self, room: int):
+        """A further one."""
+        count = len(self.ended)
+        self.triggers = (room,)
+        return self.until(lambda w: len(w.ended) > count).ended[-1]
 
     def until(self, is_so: Callable[[World], bool], limit: float = 200.0) -> World:
         end = self.now + limit

@@ -155,8 +155,8 @@ def test_floor_on_which_something_stands_is_no_floor() -> None:
     assert 0.0 < before < 1.0
 
 
-def test_a_room_without_floor_is_seen() -> None:
+def test_nothing_is_seen_of_a_room_without_floor() -> None:
     empty: Floor = FLOOR
     coverage = Coverage(empty, np.zeros(empty.info.shape, bool))
     coverage.look(Eye(pose=Pose2D(1.0, 1.0, 0.0), width=WIDTH), sight_on_map(empty, 1.0, 1.0, 8.0))
-    assert coverage.share == 1.0
+    assert coverage.share == 0.0

@@ -43,10 +43,31 @@ def test_floor_that_nobody_gets_to_is_nobodys() -> None:
     assert regions.room_at(1.0, 1.0) == 0
 
 
-def test_a_point_beside_the_floor_takes_the_nearest_and_one_far_off_is_told() -> None:
-    regions = part_rooms(drawn_floor(*TWO_ROOMS), points((1.5, 3.0), (9.6, 3.0), (30.0, 30.0)))
-    assert regions.area(1) > 10.0
-    assert regions.lost == (2,)
+OFF = {
+    "off the grid": (30.0, 30.0),
+    "far off the grid": (-4000.0, 1e6),
+    "just outside the house": (9.6, 3.0),
+    "in the outer wall": (9.2, 3.0),
+    "in the wall between two rooms": (4.75, 3.5),
+    "in what is unknown": (11.2, 2.0),
+}
+
+
+@pytest.mark.parametrize("where", OFF)
+def test_a_point_off_the_floor_takes_none_and_is_told_by_name(where: str) -> None:
+    grown = [row + "    " for row in TWO_ROOMS]
+    rooms = points((1.5, 3.0), OFF[where], (8.0, 3.0))
+    regions = part_rooms(drawn_floor(*grown), rooms)
+    assert regions.lost == (1,)
+    assert regions.area(1) == 0.0
+    assert regions.area(0) + regions.area(2) == pytest.approx(114 * 0.25)
+    assert "rooms/room1 in the points file" in regions.refusal(rooms.find(1))
+    assert regions.refusal(rooms.find(0)) == regions.refusal(rooms.find(2)) == ""
+
+
+@pytest.mark.parametrize("at", [(8.95, 3.0), (0.51, 0.51), (4.45, 3.9)])
+def test_a_point_close_to_a_wall_is_on_the_floor(at: tuple[float, float]) -> None:
+    assert part_rooms(drawn_floor(*TWO_ROOMS), points(at)).lost == ()
 
 
 @functools.cache
