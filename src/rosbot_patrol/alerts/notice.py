@@ -10,6 +10,7 @@ import base64
 import binascii
 import json
 import re
+import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,10 @@ FORMAT = 1
 _ID = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]{0,149}")
 
 URGENT = ("incident", "test")  # never merged into a digest, never held up by what is not urgent
+
+
+class LaterFormat(ValueError):
+    """A notice that a later version of this program wrote."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +75,7 @@ class Notice:
         tree |= {"wall": self.wall, "room_id": self.room_id, "facts": self.facts, "channels": self.channels}
         if self.picture is not None:
             tree["picture"] = base64.b64encode(self.picture).decode("ascii")
+        tree["check"] = _check(tree)
         return json.dumps(tree, indent=1).encode("ascii")
 
     @classmethod
@@ -77,7 +83,8 @@ class Notice:
         """The notice that `to_bytes` gave.
 
         Raises:
-            ValueError: it is none, or one of a newer version of this program; says which.
+            ValueError: it is none, or a damaged one; says so.
+            LaterFormat: it is one of a later version of this program.
         """
         try:
             tree = json.loads(data)
@@ -86,7 +93,10 @@ class Notice:
         if not isinstance(tree, dict) or not isinstance(tree.get("format"), int):
             raise ValueError("is no notice: it has no format number")
         if tree["format"] > FORMAT:
-            raise ValueError(f"is of format {tree['format']}, this version knows up to {FORMAT}")
+            raise LaterFormat(f"is of format {tree['format']}, this version knows up to {FORMAT}")
+        check = tree.pop("check", None)  # those of earlier versions have none
+        if check is not None and check != _check(tree):
+            raise ValueError("is no notice: it was damaged, its checksum does not fit")
         try:
             return cls._from_tree(tree)
         except (KeyError, TypeError, ValueError) as err:
@@ -111,6 +121,11 @@ class Notice:
             picture=data,
             **texts,
         )
+
+
+def _check(tree: dict[str, Any]) -> str:
+    """A checksum of a notice's content, whatever form its JSON has."""
+    return f"{zlib.crc32(json.dumps(tree, sort_keys=True).encode()):08x}"
 
 
 _TEXTS = ("id", "kind", "subject", "text", "room_name", "verdict", "incident", "picture_name")

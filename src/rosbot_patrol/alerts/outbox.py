@@ -20,13 +20,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rosbot_patrol.alerts.notice import Notice
+from rosbot_patrol.alerts.notice import LaterFormat, Notice
 from rosbot_patrol.files import sync_folder, write_atomic
 
 log = logging.getLogger(__name__)
 
 _NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|eml)")
+_BROKEN = re.compile(r"\d{12}-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|(?P<set_aside>broken))")
 _SCRATCH = re.compile(r"\..*\.(?P<pid>\d+)\.tmp")
+_BAD_FILE = (errno.EIO, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EBADMSG, errno.ELOOP)  # holds up no other
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 RESERVE = 2 << 20  # [bytes]
 _PROBE = 4096  # [bytes]: an empty file finds its place on a full disk
@@ -76,6 +78,8 @@ class Outbox:
         self._keep = keep
         self._known: dict[str, Waiting] = {}
         self._left_alone: set[str] = set()
+        self._stuck: list[str] = []  # those of them whose notice has to be made again
+        self._mended: set[str] = set()
         self._order = 0
 
     def make(self) -> None:
@@ -110,7 +114,7 @@ class Outbox:
         """
         self.make()
         names = self._all_names()
-        if any(found["id"] == notice.id for found in names):
+        if any(found["id"] == notice.id for found in names if found[0] not in self._stuck):
             return False
         self._order = max([self._order, *(int(found["order"]) for found in names)]) + 1
         path = self.folder / f"{self._order:012d}-{notice.id}.notice"
@@ -163,6 +167,18 @@ class Outbox:
         (self.folder / name).replace(aside)
         return aside
 
+    def broken(self) -> list[tuple[str, str]]:
+        """Name and notice's id of each file set aside that nobody has made good for yet. Raises OSError."""
+        names = dict.fromkeys(self._stuck + sorted(e.name for e in _scan(self.folder)))
+        found = ((name, _BROKEN.fullmatch(name)) for name in names if name not in self._mended)
+        return [(name, match["id"]) for name, match in found if match and (match["set_aside"] or name in self._stuck)]
+
+    def mended(self, name: str) -> None:
+        """A file of `broken` was made good for: it is none of them any more. Raises OSError."""
+        self._mended.add(name)
+        if name not in self._stuck:
+            (self.folder / name).replace(self.folder / f"{name}-told")
+
     def tidy(self) -> None:
         """Remove old notices and scratch files, keep the reserve; for the process that delivers. Raises OSError."""
         self.make()
@@ -184,16 +200,31 @@ class Outbox:
     def _look_at(self, name: str) -> None:
         try:
             notice = Notice.from_bytes((self.folder / name).read_bytes())
+            found = _NAME.fullmatch(name)
+            if found and found["id"] != notice.id:
+                raise ValueError(f"is no notice of this name: it says that it is {notice.id}")
         except FileNotFoundError:
             return
-        except ValueError as err:
-            if "this version knows" in str(err):
-                self._left_alone.add(name)
-                log.error("%s %s: it is left alone", self.folder / name, err)
-            else:
-                log.error("%s %s: set aside as %s", self.folder / name, err, self.set_aside(name))
-            return
-        self._known[name] = waiting_of(name, notice)
+        except LaterFormat as err:
+            log.error("%s %s: it is left alone", self.folder / name, err)
+            self._leave(name)
+        except (OSError, ValueError) as err:
+            if isinstance(err, OSError) and err.errno not in _BAD_FILE:
+                raise
+            self._put_aside(name, err)
+        else:
+            self._known[name] = waiting_of(name, notice)
+
+    def _put_aside(self, name: str, problem: Exception) -> None:
+        try:
+            log.error("%s %s: set aside as %s", self.folder / name, problem, self.set_aside(name))
+        except OSError as err:
+            log.error("%s %s, and cannot be set aside: %s", self.folder / name, problem, err)
+            self._leave(name)
+
+    def _leave(self, name: str) -> None:
+        self._left_alone.add(name)
+        self._stuck.append(name)
 
     def _write(self, path: Path, data: bytes) -> None:
         try:

@@ -20,6 +20,7 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.alerts.channels import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.damaged import replacement
 from rosbot_patrol.alerts.disk_watch import DiskWatch
 from rosbot_patrol.alerts.network_state import network_mark
 from rosbot_patrol.alerts.notice import Notice
@@ -51,7 +52,7 @@ class OwnerPost:
     """
 
     def __init__(self, mail: MailParams, state_dir: Path, health: Health) -> None:
-        self._who, self._mail = rospy.get_name(), mail
+        self._who, self._mail, self._state_dir = rospy.get_name(), mail, state_dir
         around = Surroundings(home=ros_home(), environ=os.environ, host=socket.gethostname())
         channels = make_channels(mail, around, prefix=rospy.get_name() + "/")
         self._outbox = Outbox(state_dir / "outbox")
@@ -224,6 +225,13 @@ class OwnerPost:
             self._postman.refresh()
             self._wake_all()
 
+    def _mend(self) -> None:
+        """Make notices that were damaged on the disk again, or tell that they are lost."""
+        for name, notice_id in self._outbox.broken():
+            log.error("notice %s was damaged on the disk: it is made again of what its record tells", notice_id)
+            self.put(replacement(self._state_dir, notice_id, time.time()))
+            self._outbox.mended(name)
+
     def _has_changed(self) -> bool:
         mtime = os.stat(self._outbox.folder).st_mtime_ns
         if mtime == self._seen_mtime:
@@ -262,6 +270,7 @@ class OwnerPost:
         self._reporter.report_spare(self._spare.statuses())
         self._try_again_where_it_helps()
         if self._postman.is_delivering:
+            self._mend()
             self._postman.tell_faults()
         self._reporter.report()
 

@@ -92,6 +92,7 @@ def test_a_notice_of_a_newer_version_is_left_alone_and_said_once(tmp_path, caplo
     assert outbox.waiting() == outbox.waiting() == []
     assert (tmp_path / "000000000001-x.notice").read_bytes() == data
     assert caplog.text.count("is of format 9") == 1
+    assert outbox.broken() == [("000000000001-x.notice", "x")]  # the owner is told what this version can tell
 
 
 def full_for(times, monkeypatch):
