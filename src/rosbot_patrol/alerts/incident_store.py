@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from typing import Any
 from rosbot_patrol.alerts import chain
 from rosbot_patrol.alerts.incident import Event, Incident, StoredFile, is_name
 from rosbot_patrol.alerts.incident_database import (
+    BUSY_TIMEOUT,
     FOLDER,
     database_path,
     errors_of,
@@ -59,9 +61,11 @@ class IncidentStore:
         self.path, self.later_version = database_path(state_dir)
         self.folder = IncidentFolder(state_dir / FOLDER)
         self.connection = (open_for_reading if read_only else open_for_writing)(self.path)
+        self._is_settled = read_only  # a kill may have left something in the WAL
         if not read_only and self.head() == (0, chain.START):
             with transaction(self.connection, self.path):
                 append_link(self.connection, chain.BEGUN, "", wall, {"wall": wall})
+            self.settle()
 
     def __enter__(self) -> IncidentStore:
         return self
@@ -71,7 +75,27 @@ class IncidentStore:
 
     def close_database(self) -> None:
         """Let go of the file."""
+        with suppress(StoreError):  # the last one that closes it does the same
+            self.settle()
         self.connection.close()
+
+    def settle(self) -> bool:
+        """Move what is finished from the WAL into the database, so that a WAL that is lost takes none of it along.
+
+        Returns:
+            Whether that is done; somebody who reads for long holds it up.
+
+        Raises:
+            StoreError: the disk does not take it.
+        """
+        if not self._is_settled:
+            with errors_of(self.path):
+                self.connection.execute("PRAGMA busy_timeout=0")  # who reads is not waited for
+                try:
+                    self._is_settled = not self.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]
+                finally:
+                    self.connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT * 1000:.0f}")
+        return self._is_settled
 
     # -- a record while its mission runs
 
@@ -83,6 +107,7 @@ class IncidentStore:
             insert_incident(self.connection, replace(incident, closed=None, events=(), files=()))
             for event in incident.events:
                 insert_event(self.connection, incident.id, event)
+        self._is_settled = False
 
     def record(self, incident_id: str, *, add: Iterable[Event] = (), **changes: Any) -> None:
         """Add to an open record, all or nothing. Raises StoreError, also where it is not open.
@@ -143,6 +168,8 @@ class IncidentStore:
         incident = replace(kept, **changes, closed=wall)
         with transaction(self.connection, self.path):
             close_incident(self.connection, incident, wall)
+        self._is_settled = False
+        self.settle()
         return incident
 
     # -- afterwards
@@ -157,6 +184,8 @@ class IncidentStore:
             append_link(self.connection, chain.AMENDMENT, incident_id, wall, body)
             words = f"{row['words']} {text}"[:WORDS]
             self.connection.execute("UPDATE incidents SET words=? WHERE id=?", (words, incident_id))
+        self._is_settled = False
+        self.settle()
 
     def remove(self, incident_id: str, *, wall: float, why: str) -> None:
         """Forget a closed record and its files; its digest stays in the chain. Raises StoreError."""
@@ -171,6 +200,7 @@ class IncidentStore:
                 (incident_id, chain.RECORD, chain.AMENDMENT),
             )
             self.connection.execute("DELETE FROM incidents WHERE id=?", (incident_id,))
+        self._is_settled = False  # `settle` after the last one
         self.folder.remove(incident_id)
         with errors_of(self.path):
             self.connection.execute("PRAGMA incremental_vacuum(64)").fetchall()

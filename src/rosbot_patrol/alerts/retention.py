@@ -138,6 +138,8 @@ def _remove(
         store.remove(incident_id, wall=wall, why=why)
         ids.append(incident_id)
         freed += size
+    if ids:
+        store.settle()
     is_done = len(ids) < most
     return Pruned(ids=tuple(ids), bytes=freed, why=why, is_done=is_done)
 

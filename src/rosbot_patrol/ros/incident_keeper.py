@@ -201,6 +201,7 @@ class IncidentKeeper:
             self._close(store, incident_id, self._closing[incident_id])
             del self._closing[incident_id]
         self._tidy(store)
+        store.settle()
         return _BUSY if self._looking or self._closing or self._album.is_waiting else _IDLE
 
     def _open(self) -> IncidentStore:
