@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.alerts.incident import Event, Incident
+from rosbot_patrol.alerts.incident import NO_ROOM, Event, Incident
 from rosbot_patrol.alerts.incident_files import NewFile
 from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.ros.incidents_tool import _command_first, _parser, main
@@ -163,3 +163,22 @@ def test_a_changed_picture_is_named(call, house):
     code, out, _ = call("verify")
     assert code == 1
     assert out.startswith("the record of m1 (link 3) does not fit: the file best-1.jpg")
+
+
+def test_a_list_tells_where_the_person_was_and_who_called(house, call):
+    seen = {"object_class": "person", "person": (1.0, 2.0), "room_id": 7, "room_name": "study"}
+    with IncidentStore(house, wall=1.0) as store:
+        for name, room in (("n1", (5, "kitchen")), ("n2", (7, "study")), ("n3", (NO_ROOM, ""))):
+            where = dict(zip(("person_room_id", "person_room"), room, strict=True))
+            store.begin(Incident(id=name, wall=1_790_030_000.0, **seen, **where))
+            store.close(name, wall=1_790_030_060.0, verdict="confirmed")
+    lines = {line.split()[0]: line for line in call("list", "--verdict", "confirmed")[1].splitlines()}
+    assert "  5 kitchen, called by 7 study  " in lines["n1"]
+    assert "  7 study  " in lines["n2"]
+    assert "called by" not in lines["n2"]
+    assert "  none, called by 7 study  " in lines["n3"]
+    assert [line.split()[0] for line in call("list", "--room", "5")[1].splitlines()[1:]] == ["n1"]
+    (row,) = [json.loads(line) for line in call("list", "--json", "--room", "5")[1].splitlines()]
+    assert (row["room_id"], row["person_room_id"], row["person_room"]) == (7, 5, "kitchen")
+    assert call("show", "n1")[1].startswith("person seen in room 5 (kitchen) while")
+    assert "x 1.00 m, y 2.00 m, in room 5 (kitchen)" in call("show", "n1")[1]

@@ -134,5 +134,5 @@ def test_each_recipient_is_tried_and_listed_by_itself(notify, outbox):
         said = notify("--list")[1]
     assert "office:a@b.org: a@b.org through the mail server" in said
     assert "refused the last notice for good: localhost" in said
-    assert "1 wait since" in said
+    assert "1 waits since" in said
     assert "451 later" in said

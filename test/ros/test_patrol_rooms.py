@@ -11,7 +11,7 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 import rospy
 from nav_msgs.msg import OccupancyGrid
 
-from rosbot_patrol.patrol.node_params import EyesTopics
+from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.ros import patrol_eyes
 from rosbot_patrol.ros.diagnostics import ERROR, OK, WARN
@@ -39,9 +39,7 @@ def eyes(monkeypatch: pytest.MonkeyPatch) -> tuple[patrol_eyes.PatrolEyes, Healt
     monkeypatch.setattr(rospy, "Subscriber", lambda *_, **__: None)
     monkeypatch.setattr(patrol_eyes, "now", lambda: 0.0)
     rooms = load_rooms(ROOT / "params" / "room_points.yaml")
-    made = patrol_eyes.PatrolEyes(
-        EyesTopics(), rooms, ("person",), None, map_frame="map", odom_frame="odom", health=health
-    )
+    made = patrol_eyes.PatrolEyes(EyesTopics(), rooms, ("person",), None, frames=InputParams(), health=health)
     return made, health
 
 

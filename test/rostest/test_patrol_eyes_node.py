@@ -102,6 +102,14 @@ def test_a_person_has_a_place_and_a_marker_and_the_robot_goes_on(house, sight):
     bodies = [m for message in shown for m in message.markers if m.ns == "people" and m.action == Marker.ADD]
     assert bodies
     assert bodies[-1].header.frame_id == "map"
+    wait_until(house.mails, 20, "the mail")
+    kept = house.incident(house.alerts[0].id)
+    assert kept.person_room_id == 0  # in view from the base on, and the sensor of room 2 called
+    text = next(part for part in house.mails()[0].walk() if part.get_content_type() == "text/plain")
+    lines = text.get_payload(decode=True).decode().splitlines()
+    assert f"Room:     {kept.person_title.removeprefix('room ')}" in lines
+    assert "Caller:   a motion sensor in room 2 (square room behind the door)" in lines
+    assert f"seen in {kept.person_title} while driving to room 2" in house.alerts[0].text
 
 
 def test_a_picture_on_the_wall_is_clear_and_said(house, sight):

@@ -7,13 +7,32 @@ import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
+NO_ROOM = -1  # of a place that is known and lies in no room
 OPEN = ""  # the verdict of a mission that still runs
 VERDICTS = ("confirmed", "clear", "unreachable", "unverified")
 
 _NAME = re.compile(r"(?!\.)[A-Za-z0-9._+-]{1,120}")
+_ON_THE_WAY = {"driving": "on the way to", "returning": "on the way back from"}
+_CALLS = {
+    "trigger": "a motion sensor in",
+    "silent_sensor": "the silent motion sensor of",
+    "schedule": "the schedule, for",
+    "action": "a program, for",
+    "all": "a person, for all rooms, among them",
+}
 _DOING = {"driving": "driving to", "looking": "looking around in", "returning": "coming home from"}
+
+
+class Place(Enum):
+    """What is known of where a person is."""
+
+    CALLED = "in the room that called"
+    OTHER = "in another room"
+    OUTSIDE = "in no room of the map"
+    UNKNOWN = "somewhere on the way"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +88,9 @@ class Incident:
         object_class, probability: of the detector, mean over `pictures`; "", 0 and 0 where nobody was confirmed.
         confirmed: when somebody was, seconds since 1970; sightings: confirmations in all.
         pose: x [m], y [m], yaw [rad] of the robot in map at that moment, None where it was not known.
-        person: x, y [m] of the person in map, None where nobody knows; person_room: the room that lies in, "" for none.
+        person: x, y [m] of the person in map, None where nobody knows.
+        person_room_id: number of the room that lies in, NO_ROOM for none, None where nobody knows.
+        person_room: name of that room.
         path: x, y [m] of the robot in map on its way.
         triggers: how often the room's sensor called.
         closed: when the record was completed, seconds since 1970; None while it is open.
@@ -95,6 +116,7 @@ class Incident:
     sightings: int = 0
     pose: tuple[float, float, float] | None = None
     person: tuple[float, float] | None = None
+    person_room_id: int | None = None
     person_room: str = ""
     path: tuple[tuple[float, float], ...] = ()
     triggers: int = 1
@@ -108,11 +130,46 @@ class Incident:
         return f"room {self.room_id} ({self.room_name})" if self.room_name else f"room {self.room_id}"
 
     @property
+    def place(self) -> Place:
+        """What is known of where the person is."""
+        if not self.object_class:
+            return Place.CALLED
+        if self.person_room_id == NO_ROOM:
+            return Place.OUTSIDE
+        if self.person_room_id is not None:
+            return Place.CALLED if self.person_room_id == self.room_id else Place.OTHER
+        if self.person_room:
+            return Place.CALLED if self.person_room in (self.room_name, self.room) else Place.OTHER
+        return Place.UNKNOWN if self.phase in _ON_THE_WAY else Place.CALLED
+
+    @property
+    def where(self) -> str:
+        """Where the person is, as far as that is known; else the room that the robot was sent to."""
+        place = self.place
+        if place is Place.OTHER:
+            return self.person_title
+        if place is Place.OUTSIDE:
+            return f"in no room of the map, near {self.room}"
+        return f"{_ON_THE_WAY[self.phase]} {self.room}" if place is Place.UNKNOWN else self.room
+
+    @property
+    def person_title(self) -> str:
+        """The room in which the person is, with its number where that is known; "" for none."""
+        is_numbered = self.person_room_id not in (None, NO_ROOM)
+        return f"room {self.person_room_id} ({self.person_room})" if is_numbered else self.person_room
+
+    @property
+    def call(self) -> str:
+        """What sent the robot to its room."""
+        return f"{_CALLS.get(self.origin, self.origin)} {self.room}"
+
+    @property
     def sentence(self) -> str:
         """For people."""
         if self.object_class:
-            doing = _DOING.get(self.phase, self.phase)
-            return f"{self.object_class} seen while {doing} {self.room}, probability {self.probability:.2f}"
+            place = {Place.OTHER: f" in {self.where}", Place.OUTSIDE: " in no room of the map"}.get(self.place, "")
+            doing = f"while {_DOING.get(self.phase, self.phase)} {self.room}"
+            return f"{self.object_class} seen{place} {doing}, probability {self.probability:.2f}"
         return f"{self.room}: {self.verdict or 'the mission runs'}{f', {self.reason}' if self.reason else ''}"
 
     def durations(self) -> tuple[tuple[str, float], ...]:

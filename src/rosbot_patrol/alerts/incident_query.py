@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sqlite3
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rosbot_patrol.alerts.incident_database import errors_of
-from rosbot_patrol.alerts.incident_rows import clean, room_tag, verdict_tag
+from rosbot_patrol.alerts.incident_rows import clean, person_tag, room_tag, verdict_tag
 
 _NO_ROW = 1 << 62
 _ORDERED = "FROM incidents INDEXED BY incidents_in_order WHERE late = 0"
@@ -20,7 +20,7 @@ class Query:
     """What to look for; what is not said does not matter.
 
     Attributes:
-        room: its id.
+        room: its id; somebody was there, or it called.
         verdict: "" for those that are open.
         since, until: when the mission began, seconds since 1970.
         text: words that have to be there, or how they begin; case and accents do not matter.
@@ -60,6 +60,8 @@ def find_incidents(connection: sqlite3.Connection, path: Path, query: Query) -> 
         return []
     with errors_of(path):
         rows = _by_words(connection, query, words) if words else _by_columns(connection, query)
+        if query.room is not None and not words:
+            rows = _newest(rows + _by_words(connection, replace(query, room=None), [_person(query.room)]), query.limit)
     return [Found(**dict(row)) for row in rows]
 
 
@@ -76,7 +78,8 @@ def _by_columns(connection: sqlite3.Connection, query: Query) -> list[sqlite3.Ro
 def _by_words(connection: sqlite3.Connection, query: Query, words: list[str]) -> list[sqlite3.Row]:
     # The index answers for room and verdict too, and walks its rows from the newest: no row is fetched for nothing.
     terms = [f"words : {word}" for word in words]
-    terms += [] if query.room is None else [f'tags : "{room_tag(query.room)}"']
+    if query.room is not None:
+        terms.append(f'(tags : "{room_tag(query.room)}" OR words : {_person(query.room)})')
     terms += [] if query.verdict is None else [f'tags : "{verdict_tag(query.verdict)}"']
     where, values = _time_limits(query)
     first, last = _span(connection, query)
@@ -85,6 +88,15 @@ def _by_words(connection: sqlite3.Connection, query: Query, words: list[str]) ->
     sql = f"""SELECT {columns} FROM incidents_text t CROSS JOIN incidents i ON i.seq = t.rowid
         WHERE incidents_text MATCH ? AND t.rowid BETWEEN ? AND ?{more} ORDER BY t.rowid DESC LIMIT ?"""
     return connection.execute(sql, (" AND ".join(terms), first, last, *values, query.limit)).fetchall()
+
+
+def _person(room_id: int) -> str:
+    return f'"{person_tag(room_id)}"'
+
+
+def _newest(rows: list[sqlite3.Row], limit: int) -> list[sqlite3.Row]:
+    found = {row["seq"]: row for row in rows}
+    return sorted(found.values(), key=lambda row: (-row["wall"], -row["seq"]))[:limit]
 
 
 def _span(connection: sqlite3.Connection, query: Query) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.alerts import chain
-from rosbot_patrol.alerts.incident import Event, Incident, StoredFile, incident_from_plain, incident_to_plain
+from rosbot_patrol.alerts.incident import Event, Incident, Place, StoredFile, incident_from_plain, incident_to_plain
 from rosbot_patrol.errors import StoreError
 
 MAX_EVENTS = 2000  # of one record
@@ -82,6 +82,8 @@ def close_incident(connection: sqlite3.Connection, incident: Incident, wall: flo
 def columns_of(incident: Incident) -> dict[str, Any]:
     """What lists and searches need of a record."""
     words = [incident.id, incident.room_name, incident.person_room, incident.object_class, incident.verdict]
+    if incident.place is Place.OTHER:
+        words.insert(0, person_tag(incident.person_room_id))
     words += [incident.reason, incident.origin, *(event.text for event in incident.events)]
     return {
         "id": incident.id,
@@ -103,6 +105,11 @@ def columns_of(incident: Incident) -> dict[str, Any]:
 def room_tag(room_id: int) -> str:
     """A word of the text index for a room."""
     return f"room{room_id}".replace("-", "minus")
+
+
+def person_tag(room_id: int | None) -> str:
+    """A word of the text index for the room in which somebody was, where another one had called."""
+    return f"inroom{room_id}"
 
 
 def verdict_tag(verdict: str) -> str:

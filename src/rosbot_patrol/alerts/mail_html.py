@@ -54,7 +54,7 @@ def html_page(notice: Notice, picture_cid: str = "") -> str:
     return _PAGE.substitute(
         label=_clean(label),
         colour=colour,
-        title=_clean(notice.room_name or notice.subject.removeprefix("rosbot patrol: ")),
+        title=_clean(notice.place or notice.room_name or notice.subject.removeprefix("rosbot patrol: ")),
         when=_clean(time.strftime("%A, %d %B %Y, %H:%M:%S", time.localtime(notice.wall))),
         picture=_PICTURE.substitute(cid=picture_cid) if picture_cid else "",
         paragraphs=_paragraphs(notice.text),

@@ -35,7 +35,9 @@ class Notice:
         subject: one line.
         text: paragraphs, for people.
         facts: (name, value) pairs shown as a table below the text.
-        room_id, room_name: where; -1 and "" for nowhere.
+        room_id, room_name: where, else the room that it is about; -1 and "" for nowhere.
+        place: where, for people, where `room_name` does not say it; "" where it does.
+        called_id, called_name: the room that the robot was sent to, where it is another; -1 and "" for the same.
         verdict: of the mission; "" for none.
         incident: id of its record; "" for none.
         picture: JPEG, None where there is none.
@@ -54,6 +56,9 @@ class Notice:
     facts: tuple[tuple[str, str], ...] = ()
     room_id: int = -1
     room_name: str = ""
+    place: str = ""
+    called_id: int = -1
+    called_name: str = ""
     verdict: str = ""
     incident: str = ""
     picture: bytes | None = None
@@ -73,6 +78,10 @@ class Notice:
         """The notice as it lies on disk."""
         tree = {"format": FORMAT, **{name: getattr(self, name) for name in _TEXTS}}
         tree |= {"wall": self.wall, "room_id": self.room_id, "facts": self.facts, "channels": self.channels}
+        if self.called_id >= 0:
+            tree |= {"called_id": self.called_id, "called_name": self.called_name}
+        if self.place:
+            tree["place"] = self.place
         if self.picture is not None:
             tree["picture"] = base64.b64encode(self.picture).decode("ascii")
         tree["check"] = _check(tree)
@@ -116,6 +125,9 @@ class Notice:
         return cls(
             wall=float(tree["wall"]),
             room_id=int(tree["room_id"]),
+            called_id=int(tree.get("called_id", -1)),
+            called_name=str(tree.get("called_name", "")),
+            place=str(tree.get("place", "")),
             facts=tuple((str(name), str(value)) for name, value in tree["facts"]),
             channels=tuple(map(str, tree["channels"])),
             picture=data,

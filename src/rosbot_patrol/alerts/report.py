@@ -14,7 +14,7 @@ from html import escape
 from PIL import Image
 
 from rosbot_patrol.alerts.chain import Link
-from rosbot_patrol.alerts.incident import Event, Incident, StoredFile, clock_text
+from rosbot_patrol.alerts.incident import Event, Incident, Place, StoredFile, clock_text
 from rosbot_patrol.alerts.report_style import STYLE
 from rosbot_patrol.counts import count_of
 
@@ -41,7 +41,7 @@ class Evidence:
 
 def render_report(incident: Incident, evidence: Evidence) -> str:
     """The report as HTML."""
-    title = f"{incident.verdict or 'running'}: {incident.room}"
+    title = f"{incident.verdict or 'running'}: {incident.where}"
     parts = [
         _head(incident),
         _facts(incident),
@@ -71,7 +71,7 @@ def _clock(wall: float) -> str:
 def _head(incident: Incident) -> str:
     kind = incident.verdict if incident.verdict in ("confirmed", "clear", "unreachable", "unverified") else "running"
     return f"""<header class="{kind}"><p class="verdict {kind}">{_text(incident.verdict or "still running")}</p>
-<h1>{_text(incident.room[0].upper() + incident.room[1:])}</h1><p>{_text(incident.reason or incident.sentence)}</p>
+<h1>{_text(incident.where[:1].upper() + incident.where[1:])}</h1><p>{_text(incident.reason or incident.sentence)}</p>
 <p class="faint">{_text(clock_text(incident.confirmed or incident.wall))}</p></header>"""
 
 
@@ -79,6 +79,8 @@ def _facts(incident: Incident) -> str:
     origin = _ORIGINS.get(incident.origin, incident.origin)
     calls = f", {incident.triggers} times" if incident.triggers > 1 else ""
     rows = [("Called by", f"{origin}{calls}"), ("Began", clock_text(incident.wall))]
+    if incident.place is not Place.CALLED:
+        rows.insert(1, ("Sent to", incident.room[0].upper() + incident.room[1:]))
     if incident.object_class:
         rows.append(
             (
@@ -95,7 +97,7 @@ def _facts(incident: Incident) -> str:
             )
         )
     if incident.person is not None:
-        room = f", in {incident.person_room}" if incident.person_room else ""
+        room = f", in {incident.person_title}" if incident.person_room else ""
         rows.append(("Person at", f"x {incident.person[0]:.2f} m, y {incident.person[1]:.2f} m in the map{room}"))
     if incident.pose is not None:
         rows.append(("Robot at", "x {:.2f} m, y {:.2f} m, heading {:.2f} rad".format(*incident.pose)))

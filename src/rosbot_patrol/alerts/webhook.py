@@ -194,6 +194,10 @@ def document(notice: Notice, *, with_picture: bool = True) -> bytes:
     }
     if notice.room_id >= 0:
         tree["room"] = {"id": notice.room_id, "name": notice.room_name}
+    if notice.place:
+        tree["place"] = notice.place
+    if notice.called_id >= 0:
+        tree["called_by"] = {"id": notice.called_id, "name": notice.called_name}
     if notice.picture is not None and with_picture:
         data = base64.b64encode(notice.picture).decode("ascii")
         tree["picture"] = {"name": notice.picture_name, "type": "image/jpeg", "base64": data}

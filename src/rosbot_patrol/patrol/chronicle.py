@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-from rosbot_patrol.alerts.incident import Event, Incident
+from rosbot_patrol.alerts.incident import NO_ROOM, Event, Incident
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.commands import Commands, Notice
@@ -19,6 +19,7 @@ from rosbot_patrol.patrol.mission import Mission
 
 BEFORE = 60.0  # [s] of what the sensors said before a mission began, in its record
 _WAY_STEP = 0.15  # [m] between two points of the way
+_OWN = ("reason", "person", "person_room_id", "person_room")  # each person's, told when they were seen
 _WHY_PAUSE = 2.0  # [s] between two sentences of one phase
 
 
@@ -159,8 +160,9 @@ class Chronicle:
         events = (*(Event(wall=wall, kind="suspect", text=text) for text in looked_like), event)
         entries.append(Entry(incident=mission.id, changes=_state(mission), path=path, events=events, closed=wall))
         for number in range(2, len(mission.people) + 1):
-            other = replace(mission, id=f"{mission.id}-{number}", place=mission.people[number - 1])
-            entries.append(Entry(incident=other.id, changes=_state(other), events=(event,), closed=wall))
+            name = f"{mission.id}-{number}"
+            changes = {key: value for key, value in _state(mission).items() if key not in _OWN}
+            entries.append(Entry(incident=name, changes=changes, events=(event,), closed=wall))
         if is_own:
             self._id = ""
         return entries
@@ -177,7 +179,14 @@ def _state(mission: Mission) -> dict[str, Any]:
     }
     if mission.place is not None:
         state["person"] = mission.place
-    return state
+    return state | person_room(mission)
+
+
+def person_room(mission: Mission) -> dict[str, Any]:
+    """The fields of a record that say in which room the person is; none where nobody knows."""
+    if mission.place_room is not None:
+        return {"person_room_id": mission.place_room.id, "person_room": mission.place_room.name}
+    return {"person_room_id": NO_ROOM} if mission.is_outside else {}
 
 
 def _seen(wall: float, notice: Notice) -> Entry:

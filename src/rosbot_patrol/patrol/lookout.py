@@ -11,6 +11,8 @@ from rosbot_patrol.patrol.conduct import Conduct
 from rosbot_patrol.patrol.inputs import Frame, Inputs
 from rosbot_patrol.patrol.mission import Mission, Verdict
 from rosbot_patrol.patrol.people import Person
+from rosbot_patrol.patrol.room_regions import NOBODYS
+from rosbot_patrol.patrol.rooms import Room
 from rosbot_patrol.patrol.watch import Confirmation
 
 log = logging.getLogger(__name__)
@@ -57,27 +59,30 @@ class Lookout(Conduct):
         if mission.best is None or seen.probability > mission.best.probability:
             mission.best = seen
         person, is_new = self._people.note(self._clock.time, seen.measured)
-        person.label, person.room = seen.label, self._room_at(person, inputs)
+        room, is_outside = self._room_at(person, inputs)
+        person.label, person.room = seen.label, room.title if room else ""
         mission.people = self._people.places
-        if mission.place is None:  # it stays what the sentence and the mail say
-            mission.place = mission.people[0]
+        if mission.place is None and person.number == 1:  # it stays what the sentence and the mail say
+            mission.place, mission.place_room, mission.is_outside = mission.people[0], room, is_outside
         out.people = tuple(self._people.met)
+        said = saying.sighting(mission, seen, room, is_outside=is_outside)
         if mission.verdict is not Verdict.CONFIRMED:
-            self._decide(Verdict.CONFIRMED, saying.sighting(mission, seen, person.room))
+            self._decide(Verdict.CONFIRMED, said)
         if is_new:
+            notice = self._notice(mission, inputs, seen, person.number)
             if person.number > 1:
-                log.warning(
-                    "a second incident, %s: %s", f"{mission.id}-{person.number}", saying.sighting(mission, seen)
-                )
+                log.warning("a second incident, %s: %s", notice.mission.id, said)
+                notice.mission.place_room, notice.mission.is_outside = room, is_outside
+                notice.mission.reason = said
             mission.notified = out.changed = True
-            out.notices += (self._notice(mission, inputs, seen, person.number),)
+            out.notices += (notice,)
 
-    def _room_at(self, person: Person, inputs: Inputs) -> str:
-        """The room in which a person is, "" where that is not known."""
+    def _room_at(self, person: Person, inputs: Inputs) -> tuple[Room | None, bool]:
+        """The room in which a person is, and whether they are known to be in none."""
         if inputs.house is None or person.x is None or person.y is None:
-            return ""
-        room = self.rooms.find(inputs.house.room_at(person.x, person.y))
-        return room.title if room else ""
+            return None, False
+        found = inputs.house.room_at(person.x, person.y)
+        return self.rooms.find(found), found == NOBODYS
 
     def _notice(self, mission: Mission, inputs: Inputs, seen: Confirmation, number: int) -> Notice:
         copy = dataclasses.replace(mission, people=list(mission.people))

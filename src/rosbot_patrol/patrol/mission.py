@@ -56,6 +56,8 @@ class Mission:
         views_done: poses from which the room was looked at in a full turn.
         share_seen: of the room's floor, 0 to 1, None where nobody measures.
         place: x, y in map [m] of the person who was confirmed first, then; None where it is not known.
+        place_room: the room that lies in, None where it lies in none or nobody knows.
+        is_outside: that place lies in no room of the map.
         people: where each of those met was last, likewise; each of them gets a notice.
         own_motion: rooms whose sensor called while the robot passed them, with seconds since 1970: not followed.
     """
@@ -82,6 +84,8 @@ class Mission:
     views_done: list[View] = field(default_factory=list)
     share_seen: float | None = None
     place: tuple[float, float] | None = None
+    place_room: Room | None = None
+    is_outside: bool = False
     people: list[tuple[float, float] | None] = field(default_factory=list)
     own_motion: list[tuple[float, int]] = field(default_factory=list)
 
@@ -112,6 +116,8 @@ def mission_to_plain(mission: Mission) -> dict[str, Any]:
         "views_done": [list(view) for view in mission.views_done],
         "share_seen": mission.share_seen,
         "place": list(mission.place) if mission.place else None,
+        "place_room": mission.place_room.id if mission.place_room else None,
+        "is_outside": mission.is_outside,
         "people": [list(place) if place else None for place in mission.people],
         "own_motion": [list(item) for item in mission.own_motion],
     }
@@ -128,6 +134,7 @@ def mission_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Mission | None
         return None
     place = plain["place"]
     share = plain["share_seen"]
+    place_room = plain.get("place_room")  # as the next, not in files of earlier versions
     return Mission(
         id=str(plain["id"]),
         room=room,
@@ -147,6 +154,8 @@ def mission_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Mission | None
         views_done=[(float(x), float(y), float(yaw)) for x, y, yaw in plain["views_done"]],
         share_seen=None if share is None else float(share),
         place=None if place is None else (float(place[0]), float(place[1])),
+        place_room=None if place_room is None else rooms.find(int(place_room)),
+        is_outside=bool(plain.get("is_outside", False)),
         people=[None if each is None else (float(each[0]), float(each[1])) for each in plain["people"]],
         own_motion=[(float(wall), int(room_id)) for wall, room_id in plain["own_motion"]],
     )

@@ -8,6 +8,7 @@ from rosbot_patrol.counts import count_of
 from rosbot_patrol.patrol.commands import Report
 from rosbot_patrol.patrol.mission import Mission, Phase
 from rosbot_patrol.patrol.queueing import MissionQueue
+from rosbot_patrol.patrol.rooms import Room
 from rosbot_patrol.patrol.suspects import Suspect
 from rosbot_patrol.patrol.watch import Confirmation
 
@@ -19,16 +20,32 @@ def verdict(mission: Mission) -> str:
     return f"{mission.verdict.value}: {mission.reason}" if mission.verdict else "without a verdict"
 
 
-def sighting(mission: Mission, seen: Confirmation, room: str = "") -> str:
-    """That somebody was seen; `room` is the one in which they are, where that is known."""
-    where = _WHERE.get(mission.phase, "on the way back from")
+def sighting(mission: Mission, seen: Confirmation, room: Room | None = None, *, is_outside: bool = False) -> str:
+    """That somebody was seen: first where they are, then where the robot was sent.
+
+    Args:
+        mission: that runs.
+        seen: what the detector saw.
+        room: in which the person is, None where that is not known.
+        is_outside: the person's place is known and lies in no room.
+    """
     sure = f"probability {seen.probability:.2f} over {count_of(seen.pictures, 'picture')}"
     place = ""
     if seen.measured is not None:
         about = "about " if seen.measured.error > 0.5 else ""
-        inside = f" in {room}" if room and room != mission.room.title else ""
-        place = f", {about}at ({seen.measured.x:.1f}, {seen.measured.y:.1f}){inside}"
+        place = f", {about}at ({seen.measured.x:.1f}, {seen.measured.y:.1f})"
+    if room is not None and room.id != mission.room.id:
+        return f"{seen.label} seen in {room.title}{place}, {_robot(mission)}, {sure}"
+    if is_outside:
+        return f"{seen.label} seen in no room of the map{place}, {_robot(mission)}, {sure}"
+    where = _WHERE.get(mission.phase, "on the way back from")
     return f"{seen.label} seen {where} {mission.room.title}{place}, {sure}"
+
+
+def _robot(mission: Mission) -> str:
+    """Where the robot was when it saw somebody elsewhere."""
+    where = "from" if mission.phase is Phase.LOOKING else _WHERE.get(mission.phase, "on the way back from")
+    return f"{where} {mission.room.title}"
 
 
 def clear(mission: Mission, turned_deg: float, refusals: Mapping[str, int]) -> str:

@@ -15,10 +15,11 @@ import sys
 import time
 import zipfile
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from rosbot_patrol.alerts.incident import VERDICTS, Incident, clock_text, incident_to_plain
+from rosbot_patrol.alerts.incident import NO_ROOM, VERDICTS, Incident, Place, clock_text, incident_to_plain
 from rosbot_patrol.alerts.incident_database import errors_of
 from rosbot_patrol.alerts.incident_files import REPORT
 from rosbot_patrol.alerts.incident_query import Found, Query, find_incidents
@@ -86,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
             command.add_argument("text", nargs="+", help="words, or how they begin")
         else:
             command.add_argument("--text", nargs="+", default=[], metavar="WORD", help="words, or how they begin")
-        command.add_argument("--room", type=int, metavar="N", help="its id")
+        command.add_argument("--room", type=int, metavar="N", help="its id: somebody was there, or it called")
         command.add_argument("--verdict", choices=(*VERDICTS, "open"))
         command.add_argument("--since", type=_when, metavar="WHEN", help="2026-11-21, '2026-11-21 18:30', 12h, 7d")
         command.add_argument("--until", type=_when, metavar="WHEN")
@@ -147,10 +148,10 @@ def _list(store: IncidentStore, given: argparse.Namespace) -> int:
         limit=given.limit + 1,
     )
     found = find_incidents(store.connection, store.path, query)
-    shown = found[: given.limit]
+    shown = [(row, _where(store, row)) for row in found[: given.limit]]
     if given.json:
-        for row in shown:
-            print(json.dumps(vars(row), ensure_ascii=False))
+        for row, person in shown:
+            print(json.dumps(vars(row) | vars(person), ensure_ascii=False))
         return 0
     print(_table(shown) if shown else "no incidents")
     if len(found) > given.limit:
@@ -158,17 +159,40 @@ def _list(store: IncidentStore, given: argparse.Namespace) -> int:
     return 0
 
 
-def _table(rows: Iterable[Found]) -> str:
+@dataclass(frozen=True, kw_only=True)
+class _Person:
+    """Where somebody was; see Incident."""
+
+    person_room_id: int | None = None
+    person_room: str = ""
+    place: str = Place.CALLED.value
+
+
+def _where(store: IncidentStore, row: Found) -> _Person:
+    """Where the person of a list's row was, as the record tells."""
+    try:
+        kept = store.get(row.id) if row.object_class else None
+    except StoreError:  # `verify` names it
+        kept = None
+    if kept is None:
+        return _Person()
+    return _Person(person_room_id=kept.person_room_id, person_room=kept.person_room, place=kept.place.value)
+
+
+def _table(rows: Iterable[tuple[Found, _Person]]) -> str:
     head = ("id", "began", "room", "verdict", "seen", "reason")
-    cells = [head, *(_cells(row) for row in rows)]
+    cells = [head, *(_cells(row, person) for row, person in rows)]
     widths = [max(len(row[i]) for row in cells) for i in range(len(head) - 1)]
     lines = ("  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[-1]]) for row in cells)
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _cells(row: Found) -> tuple[str, ...]:
+def _cells(row: Found, person: _Person) -> tuple[str, ...]:
     share = "" if row.share is None else f"{100 * row.share:.0f} %"
     room = f"{row.room_id} {row.room_name}"
+    if person.place != Place.CALLED.value:
+        number = f"{person.person_room_id} " if person.person_room_id not in (None, NO_ROOM) else ""
+        room = f"{number}{person.person_room}, called by {room}" if person.person_room else f"none, called by {room}"
     verdict = row.verdict or "open"
     cells = (row.id, clock_text(row.wall), room, verdict, share, row.reason)
     return tuple("".join(c if c.isprintable() else " " for c in cell) for cell in cells)  # no escape codes of others
@@ -194,7 +218,8 @@ def _show(store: IncidentStore, given: argparse.Namespace) -> int:
     if incident.share_seen is not None:
         lines.append(f"{100 * incident.share_seen:.0f} % of the room's floor was seen")
     if incident.person is not None:
-        lines.append("the person stood at x {:.2f} m, y {:.2f} m".format(*incident.person))
+        inside = f", in {incident.person_title}" if incident.person_room else ""
+        lines.append("the person stood at x {:.2f} m, y {:.2f} m".format(*incident.person) + inside)
     for event in (*incident.events, *store.amendments(incident.id)):
         lines.append(f"  {clock_text(event.wall)[11:19]}  {event.kind:8} {event.text}")
     lines += [f"  {store.folder.path(incident.id, file.name)}  {file.caption}" for file in incident.files]

@@ -25,7 +25,7 @@ from rosbot_patrol.alerts.postman import Delivery
 from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
-from rosbot_patrol.patrol.chronicle import Entry
+from rosbot_patrol.patrol.chronicle import Entry, person_room
 from rosbot_patrol.patrol.commands import Commands, Ignored, Notice, Release, Word
 from rosbot_patrol.patrol.ignored_log import IgnoredLog
 from rosbot_patrol.ros.diagnostics import ERROR, OK, Health
@@ -123,6 +123,7 @@ class AlertDesk:
             ros_time=ros_time,
             room_id=mission.room.id,
             room_name=mission.room.name,
+            origin=mission.origin.value,
             phase=notice.phase.value,
             object_class=seen.label,
             probability=seen.probability,
@@ -130,6 +131,8 @@ class AlertDesk:
             verdict=mission.verdict.value if mission.verdict else "",
             reason=mission.reason,
             pose=(pose.x, pose.y, pose.yaw) if pose else None,
+            person=mission.place,
+            **person_room(mission),
         )
         self._jobs.append(lambda: self._record(incident, notice))
         self._keeper.see(incident.id, seen.stamp)

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import roslib.message
 import rospy
 
+from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.rosserial.topics import TopicInfo
 
@@ -57,7 +58,9 @@ class Layout:
             ProtocolError: it has another size.
         """
         if len(data) != self.size:
-            raise ProtocolError("", f"{info.name}: {len(data)} bytes, a {info.message_type} has {self.size}")
+            raise ProtocolError(
+                "", f"{info.name}: {count_of(len(data), 'byte')}, a {info.message_type} has {self.size}"
+            )
         return _with_clean_flags(data, self.flags)
 
 
@@ -75,7 +78,9 @@ class VaryingLayout:
         except struct.error:
             end = -1
         if end != len(data):
-            raise ProtocolError("", f"{info.name}: {len(data)} bytes that are no {info.message_type}")
+            raise ProtocolError(
+                "", f"{info.name}: {count_of(len(data), 'byte that is', 'bytes that are')} no {info.message_type}"
+            )
         return _with_clean_flags(data, flags)
 
 

@@ -24,6 +24,7 @@ class World:
         self.goal = None
         self.refuse = set()
         self.person_when = lambda world: False
+        self.boxes, self.house = lambda world: (PERSON,), None
         self.detector, self.camera, self.moves = True, True, True
         self.detector_at = self.camera_at = self.now
         self.triggers, self.requests = [], []
@@ -39,7 +40,7 @@ class World:
         if round(self.now * 25) % 3 == 0:
             if self.detector:
                 self.detector_at = self.now
-                frames = [Frame(stamp=self.now - 0.05, boxes=(PERSON,))] if self.person_when(self) else [Frame()]
+                frames = [Frame(stamp=self.now - 0.05, boxes=self.boxes(self))] if self.person_when(self) else [Frame()]
             if self.camera:
                 self.camera_at = self.now
         out = self.manager.step(
@@ -48,6 +49,7 @@ class World:
                 wall=self.wall + self.now,
                 triggers=tuple(self.triggers),
                 requests=tuple(self.requests),
+                house=self.house,
                 guarded=self.guarded,
                 stop=self.stop,
                 battery=self.battery,
