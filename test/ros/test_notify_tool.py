@@ -113,6 +113,15 @@ def test_where_a_node_delivers_it_is_asked_to(notify, outbox, tmp_path, monkeypa
     assert (outbox.folder / "flush").exists()
 
 
+def test_where_nothing_waits_no_node_is_waited_for(notify, outbox):
+    node = FileLock(outbox.folder / "lock", "/patrolling_node")
+    assert node.take()
+    status, said = notify("--flush")
+    assert status == 0
+    assert "Nothing waits." in said
+    assert not (outbox.folder / "flush").exists()
+
+
 def test_no_outbox_is_no_fault(notify):
     status, said = notify("--list")
     assert status == 0

@@ -121,8 +121,10 @@ def _flush_here(postman: Postman) -> int:
 
 
 def _flush_there(folder: Path) -> int:
-    (folder / "flush").touch()
     began, outbox = time.time(), Outbox(folder)
+    if not outbox.waiting():
+        return 0  # the node rewrites its status once a minute only
+    (folder / "flush").touch()
     while time.time() - began < FLUSH_WAIT:
         told = state_of(folder) or {}
         has_tried = not (folder / "flush").exists() and float(str(told.get("wall", 0.0))) > began + 1.0
