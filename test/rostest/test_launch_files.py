@@ -237,3 +237,10 @@ def test_what_is_given_wins_over_the_house() -> None:
     assert given["/simulator/motion_sensors"] == "/s"
     assert given["/patrolling_node/path_to_params"] == "/p"
     assert next(node.args for node in config.nodes if node.name == "map_server") == "/m"
+
+
+def test_rooms_are_marked_without_a_guard() -> None:
+    """Marked beside the guard, one's own house was patrolled by the tutorial's rooms."""
+    nodes = names(parse(ROOT / "launch" / "mark_rooms.launch", "map_file:=/m"))
+    assert set(nodes) == {"map_server", "map_broadcaster", "rviz"}
+    assert set(names(parse(ROOT / "launch" / "mark_rooms.launch", "rviz:=false"))) == {"map_server", "map_broadcaster"}
