@@ -12,7 +12,7 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion
 from nav_msgs.msg import OccupancyGrid, Odometry
 
-from rosbot_patrol.errors import TransformError
+from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map, write_map
 from rosbot_patrol.navigation.interfaces import BAD_QUATERNION
@@ -41,15 +41,15 @@ def goal_message(orientation=None):
 
 
 def test_a_map():
-    info = convert.grid_from_msg(grid_message()).info
+    info = convert.grid_from_msg(grid_message(), "/map").info
     assert (info.origin_x, info.yaw) == (-1.0, 0.0)
-    assert convert.grid_from_msg(grid_message(TWICE)).info.yaw == pytest.approx(math.pi / 2)
-    with pytest.raises(ValueError, match="is no orientation"):
-        convert.grid_from_msg(grid_message(NOT_FINITE))
+    assert convert.grid_from_msg(grid_message(TWICE), "/map").info.yaw == pytest.approx(math.pi / 2)
+    with pytest.raises(MapError, match=r"/map.*is no orientation"):
+        convert.grid_from_msg(grid_message(NOT_FINITE), "/map")
 
 
 def test_a_map_is_saved_with_yaw_0(tmp_path):
-    _, text = write_map(tmp_path / "saved", convert.grid_from_msg(grid_message()))
+    _, text = write_map(tmp_path / "saved", convert.grid_from_msg(grid_message(), "/map"))
     assert "origin: [-1.000000, 0.000000, 0.000000]" in text.read_text()
     assert read_map(text).info.yaw == 0.0
 

@@ -130,7 +130,7 @@ def test_poses_that_cannot_be_taken_are_counted_and_left_out(tmp_path: Path) -> 
     elsewhere = maker.initial_pose(BEGIN, Pose2D(3.0, 0.0, 0.0))
     elsewhere.header.frame_id = "odom"
     broken = maker.initial_pose(BEGIN, Pose2D(3.0, 0.0, 0.0))
-    broken.pose.pose.orientation.w = 0.0
+    broken.pose.pose.orientation.w = math.nan
     messages = [
         *without("/initialpose"),
         (BEGIN + 1.0, "/initialpose", elsewhere),
