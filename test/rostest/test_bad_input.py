@@ -382,7 +382,9 @@ def test_parameters_and_plug_ins_that_move_base_cannot_use(ros):
             "local_costmap__plugins": layers
         },
         "controller_frequency: expected a number [Hz], got 'fast'": {"controller_frequency": "fast"},
-        "TrajectoryPlannerROS/max_vel_x: is -1.0, expected at least 0.0 m/s": {"TrajectoryPlannerROS__max_vel_x": -1.0},
+        "TrajectoryPlannerROS/max_rotational_vel: is -1.0, expected at least": {
+            "TrajectoryPlannerROS__max_rotational_vel": -1.0
+        },
         "base_local_planner: knows no plug-in 'teb_local_planner/TebLocalPlannerROS', expected one of "
         "base_local_planner/TrajectoryPlannerROS": {"base_local_planner": "teb_local_planner/TebLocalPlannerROS"},
         "base_global_planner: knows no plug-in 'SBPLLatticePlanner', expected one of navfn/NavfnROS": {

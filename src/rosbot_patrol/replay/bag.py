@@ -22,6 +22,7 @@ from rosbags.typesys import Stores, TypesysError, get_typestore
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.replay.definitions import definition_problem, know_headers
 from rosbot_patrol.replay.records import ANY, KINDS, Kind
+from rosbot_patrol.replay.ros1_reader import LenientReader
 
 # What rosbags and the decompressors raise where bytes make no sense.
 BROKEN = (
@@ -67,6 +68,8 @@ class Bag:
             raise BagError(self.path, "is a folder without metadata.yaml, expected a ROS 1 bag or a ROS 2 bag's folder")
         try:
             self._reader = AnyReader([self.path], default_typestore=get_typestore(Stores.ROS2_FOXY))
+            if not self._reader.is2:
+                self._reader.readers = [LenientReader(self.path)]
             self._reader.open()
             know_headers(self._reader.typestore)
         except BROKEN as err:

@@ -10,8 +10,10 @@ from pathlib import Path
 import made_bag
 import numpy as np
 import pytest
+import rosbags.rosbag1.writer
 from made_bag import Maker, write_bag
 from rosbags.rosbag1 import Writer
+from rosbags.rosbag1.writer import Header as WriterHeader
 
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.geometry import Pose2D
@@ -245,3 +247,55 @@ def test_a_message_that_is_shorter_than_it_says(tmp_path: Path) -> None:
         writer.write(connection, 10**9, maker.bytes(maker.scan(scan_at(1.0)))[:-9])
     text = refused(path)
     assert re.search(r"a message of '/scan' .* is no sensor_msgs/LaserScan", text)
+
+
+# -- headers of topics that rosbag takes
+
+OTHER_TOPIC = "std_msgs/msg/String"
+
+
+def bag_with_header(path: Path, **changes: bytes | None) -> Path:
+    """A bag of one scan and one text whose topics' headers have other fields; None: without that field."""
+    maker = Maker()
+    text = maker.new(OTHER_TOPIC, "hello")
+    messages = [(BEGIN, "/scan", maker.scan(scan_at(BEGIN))), (BEGIN + 1.0, "/said", text)]
+    with pytest.MonkeyPatch.context() as patch:
+        fields = {name: value for name, value in changes.items() if value is not None}
+
+        class Changed(WriterHeader):
+            def write(self, dst, opcode=None):
+                if "message_definition" in self:
+                    for name in changes:
+                        self.pop(name, None)
+                    self.update(fields)
+                return super().write(dst, opcode)
+
+        patch.setattr(rosbags.rosbag1.writer, "Header", Changed)
+        return write_bag(path, messages)
+
+
+@pytest.mark.parametrize("latching", [b"", b"True", b"true", b"False", b"0", b"1", b"2", b"yes", b" 1 ", b"\xff", None])
+def test_any_text_for_latching_is_taken(tmp_path: Path, latching: bytes | None) -> None:
+    path = bag_with_header(tmp_path / "made.bag", latching=latching)
+    (found,) = read(path, "/scan")
+    assert found.content.frame_id == "laser"
+    with Bag(path) as bag:
+        told = {each.ext.latching for each in bag._reader.connections}
+    assert told == {None if latching is None else int(latching.strip() in (b"1", b"True", b"true"))}
+
+
+@pytest.mark.parametrize("callerid", [None, b"", b"/play", b"/k\xfcche"])
+def test_a_sender_without_a_name_is_taken(tmp_path: Path, callerid: bytes | None) -> None:
+    assert len(read(bag_with_header(tmp_path / "made.bag", callerid=callerid), "/scan")) == 1
+
+
+def test_an_empty_definition_is_that_of_noetic_where_the_sum_is(tmp_path: Path) -> None:
+    path = bag_with_header(tmp_path / "made.bag", message_definition=b"")
+    (found,) = read(path, "/scan")
+    np.testing.assert_array_equal(found.content.ranges, [1.0, 2.0, np.inf, np.inf])
+    with Bag(path) as bag:
+        (said,) = [each for each in bag._reader.connections if each.topic == "/said"]
+        assert said.msgdef.startswith("string data")
+    other = bag_with_header(tmp_path / "other.bag", message_definition=b"", md5sum=b"0" * 32)
+    with Bag(other) as bag:
+        assert {each.msgdef for each in bag._reader.connections} == {""}
