@@ -84,9 +84,8 @@ def make(**depth):
             {"name": "ranges", "type": "range_sensor_layer::RangeSensorLayer"},
         ],
         "low": {
-            "observation_sources": "depth",
+            "depth_sources": "depth",
             "depth": {
-                "data_type": "DepthImage",
                 "topic": "camera/depth/image_raw",
                 "floor_height": -0.04,
                 "clearing": True,

@@ -1,6 +1,6 @@
 """Depth pictures as an obstacle layer's source: low things that pass under the lidar's plane, or over it.
 
-`data_type: DepthImage` is ours. Upstream takes a depth camera as PointCloud2, and clears by rays in the plane: such a
+`depth_sources` are ours. Upstream takes a depth camera as PointCloud2, and clears by rays in the plane: such a
 ray passes over a low thing to the wall behind it and takes its mark away as soon as the robot is too near to see the
 thing any more. Here a mark goes only when the camera looks behind it, from just above the floor to the top (the idea
 is that of projective fusion, e.g. Newcombe et al., KinectFusion, 2011). Give it a layer of its own: beams of a lidar in

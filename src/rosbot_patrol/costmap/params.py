@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
+from rosbot_patrol.costmap.sensor_params import DEPTH_IMAGE, DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import load, param
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +67,7 @@ class ObstacleParams:
     max_obstacle_height: float = param(2.0, unit="m", lo=0.0, hi=50.0, clamps="both")
     transform_tolerance: float = param(0.2, unit="s", lo=0.0)
     observation_sources: str = param("", doc="names of sources, separated by spaces")
+    depth_sources: str = param("", doc="ours: the same for depth cameras, in a place that upstream does not read")
     forget_unseen_after: float = param(
         0.0,
         unit="s",
@@ -148,6 +152,7 @@ LAYER_TYPES: dict[str, type] = {
     "RangeSensorLayer": RangeSensorParams,
 }
 
+_SOURCES = ("observation_sources", "depth_sources")
 _RANGES = ("obstacle_range", "raytrace_range")
 _HEIGHTS = ("max_obstacle_height", "min_obstacle_height")
 _VOXEL = ("origin_z", "z_resolution", "z_voxels", "unknown_threshold", "mark_threshold", "publish_voxel_map")
@@ -163,7 +168,7 @@ _FROM_COSTMAP: dict[str, tuple[str, ...]] = {
 # And what pre-hydro files have there besides (the last two of the map are ours: upstream drops them).
 _LEGACY: dict[str, tuple[str, ...]] = {
     "static_layer": (*_FROM_COSTMAP["StaticLayer"], "subscribe_to_updates", "first_map_only"),
-    "obstacle_layer": (*_FROM_COSTMAP["ObstacleLayer"], *_VOXEL, "min_obstacle_height", "observation_sources"),
+    "obstacle_layer": (*_FROM_COSTMAP["ObstacleLayer"], *_VOXEL, "min_obstacle_height", *_SOURCES),
     "inflation_layer": _FROM_COSTMAP["InflationLayer"],
 }
 
@@ -183,7 +188,7 @@ def read_costmap(tree: Mapping[str, Any], *, name: str = "~costmap/") -> Costmap
     if legacy:
         tree = translate_legacy(tree)
     plugins = _plugins(tree["plugins"], name + "plugins")
-    sources = [s for p in plugins for s in str(_sub(tree, p[0], name).get("observation_sources", "")).split()]
+    sources = [s for p in plugins for s in _source_names(_sub(tree, p[0], name))]
     taken = [key for plugin in plugins for key in _FROM_COSTMAP[plugin[1]]]
     ignore = ["plugins", "static_map", "map_type", *[p[0] for p in plugins], *sources, *taken, *_RANGES, *_HEIGHTS]
     if legacy:
@@ -207,7 +212,7 @@ def translate_legacy(tree: Mapping[str, Any]) -> dict[str, Any]:
             continue
         moved = {key: tree[key] for key in keys if key in tree}
         if layer == "obstacle_layer":
-            moved.update({s: tree[s] for s in str(tree.get("observation_sources", "")).split() if s in tree})
+            moved.update({source: tree[source] for source in _source_names(tree) if source in tree})
         given = tree.get(layer, {})
         out[layer] = {**given, **moved} if isinstance(given, Mapping) else given
     out["plugins"] = plugins
@@ -243,7 +248,7 @@ def _read_layer(tree: Mapping[str, Any], plugin: tuple[str, str], params: Costma
     sources: dict[str, SourceParams] = {}
     if kind in ("ObstacleLayer", "VoxelLayer"):
         own.setdefault("track_unknown_space", params.track_unknown_space)
-        for source in str(own.get("observation_sources", "")).split():
+        for source in _source_names(own):
             sources[source] = _read_source(tree, own, source, prefix)
     ignore = [*sources, *_RANGES, *_HEIGHTS, *_VOXEL]
     return LayerConfig(layer, kind, load(LAYER_TYPES[kind], own, name=prefix, ignore=ignore), sources)
@@ -256,5 +261,16 @@ def _read_source(tree: Mapping[str, Any], layer: Mapping[str, Any], source: str,
         inherited.update({key: scope[key] for key in _RANGES if key in scope})
     own = _sub(layer, source, prefix)
     values = {**inherited, **own, "topic": own.get("topic") or source}
-    kind = DepthSourceParams if own.get("data_type") == "DepthImage" else SourceParams
-    return load(kind, values, name=f"{prefix}{source}/")
+    name = f"{prefix}{source}/"
+    if source in str(layer.get("depth_sources", "")).split():
+        return load(DepthSourceParams, values, name=name)
+    if own.get("data_type") != DEPTH_IMAGE:
+        return load(SourceParams, values, name=name)
+    log.warning(
+        "%sdata_type: move %s from observation_sources to depth_sources: upstream's node ends here", name, source
+    )
+    return load(DepthSourceParams, values, name=name)
+
+
+def _source_names(layer: Mapping[str, Any]) -> list[str]:
+    return [source for key in _SOURCES for source in str(layer.get(key, "")).split()]

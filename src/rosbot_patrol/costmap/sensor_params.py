@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from rosbot_patrol.params import param
 
+DEPTH_IMAGE = "DepthImage"
+
 _UNDER, _TOP = 0.02, 0.3
 
 
@@ -15,7 +17,7 @@ class SourceParams:
 
     topic: str = param("", doc="topic, the source's name where empty")
     sensor_frame: str = param("", doc="frame of the sensor, the message's where empty")
-    data_type: str = param("PointCloud", choices=("LaserScan", "PointCloud", "PointCloud2", "DepthImage"))
+    data_type: str = param("PointCloud", choices=("LaserScan", "PointCloud", "PointCloud2"))
     observation_persistence: float = param(0.0, unit="s", lo=0.0, doc="how long a scan is used again")
     expected_update_rate: float = param(0.0, unit="s", lo=0.0, doc="older input stops the robot; 0 is never")
     min_obstacle_height: float = param(0.0, unit="m")
@@ -33,12 +35,15 @@ class SourceParams:
 
 @dataclass(frozen=True, kw_only=True)
 class DepthSourceParams(SourceParams):
-    """A source of `data_type: DepthImage`, which is ours: what a depth camera sees of things that the lidar misses.
+    """One of `depth_sources`, which are ours: what a depth camera sees of things that the lidar misses.
+
+    They stand beside `observation_sources`, as upstream's layer ends move_base for a data_type that it does not know.
 
     Heights are above the floor, which lies at `floor_height` in the costmap's frame: odom and map lie where base_link
     does, on the ROSbot at the height of its axles.
     """
 
+    data_type: str = param(DEPTH_IMAGE, choices=(DEPTH_IMAGE,), doc="sensor_msgs/Image with 32FC1 or 16UC1")
     camera_info_topic: str = param("", doc="camera_info beside the topic where empty")
     min_obstacle_height: float = param(_UNDER, unit="m", doc="above the floor; lower is floor")
     max_obstacle_height: float = param(_TOP, unit="m", doc="above the floor; higher is no obstacle")

@@ -87,7 +87,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
             ("<costmap>/static_layer/", StaticParams),
             ("<costmap>/obstacle_layer/", ObstacleParams),
             ("<costmap>/obstacle_layer/<source>/", SourceParams),
-            ("<costmap>/obstacle_layer/<source of data_type DepthImage>/", DepthSourceParams),
+            ("<costmap>/obstacle_layer/<one of depth_sources>/", DepthSourceParams),
             ("<costmap>/inflation_layer/", InflationParams),
             ("<costmap>/<name of a VoxelLayer>/", VoxelParams),
             ("<costmap>/<name of a KeepoutLayer>/", KeepoutParams),

@@ -12,6 +12,7 @@ import yaml
 from rosbot_patrol.costmap.footprint import Footprint, read_footprint
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.params import read_costmap
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, SourceParams
 from rosbot_patrol.errors import ParamError
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -87,3 +88,46 @@ def test_footprint_radii_include_the_padding():
 
 def test_without_a_footprint_the_robot_is_round():
     assert Footprint.of("[]", robot_radius=0.3, padding=0.0).circumscribed_radius == pytest.approx(0.3)
+
+
+def low_layer(**values):
+    tree = {"plugins": [{"name": "low", "type": "costmap_2d::ObstacleLayer"}], "low": values}
+    (found,) = read_costmap(tree, name="/move_base/local_costmap/").layers
+    return found
+
+
+def test_depth_cameras_have_a_place_of_their_own(caplog):
+    found = low_layer(
+        depth_sources="a b", observation_sources="scan", a={"topic": "depth"}, scan={"data_type": "LaserScan"}
+    )
+    assert {name: type(source) for name, source in found.sources.items()} == {
+        "scan": SourceParams,
+        "a": DepthSourceParams,
+        "b": DepthSourceParams,
+    }
+    assert (found.sources["a"].topic, found.sources["b"].topic, found.sources["a"].data_type) == (
+        "depth",
+        "b",
+        "DepthImage",
+    )
+    assert not caplog.messages
+
+
+def test_the_old_place_of_a_depth_camera_still_works_and_warns(caplog):
+    found = low_layer(observation_sources="camera", camera={"data_type": "DepthImage", "floor_height": -0.04})
+    assert found.sources["camera"] == DepthSourceParams(topic="camera", floor_height=-0.04)
+    (said,) = caplog.messages
+    assert (
+        "/move_base/local_costmap/low/camera/data_type: move camera from observation_sources to depth_sources" in said
+    )
+
+
+def test_a_depth_camera_of_another_data_type_is_an_error():
+    with pytest.raises(ParamError, match=r"low/camera/data_type: is 'LaserScan', expected one of DepthImage"):
+        low_layer(depth_sources="camera", camera={"data_type": "LaserScan"})
+
+
+def test_depth_cameras_of_a_file_without_plugins():
+    tree = {"observation_sources": "scan", "scan": {"data_type": "LaserScan"}, "depth_sources": "camera", "camera": {}}
+    layers = {layer.name: layer for layer in read_costmap(tree).layers}
+    assert set(layers["obstacle_layer"].sources) == {"scan", "camera"}

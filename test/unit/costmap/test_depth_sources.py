@@ -58,7 +58,7 @@ def take(boxes, pose=None, *, noise=0.0, seed=1, pitch=0.0, nearest=0.4, farthes
 
 def params(**changes):
     values = {"obstacle_range": 2.5, "raytrace_range": 3.0, "floor_height": -AXLES, "clearing": True, **changes}
-    return DepthSourceParams(data_type="DepthImage", **values)
+    return DepthSourceParams(**values)
 
 
 def look(boxes, pose=None, *, noise=0.0, seed=1, pitch=0.0, stamp=0.0, **changes):
@@ -68,14 +68,14 @@ def look(boxes, pose=None, *, noise=0.0, seed=1, pitch=0.0, stamp=0.0, **changes
 
 def make(layers=None, **changes):
     """A costmap with a lidar's layer and one for the camera."""
-    depth = {"data_type": "DepthImage", "clearing": True, "floor_height": -AXLES, "obstacle_range": 2.5, **changes}
+    depth = {"clearing": True, "floor_height": -AXLES, "obstacle_range": 2.5, **changes}
     tree = {
         "plugins": [
             {"name": "lidar", "type": "costmap_2d::ObstacleLayer"},
             {"name": "low", "type": "costmap_2d::ObstacleLayer"},
         ],
         "lidar": {"observation_sources": "scan", "scan": {"data_type": "LaserScan", "clearing": True}},
-        "low": {"observation_sources": "depth", "depth": depth, **(layers or {})},
+        "low": {"depth_sources": "depth", "depth": depth, **(layers or {})},
         "rolling_window": True,
         "width": 6.0,
         "height": 6.0,
