@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from pathlib import Path
 
 import pytest
@@ -223,7 +224,7 @@ def test_a_house_brings_its_world_map_points_and_sensors(house: str, map_name: s
         (given["/patrolling_node/path_to_params"], "params", f"{points}.yaml"),
         (given["/house_markers/path_to_params"], "params", f"{points}.yaml"),
         (given["/demo_intruder/walks"], "config", f"{house}_demo.yaml"),
-        (Path(arguments), "maps", f"{map_name}.yaml"),
+        (Path(arguments.strip('"')), "maps", f"{map_name}.yaml"),
     ):
         assert (path.parent.name, path.name) == (folder, name)
         assert path.is_file()
@@ -236,7 +237,16 @@ def test_what_is_given_wins_over_the_house() -> None:
     assert given["/simulator/world"] == "/w"
     assert given["/simulator/motion_sensors"] == "/s"
     assert given["/patrolling_node/path_to_params"] == "/p"
-    assert next(node.args for node in config.nodes if node.name == "map_server") == "/m"
+    assert next(node.args for node in config.nodes if node.name == "map_server") == '"/m"'
+
+
+@pytest.mark.parametrize("launch", ["rosbot_patrol", "mark_rooms"])
+@pytest.mark.parametrize("robot", [False, True])
+def test_the_path_of_a_map_may_hold_blanks(launch: str, robot: bool) -> None:
+    """roslaunch splits a program's arguments as a shell does."""
+    nodes = parse(ROOT / "launch" / f"{launch}.launch", "map_file:=/home/you/my (new) house's.yaml", robot=robot).nodes
+    given = next(node.args for node in nodes if node.name == "map_server")
+    assert shlex.split(given) == ["/home/you/my (new) house's.yaml"]
 
 
 def test_rooms_are_marked_without_a_guard() -> None:
