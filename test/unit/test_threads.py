@@ -11,8 +11,8 @@ ROS = Path(__file__).parents[2] / "src" / "rosbot_patrol" / "ros"
 PLAIN = {
     "node.py": "ends the node on a signal",
     "greeting.py": "one a link; ends with it",
+    "by_hand.py": "asks the master before a tool is a node",
     "campaign_mail.py": "a server of the standard library in a program that is no node",
-    "incident_keeper.py": "",
 }
 
 
