@@ -13,6 +13,7 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 from rosbot_patrol.ros import simulator_messages as messages
 from rosbot_patrol.ros import simulator_outputs
 from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RateParams, is_due
+from rosbot_patrol.ros.simulator_pace import SharedClock
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.robot import load_robot
 from rosbot_patrol.simulation.scene import Body
@@ -29,8 +30,8 @@ class Wire:
     sent: dict[str, list[Any]] = {}
 
     def __init__(self, topic: str, *_: object, **__: object) -> None:
-        self.topic = topic
-        Wire.sent.setdefault(topic, [])
+        self.topic = simulator_outputs.rospy.resolve_name(topic)
+        Wire.sent.setdefault(self.topic, [])
 
     def get_num_connections(self) -> int:
         return int(self.topic in Wire.heard)
@@ -74,11 +75,13 @@ def casts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return counted
 
 
-def run(urdf: Path, seconds: float, *topics: str, rates: RateParams | None = None) -> Engine:
+def run(
+    urdf: Path, seconds: float, *topics: str, rates: RateParams | None = None, shared: SharedClock | None = None
+) -> Engine:
     engine = Engine(World(), make_renderer=CountingRenderer)  # type: ignore[arg-type]
     engine.spawn_robot(load_robot(urdf))
     Wire.heard = set(topics)
-    outputs = Outputs(engine, rates or RateParams())
+    outputs = Outputs(engine, rates or RateParams(), shared=shared)
     for tick in range(1, round(seconds / simulator_outputs.TICK) + 1):
         for _ in range(STEPS_PER_TICK):
             engine.step()
@@ -108,6 +111,17 @@ def test_one_listener_is_one_measurement_each(casts: list[int], topic: str, beam
     run(ROOT / "urdf" / "rosbot.urdf", 1.0, topic)
     assert (casts, CountingRenderer.renders) == (beams, renders)
     assert Wire.sent[topic]
+
+
+def test_with_a_clock_of_another_node_there_is_none_of_its_own_and_stamps_are_of_that(casts: list[int]) -> None:
+    shared = SharedClock(lambda: 500.0)
+    shared.restart(0.0)
+    run(ROOT / "urdf" / "rosbot.urdf", 1.0, "/scan", "/odom", "/rosbot/imu", "/battery", shared=shared)
+    assert "/clock" not in Wire.sent
+    for topic in ("/scan", "/odom", "/rosbot/imu", "/battery"):
+        stamps = [message.header.stamp.to_sec() for message in Wire.sent[topic]]
+        assert 500.0 < stamps[0] <= stamps[-1] <= 501.001, topic
+    assert Wire.sent["/tf"][-1].transforms[0].header.stamp.to_sec() == pytest.approx(501.0)
 
 
 def test_another_robot_speaks_of_its_own_frames(casts: list[int]) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
+from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace, SharedClock
 
 TICK = 0.01
 
@@ -138,3 +138,55 @@ def test_rate_0_waits_for_nothing():
     lap = Lap(0.0)
     lap.run(1.0)
     assert lap.now == 100.0
+
+
+class Told:
+    """A simulation that keeps to a clock which the test tells; a second of it takes `cost` seconds of that."""
+
+    def __init__(self, now: float, *, cost: float = 0.0) -> None:
+        self.now, self.sim, self._cost = now, 0.0, cost
+        self.clock = SharedClock(lambda: self.now)
+        self.clock.restart(self.sim)
+
+    def run(self, until: float) -> None:
+        """Let the clock run in steps of its own 10 ms."""
+        while self.now < until - 1e-9:
+            self.now = round(self.now + TICK, 4)
+            while self.clock.is_due(self.sim) and (not self._cost or self.now < until):
+                self.sim = round(self.sim + TICK, 4)
+                self.now = round(self.now + TICK * self._cost, 6)
+
+
+def test_a_simulation_keeps_to_the_clock_of_another_from_where_that_stands() -> None:
+    told = Told(500.0)
+    told.run(510.0)
+    assert told.sim + told.clock.ahead == pytest.approx(510.0, abs=2 * TICK)
+    assert told.sim == pytest.approx(10.0, abs=2 * TICK)
+
+
+def test_nothing_is_due_before_the_clock_has_begun_nor_while_it_stands() -> None:
+    told = Told(0.0)
+    assert not told.clock.is_due(told.sim)
+    told.now = 20.0
+    assert told.clock.is_due(told.sim)
+    told.run(25.0)
+    stood = told.sim
+    assert not told.clock.is_due(told.sim)
+    assert told.sim == stood
+
+
+def test_a_slow_simulation_falls_behind_says_how_far_and_never_jumps() -> None:
+    told = Told(100.0, cost=2.0)
+    told.run(110.0)
+    assert told.clock.ahead == 100.0
+    assert 0.0 <= told.clock.behind(told.sim) < 10.0
+    assert told.sim < 6.0
+
+
+def test_a_clock_that_begins_anew_is_followed_from_there() -> None:
+    told = Told(300.0)
+    told.run(310.0)
+    told.now = 2.0
+    told.run(5.0)
+    assert told.sim + told.clock.ahead == pytest.approx(5.0, abs=2 * TICK)
+    assert told.sim == pytest.approx(13.0, abs=3 * TICK)

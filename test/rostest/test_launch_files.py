@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
@@ -59,6 +61,13 @@ def check_programs(config: roslaunch.config.ROSLaunchConfig) -> None:
         found = roslib.packages.find_node(node.package, node.type)
         ours = node.package == "rosbot_patrol" or (ROOT / "drop_in" / node.package).is_dir()
         assert len(found) == 1 if ours else found, f"{node.package}/{node.type}: {found}"
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda p: p.name)
+def test_every_argument_is_documented(path: Path) -> None:
+    tree = ElementTree.parse(path)
+    missing = [tag.get("name") for tag in tree.getroot().findall("arg") if not tag.get("doc")]
+    assert missing == []
 
 
 @pytest.mark.parametrize("path", OURS + FORWARDED, ids=lambda p: f"{p.parts[-3]}/{p.name}")
@@ -254,3 +263,100 @@ def test_rooms_are_marked_without_a_guard() -> None:
     nodes = names(parse(ROOT / "launch" / "mark_rooms.launch", "map_file:=/m"))
     assert set(nodes) == {"map_server", "map_broadcaster", "rviz"}
     assert set(names(parse(ROOT / "launch" / "mark_rooms.launch", "rviz:=false"))) == {"map_server", "map_broadcaster"}
+
+
+# What guards of one master share, and why.
+SHARED = {
+    "/use_sim_time",  # rospy knows one clock
+    "/rosdistro",
+    "/rosversion",
+}
+MODES = {
+    "simulation": ("simulation:=true",),
+    "robot": ("simulation:=false",),
+    "tutorial": ("simulation:=true", "profile:=tutorial"),
+    "pc": ("simulation:=true", "detector:=pc"),
+}
+WITH_NS = ["rosbot_patrol", "demo", "scenario", "rosbot_patrol_pc", "rviz"]
+# Names that the tutorial's and darknet_ros's own files give from the root, and what stands for them in a namespace.
+FROM_THE_ROOT = {"/tf", "/tf_static", "/map", "/motion_trigger", "/rgb_raw", "/camera/rgb/image_raw", "/base_scan"}
+
+
+def strays(config: roslaunch.config.ROSLaunchConfig, inside: str) -> list[str]:
+    """What of a launch lies outside a namespace: nodes, parameters, remaps, topics in the arguments of nodes."""
+    found = [f"param {name}" for name in config.params if not name.startswith(inside) and name not in SHARED]
+    for node in config.nodes:
+        if not node.namespace.startswith(inside):
+            found.append(f"node {node.namespace}{node.name}")
+        found += [f"{node.name}: {word}" for word in re.findall(r"\S+:=/\S+", node.args or "")]
+        for name, to in node.remap_args:
+            is_known = name in FROM_THE_ROOT or name.startswith("/darknet_ros/")
+            if to.startswith("/") or (name.startswith("/") and not is_known):
+                found.append(f"{node.name}: remap from {name} to {to}")
+    return found
+
+
+def test_a_launch_outside_a_namespace_would_be_found() -> None:
+    found = strays(parse(ROOT / "launch" / "rosbot_patrol.launch"), "/robot1/")
+    assert "node /patrolling_node" in found
+    assert "param /patrolling_node/state_dir" in found
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("way", ["ns:=robot1", "__ns:=robot1"])
+def test_the_guard_lies_all_in_its_namespace(mode: str, way: str) -> None:
+    config = parse(ROOT / "launch" / "rosbot_patrol.launch", way, "rviz:=true", *MODES[mode])
+    assert strays(config, "/robot1/") == []
+    plain = parse(ROOT / "launch" / "rosbot_patrol.launch", "rviz:=true", *MODES[mode])
+    assert {(n.name, n.type) for n in config.nodes} == {(n.name, n.type) for n in plain.nodes}
+    values = {name.removeprefix("/robot1"): value.value for name, value in config.params.items()}
+    assert values == {name: value.value for name, value in plain.params.items()}
+
+
+@pytest.mark.parametrize("name", WITH_NS)
+def test_each_launch_file_with_ns_lies_in_it(name: str) -> None:
+    assert strays(parse(ROOT / "launch" / f"{name}.launch", "ns:=home/robot1"), "/home/robot1/") == []
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda p: p.name)
+def test_each_launch_file_can_be_pushed_into_a_namespace(path: Path) -> None:
+    config = parse(path, "__ns:=robot1")
+    assert strays(config, "/robot1/") == []
+    for node in config.nodes:
+        if node.type in ("static_transform_publisher", "robot_state_publisher", "amcl", "move_base", "slam_gmapping"):
+            assert ["/tf", "tf"] in node.remap_args, node.name
+
+
+def test_without_a_namespace_every_remap_leads_where_it_led() -> None:
+    config = parse(ROOT / "launch" / "rosbot_patrol.launch", "rviz:=true")
+    led = {
+        node.name: {name: "/" + to.lstrip("/") for name, to in node.remap_args if name.lstrip("/") != to.lstrip("/")}
+        for node in config.nodes
+    }
+    assert {name: remaps for name, remaps in led.items() if remaps} == {
+        "amcl": {"~cmd_vel": "/cmd_vel/amcl"},
+        "move_base": {"cmd_vel": "/cmd_vel/move_base"},
+        "twist_mux": {"cmd_vel_out": "/cmd_vel"},
+        "teleop_twist_keyboard": {"cmd_vel": "/cmd_vel/teleop"},
+        "patrolling_node": {"cmd_vel": "/cmd_vel/patrol"},
+    }
+    assert next(n.args for n in config.nodes if n.name == "rgb_compress").split() == [
+        "raw", "in:=camera/rgb/image_raw", "compressed", "out:=rgb_republish"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("launch", ["rosbot_patrol", "rosbot_patrol_pc", "esp_connector"])
+def test_bridges_take_three_ports_from_the_first(launch: str) -> None:
+    for words, first in (((), 11411), (("bridge_port:=11511",), 11511)):
+        given = {
+            name: value.value for name, value in parse(ROOT / "launch" / f"{launch}.launch", *words).params.items()
+        }
+        assert [given[f"/esp_client{k}/tcp_port"] for k in (1, 2, 3)] == [first, first + 1, first + 2]
+        assert given.get("/simulator/bridge_port", first) == first
+
+
+def test_a_second_simulation_keeps_to_the_clock_of_the_first() -> None:
+    for words, clock in (((), True), (("ns:=robot2", "clock:=false"), False)):
+        config = parse(ROOT / "launch" / "demo.launch", *words)
+        (value,) = [v.value for name, v in config.params.items() if name.endswith("/simulator/clock")]
+        assert value is clock

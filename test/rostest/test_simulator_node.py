@@ -1,5 +1,6 @@
 """simulator before a real master: topics and frames, driving, contacts, actors, sensors over TCP, pause, bad input."""
 
+import re
 import subprocess
 import sys
 import time
@@ -149,3 +150,49 @@ def test_it_ends_soon_on_an_interrupt(ros):
     began = time.monotonic()
     assert node.stop() == 0
     assert time.monotonic() - began < 5.0
+
+
+SECOND = ("__ns:=robot2", "__name:=simulator", "/tf:=tf", "/tf_static:=tf_static")
+
+
+def seconds(said, key="header"):
+    """A stamp as the probe prints it."""
+    text = said[key]
+    return int(re.search(r"secs: *(\d+)", text)[1]) + int(re.search(r"nsecs: *(\d+)", text)[1]) / 1e9
+
+
+def test_a_second_simulation_needs_a_namespace_and_keeps_to_the_clock_of_the_first(ros):
+    first = ros.node("simulator", URDF, WORLD, "_rate:=2.0")
+    first.says("motion sensors", 20.0)
+    refused = ros.node("simulator", URDF, WORLD, *SECOND)
+    refused.says("/clock: is published by /simulator already: give this simulation clock:=false", 20.0)
+    assert refused.popen.wait(10.0) == 1
+
+    probe = ros.probe()
+    probe.tell(subscribe=["/robot2/odom", "nav_msgs/Odometry"])
+    probe.tell(subscribe=["/odom", "nav_msgs/Odometry"])
+    probe.tell(advertise=["/robot2/cmd_vel", "geometry_msgs/Twist"])
+    second = ros.node("simulator", URDF, WORLD, "_clock:=false", *SECOND)
+    second.says("motion sensors", 20.0)
+    late = probe.expect(lambda s: s.get("topic") == "/robot2/odom", 20.0)
+    wait_for(lambda: len(probe.heard(topic="/robot2/odom")) > 20, 20.0, "the second one's odometry")
+    here, there = (seconds(probe.heard(topic=t)[-1]) for t in ("/odom", "/robot2/odom"))
+    assert abs(here - there) < 0.5
+    assert seconds(late) > 1.0  # the first one's time, not one that begins anew
+
+    def drives():
+        probe.tell(publish=["/robot2/cmd_vel", {"linear": {"x": 0.3}}])
+        return moved(probe, "/robot2/odom") > 0.2
+
+    wait_for(drives, 20.0, "the second robot's drive")
+    assert moved(probe, "/odom") < 0.02
+    listed = subprocess.run(["rosnode", "info", "/robot2/simulator"], env=ros.env, capture_output=True, text=True)
+    names = re.findall(r"^ \* (/\S+)", listed.stdout, re.MULTILINE)
+    assert "/robot2/scan" in names
+    assert {n for n in names if not n.startswith("/robot2/")} <= {"/clock", "/rosout", "/diagnostics"}
+
+
+def moved(probe, topic):
+    """How far a robot's odometry has gone [m]."""
+    x, y = re.search(r"x: (\S+)\s+y: (\S+)", probe.heard(topic=topic)[-1]["pose"]).groups()
+    return abs(float(x)) + abs(float(y))

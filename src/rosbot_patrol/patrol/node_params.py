@@ -25,12 +25,12 @@ from rosbot_patrol.patrol.watch import WatchParams
 class EyesTopics:
     """Where camera, depth and map are heard."""
 
-    camera_info_topic: str = param("/camera/rgb/camera_info", doc="lens of the camera that the detector looks through")
+    camera_info_topic: str = param("camera/rgb/camera_info", doc="lens of the camera that the detector looks through")
     depth_topic: str = param(
-        "/camera/depth/image_raw", doc="depth in m (32FC1) or mm (16UC1), for places and posters; empty: none"
+        "camera/depth/image_raw", doc="depth in m (32FC1) or mm (16UC1), for places and posters; empty: none"
     )
     depth_info_topic: str = param(
-        "/camera/depth/camera_info", doc="lens of the depth camera; silent: the colour camera's"
+        "camera/depth/camera_info", doc="lens of the depth camera; silent: the colour camera's"
     )
     depth_reach: float = param(
         4.5,
@@ -59,7 +59,7 @@ class InputParams:
         2.0, unit="s", lo=0.1, doc="maximum age of map -> odom, which amcl repeats with each scan; older: no pose"
     )
     scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="an older scan says nothing of obstacles")
-    battery_topic: str = param("/battery", doc="state of the battery (TurtleBot3: battery_state)")
+    battery_topic: str = param("battery", doc="state of the battery (TurtleBot3: battery_state)")
     latched_window: float = param(
         10.0, unit="s", lo=0.0, doc="so long after its start a latched trigger that it had before is not taken again"
     )
@@ -72,7 +72,7 @@ class NodeParams(BehaviourParams, SightParams):
     path_to_params: str = param(doc="points file (the tutorial's name)")
     sensors: str = param("", doc="file of the sensors; empty or none: a sensor's id is the number of its room")
     state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
-    image_topic: str = param("/camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
+    image_topic: str = param("camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
     rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
     sensor_watch_after: float = param(
         20.0, unit="s", lo=6.0, doc="a sensor_watch that was there and says nothing for so long has gone, or hangs"

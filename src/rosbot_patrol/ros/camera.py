@@ -58,7 +58,8 @@ class Camera:
     ) -> None:
         self._kind = Image if transport == "raw" else CompressedImage
         self._transport = transport
-        self._topic = rospy.resolve_name(topic if transport == "raw" else f"{topic}/{transport}")
+        base = rospy.resolve_name(topic)  # a remap is of the base name, as in image_transport
+        self._topic = base if transport == "raw" else f"{base}/{transport}"
         self._lock = threading.Lock()
         self._newest: Image | CompressedImage | None = None
         self._last_stamp = rospy.Time(0)

@@ -104,7 +104,7 @@ class DarknetNode:
         self._window = self._open_window()
         self._advertise()
         self._standby = Standby(_private(params.publishers.object_detector.topic), params.standby_after, self._health)
-        self._action = CheckForObjects(_private(params.actions.camera_reading.topic), self._notify)
+        self._action = CheckForObjects(rospy.resolve_name(_private(params.actions.camera_reading.topic)), self._notify)
         self._camera = Camera(
             _private(params.subscribers.camera_reading.topic),
             transport=params.image_transport,

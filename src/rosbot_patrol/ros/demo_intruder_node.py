@@ -35,7 +35,7 @@ class DemoParams:
     room: int = param(5, lo=0, doc="room that the intruder walks into")
     delay: float = param(3.0, unit="s", lo=0.0, doc="time on guard before they come")
     look: str = param("", doc="name of the intruder's look, empty: drawn from the simulator's seed")
-    simulator: str = param("/simulator", doc="node name of the simulator")
+    simulator: str = param("simulator", doc="node name of the simulator")
 
 
 def read_walk(path: Path, room: int) -> WalkParams:
@@ -63,7 +63,7 @@ def _wait_until_on_guard() -> None:
         if state.state == PatrolState.IDLE:
             on_guard.set()
 
-    subscriber = rospy.Subscriber("/patrol/state", PatrolState, look, queue_size=1)
+    subscriber = rospy.Subscriber("patrol/state", PatrolState, look, queue_size=1)
     if not is_launched():
         require_publisher(subscriber, "patrol_robot")
     while not rospy.is_shutdown() and not on_guard.wait(0.2):

@@ -53,7 +53,7 @@ class DepthRing:
     """The last depth pictures, listened to only while somebody wants them."""
 
     def __init__(self, topic: str, info_topic: str, health: Health) -> None:
-        self._topic, self._health = topic, health
+        self._topic, self._health = rospy.resolve_name(topic) if topic else "", health
         self._lens = Lenses(info_topic if topic else "")
         self._lock = threading.Lock()
         self._ring: deque[Image] = deque(maxlen=6)

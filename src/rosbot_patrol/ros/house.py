@@ -130,7 +130,7 @@ class House:
         launch: package and file for roslaunch.
         plain: give the launch file no argument but those named here.
         before: command that starts roslaunch, as one that enters another host.
-        arguments: arguments of the launch file.
+        arguments: arguments of the launch file; `ns` is where its topics are looked for.
     """
 
     def __init__(
@@ -163,7 +163,8 @@ class House:
         self.pose_stamp = 0.0
         self.contacts: list[tuple[str, str]] = []
         self._mission: Mission | None = None
-        self._trigger = rospy.Publisher("/motion_trigger", EspTrigger, queue_size=5)
+        self._inside = f"/{arguments['ns']}/" if arguments.get("ns") else "/"
+        self._trigger = rospy.Publisher(self.name("motion_trigger"), EspTrigger, queue_size=5)
 
     def __enter__(self) -> House:
         self.start()
@@ -171,6 +172,10 @@ class House:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
+
+    def name(self, relative: str) -> str:
+        """A topic or service of this house as seen from the root."""
+        return self._inside + relative
 
     def start(self, environment: Mapping[str, str] | None = None) -> None:
         """Launch it; does not wait."""
@@ -186,10 +191,10 @@ class House:
             )
         self.started = time.monotonic()
         self._subscribers = [
-            rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=50),
-            rospy.Subscriber("/patrol/alerts", Alert, self._on_alert, queue_size=50),
-            rospy.Subscriber("/ground_truth/odom", Odometry, self._on_truth, queue_size=50),
-            rospy.Subscriber("/ground_truth/contacts", Contacts, self._on_contacts, queue_size=50),
+            rospy.Subscriber(self.name("patrol/state"), PatrolState, self._on_state, queue_size=50),
+            rospy.Subscriber(self.name("patrol/alerts"), Alert, self._on_alert, queue_size=50),
+            rospy.Subscriber(self.name("ground_truth/odom"), Odometry, self._on_truth, queue_size=50),
+            rospy.Subscriber(self.name("ground_truth/contacts"), Contacts, self._on_contacts, queue_size=50),
         ]
 
     def stop(self) -> None:
@@ -203,7 +208,7 @@ class House:
         with contextlib.suppress(rosnode.ROSNodeIOException, OSError):
             rosnode.cleanup_master_blacklist(
                 rosgraph.Master("/house"),
-                [n for n in rosnode.get_node_names() if "house_watch" not in n and n != "/rosout"],
+                [n for n in rosnode.get_node_names(self._inside) if "house_watch" not in n and n != "/rosout"],
             )
 
     def kill(self) -> None:
@@ -256,7 +261,9 @@ class House:
 
     def trigger(self, room: int, move: bool = True) -> None:
         """Publish a motion trigger as `rostopic pub` does."""
-        self.wait(lambda: self._trigger.get_num_connections() > 0, 10.0, "a subscriber of /motion_trigger")
+        self.wait(
+            lambda: self._trigger.get_num_connections() > 0, 10.0, f"a subscriber of {self.name('motion_trigger')}"
+        )
         self._trigger.publish(EspTrigger(id=room, move=move))
 
     def spawn(
@@ -271,8 +278,8 @@ class House:
         posture: str = "",
     ) -> None:
         """Place an actor."""
-        rospy.wait_for_service("/simulator/spawn_actor", 10.0)
-        answer = rospy.ServiceProxy("/simulator/spawn_actor", SpawnActor)(
+        rospy.wait_for_service(self.name("simulator/spawn_actor"), 10.0)
+        answer = rospy.ServiceProxy(self.name("simulator/spawn_actor"), SpawnActor)(
             name, model, look, posture, Pose2DMsg(x, y, yaw)
         )
         if not answer.success:
@@ -281,13 +288,15 @@ class House:
     def walk(self, name: str, points: list[tuple[float, float]], speed: float = 0.8, loop: bool = False) -> None:
         """Let an actor walk."""
         path = [Pose2DMsg(x, y, 0.0) for x, y in points]
-        answer = rospy.ServiceProxy("/simulator/move_actor", MoveActor)(name=name, path=path, speed=speed, loop=loop)
+        answer = rospy.ServiceProxy(self.name("simulator/move_actor"), MoveActor)(
+            name=name, path=path, speed=speed, loop=loop
+        )
         if not answer.success:
             raise HouseError(answer.message)
 
     def remove(self, name: str) -> None:
         """Take an actor away."""
-        answer = rospy.ServiceProxy("/simulator/remove_actor", RemoveActor)(name)
+        answer = rospy.ServiceProxy(self.name("simulator/remove_actor"), RemoveActor)(name)
         if not answer.success:
             raise HouseError(answer.message)
 

@@ -115,7 +115,7 @@ class IncidentKeeper:
             running: ids of missions that go on from before the program's start; other open records are closed.
         """
         self._running = tuple(running)
-        rospy.Subscriber("/map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 23)
+        rospy.Subscriber("map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 23)
         Worker(self._run, name="incidents").start()
 
     # -- what the patrol hands over; returns at once
@@ -311,7 +311,7 @@ class IncidentKeeper:
 
     def _on_map(self, message: GridMsg) -> None:  # type: ignore[valid-type]
         try:
-            self._map = crop_map(convert.grid_from_msg(message, "/map"))
+            self._map = crop_map(convert.grid_from_msg(message, rospy.resolve_name("map")))
         except MapError as err:
             log.error("the map cannot be drawn: %s", err)
 

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from rosgraph.names import get_ros_namespace
+
 from rosbot_patrol.alerts.incident import NO_ROOM, VERDICTS, Incident, Place, clock_text, incident_to_plain
 from rosbot_patrol.alerts.incident_database import errors_of
 from rosbot_patrol.alerts.incident_files import REPORT
@@ -30,8 +32,8 @@ from rosbot_patrol.alerts.retention import RetentionParams, prune
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import write_atomic
-from rosbot_patrol.ros.node import ros_home
 from rosbot_patrol.ros.private_files import use_private_umask
+from rosbot_patrol.ros.state_folder import state_folder
 
 _UNITS = {"m": 60.0, "h": 3600.0, "d": 86_400.0, "w": 604_800.0}
 _ALL = 1_000_000_000
@@ -41,9 +43,11 @@ _FLAGS = ("--json", "--all", "--no-files", "-h", "--help")  # options without a 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command."""
-    given = _parser().parse_args(_command_first(list(sys.argv[1:] if arguments is None else arguments)))
+    if arguments is None:
+        arguments = [word for word in sys.argv[1:] if not word.startswith("__")]
+    given = _parser().parse_args(_command_first(list(arguments)))
     use_private_umask()
-    state_dir = (given.state_dir or ros_home() / "rosbot_patrol").expanduser()
+    state_dir = state_folder(given.state_dir, get_ros_namespace())
     try:
         IncidentStore(state_dir, read_only=True).close_database()  # no command makes one where there is none
         with IncidentStore(state_dir, wall=time.time(), read_only=given.command != "prune") as store:

@@ -71,9 +71,9 @@ class _Markers:
         self._wrong: dict[int, ColorRGBA] = {}
         self._lock = threading.Lock()
         self._publisher = rospy.Publisher("~markers", MarkerArray, queue_size=1, latch=True)
-        rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=1)
-        rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=20)
-        rospy.Subscriber("/sensors/states", SensorStates, self._on_sensors, queue_size=1)
+        rospy.Subscriber("patrol/state", PatrolState, self._on_state, queue_size=1)
+        rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=20)
+        rospy.Subscriber("sensors/states", SensorStates, self._on_sensors, queue_size=1)
 
     def _on_state(self, state: PatrolState) -> None:
         with self._lock:

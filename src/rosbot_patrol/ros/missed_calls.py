@@ -44,7 +44,7 @@ class MissedCalls:
     def start(self) -> None:
         """Begin to listen, where there was a gap."""
         if self._vigil.has_gap:
-            self._subscriber = rospy.Subscriber("/sensors/states", SensorStates, self._on_states, queue_size=5)
+            self._subscriber = rospy.Subscriber("sensors/states", SensorStates, self._on_states, queue_size=5)
 
     def step(self) -> None:
         """Give signs of life; stop listening after a while."""

@@ -42,7 +42,7 @@ class NarratorParams:
     time_limit: float = param(0.0, unit="s", lo=0.0, doc="exit status 4 after this time; 0: none")
     summary_file: str = param("", doc="JSON file for all that was seen; empty: none")
     scenario: str = param("", doc="file of the scenario that is played; empty: none")
-    simulator: str = param("/simulator", doc="node name of the simulator that plays it")
+    simulator: str = param("simulator", doc="node name of the simulator that plays it")
     on_guard_hint: str = param("", doc="line printed when the patrol is on guard for the first time")
 
 
@@ -59,9 +59,9 @@ class NarratorNode:
         file = self.params.scenario
         self._scenario = ScenarioWatch(file, self.params.simulator, self._tell) if file else None
         self._subscribers = [
-            rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100),
-            rospy.Subscriber("/patrol/state", PatrolState, self._on_state, queue_size=100),
-            rospy.Subscriber("/patrol/alerts", Alert, self._on_alert, queue_size=100),
+            rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=100),
+            rospy.Subscriber("patrol/state", PatrolState, self._on_state, queue_size=100),
+            rospy.Subscriber("patrol/alerts", Alert, self._on_alert, queue_size=100),
         ]
 
     def run(self) -> int:

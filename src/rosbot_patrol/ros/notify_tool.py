@@ -21,6 +21,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from rosgraph.names import get_ros_namespace
+
 from rosbot_patrol.alerts.channel import Channel
 from rosbot_patrol.alerts.channels import MailParams, Surroundings, load_channels, make_channels
 from rosbot_patrol.alerts.outbox import Outbox
@@ -30,7 +32,9 @@ from rosbot_patrol.alerts.trial import trial_notice, try_channel
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import unknown_name
+from rosbot_patrol.ros.node import ros_home
 from rosbot_patrol.ros.private_files import use_private_umask
+from rosbot_patrol.ros.state_folder import state_folder
 
 FLUSH_WAIT = 90.0  # [s] for the node that delivers
 
@@ -50,9 +54,8 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Do what is asked; returns the exit status. Raises ParamError, OSError."""
     options = _parse(arguments)
-    home = Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
-    folder = (Path(options.state_dir).expanduser() if options.state_dir else home / "rosbot_patrol") / "outbox"
-    around = Surroundings(home=home, environ=os.environ, host=socket.gethostname())
+    folder = state_folder(options.state_dir, get_ros_namespace()) / "outbox"
+    around = Surroundings(home=ros_home(), environ=os.environ, host=socket.gethostname())
     if options.list:
         return show(folder)
     channels = _channels(options, folder, around)

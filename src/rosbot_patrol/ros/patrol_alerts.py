@@ -69,7 +69,7 @@ class AlertDesk:
         self._to_record = threading.Event()
         self._told: dict[str, Incident] = {}
         self._telling = threading.Lock()
-        self._publisher = rospy.Publisher("/patrol/alerts", Alert, queue_size=10)
+        self._publisher = rospy.Publisher("patrol/alerts", Alert, queue_size=10)
 
     def start(self) -> None:
         """Begin to work."""

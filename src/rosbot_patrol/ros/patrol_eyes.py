@@ -87,7 +87,7 @@ class PatrolEyes:
         self._has_map = threading.Event()
         self.house: RoomRegions | None = None
         Worker(self._part_maps, name="rooms").start()
-        rospy.Subscriber("/map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 24)
+        rospy.Subscriber("map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 24)
 
     # -- frames
 
@@ -207,7 +207,7 @@ class PatrolEyes:
 
     def _part(self, message: OccupancyGrid) -> None:
         try:
-            house = part_rooms(floor_of(convert.grid_from_msg(message, rospy.resolve_name("/map"))), self._rooms)
+            house = part_rooms(floor_of(convert.grid_from_msg(message, rospy.resolve_name("map"))), self._rooms)
         except MapError as err:
             self._refuse(err)
             return

@@ -111,11 +111,11 @@ class PatrolInputs:
 
     def start(self) -> None:
         """Begin to listen."""
-        rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=100, tcp_nodelay=True)
-        rospy.Subscriber("/sensors/events", SensorEvent, self._on_sensor_event, queue_size=100)
-        rospy.Subscriber("/darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes, queue_size=10)
-        rospy.Subscriber("/darknet_ros/found_object", ObjectCount, self._on_count, queue_size=10)
-        rospy.Subscriber("/scan", LaserScanMsg, self._on_scan, queue_size=1, buff_size=1 << 18)
+        rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=100, tcp_nodelay=True)
+        rospy.Subscriber("sensors/events", SensorEvent, self._on_sensor_event, queue_size=100)
+        rospy.Subscriber("darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes, queue_size=10)
+        rospy.Subscriber("darknet_ros/found_object", ObjectCount, self._on_count, queue_size=10)
+        rospy.Subscriber("scan", LaserScanMsg, self._on_scan, queue_size=1, buff_size=1 << 18)
         rospy.Subscriber(self.params.battery_topic, BatteryState, self._on_battery, queue_size=1)
 
     # -- callbacks store

@@ -33,7 +33,7 @@ class Neighbour:
 
     def start(self) -> None:
         """Begin to listen."""
-        rospy.Subscriber("/sensors/states", SensorStates, self._on_states, queue_size=2)
+        rospy.Subscriber("sensors/states", SensorStates, self._on_states, queue_size=2)
 
     def _on_states(self, _: SensorStates) -> None:
         self._absence.heard(time.monotonic())

@@ -51,7 +51,7 @@ from rosbot_patrol.patrol.store import PatrolStore
 from rosbot_patrol.ros.diagnostics import Health
 from rosbot_patrol.ros.incident_keeper import IncidentKeeper, RecordParams
 from rosbot_patrol.ros.missed_calls import MissedCalls
-from rosbot_patrol.ros.node import Loop, now, ros_home, run_node
+from rosbot_patrol.ros.node import Loop, now, run_node
 from rosbot_patrol.ros.owner_mail import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.patrol_actions import PatrolActions
 from rosbot_patrol.ros.patrol_alerts import AlertDesk
@@ -71,6 +71,7 @@ from rosbot_patrol.ros.patrol_settings import (
 )
 from rosbot_patrol.ros.people_markers import PeopleMarkers
 from rosbot_patrol.ros.private_files import keep_private
+from rosbot_patrol.ros.state_folder import claim_folder, state_folder
 from rosbot_patrol.ros.transforms import Transforms
 from rosbot_patrol.sensors.sensor_file import load_sensors
 
@@ -90,8 +91,9 @@ class PatrolNode:
         rooms = load_rooms(Path(self.params.path_to_params).expanduser())
         names = {room.id: room.name for room in rooms}
         self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
-        folder = Path(self.params.state_dir).expanduser() if self.params.state_dir else ros_home() / "rosbot_patrol"
+        folder = state_folder(self.params.state_dir, rospy.get_namespace())
         keep_private(folder)
+        claim_folder(folder, rospy.get_name() + "/state_dir")
         self.health = Health()
         evidence = load_flat(EvidenceParams, tree)
         self.pictures = PictureRing(self.params.image_topic, evidence)

@@ -52,9 +52,9 @@ class StopSwitch:
         self._write_later = write_later
         self._lock = threading.Lock()
         self._told = float("-inf")
-        self._topic = rospy.Publisher("/e_stop", Bool, queue_size=5, latch=True)
-        rospy.Subscriber("/e_stop", Bool, self._on_topic, queue_size=10, tcp_nodelay=True)
-        rospy.Service("/patrol/emergency_stop", SetBool, self._on_service)
+        self._topic = rospy.Publisher("e_stop", Bool, queue_size=5, latch=True)
+        rospy.Subscriber("e_stop", Bool, self._on_topic, queue_size=10, tcp_nodelay=True)
+        rospy.Service("patrol/emergency_stop", SetBool, self._on_service)
 
     @property
     def why(self) -> str:
@@ -125,8 +125,8 @@ class ArmingDesk:
         self._arming, self._path, self._write_later = arming, path, write_later
         self._lock = threading.Lock()
         self._told: Guarded | None = None
-        self._publisher = rospy.Publisher("/patrol/arming", ArmingMsg, queue_size=5, latch=True)
-        rospy.Service("/patrol/arm", Arm, self._on_service)
+        self._publisher = rospy.Publisher("patrol/arming", ArmingMsg, queue_size=5, latch=True)
+        rospy.Service("patrol/arm", Arm, self._on_service)
 
     def step(self, calls: dict[str, int]) -> Guarded:
         """What is guarded; `calls` are the rooms of missions, by id, that sensors called for."""
@@ -177,9 +177,9 @@ class Orders:
 
     def __init__(self, manager: PatrolManager, rooms: Rooms, stepping: threading.Lock) -> None:
         self._manager, self._rooms, self._stepping = manager, rooms, stepping
-        rospy.Service("/patrol/cancel", Trigger, self._cancel)
-        rospy.Service("/patrol/home", Trigger, self._home)
-        rospy.Service("/patrol/all", Trigger, self._all)
+        rospy.Service("patrol/cancel", Trigger, self._cancel)
+        rospy.Service("patrol/home", Trigger, self._home)
+        rospy.Service("patrol/all", Trigger, self._all)
 
     def _cancel(self, _: TriggerRequest) -> TriggerResponse:
         with self._stepping:

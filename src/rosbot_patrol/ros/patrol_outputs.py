@@ -24,7 +24,7 @@ class Wheels:
     """/cmd_vel while the patrol turns; another's, else."""
 
     def __init__(self) -> None:
-        self.publisher = rospy.Publisher("/cmd_vel", Twist, queue_size=1)
+        self.publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         self._turning = False
 
     def turn(self, speed: float | None) -> None:
@@ -47,7 +47,7 @@ class Pulse:
 
     def __init__(self) -> None:
         self._at = -math.inf
-        self._publisher = rospy.Publisher("/patrol/alive", Empty, queue_size=2)
+        self._publisher = rospy.Publisher("patrol/alive", Empty, queue_size=2)
 
     def step(self) -> None:
         """Call it in each step."""
@@ -67,7 +67,7 @@ class StatePublisher:
     def __init__(self, health: Health) -> None:
         self._health = health
         self._report: Report | None = None
-        self._publisher = rospy.Publisher("/patrol/state", PatrolState, queue_size=10, latch=True)
+        self._publisher = rospy.Publisher("patrol/state", PatrolState, queue_size=10, latch=True)
 
     def publish(self, time_now: float, report: Report, mission: Mission | None) -> None:
         """Tell a state that is new.

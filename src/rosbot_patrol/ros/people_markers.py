@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from rosbot_patrol.patrol.people import Person
 
-TOPIC = "/patrol/people"
+TOPIC = "patrol/people"
 _RED, _DARK = ColorRGBA(0.9, 0.1, 0.1, 0.9), ColorRGBA(0.4, 0.0, 0.0, 1.0)
 
 

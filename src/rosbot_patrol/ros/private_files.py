@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 UMASK = 0o077
 _FOLDERS = ("outbox", "sensor_outbox", "held", "incidents")
-_FILES = ("*.json*", "*.jsonl*", "incidents.*", "alive*", ".*.tmp")
+_FILES = ("*.json*", "*.jsonl*", "incidents.*", "alive*", "*.lock", ".*.tmp")
 _MAILDIR = ("cur", "new", "tmp")
 
 

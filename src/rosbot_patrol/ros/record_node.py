@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import rosgraph
+from rosgraph.names import get_ros_namespace, ns_join, resolve_name
 
 from rosbot_patrol.ros.by_hand import master_problem
 from rosbot_patrol.ros.private_files import UMASK
@@ -33,12 +34,15 @@ DID = (
     "/amcl_pose", "/amcl/health", "/move_base/goal", "/move_base/status", "/move_base/result", "/move_base/cancel",
     "/cmd_vel", "/cmd_vel/move_base", "/cmd_vel/patrol", "/patrol/state", "/patrol/alerts", "/diagnostics",
 )  # fmt: skip
+SHARED = ("/clock", "/diagnostics")  # by all guards of one master
 LEAST_FREE = 500  # [MB] on the disk to begin with
 
 
-def topics(also: Sequence[str] = (), *, camera: bool = True) -> list[str]:
-    """What is recorded."""
-    return [*HEARD, *(CAMERA if camera else ()), *DID, *also]
+def topics(also: Sequence[str] = (), *, camera: bool = True, namespace: str = "/") -> list[str]:
+    """What is recorded of the guard in a namespace; names given by hand count as ROS resolves them there."""
+    own = [*HEARD, *(CAMERA if camera else ()), *DID]
+    inside = [name if name in SHARED else namespace.rstrip("/") + name for name in own]
+    return [*inside, *(resolve_name(name, ns_join(namespace, "record")) for name in also)]
 
 
 def command(file: Path, wanted: Sequence[str], *, duration: float = 0.0) -> list[str]:
@@ -79,7 +83,7 @@ def record(given: argparse.Namespace) -> int:
     if problem:
         print(f"record: {problem}", file=sys.stderr)
         return 2
-    wanted = topics(given.also, camera=not given.no_camera)
+    wanted = topics(given.also, camera=not given.no_camera, namespace=get_ros_namespace())
     published = {name for name, _ in rosgraph.Master("/record").getPublishedTopics("/")}
     missing = [name for name in wanted if name not in published]
     if missing:

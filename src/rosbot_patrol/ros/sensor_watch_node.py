@@ -30,11 +30,12 @@ from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.ros.diagnostics import Health
-from rosbot_patrol.ros.node import Worker, load_params, ros_home, run_node, sender_of
+from rosbot_patrol.ros.node import Worker, load_params, run_node, sender_of
 from rosbot_patrol.ros.owner_mail import RETRY, OwnerPost, refuse_passwords
 from rosbot_patrol.ros.private_files import keep_private
 from rosbot_patrol.ros.sensor_reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.ros.serial_links import links_from_msg
+from rosbot_patrol.ros.state_folder import state_folder
 from rosbot_patrol.sensors.looks import Looks
 from rosbot_patrol.sensors.notices import Notice, Notices
 from rosbot_patrol.sensors.problems import SERIOUS
@@ -89,7 +90,7 @@ class SensorWatch:
         refuse_passwords(tree)
         params = load_group(SensorWatchParams, tree)
         sensors = load_list(params)
-        folder = Path(params.state_dir).expanduser() if params.state_dir else ros_home() / "rosbot_patrol"
+        folder = state_folder(params.state_dir, rospy.get_namespace())
         keep_private(folder)
         self._memory = folder / "sensors.json"
         self._health = Health("motion sensors")
@@ -109,12 +110,12 @@ class SensorWatch:
         self._triggers: deque[tuple[int, bool, str, float]] = deque(maxlen=MAX_WAITING)
         self._links: deque[tuple[SensorLinks, float, float]] = deque(maxlen=1000)
         self._patrol: deque[tuple[str, float]] = deque(maxlen=10)
-        self._states = rospy.Publisher("/sensors/states", SensorStates, queue_size=5, latch=True)
-        self._events = rospy.Publisher("/sensors/events", SensorEvent, queue_size=100)
+        self._states = rospy.Publisher("sensors/states", SensorStates, queue_size=5, latch=True)
+        self._events = rospy.Publisher("sensors/events", SensorEvent, queue_size=100)
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
-        rospy.Subscriber("/motion_trigger", EspTrigger, self._on_trigger, queue_size=1000)
-        rospy.Subscriber("/patrol/alive", Empty, self._on_patrol, queue_size=10)
-        rospy.Subscriber("/sensors/links", SensorLinks, self._on_links, queue_size=100)
+        rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=1000)
+        rospy.Subscriber("patrol/alive", Empty, self._on_patrol, queue_size=10)
+        rospy.Subscriber("sensors/links", SensorLinks, self._on_links, queue_size=100)
         self._post.start()
         Worker(self._work, name="watch").start()
         rospy.spin()

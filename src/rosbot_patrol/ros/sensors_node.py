@@ -70,9 +70,10 @@ def main() -> None:
 
     require_master("sensors", status=2)
     rospy.init_node("sensors", anonymous=True)
-    rospy.Subscriber("/sensors/states", SensorStates, show, queue_size=1)
+    rospy.Subscriber("sensors/states", SensorStates, show, queue_size=1)
     if not came.wait(arguments.wait):
-        print(f"nothing on /sensors/states within {arguments.wait:g} s: is sensor_watch running?", file=sys.stderr)
+        topic = rospy.resolve_name("sensors/states")
+        print(f"nothing on {topic} within {arguments.wait:g} s: is sensor_watch running?", file=sys.stderr)
     elif arguments.follow:
         rospy.spin()
     sys.stdout.flush()

@@ -29,7 +29,7 @@ class LinkTeller:
         self._is_started = False
         # in simulated time a device's clock goes at another pace, which is no fault of it
         self._compares_clocks = not rospy.get_param("/use_sim_time", False)
-        self._publisher = rospy.Publisher("/sensors/links", SensorLinks, queue_size=5)
+        self._publisher = rospy.Publisher("sensors/links", SensorLinks, queue_size=5)
 
     def start(self) -> None:
         """Begin to publish; a bridge on which no sensor is expected does so with the first that it hears."""

@@ -67,7 +67,7 @@ class FaultServices:
             client.set_link(_quality(self._engine.faults.link(sensor), self._seed + sensor))
         active = self._engine.faults.active
         message = DiagnosticArray(status=[_status(fault, began) for fault, began in active])
-        message.header.stamp = rospy.Time.from_sec(self._engine.now)
+        message.header.stamp = rospy.Time.now()
         self._topic.publish(message)
         names = [str(fault) for fault, _ in active]
         values = {fault.name: f"since {began:.2f} s" for fault, began in active}

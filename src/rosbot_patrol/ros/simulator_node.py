@@ -29,16 +29,17 @@ from rosbot_patrol.params import param
 from rosbot_patrol.ros.convert import twist_from_msg
 from rosbot_patrol.ros.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.inputs import Latest
-from rosbot_patrol.ros.node import load_params, run_node
+from rosbot_patrol.ros.node import load_params, now, run_node
 from rosbot_patrol.ros.packages import model_folders, package_finder
 from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.simulator_doors import DoorServices
 from rosbot_patrol.ros.simulator_faults import FaultServices
-from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, Outputs, RateParams
-from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace
+from rosbot_patrol.ros.simulator_outputs import STEPS_PER_TICK, TICK, Outputs, RateParams
+from rosbot_patrol.ros.simulator_pace import Lockstep, LockstepParams, Pace, SharedClock, refuse_second_clock
 from rosbot_patrol.ros.simulator_requests import Requests
 from rosbot_patrol.ros.simulator_scenario import ScenarioRunner
 from rosbot_patrol.rosserial.keys import read_keys
+from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.renderer import make_renderer
@@ -54,6 +55,8 @@ log = logging.getLogger(__name__)
 
 _HEALTH_PERIOD = 1.0
 _PAUSED_PERIOD = 0.05
+_FOLLOW_PERIOD = 0.002  # between looks at a clock of 100 Hz [s]
+_BEHIND = 0.5  # what is farther behind the clock is late for the nodes that listen [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +78,10 @@ class SimulatorParams(EngineParams):
     motion_sensors: str = param("", doc="file of the motion sensors, empty: none")
     prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
     bridge_host: str = param("localhost", doc="where the bridge of the motion sensors runs")
+    bridge_port: int = param(
+        DEFAULT_TCP_PORT, lo=1, hi=65535, doc="TCP port of the first bridge, which is 11411 in the sensors' file"
+    )
+    clock: bool = param(True, doc="publish /clock; false: keep to the time that another node tells")
     key_file: str = param(
         "", doc="keys by which the motion sensors prove themselves to a bridge that asks; empty: none"
     )
@@ -109,13 +116,22 @@ class Simulator:
         self._tick = 0
         self._command: Latest[Twist] = Latest()
         self._pace = Pace(p.rate)
-        self._outputs = Outputs(self._engine, p.rates, exact_odometry=p.odometry == "ground_truth")
+        self._shared = None if p.clock else SharedClock(now)
+        if self._shared is None:
+            refuse_second_clock()
+        self._outputs = Outputs(
+            self._engine,
+            p.rates,
+            exact_odometry=p.odometry == "ground_truth",
+            shared=self._shared,
+        )
         self._requests = Requests(self._engine, self._set_paused, self._step_ticks)
         self._lockstep = Lockstep(p.lockstep, lambda: self._engine.now)
-        if p.rate == 0.0:
+        if p.rate == 0.0 and p.clock:
             self._lockstep.subscribe()
         keys = read_keys(p.key_file) if p.key_file else {}
-        self._clients = {s.id: EspClient(p.bridge_host, s.port, s.id, key=keys.get(s.id)) for s in places}
+        shift = p.bridge_port - DEFAULT_TCP_PORT
+        self._clients = {s.id: EspClient(p.bridge_host, s.port + shift, s.id, key=keys.get(s.id)) for s in places}
         self._scenario = None
         if scenario is not None:
             self._scenario = ScenarioRunner(scenario, self._engine, self._clients, is_watched=p.scenario_watched)
@@ -126,21 +142,23 @@ class Simulator:
         self._report_world(world)
         self._doors = DoorServices(self._engine, self._requests.ask)
         self._faults = FaultServices(self._engine, self._clients, self._requests.ask, self._health, p.seed)
-        rospy.Subscriber("/cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
         log.info("world '%s': bodies: %d, motion sensors: %d", world.name, len(world.bodies), len(places))
 
     def run(self) -> None:
         """Simulate until shutdown."""
         if self._engine.has_robot:
             self._engine.warm_up()
-        self._pace.restart(self._engine.now)
+        self._restart_pace()
         report_at, report_sim = time.monotonic(), self._engine.now
         while not rospy.is_shutdown():
             self._requests.serve()
             if self._paused:
                 self._faults.follow()
                 time.sleep(_PAUSED_PERIOD)
-                self._pace.restart(self._engine.now)
+                self._restart_pace()
+            elif self._shared is not None:
+                self._follow(self._shared)
             else:
                 self._advance()
                 self._lockstep.wait()
@@ -158,6 +176,18 @@ class Simulator:
         for client in self._clients.values():
             client.stop(0.0)
         self._engine.close()
+
+    def _restart_pace(self) -> None:
+        self._pace.restart(self._engine.now)
+        if self._shared is not None:
+            self._shared.restart(self._engine.now)
+
+    def _follow(self, shared: SharedClock) -> None:
+        """Advance once the shared clock has come so far."""
+        if shared.is_due(self._engine.now + TICK):
+            self._advance()
+        else:
+            time.sleep(_FOLLOW_PERIOD)
 
     def _advance(self) -> None:
         command = self._command.take()
@@ -192,6 +222,9 @@ class Simulator:
     def _report(self, factor: float) -> None:
         slow = self._params.rate > 0.0 and factor < 0.9 * self._params.rate and not self._paused
         text = f"paused at {self._engine.now:.1f} s" if self._paused else f"{factor:.2f} x real time"
+        if self._shared is not None and not self._paused:
+            behind = self._shared.behind(self._engine.now)
+            slow, text = behind > _BEHIND, f"{text}, {max(behind, 0.0):.2f} s behind /clock"
         values = {
             "real-time factor": f"{factor:.2f}",
             "simulated time": f"{self._engine.now:.1f}",
@@ -199,7 +232,7 @@ class Simulator:
             "motion sensors linked": sum(c.connected for c in self._clients.values()),
         }
         self._health.set("", WARN if slow else OK, text, values)
-        if self._params.rate == 0.0:
+        if self._params.rate == 0.0 and self._shared is None:
             self._report_lockstep()
 
     def _report_lockstep(self) -> None:
@@ -235,10 +268,11 @@ def _open_window(engine: Engine) -> Window:
 def _description(p: SimulatorParams) -> RobotDescription:
     if p.urdf:
         return load_robot(p.urdf, package_finder(p.model_path))
-    text = rospy.get_param("/robot_description", "")
+    name = rospy.search_param("robot_description") or rospy.resolve_name("robot_description")
+    text = rospy.get_param(name, "")
     if not text:
-        raise WorldError("/robot_description", "is missing: give the robot's URDF there, or a file in ~urdf")
-    return parse_robot(text, source="/robot_description", find_package=package_finder(p.model_path))
+        raise WorldError(name, "is missing: give the robot's URDF there, or a file in ~urdf")
+    return parse_robot(text, source=name, find_package=package_finder(p.model_path))
 
 
 def main() -> None:

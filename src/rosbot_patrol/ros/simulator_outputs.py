@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -17,6 +17,7 @@ from rosbot_patrol.msg import Contacts
 from rosbot_patrol.params import param
 from rosbot_patrol.ros import simulator_messages as messages
 from rosbot_patrol.ros.convert import scan_to_msg, time_to_msg, transform_to_msg
+from rosbot_patrol.ros.simulator_pace import SharedClock
 from rosbot_patrol.simulation.engine import STEP, Engine
 
 TICK = 0.01  # of /clock [s]
@@ -47,32 +48,40 @@ class Outputs:
         engine: what is simulated.
         rates: how often.
         exact_odometry: /odom tells the truth, as Gazebo's does.
+        shared: the time that another node tells; None: /clock is published.
     """
 
-    def __init__(self, engine: Engine, rates: RateParams, *, exact_odometry: bool = False) -> None:
-        self._engine = engine
+    def __init__(
+        self,
+        engine: Engine,
+        rates: RateParams,
+        *,
+        exact_odometry: bool = False,
+        shared: SharedClock | None = None,
+    ) -> None:
+        self._engine, self._shared = engine, shared
         self._exact = exact_odometry
         self._odom_start: Pose2D | None = None
         self._touching = False
         publisher = rospy.Publisher
-        self._clock = publisher("/clock", Clock, queue_size=1)
-        self._odom = publisher("/odom", Odometry, queue_size=1)
+        self._clock = publisher("/clock", Clock, queue_size=1) if shared is None else None
+        self._odom = publisher("odom", Odometry, queue_size=1)
         self._tf = publisher("/tf", TFMessage, queue_size=20)
-        self._scan = publisher("/scan", LaserScan, queue_size=1)
-        self._imu = publisher("/rosbot/imu", Imu, queue_size=1)
+        self._scan = publisher("scan", LaserScan, queue_size=1)
+        self._imu = publisher("rosbot/imu", Imu, queue_size=1)
         self._ranges: dict[str, rospy.Publisher] = {}
         for frame in [m.frame for m in engine.description.ranges] if engine.has_robot else _RANGE_FRAMES:
             self._range_publisher(frame)
-        self._joints = publisher("/joint_states", JointState, queue_size=1)
-        self._battery = publisher("/battery", BatteryState, queue_size=1)
-        self._truth = publisher("/ground_truth/odom", Odometry, queue_size=1)
-        self._contacts = publisher("/ground_truth/contacts", Contacts, queue_size=10)
-        self._actors = publisher("/ground_truth/actors", TFMessage, queue_size=10)
-        self._rgb = publisher("/camera/rgb/image_raw", Image, queue_size=1)
-        self._rgb_info = publisher("/camera/rgb/camera_info", CameraInfo, queue_size=1)
-        self._depth = publisher("/camera/depth/image_raw", Image, queue_size=1)
-        self._depth_info = publisher("/camera/depth/camera_info", CameraInfo, queue_size=1)
-        self._cloud = publisher("/camera/depth/points", PointCloud2, queue_size=1)
+        self._joints = publisher("joint_states", JointState, queue_size=1)
+        self._battery = publisher("battery", BatteryState, queue_size=1)
+        self._truth = publisher("ground_truth/odom", Odometry, queue_size=1)
+        self._contacts = publisher("ground_truth/contacts", Contacts, queue_size=10)
+        self._actors = publisher("ground_truth/actors", TFMessage, queue_size=10)
+        self._rgb = publisher("camera/rgb/image_raw", Image, queue_size=1)
+        self._rgb_info = publisher("camera/rgb/camera_info", CameraInfo, queue_size=1)
+        self._depth = publisher("camera/depth/image_raw", Image, queue_size=1)
+        self._depth_info = publisher("camera/depth/camera_info", CameraInfo, queue_size=1)
+        self._cloud = publisher("camera/depth/points", PointCloud2, queue_size=1)
         self._due: list[tuple[float, int, Callable[[float], None]]] = [
             (rates.odometry, 0, self._send_odometry),
             (rates.ground_truth, 0, self._send_truth),
@@ -94,8 +103,9 @@ class Outputs:
                 raise
 
     def _publish(self, tick: int) -> None:
-        now = self._engine.now
-        self._clock.publish(Clock(time_to_msg(now)))
+        now = self._engine.now + (self._shared.ahead if self._shared else 0.0)
+        if self._clock is not None:
+            self._clock.publish(Clock(time_to_msg(now)))
         if not self._engine.has_robot:
             return
         self._send_contacts(now)
@@ -145,7 +155,7 @@ class Outputs:
         if self._engine.faults.is_silent("lidar"):
             return
         lidar = self._engine.params.lidar
-        message = scan_to_msg(self._engine.scan())
+        message = scan_to_msg(replace(self._engine.scan(), stamp=now))
         message.scan_time = lidar.sweep_time
         message.time_increment = lidar.sweep_time / lidar.samples
         self._scan.publish(message)
@@ -169,7 +179,7 @@ class Outputs:
 
     def _range_publisher(self, frame: str) -> rospy.Publisher:
         if frame not in self._ranges:
-            topic = f"/range/{frame.removeprefix('range_')}"
+            topic = f"range/{frame.removeprefix('range_')}"
             self._ranges[frame] = rospy.Publisher(topic, Range, queue_size=1)
         return self._ranges[frame]
 

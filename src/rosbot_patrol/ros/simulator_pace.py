@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import logging
+import socket
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from urllib.parse import urlparse
 
+import rosgraph
 import rospy
 from tf2_msgs.msg import TFMessage
 
+from rosbot_patrol.errors import WorldError
 from rosbot_patrol.params import param
 from rosbot_patrol.ros.node import sender_of
 
@@ -17,9 +21,11 @@ log = logging.getLogger(__name__)
 
 _BEHIND = 0.25  # what the clock has lost beyond this is not caught up [s]
 _CATCHING_UP = 1.5  # how much faster than its rate it may run to catch up; it never jumps
+_SET_BACK = 1.0  # a clock that falls back this far has begun anew [s]
 _REPORT = 10.0
 _TF = "tf:"
 _LOOK = 0.0005
+_PATIENCE = 2.0  # [s] wall time for a node to answer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +76,55 @@ class Pace:
             self._sleep(max(due, earliest) - now)
             now = max(due, earliest)
         self._last_wall, self._last_sim = now, sim
+
+
+class SharedClock:
+    """Keeps a simulation to ROS's time, which another node tells on /clock (or the wall, without /use_sim_time).
+
+    Args:
+        now: ROS time [s], 0 before it is known.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._is_set = False
+        self.ahead = 0.0  # ROS time minus simulated time [s]
+
+    def restart(self, sim: float) -> None:
+        """Begin anew at a simulated time."""
+        now = self._now()
+        self._is_set, self.ahead = now > 0.0, round(now - sim, 2)
+
+    def is_due(self, sim: float) -> bool:
+        """Whether ROS's time has reached a simulated time; a clock that was set back begins anew."""
+        if not self._is_set or self.behind(sim) < -_SET_BACK:
+            self.restart(sim)
+        return self._is_set and self.behind(sim) >= 0.0
+
+    def behind(self, sim: float) -> float:
+        """How far a simulated time lies behind ROS's [s]."""
+        return self._now() - (sim + self.ahead)
+
+
+def refuse_second_clock() -> None:
+    """Raise WorldError where another node publishes /clock: two clocks make time jump for every node."""
+    own, master = rospy.get_name(), rosgraph.Master(rospy.get_name())
+    published, _, _ = master.getSystemState()
+    tellers = {node for topic, nodes in published if topic == "/clock" for node in nodes}
+    for node in sorted(tellers - {own}):
+        if _answers(master.lookupNode(node)):
+            problem = f"is published by {node} already: give this simulation clock:=false, it then keeps to that time"
+            raise WorldError("/clock", problem)
+
+
+def _answers(uri: str) -> bool:
+    """Whether a node's port is open; the master keeps the names of nodes that were killed."""
+    place = urlparse(uri)
+    try:
+        socket.create_connection((place.hostname, place.port), _PATIENCE).close()
+    except OSError:
+        return False
+    return True
 
 
 class Lockstep:

@@ -67,9 +67,9 @@ class Requests:
         rospy.Service("~set_pose", SetPose, self._set_pose)
         rospy.Service("~remove_robot", Trigger, self._remove_robot)
         for name in ("reset_simulation", "reset_world"):
-            rospy.Service(f"/gazebo/{name}", Empty, lambda _: self._empty(self._engine.reset))
-        rospy.Service("/gazebo/pause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(True)))
-        rospy.Service("/gazebo/unpause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(False)))
+            rospy.Service(f"gazebo/{name}", Empty, lambda _: self._empty(self._engine.reset))
+        rospy.Service("gazebo/pause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(True)))
+        rospy.Service("gazebo/unpause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(False)))
 
     def serve(self) -> None:
         """Do what has been asked for."""

@@ -47,7 +47,7 @@ class ScenarioRunner:
         self._told = rospy.Publisher("~scenario", String, queue_size=100, latch=True)
         self._is_played = False
         self._player = ScenarioPlayer(scenario, engine, lambda sensor: clients[sensor].trigger(), self._tell)
-        rospy.Subscriber("/patrol/state", PatrolState, self._note, queue_size=50)
+        rospy.Subscriber("patrol/state", PatrolState, self._note, queue_size=50)
 
     @property
     def waiting(self) -> tuple[str, ...]:

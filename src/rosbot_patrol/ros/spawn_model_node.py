@@ -20,7 +20,7 @@ from rosbot_patrol.ros.by_hand import PATIENCE, NobodyThere, is_launched
 from rosbot_patrol.ros.node import run_node
 from rosbot_patrol.srv import SpawnRobot
 
-SERVICES = ("/gazebo/spawn_robot", "/simulator/spawn_robot")
+SERVICES = ("gazebo/spawn_robot", "simulator/spawn_robot", "/gazebo/spawn_robot")
 
 
 def _parse(argv: list[str]) -> tuple[argparse.Namespace, list[str]]:
@@ -46,8 +46,8 @@ def _description(options: argparse.Namespace) -> str:
 
 
 def _service() -> str:
-    """The running simulator's service, wherever it is named (gazebo, simulator)."""
-    for name in SERVICES:
+    """The running simulator's service, wherever it is named: in this namespace, or Gazebo's for all robots."""
+    for name in map(rospy.resolve_name, SERVICES):
         try:
             rospy.wait_for_service(name, timeout=PATIENCE / len(SERVICES))
         except rospy.ROSException:

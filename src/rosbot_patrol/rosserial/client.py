@@ -193,7 +193,10 @@ def listen(port: int, host: str = "") -> socket.socket:
 
 def _why_not(port: int, problem: OSError | None) -> str:
     if problem is not None and problem.errno == errno.EADDRINUSE:
-        return f"TCP port {port} is already taken by another program (a second serial_node?); choose another ~tcp_port"
+        return (
+            f"TCP port {port} is already taken by another program (a second serial_node?); choose another ~tcp_port"
+            " (bridge_port of the launch files)"
+        )
     return f"TCP port {port} cannot be opened: {problem}"
 
 
