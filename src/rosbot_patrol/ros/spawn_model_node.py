@@ -66,7 +66,8 @@ def main() -> None:
         urdf = _description(options)
         service = _service()
         if not service and not is_launched():
-            raise NobodyThere(f"neither {' nor '.join(SERVICES)} is offered: is the simulator running?")
+            names = " nor ".join(map(rospy.resolve_name, SERVICES))
+            raise NobodyThere(f"neither {names} is offered: is the simulator running?")
         while not service and not rospy.is_shutdown():
             rospy.loginfo_throttle(5.0, "spawn_model waits for the simulator")
             service = _service()
