@@ -28,7 +28,7 @@ _WORDS = {
 
 
 class EmergencyStop:
-    """Whether the robot has to stand still.
+    """Whether the robot has to stand still; any thread may ask while another presses or releases.
 
     Args:
         path: where that is kept; a file that cannot be read holds the robot.
@@ -36,7 +36,7 @@ class EmergencyStop:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._held: set[str] = self._read()
+        self._held = self._read()  # replaced as a whole: who asks sees what was held before or after a press
         self._unsaved = False
         if self._held:
             log.warning("%s, before the program ended", self.why)
@@ -49,19 +49,18 @@ class EmergencyStop:
     @property
     def why(self) -> str:
         """Who holds it, "" where nobody does."""
-        return _WORDS[min(self._held, key=list(_WORDS).index)] if self._held else ""
+        held = self._held
+        return _WORDS[min(held, key=list(_WORDS).index)] if held else ""
 
     def press(self, pressed: bool, source: str) -> bool:
         """Press (or release); whether `is_held` has changed. It holds at once, `save` makes it last."""
-        was, before = self.is_held, set(self._held)
+        before = self._held
         if pressed:
-            self._held.add(source)
-        elif source == SERVICE:
-            self._held.clear()
+            self._held = before | {source}
         else:
-            self._held.discard(source)
+            self._held = frozenset() if source == SERVICE else before - {source}
         self._unsaved |= self._held != before
-        return self.is_held != was
+        return bool(self._held) != bool(before)
 
     def save(self) -> None:
         """Bring it to the disk where it changed. Raises OSError."""
@@ -69,19 +68,19 @@ class EmergencyStop:
             write_atomic(self._path, json.dumps({"held_by": sorted(self._held)}).encode())
             self._unsaved = False
 
-    def _read(self) -> set[str]:
+    def _read(self) -> frozenset[str]:
         try:
             tree = json.loads(self._path.read_bytes())
         except (FileNotFoundError, NotADirectoryError):  # no such file: it was never pressed
-            return set()
+            return frozenset()
         except (OSError, ValueError, RecursionError) as err:
             return self._doubt(str(err))
         if tree == {"held_by": []}:
-            return set()
+            return frozenset()
         held = tree.get("held_by") if isinstance(tree, dict) else None
-        known = {name for name in held if name in (SERVICE, TOPIC)} if isinstance(held, list) else set()
+        known = frozenset(name for name in held if name in (SERVICE, TOPIC)) if isinstance(held, list) else frozenset()
         return known if tree == {"held_by": sorted(known)} else known | self._doubt("it is no list of who pressed")
 
-    def _doubt(self, problem: str) -> set[str]:
+    def _doubt(self, problem: str) -> frozenset[str]:
         log.error("%s cannot be read (%s): the robot stands still until the stop is released", self._path, problem)
-        return {_FILE}
+        return frozenset({_FILE})

@@ -83,7 +83,8 @@ class PatrolInputs:
         self.eyes, self.transforms = eyes, transforms
         self.params, self._rooms, self._sensors, self._store, self._wake = params, rooms, sensors, store, wake
         self._journal = journal
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # of the calls; the step wants it, so nobody holds it over the disk
+        self._writing = threading.Lock()  # of the journal
         self._calls: deque[_Call] = deque()
         self._on_disk: frozenset[int] = frozenset()
         self._served: frozenset[int] = frozenset()
@@ -148,11 +149,14 @@ class PatrolInputs:
         return room
 
     def _call(self, room: int, sender: str) -> None:
-        with self._lock:
-            number = 0 if self._is_covered(room) else self._write_down(room)
-            self._calls.append(_Call(room, sender, number))
-            while len(self._calls) > 1000:
-                self._calls.popleft()
+        with self._writing:
+            with self._lock:
+                is_covered = self._is_covered(room)
+            number = 0 if is_covered else self._write_down(room)
+            with self._lock:
+                self._calls.append(_Call(room, sender, number))
+                while len(self._calls) > 1000:
+                    self._calls.popleft()
         self._wake()
 
     def _is_covered(self, room: int) -> bool:
@@ -263,7 +267,7 @@ class PatrolInputs:
     def note_saved(self, served: frozenset[int], taken: int) -> None:
         """The same of the memory that is on disk now, which knows the journal up to `taken`."""
         self._on_disk = served
-        with self._lock:
+        with self._writing:
             self._journal.drop(taken)
 
     def _pose(self, time_now: float) -> Pose2D | None:

@@ -1,9 +1,11 @@
 """The emergency stop is held until those who pressed it, or the service, release it; over restarts."""
 
 import logging
+import threading
 
 import pytest
 
+from rosbot_patrol.patrol import emergency
 from rosbot_patrol.patrol.emergency import SERVICE, TOPIC, EmergencyStop
 
 
@@ -129,3 +131,40 @@ def test_a_damaged_name_keeps_what_can_be_read(tmp_path):
     path = tmp_path / "stop.json"
     path.write_bytes(b'{"held_by": ["servicd", "topic"]}')
     assert "topic" in EmergencyStop(path).why
+
+
+def test_who_asks_why_while_another_releases_gets_an_answer(tmp_path, monkeypatch):
+    """What is released between the question and the answer, as another thread may do it."""
+    stop = EmergencyStop(tmp_path / "stop.json")
+    stop.press(True, SERVICE)
+
+    class Words(dict):
+        def __iter__(self):
+            stop.press(False, SERVICE)
+            return super().__iter__()
+
+    monkeypatch.setattr(emergency, "_WORDS", Words(emergency._WORDS))
+    assert "service" in stop.why
+    assert not stop.is_held
+    assert stop.why == ""
+
+
+def test_two_threads_press_and_ask(tmp_path):
+    stop, errors, is_over = EmergencyStop(tmp_path / "stop.json"), [], threading.Event()
+
+    def ask():
+        while not is_over.is_set():
+            try:
+                assert stop.why in ("", emergency._WORDS[SERVICE], emergency._WORDS[TOPIC])
+            except Exception as err:
+                errors.append(err)
+                return
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    for _ in range(3000):
+        for pressed, source in ((True, TOPIC), (True, SERVICE), (False, TOPIC), (False, SERVICE)):
+            stop.press(pressed, source)
+    is_over.set()
+    asking.join()
+    assert errors == []
