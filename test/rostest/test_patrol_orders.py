@@ -57,6 +57,14 @@ def test_action_services_and_arming(house):
     assert not refused.accepted
     assert "the mode 'party' is not known here" in refused.message
     assert call("/patrol/arm", Arm, "disarmed").accepted
+    assert "the mode is disarmed now, it was armed_away; ordered by /patrol_test on this machine" in house.log(
+        house.patrol
+    )
+    wait_until(lambda: any(mail["Subject"] == "rosbot patrol: disarmed" for mail in house.mails()), 20, "the mail")
+    (mail,) = [mail for mail in house.mails() if mail["Subject"] == "rosbot patrol: disarmed"]
+    plain = next(part for part in mail.walk() if part.get_content_type() == "text/plain").get_payload(decode=True)
+    said = "Ordered by /patrol_test on this machine, by the service /patrol/arm, 20"
+    assert said in " ".join(plain.decode().split())
     wait_until(lambda: modes and modes[-1].mode == "disarmed", 20, "the mode")
     house.send(1)
     wait_until(lambda: "the house is disarmed" in house.log(house.patrol), 20, "the word")

@@ -6,6 +6,7 @@
 - Disarming ends at once what sensors and rounds called for.
 - A mode is kept over restarts. A fresh install is armed_away, without delays, so that the first patrol mails.
 - A clock that is set cannot make a delay longer than it is.
+- `armed` means armed_away.
 """
 
 from __future__ import annotations
@@ -20,17 +21,15 @@ from typing import Any
 
 from rosbot_patrol import params
 from rosbot_patrol.files import write_atomic
-from rosbot_patrol.params import param, unknown_name
+from rosbot_patrol.params import param
 from rosbot_patrol.patrol.inputs import Guarded
+from rosbot_patrol.patrol.modes import DISARMED, MODES, parse_mode, unknown_mode
 from rosbot_patrol.patrol.room_choice import choose_rooms
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.wall_times import Window, parse_window, parse_zone
 from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)
-
-DISARMED = "disarmed"
-MODES = ("armed_away", "armed_home", "night", DISARMED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,18 +132,19 @@ class Arming:
             until = memory.get(name)
             setattr(self, f"_{name}", float(until) if isinstance(until, (int, float)) else None)
 
-    def arm(self, mode: str, wall: float) -> tuple[bool, str]:
+    def arm(self, name: str, wall: float) -> tuple[bool, str]:
         """Change the mode.
 
         Args:
-            mode: one of MODES.
+            name: of the mode, as people type it.
             wall: seconds since 1970.
 
         Returns:
             Whether it was taken, and one sentence.
         """
-        if mode not in MODES:
-            return False, f"the mode {unknown_name(mode, MODES)}; the mode stays {self.mode}"
+        mode = parse_mode(name)
+        if mode is None:
+            return False, f"the mode {unknown_mode(name)}; the mode stays {self.mode}"
         was, self.mode = self.mode, mode
         self._entry_until = None
         delay = self._rules.modes[mode].exit_delay if mode != DISARMED else 0.0
@@ -208,6 +208,6 @@ def read_memory(path: Path) -> Mapping[str, Any]:
         return {}
 
 
-def write_memory(path: Path, arming: Arming) -> None:
-    """Keep the mode. Raises OSError."""
-    write_atomic(path, json.dumps(arming.snapshot(), indent=1).encode())
+def write_memory(path: Path, memory: Mapping[str, Any]) -> None:
+    """Keep what `snapshot` gave. Raises OSError."""
+    write_atomic(path, json.dumps(memory, indent=1).encode())

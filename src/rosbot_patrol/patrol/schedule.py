@@ -23,8 +23,8 @@ from typing import Any
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.params import param, unknown_name
-from rosbot_patrol.patrol.arming import DISARMED, MODES
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.modes import DISARMED, MODES, parse_mode, unknown_mode
 from rosbot_patrol.patrol.room_choice import choose_rooms
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.wall_times import local, moment, parse_days, parse_time, parse_zone
@@ -97,15 +97,20 @@ def load_schedule(path: str, rooms: Rooms) -> tuple[tuple[Round, ...], tzinfo | 
     return rounds, parse_zone(file.time_zone, f"{prefix}time_zone")
 
 
+def _mode(name: str, where: str) -> str:
+    mode = parse_mode(name)
+    if mode is None:
+        raise ParamError(where, unknown_mode(name))
+    return mode
+
+
 def _round(item: Any, prefix: str, rooms: Rooms) -> Round:
     spec = params.load_strict(RoundSpec, item, name=prefix)
     if bool(spec.at) == bool(spec.every):
         raise ParamError(f"{prefix}at", "expected either times of day (at) or an interval (every)")
     if 0.0 < spec.every < 60.0:
         raise ParamError(f"{prefix}every", f"is {spec.every:g}, expected at least 60 s")
-    for i, mode in enumerate(spec.modes):
-        if mode not in MODES:
-            raise ParamError(f"{prefix}modes[{i}]", unknown_name(mode, MODES))
+    modes = frozenset(_mode(name, f"{prefix}modes[{i}]") for i, name in enumerate(spec.modes))
     chosen = choose_rooms(spec.rooms, rooms, f"{prefix}rooms")
     return Round(
         name=spec.name,
@@ -113,7 +118,7 @@ def _round(item: Any, prefix: str, rooms: Rooms) -> Round:
         minutes=tuple(sorted({parse_time(value, f"{prefix}at[{i}]") for i, value in enumerate(spec.at)})),
         days=parse_days(spec.days, f"{prefix}days"),
         every=spec.every,
-        modes=frozenset(spec.modes) or GUARDING,
+        modes=modes or GUARDING,
         skips_missed=spec.missed == "skip",
     )
 

@@ -159,7 +159,8 @@ class PatrolNode:
         stop = EmergencyStop(folder / "stop.json")
         self._stop_switch = StopSwitch(stop, self.move_base, self._wheels.publisher, self.desk.write_later)
         kept = folder / "arming.json"
-        self._arming = ArmingDesk(Arming(self.rules, read_memory(kept)), kept, self.desk.write_later)
+        memory = Arming(self.rules, read_memory(kept))
+        self._arming = ArmingDesk(memory, kept, self._tell_owner, self.desk.write_later)
         self._orders = Orders(self.manager, rooms, self._stepping)
         self._actions = PatrolActions(self.manager, rooms)
 
@@ -233,6 +234,9 @@ class PatrolNode:
             for entry in due
             for room in entry.rooms
         )
+
+    def _tell_owner(self, word: Word) -> None:
+        self.desk.follow(Commands(words=(word,)))
 
     def _note_sighting(self, stamp: float, boxes: Sequence[Box]) -> None:
         alarms = [box for box in boxes if box.label in self.params.alarm_classes]

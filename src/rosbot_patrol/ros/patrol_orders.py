@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -15,13 +16,16 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, Trig
 
 from rosbot_patrol.msg import Arming as ArmingMsg
 from rosbot_patrol.patrol.arming import Arming, write_memory
+from rosbot_patrol.patrol.commands import Word
 from rosbot_patrol.patrol.emergency import SERVICE, TOPIC, EmergencyStop
 from rosbot_patrol.patrol.inputs import Guarded
 from rosbot_patrol.patrol.manager import PatrolManager
+from rosbot_patrol.patrol.modes import DISARMED
 from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.schedule import all_rooms
 from rosbot_patrol.ros import convert
+from rosbot_patrol.ros.node import CallerService, caller_of
 from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.srv import Arm, ArmRequest, ArmResponse
 
@@ -118,15 +122,24 @@ class ArmingDesk:
     Args:
         arming: the mode.
         path: where it is kept.
+        tell: takes a word for the owner, from any thread; returns at once.
         write_later: takes what the disk did not, and tries it until it does.
     """
 
-    def __init__(self, arming: Arming, path: Path, write_later: Callable[[Callable[[], None]], None]) -> None:
-        self._arming, self._path, self._write_later = arming, path, write_later
-        self._lock = threading.Lock()
+    def __init__(
+        self,
+        arming: Arming,
+        path: Path,
+        tell: Callable[[Word], None],
+        write_later: Callable[[Callable[[], None]], None],
+    ) -> None:
+        self._arming, self._path, self._tell, self._write_later = arming, path, tell, write_later
+        self._lock = threading.Lock()  # of the mode; the step wants it, so nobody holds it over the disk
+        self._keeping = threading.Lock()  # of the file: one change after the other
         self._told: Guarded | None = None
+        log.log(logging.WARNING if arming.mode == DISARMED else logging.INFO, "the mode is %s", arming.mode)
         self._publisher = rospy.Publisher("patrol/arming", ArmingMsg, queue_size=5, latch=True)
-        rospy.Service("patrol/arm", Arm, self._on_service)
+        CallerService("patrol/arm", Arm, self._on_service)
 
     def step(self, calls: dict[str, int]) -> Guarded:
         """What is guarded; `calls` are the rooms of missions, by id, that sensors called for."""
@@ -140,21 +153,34 @@ class ArmingDesk:
         return guarded
 
     def _on_service(self, request: ArmRequest) -> ArmResponse:
-        with self._lock:
-            accepted, text = self._arming.arm(request.mode.strip(), time.time())
-            (log.info if accepted else log.error)("arming: %s", text)
-            if accepted:
-                try:
-                    write_memory(self._path, self._arming)
-                except OSError as err:
-                    log.error("the mode cannot be kept: %s; trying on", err)
-                    self._write_later(self._save)
-                    text += NOTED + str(err)
-        return ArmResponse(accepted=accepted, message=text)
+        """Change the mode at once; it is on disk before the answer."""
+        caller, wall = caller_of(request), time.time()
+        with self._keeping:
+            with self._lock:
+                before = self._arming.snapshot()
+                accepted, text = self._arming.arm(request.mode, wall)
+                memory = self._arming.snapshot()
+            (log.warning if accepted else log.error)("arming: %s; ordered by %s (service /patrol/arm)", text, caller)
+            if accepted and memory != before:
+                self._tell(changed_word(self._arming.mode, text, caller, wall))
+            problem = self._keep(memory) if accepted else ""
+        return ArmResponse(accepted=accepted, message=text + (NOTED + problem if problem else ""))
+
+    def _keep(self, memory: Mapping[str, Any]) -> str:
+        """Bring the mode to the disk; what was wrong with that."""
+        try:
+            write_memory(self._path, memory)
+        except OSError as err:
+            log.error("the mode cannot be kept: %s; trying on", err)
+            self._write_later(self._save)
+            return str(err)
+        return ""
 
     def _save(self) -> None:
-        with self._lock:
-            write_memory(self._path, self._arming)
+        with self._keeping:
+            with self._lock:
+                memory = self._arming.snapshot()
+            write_memory(self._path, memory)
 
     def _publish(self, guarded: Guarded, wall: float) -> None:
         message = ArmingMsg(mode=guarded.mode, all_rooms=guarded.rooms is None, quiet=guarded.is_quiet)
@@ -164,6 +190,13 @@ class ArmingDesk:
         message.entry_delay = max(guarded.holds_until - wall, 0.0) if guarded.holds_until else 0.0
         message.why = guarded.why or f"the mode {guarded.mode} holds"
         self._publisher.publish(message)
+
+
+def changed_word(mode: str, text: str, caller: str, wall: float) -> Word:
+    """What the owner is told of another mode: what, who, from where, when."""
+    when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(wall))
+    kind = "disarmed" if mode == DISARMED else f"armed ({mode})"
+    return Word(kind=kind, text=f"{text}. Ordered by {caller}, by the service /patrol/arm, {when}")
 
 
 class Orders:

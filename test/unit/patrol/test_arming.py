@@ -91,7 +91,7 @@ def test_the_mode_is_kept_over_restarts(tmp_path):
     arming = Arming(RULES, read_memory(path))
     arming.arm("disarmed", 0.0)
     arming.arm("armed_away", 100.0)
-    write_memory(path, arming)
+    write_memory(path, arming.snapshot())
     again = Arming(RULES, read_memory(path))
     assert again.mode == "armed_away"
     assert not again.step(120.0).counts(1)
