@@ -71,7 +71,9 @@ class NodeParams(BehaviourParams, SightParams):
 
     path_to_params: str = param(doc="points file (the tutorial's name)")
     sensors: str = param("", doc="file of the sensors; empty or none: a sensor's id is the number of its room")
-    state_dir: str = param("", doc="folder of outbox, incidents and queue; empty: rosbot_patrol in ROS's home")
+    state_dir: str = param(
+        "", doc="folder of outbox, incidents and queue; empty: rosbot_patrol(-NAMESPACE) in ROS's home"
+    )
     image_topic: str = param("camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
     rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
     sensor_watch_after: float = param(

@@ -61,7 +61,9 @@ class SensorWatchParams:
         "", doc="file of the sensors; empty or none: each room's sensor has the room's number as its id"
     )
     motion_sensors: str = param("", doc="the simulator's file, to hold `sensors` against; empty: none")
-    state_dir: str = param("", doc="folder of notices that wait, as the patrol's; empty: rosbot_patrol in ROS's home")
+    state_dir: str = param(
+        "", doc="folder of notices that wait, as the patrol's; empty: rosbot_patrol(-NAMESPACE) in ROS's home"
+    )
 
 
 GROUPS = (SensorWatchParams, WatchTimes, NoticeTimes, LookTimes, MailParams)

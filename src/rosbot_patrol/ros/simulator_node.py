@@ -23,7 +23,7 @@ import rospy
 from geometry_msgs.msg import Twist
 
 from rosbot_patrol.counts import count_of
-from rosbot_patrol.errors import WorldError
+from rosbot_patrol.errors import ParamError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.params import param
 from rosbot_patrol.ros.convert import twist_from_msg
@@ -42,6 +42,7 @@ from rosbot_patrol.rosserial.keys import read_keys
 from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine, EngineParams
+from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.robot import RobotDescription, load_robot, parse_robot
 from rosbot_patrol.simulation.scenario import Scenario, Start, read_scenario
@@ -130,8 +131,7 @@ class Simulator:
         if p.rate == 0.0 and p.clock:
             self._lockstep.subscribe()
         keys = read_keys(p.key_file) if p.key_file else {}
-        shift = p.bridge_port - DEFAULT_TCP_PORT
-        self._clients = {s.id: EspClient(p.bridge_host, s.port + shift, s.id, key=keys.get(s.id)) for s in places}
+        self._clients = {s.id: EspClient(p.bridge_host, _port(s, p), s.id, key=keys.get(s.id)) for s in places}
         self._scenario = None
         if scenario is not None:
             self._scenario = ScenarioRunner(scenario, self._engine, self._clients, is_watched=p.scenario_watched)
@@ -243,6 +243,15 @@ class Simulator:
         else:
             text = f"waits for {', '.join(waited)}" if waited else "waits for nobody"
         self._health.set("lockstep", WARN if idle else OK, text, waited)
+
+
+def _port(place: SensorPlace, p: SimulatorParams) -> int:
+    """TCP port of a sensor's bridge; the file's ports count from 11411. Raises ParamError."""
+    port = place.port - DEFAULT_TCP_PORT + p.bridge_port
+    if not 0 <= port <= 65535:
+        problem = f"is {p.bridge_port}, but then sensor {place.id} of {p.motion_sensors} has port {port}"
+        raise ParamError(f"{rospy.get_name()}/bridge_port", f"{problem}, expected 0 to 65535")
+    return port
 
 
 def _set_by(scenario: Scenario, p: SimulatorParams) -> SimulatorParams:

@@ -45,7 +45,7 @@ def claim_folder(folder: Path, name: str) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         lock = (folder / "patrol.lock").open("a", encoding="utf-8")
     except OSError as err:
-        log.error("%s cannot be locked against a second patrol: %s", folder, err)
+        log.warning("%s cannot be locked against a second patrol: %s", folder, err)
         return
     deadline = time.monotonic() + _PATIENCE
     while not _is_taken(lock):
@@ -63,5 +63,5 @@ def _is_taken(lock: IO[str]) -> bool:
     except BlockingIOError:
         return False
     except OSError as err:  # a disk that knows no locks
-        log.error("%s cannot be locked against a second patrol: %s", lock.name, err)
+        log.warning("%s cannot be locked against a second patrol: %s", lock.name, err)
     return True
