@@ -36,3 +36,30 @@ def test_the_drop_ins_of_another_copy_are_no_originals(tmp_path: Path) -> None:
     said = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
     assert "move_base" in said.stdout
     assert not (tmp_path / "ws" / "src" / "move_base").exists()
+
+
+UPSTREAMS = {  # CATKIN_DEPENDS of upstream's packages
+    "amcl": "diagnostic_updater dynamic_reconfigure geometry_msgs nav_msgs rosbag roscpp sensor_msgs std_srvs tf2 "
+    "tf2_msgs tf2_ros",
+    "darknet_ros": "actionlib cv_bridge darknet_ros_msgs image_transport nodelet roscpp rospy std_msgs",
+    "darknet_ros_msgs": "actionlib_msgs geometry_msgs message_runtime sensor_msgs std_msgs",
+    "gazebo_ros": "dynamic_reconfigure gazebo_msgs geometry_msgs roscpp rosgraph_msgs roslib std_msgs std_srvs tf",
+    "map_server": "nav_msgs roscpp tf2",
+    "move_base": "dynamic_reconfigure geometry_msgs move_base_msgs nav_msgs roscpp",
+    "rosbot_ekf": "message_runtime roscpp rospy",
+    "rosserial_msgs": "message_runtime",
+}
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: p.name)
+def test_drop_ins_export_what_upstreams_packages_export(package: Path) -> None:
+    """As far as it is installed: `patrol_installed` leaves out what is not. The others export nothing upstream."""
+    text = (package / "CMakeLists.txt").read_text("utf-8")
+    (exported,) = re.findall(r"catkin_package\(([^)]*)\)", text)
+    if found := re.findall(r"patrol_installed\(exports ([^)]*)\)", text):
+        exported = exported.replace("${exports}", found[0])
+    names = set(exported.split())
+    assert set(UPSTREAMS.get(package.name, "").split()) <= names
+    xml = (package / "package.xml").read_text("utf-8")
+    for name in names - {"CATKIN_DEPENDS", "message_runtime"}:
+        assert f"<depend>{name}</depend>" in xml, f"catkin_package() refuses {name}, which package.xml does not list"
