@@ -260,3 +260,28 @@ def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp
     time.sleep(2.5)
     assert len(watch.mails()) == 1
     assert watch.node.stop() == 0
+
+
+def test_people_at_home_are_no_mail_and_a_sensor_that_is_stuck_is_told_when_they_have_left(ros, tmp_path):
+    probe, port = ros.probe(), free_port()
+    probe.tell(subscribe=EVENTS)
+    probe.tell(advertise=["/patrol/arming", "rosbot_patrol/Arming"])
+    watch = Watch(ros, tmp_path, [{"id": 1, "room": 1}, {"id": 2, "room": 2}], motion_pause=2.0)
+    watch.node.says("watching 2 sensors")
+    bridge(ros, port)
+    sensors = [EspClient("127.0.0.1", port, i, stuck_after=1.0).start() for i in (1, 2)]
+    time.sleep(0.5)
+    probe.tell(publish=["/patrol/arming", {"mode": "armed_home", "all_rooms": False, "rooms": [2]}])
+    time.sleep(0.5)
+    for sensor in sensors:
+        sensor.set_motion(True)
+    for i in (1, 2):
+        probe.expect(event("stuck_on", i, True))
+    title = "sensor {0} in room {0} ({1}) reports motion without an end"
+    watch.mail(title.format(2, "square room behind the door"))
+    time.sleep(5.0)
+    assert len(watch.mails()) == 1
+    probe.tell(publish=["/patrol/arming", {"mode": "armed_away", "all_rooms": True}])
+    watch.mail(title.format(1, "guest room"))
+    for sensor in sensors:
+        sensor.stop()

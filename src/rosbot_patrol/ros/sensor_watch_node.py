@@ -1,7 +1,8 @@
 """sensor_watch: knows which motion sensor is well, and tells who asks, and the owner, when one is not.
 
 Listens to /motion_trigger, whoever publishes there, to the bridges' /sensors/links and to the patrol's /patrol/alive: a
-patrol that is dead or hangs answers nobody, and cannot say so itself. Publishes /sensors/states
+patrol that is dead or hangs answers nobody, and cannot say so itself. The patrol's /patrol/arming says which rooms are
+guarded; until it is heard, and where the patrol has gone, all are. Publishes /sensors/states
 (latched), /sensors/events and /diagnostics, and tells the owner through the outbox in ~state_dir, which it shares with
 the patrol but needs no other node to deliver.
 
@@ -26,6 +27,7 @@ from rosbot_patrol.alerts.channels import MailParams
 from rosbot_patrol.alerts.notice import Notice as PostNotice
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import write_atomic
+from rosbot_patrol.msg import Arming as ArmingMsg
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.rooms import load_rooms
@@ -38,7 +40,7 @@ from rosbot_patrol.ros.serial_links import links_from_msg
 from rosbot_patrol.ros.state_folder import state_folder
 from rosbot_patrol.sensors.looks import Looks
 from rosbot_patrol.sensors.notices import Notice, Notices
-from rosbot_patrol.sensors.problems import SERIOUS
+from rosbot_patrol.sensors.problems import SERIOUS, Kind
 from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
 from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
@@ -98,7 +100,10 @@ class SensorWatch:
         self._health = Health("motion sensors")
         self._post = OwnerPost(load_group(MailParams, tree), folder, self._health)
         self._watch = Supervisor(sensors, load_group(WatchTimes, tree), time.monotonic())
-        self._notices = Notices(load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory))
+        self._guarded: frozenset[int] | None = None  # rooms, None for all
+        self._notices = Notices(
+            load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory), is_guarded=self._is_guarded
+        )
         self._looks = Looks(load_group(LookTimes, tree))
         self._reports = Reports(self._health)
         self._unwritten = False
@@ -117,6 +122,7 @@ class SensorWatch:
         self._simulated = bool(rospy.get_param("/use_sim_time", False))
         rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=1000)
         rospy.Subscriber("patrol/alive", Empty, self._on_patrol, queue_size=10)
+        rospy.Subscriber("patrol/arming", ArmingMsg, self._on_arming, queue_size=10)
         rospy.Subscriber("sensors/links", SensorLinks, self._on_links, queue_size=100)
         self._post.start()
         Worker(self._work, name="watch").start()
@@ -130,12 +136,21 @@ class SensorWatch:
     def _on_patrol(self, message: Empty) -> None:
         self._patrol.append((sender_of(message), time.monotonic()))
 
+    def _on_arming(self, message: ArmingMsg) -> None:
+        self._guarded = None if message.all_rooms else frozenset(message.rooms)
+
     def _on_links(self, message: SensorLinks) -> None:
         # in simulated time both stamps are of one clock
         offset = 0.0 if self._simulated else message.header.stamp.to_sec() - rospy.get_time()
         self._links.append((message, offset, time.monotonic()))
 
     # -- step
+
+    def _is_guarded(self, room: int | None) -> bool:
+        """Whether motion in a room means anything; what is not known counts as guarded."""
+        guarded = self._guarded
+        is_patrol_gone = any(key.kind is Kind.PATROL_GONE for key in self._watch.problems())
+        return guarded is None or room is None or room in guarded or is_patrol_gone
 
     def _work(self) -> None:
         count = 0

@@ -5,13 +5,15 @@
 - Sensors that nobody hears because their bridge has gone are the bridge's problem. A sensor that comes and goes is told
   to flap, and not each time to be silent.
 - What was told outlives the program: who restarts it is not told again.
+- In a room that is not guarded people move as they like: what motion alone says of its sensor is no notice. It is told
+  where it still lasts once the room is guarded again, and the motion of those who leave has come to its end.
 """
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +27,7 @@ log = logging.getLogger(__name__)
 
 ALONG = 5.0  # a problem that has lasted so long goes along with a notice that is due [s]
 PATIENCE = 900.0  # a problem told before a restart may need so long to show again [s]
+_SAID_BY_MOTION = (Kind.STUCK_ON, Kind.NO_MOTION)
 _SHOWN_BY_BEING_HEARD = (Kind.SILENT, Kind.BRIDGE_GONE, Kind.PATROL_GONE)
 
 
@@ -54,10 +57,18 @@ class Notices:
         times: when.
         now: time, of any monotonic clock [s].
         memory: what `snapshot` gave before the program ended.
+        is_guarded: whether a room is guarded now; None stands for a sensor without a room.
     """
 
-    def __init__(self, times: NoticeTimes, now: float, memory: Mapping[str, Any] | None = None) -> None:
-        self._times = times
+    def __init__(
+        self,
+        times: NoticeTimes,
+        now: float,
+        memory: Mapping[str, Any] | None = None,
+        *,
+        is_guarded: Callable[[int | None], bool] = lambda room: True,
+    ) -> None:
+        self._times, self._is_guarded = times, is_guarded
         self._began = now
         self._last = float("-inf")
         self._seen: dict[Key, float] = {}
@@ -94,9 +105,13 @@ class Notices:
         statuses = {status.sensor_id: status for status in listed}
         for key in [key for key in self._seen if key not in problems]:
             del self._seen[key]
+        calm = {key for key in problems if self._is_calm(key, watch)}
         for key in problems:
             self._seen.setdefault(key, now)
-        new = {key: p for key, p in problems.items() if key not in self._told and not self._is_covered(p, problems)}
+        for key in calm:
+            self._seen[key] = now + watch.motion_pause
+        untold = {key: p for key, p in problems.items() if key not in self._told and key not in calm}
+        new = {key: p for key, p in untold.items() if not self._is_covered(p, problems)}
         well = self._well(problems, statuses, watch, now)
         due = any(now - self._seen[key] >= self._times.notice_after for key in new)
         if not (due or well) or now - self._last < self._times.notice_interval:
@@ -107,6 +122,10 @@ class Notices:
         self._last = now
         self._count += 1
         return self._notice(tuple(items), statuses, watch, wall)
+
+    def _is_calm(self, key: Key, watch: Supervisor) -> bool:
+        """Whether a problem may be people who are at home."""
+        return key.kind in _SAID_BY_MOTION and not self._is_guarded(watch.sensors.room_of(key.sensor_id))
 
     def _is_covered(self, problem: Problem, problems: Mapping[Key, Problem]) -> bool:
         """Whether another problem says it already."""

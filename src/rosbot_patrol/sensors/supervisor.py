@@ -264,6 +264,11 @@ class Supervisor:
         return max(self._now - since, 0.0)
 
     @property
+    def motion_pause(self) -> float:
+        """So long after the last motion of somebody who leaves a sensor is no longer taken for stuck [s]."""
+        return self._times.motion_pause
+
+    @property
     def patrol(self) -> str:
         """The patrol's node, "" where it was never heard."""
         return self._patrol[0] if self._patrol is not None else ""

@@ -15,7 +15,10 @@ class Owner:
 
     def __init__(self, house, memory=None, **times):
         self.house = house
-        self.notices = Notices(NoticeTimes(**times), house.now, memory)
+        self.guarded = None  # rooms, None for all
+        self.notices = Notices(
+            NoticeTimes(**times), house.now, memory, is_guarded=lambda r: self.guarded is None or r in self.guarded
+        )
         self.got = []
 
     def run(self, seconds):
@@ -223,3 +226,74 @@ def test_a_patrol_that_hangs_is_told_first_and_by_whom_it_was_heard():
         again.house.watch.patrol_heard("/patrolling_node", again.house.now)
         again.run(1.0)
     assert "the patrol (patrolling_node) is well again" in again.got[-1].text.lower()
+
+
+def people_at_home(owner, *ids):
+    for i in ids:
+        owner.house.speaker(i).move = True  # reports its level
+
+
+def test_people_at_home_are_no_notice_and_one_that_stays_stuck_is_told_when_they_have_left():
+    owner = Owner(House(1, 2))
+    owner.guarded = frozenset()  # disarmed
+    people_at_home(owner, 1, 2)
+    assert owner.run(5000) == []
+    assert ("stuck_on", 1, True) in [*map(str_event, owner.house.events)]  # the state is there all the same
+    owner.guarded = None
+    owner.house.speaker(1).move = False  # the last one goes as the exit delay ends; 2 is stuck
+    assert owner.run(149) == []
+    (notice,) = owner.run(600)
+    assert kinds(notice) == [Kind.STUCK_ON]
+    assert notice.subject == "rosbot patrol: sensor 2 in room 2 (place 2) reports motion without an end"
+
+
+def str_event(event):
+    return event.problem.key.kind_name, event.problem.key.sensor_id, event.active
+
+
+def test_only_guarded_rooms_tell_of_motion_and_all_tell_of_silence():
+    owner = Owner(House(1, 2, 3))
+    owner.guarded = frozenset({2})
+    people_at_home(owner, 1, 2)
+    owner.silence(3)
+    owner.run(3000)
+    assert sorted(map(str, (kind for notice in owner.got for kind in kinds(notice)))) == sorted(
+        map(str, (Kind.SILENT, Kind.STUCK_ON))
+    )
+    assert not any("sensor 1 " in notice.text for notice in owner.got)
+
+
+def test_a_guard_that_comes_and_goes_begins_anew_each_time():
+    owner = Owner(House(1))
+    people_at_home(owner, 1)
+    owner.guarded = frozenset()
+    owner.run(1000)
+    for _ in range(5):
+        owner.guarded = None
+        assert owner.run(140) == []
+        owner.guarded = frozenset()
+        assert owner.run(10) == []
+    owner.guarded = None
+    assert len(owner.run(200)) == 1
+
+
+def test_what_was_told_while_armed_is_told_to_be_over_and_no_more_while_disarmed():
+    owner = Owner(House(1))
+    people_at_home(owner, 1)
+    assert len(owner.run(900)) == 1
+    owner.guarded = frozenset()
+    assert owner.run(3000) == []
+    owner.house.speaker(1).move = False
+    (notice,) = owner.run(600)
+    assert "is well again" in notice.subject
+    people_at_home(owner, 1)
+    assert owner.run(3000) == []
+
+
+def test_very_long_without_motion_is_told_where_it_is_guarded_only():
+    owner = Owner(House(1, 2, no_motion_after=500.0))
+    owner.guarded = frozenset({2})
+    owner.run(3000)
+    assert [notice.subject for notice in owner.got] == [
+        "rosbot patrol: sensor 2 in room 2 (place 2) has seen no motion for very long"
+    ]
