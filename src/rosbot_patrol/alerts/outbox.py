@@ -90,6 +90,16 @@ class Outbox:
         """Whether a notice of this id waits or was delivered."""
         return any(found["id"] == notice_id for found in self._all_names())
 
+    def waits(self, notice_id: str) -> bool | None:
+        """Whether a notice waits, whole or damaged, or was delivered (False); None: it is not here. Raises OSError."""
+        if any(broken_id == notice_id for _, broken_id in self.broken()):
+            return True
+        for folder, answer in ((self.folder, True), (self.sent, False)):
+            names = (_NAME.fullmatch(entry.name) for entry in _scan(folder))
+            if any(found["id"] == notice_id for found in names if found and found[0] not in self._stuck):
+                return answer
+        return None
+
     def find(self, notice_id: str) -> Notice | None:
         """The notice of this id, waiting or delivered; None where there is none.
 

@@ -151,7 +151,7 @@ class Postman:
                 who, silent = self.lock.seized_from, self._stale_after
                 log.error("%s, which delivered the notices, gave no sign of life for %.0f s: taking over", who, silent)
             self._adopt()
-            self.receipts.read_new()
+            self._read_receipts()
             now, wall = self._clocks.now(), self._clocks.wall()
             for name, channel in self.channels.items():
                 ago = max(wall - self.receipts.last.get(name, float("-inf")), 0.0)
@@ -171,7 +171,7 @@ class Postman:
         with self._guard:
             before = {entry.name for entry in self._waiting}
             self._waiting = self.outbox.waiting()
-            self.receipts.read_new()  # after the look at the folder: another program writes receipts before the notice
+            self._read_receipts()  # after the look at the folder: another program writes receipts before the notice
             for name, lane in self._lanes.items():
                 self._offer(name)
                 if any(entry.name not in before for entry in self._waiting):
@@ -180,6 +180,13 @@ class Postman:
             self._settle_refusals()
             self._finish()
             self.outbox.tidy()
+
+    def learn(self, receipt: Receipt) -> None:
+        """Notices went to a channel past this object: it sends them there no more."""
+        with self._guard:
+            self.receipts.note(receipt)
+            if lane := self._lanes.get(receipt.channel):
+                lane.offer(e for e in self._waiting if self._is_open(e, receipt.channel))
 
     def deliver(self, name: str) -> Delivery | None:
         """Send what is due on a channel, None where nothing is; waits for the transport. Raises OSError."""
@@ -275,6 +282,12 @@ class Postman:
         else:
             log.error("%s was removed, by which others know who delivers: making it anew", self.lock.path)
         self.hand_over()
+
+    def _read_receipts(self) -> None:
+        try:
+            self.receipts.read_new()
+        except OSError as err:  # rather twice than never
+            log.error("%s cannot be read: %s; what was taken before may be sent again", self.receipts.path, err)
 
     def _adopt(self) -> None:
         if not isinstance(self.outbox, Outbox):

@@ -16,7 +16,7 @@ from rosbot_patrol.alerts.memory_outbox import MemoryOutbox
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import Outbox
 from rosbot_patrol.alerts.postman import ChannelStatus, Clocks, Delivery, Postman
-from rosbot_patrol.alerts.receipts import Receipts
+from rosbot_patrol.alerts.receipts import Receipt, Receipts
 
 
 class SparePost:
@@ -37,6 +37,11 @@ class SparePost:
     def __len__(self) -> int:
         return len(self._box)
 
+    @property
+    def ids(self) -> list[str]:
+        """Of the notices that are here."""
+        return [notice.id for notice in self._box.all()]
+
     def find(self, notice_id: str) -> Notice | None:
         """A notice that is not on the disk yet, None where it is or is not known."""
         return self._box.find(notice_id)
@@ -51,6 +56,10 @@ class SparePost:
         """Send what is due on a channel, None where nothing is; waits for the transport."""
         with self._sending[name]:
             return self._postman.deliver(name)
+
+    def learn(self, receipt: Receipt) -> None:
+        """A channel took something from the disk."""
+        self._postman.learn(receipt)
 
     def pause(self, name: str) -> float:
         """How long until `deliver` may have something to do [s]."""
@@ -69,15 +78,19 @@ class SparePost:
                 if not lock.acquire(blocking=False):
                     return False
                 stack.callback(lock.release)
-            added = self._postman.receipts.added
-            while added:
-                receipts.add(added[0])
-                added.pop(0)
+            self.write_receipts(receipts)
             for notice in self._box.all():
                 outbox.put(notice)
                 self._box.forget(notice.id)
             self._postman.refresh()
         return not len(self._box)
+
+    def write_receipts(self, receipts: Receipts) -> None:
+        """Write down what channels took from here. Raises OSError."""
+        added = self._postman.receipts.added
+        while added:
+            receipts.add(added[0])
+            added.pop(0)
 
     def statuses(self) -> list[ChannelStatus]:
         """How the channels do with what they have still to take."""

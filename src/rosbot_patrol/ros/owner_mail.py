@@ -26,6 +26,7 @@ from rosbot_patrol.alerts.network_state import network_mark
 from rosbot_patrol.alerts.notice import Notice
 from rosbot_patrol.alerts.outbox import DISK_FULL, Outbox
 from rosbot_patrol.alerts.postman import Delivery, Postman
+from rosbot_patrol.alerts.receipts import Receipt
 from rosbot_patrol.alerts.secrets_on_disk import refuse_secrets
 from rosbot_patrol.alerts.settings_file import Settings, write_settings
 from rosbot_patrol.alerts.spare_post import SparePost
@@ -38,6 +39,7 @@ log = logging.getLogger(__name__)
 
 LOOK = 0.2  # [s] between looks at the folder, in which other programs put
 RETRY = 5.0  # [s] where the disk does not take something
+RECENT = 50  # notices of this program that are in memory, too, until they are delivered
 PROBE = 30.0  # [s] between two looks whether it would
 HOUSEKEEPING = 2.0  # [s]
 
@@ -64,7 +66,9 @@ class OwnerPost:
         self._spare = SparePost(channels)
         self._disk = DiskWatch(state_dir)
         self._probed = float("-inf")
-        self._is_others = self._is_proved = False
+        self._is_others = self._is_proved = self._is_stuck = False
+        self._recent: dict[str, Notice] = {}  # put on the disk by this program, and not known to be delivered
+        self._minded = float("-inf")
         self._refused = Repeats(60.0)
         self._putting = threading.Lock()
         self._kept: deque[Notice] = deque()
@@ -119,13 +123,16 @@ class OwnerPost:
                 self._spare.put(notice)
                 self._wake_all()
                 return False
+            self._recent[notice.id] = notice
+            while len(self._recent) > RECENT:
+                self._recent.pop(next(iter(self._recent)))
         self._wake.set()
         return True
 
     @property
     def is_written(self) -> bool:
         """Whether every notice that was put is on the disk."""
-        return not len(self._spare)
+        return all(notice_id in self._recent for notice_id in self._spare.ids)
 
     @property
     def is_disk_full(self) -> bool:
@@ -162,29 +169,35 @@ class OwnerPost:
 
     def _supervise(self) -> None:
         while not rospy.is_shutdown():
-            pause, self._is_proved = LOOK, False
-            for part in (self._look_at_disk, self._look, self._keep_house):
-                try:
-                    part()
-                except OSError as err:
-                    self._disk_failed(err)
-                    pause, self._is_proved = RETRY, False
-            if self._is_proved:
-                self._disk.worked()
-            self._tell_of_disk()
-            self._wake.wait(pause)
+            self._wake.wait(self._pass())
             self._wake.clear()
+
+    def _pass(self) -> float:
+        """Look at everything once; returns how long to wait for the next time [s]."""
+        pause, self._is_proved = LOOK, False
+        for part in (self._look_at_disk, self._look, self._mind_recent, self._keep_house):
+            try:
+                part()
+            except OSError as err:
+                self._disk_failed(err)
+                pause, self._is_proved = RETRY, False
+        if self._is_proved:
+            self._disk.worked()
+        self._tell_of_disk()
+        return pause
 
     def _look_at_disk(self) -> None:
         """Write what is in memory only; where there is nothing, see now and then whether something could be written."""
         while self._kept:
             self.put(self._kept[0])
             self._kept.popleft()
-        waits = not self.is_written or self._disk.error is not None
+        waits = len(self._spare) or self._disk.error is not None
         if time.monotonic() - self._probed < (RETRY if waits else PROBE):
             return
         self._probed = time.monotonic()
-        if self.is_written:
+        if self._is_stuck:
+            self._spare.write_receipts(self._postman.receipts)
+        elif not len(self._spare):
             self._outbox.probe()
         elif not self._settle():
             self._probed += 1.0 - RETRY  # a channel is busy
@@ -217,13 +230,30 @@ class OwnerPost:
         was_delivering = self._postman.is_delivering
         if not was_delivering:
             self._look_on()
-        self._is_others = False  # to tell that the disk is gone, unless the lock says who does
-        self._is_others = not self._postman.take_over()
+        self._is_others, self._is_stuck = False, True  # where the lock cannot be used
+        self._is_others, self._is_stuck = not self._postman.take_over(), False
         if self._is_others:
             pass
         elif not was_delivering or self._has_changed():
             self._postman.refresh()
             self._wake_all()
+
+    def _mind_recent(self) -> None:
+        """Send this program's notices from memory where they cannot be delivered from the disk after all."""
+        if time.monotonic() - self._minded < HOUSEKEEPING:
+            return
+        self._minded = time.monotonic()
+        with self._putting:
+            recent = list(self._recent.values())
+        for notice in recent:
+            waits = None if self._is_stuck else self._outbox.waits(notice.id)
+            if not waits and not self._is_stuck:  # it was delivered, or is gone
+                with self._putting:
+                    self._recent.pop(notice.id, None)
+            if waits is None and self._spare.find(notice.id) is None:
+                log.error("notice %s cannot be delivered from %s: it is sent from memory", notice.id, self.place)
+                self._spare.put(notice)
+                self._wake_all()
 
     def _mend(self) -> None:
         """Make notices that were damaged on the disk again, or tell that they are lost."""
@@ -242,7 +272,12 @@ class OwnerPost:
 
     def _look_on(self) -> None:
         """Another program delivers: hear what it delivered."""
-        for receipt in self._postman.receipts.read_new():
+        try:
+            receipts = self._postman.receipts.read_new()
+        except OSError as err:  # it is no reason not to deliver
+            self._disk_failed(err)
+            return
+        for receipt in receipts:
             became = f"refused for good by '{receipt.channel}': {receipt.refused}"
             if not receipt.refused:
                 became = f"delivered by {receipt.transport}: {receipt.where}"
@@ -277,7 +312,7 @@ class OwnerPost:
     def _try_again_where_it_helps(self) -> None:
         flush = self._outbox.folder / "flush"
         is_asked = self._postman.is_delivering and flush.exists()
-        has_trouble = self._postman.has_trouble or not self.is_written
+        has_trouble = self._postman.has_trouble or len(self._spare) > 0
         mark = network_mark() if has_trouble else self._network
         if is_asked or mark != self._network:
             self._spare.nudge()
@@ -304,13 +339,17 @@ class OwnerPost:
         """Send what is due on a channel; returns what it was, and how long to wait where nothing is [s]."""
         done = self._spare.deliver(name)
         pause = self._spare.pause(name)
-        if done is not None:
-            return done, 0.0
         try:
-            return self._postman.deliver(name), min(pause, self._postman.pause(name))
+            done = done or self._postman.deliver(name)
+            pause = min(pause, self._postman.pause(name))
         except OSError as err:
             self._disk_failed(err)
-            return None, min(pause, RETRY)
+            pause = min(pause, RETRY)
+        if done is not None and done.delivered:
+            receipt = Receipt(channel=name, transport=done.transport, ids=done.ids, wall=time.time(), where=done.where)
+            self._spare.learn(receipt)
+            self._postman.learn(receipt)
+        return done, pause
 
     def _tell(self, delivery: Delivery) -> None:
         for listener in self._listeners:
