@@ -35,7 +35,6 @@ from node_cost import PROFILES, measure_profiles, original
 
 from rosbot_patrol.amcl.localizer import Localizer
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.scan import LaserScan
@@ -83,7 +82,7 @@ def update_times(particles: int, beams: int, repeats: int, *, spread: bool) -> l
     )
     localizer = Localizer(params, np.random.default_rng(1))
     localizer.set_map(read_map(ROOT / "maps" / "rosbot_map.yaml"))
-    scan, mount, times = room_scan(beams), Mount(), []
+    scan, mount, times = room_scan(beams), Pose2D(), []
     scans = [replace(scan, stamp=0.3 * i) for i in range(repeats + 5)]  # so that each is compared with the map, too
     localizer.update(scan, Pose2D(), mount)
     for i in range(repeats + 5):

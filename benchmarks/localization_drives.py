@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.errors import PlanningError, WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid
@@ -54,7 +53,7 @@ class Record:
 
     house: str
     moments: list[Moment]
-    mount: Mount
+    mount: Pose2D
 
 
 @lru_cache
@@ -144,11 +143,11 @@ class Driver:
         for _ in range(SCAN_STEPS):
             self.engine.step()
         self.touched += bool(self.engine.touches())
-        return Moment(self.engine.pose, self.engine.odometry[0], self.engine.scan())
+        return Moment(self.engine.pose, self.engine.odometry[0], self.engine.level_scan().scan)
 
     def record(self, moments: list[Moment]) -> Record:
         """What was driven."""
-        return Record(self.house, moments, Mount(self.engine.laser_mount))
+        return Record(self.house, moments, self.engine.level_scan().pose)
 
 
 def patrol(house: str, seed: int, rooms: int | None = None) -> Record:

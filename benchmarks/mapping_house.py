@@ -29,10 +29,10 @@ from rosbot_patrol.maps.distance_kernels import bounded_distances
 from rosbot_patrol.maps.occupancy import FREE
 from rosbot_patrol.patrol.rooms import load_rooms
 from rosbot_patrol.replay.carmen import noisy_odometry
-from rosbot_patrol.scan import LaserScan, Mount
+from rosbot_patrol.scan import LaserScan
 
 ROOT = Path(__file__).resolve().parents[1]
-MOUNT = Mount(Pose2D(0.02, 0.0, math.pi))
+MOUNT = Pose2D(0.02, 0.0, math.pi)
 BEAMS, REACH, NOISE = 720, 12.0, 0.01
 SPEED, TURNING, RATE = 0.3, 0.8, 10.0
 CLEARANCE = 0.4  # m from walls that the ways keep
@@ -89,7 +89,7 @@ def scans(poses: Poses, field: Field, rng: np.random.Generator) -> Iterator[Lase
     """What the lidar sees at each pose."""
     angles = np.linspace(-math.pi, math.pi, BEAMS)
     for i, row in enumerate(poses):
-        laser = compose(Pose2D(*row), MOUNT.pose)
+        laser = compose(Pose2D(*row), MOUNT)
         place = (field.values, field.origin_x, field.origin_y, field.resolution, REACH)
         ranges = np.array([cast_ray(laser.x, laser.y, laser.yaw + a, *place) for a in angles.tolist()])
         seen = ranges < REACH

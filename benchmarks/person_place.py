@@ -21,7 +21,7 @@ from watch import CLASSES, LOOKS, draw_places, make_engine
 
 from rosbot_patrol.detection.detector import load_detector
 from rosbot_patrol.errors import WorldError
-from rosbot_patrol.geometry import Pose2D, compose, transform_points
+from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.patrol.floor import floor_of
@@ -29,7 +29,6 @@ from rosbot_patrol.patrol.inputs import Box, Measured
 from rosbot_patrol.patrol.judge import Judge
 from rosbot_patrol.patrol.person_place import Depth, Lens, View, measure
 from rosbot_patrol.patrol.witness import off_the_map
-from rosbot_patrol.scan import scan_points
 from rosbot_patrol.simulation.matrices import from_pose2d
 from rosbot_patrol.simulation.world import load_world
 
@@ -63,8 +62,8 @@ class Stage:
             Box(label=d.name, probability=d.probability, xmin=d.xmin, ymin=d.ymin, xmax=d.xmax, ymax=d.ymax)
             for d in self.detector.detect(Picture(np.ascontiguousarray(picture.colour), "rgb8"))
         ]
-        pose = compose(self.engine.pose, self.engine.laser_mount)
-        off = off_the_map(self.floor, transform_points(pose, scan_points(self.engine.scan())), 0.3)
+        points = transform_points(self.engine.pose, self.engine.level_scan().points)
+        off = off_the_map(self.floor, points, 0.3)
         return boxes, Depth(picture.depth, self.lens), off
 
 
@@ -74,8 +73,8 @@ def put(stage: Stage, kind: str, place: Pose2D, rng: np.random.Generator) -> Pos
     for _ in range(30):
         engine.carry(place)
         bearing = float(rng.uniform(-0.45, 0.45))
-        scan = engine.scan()
-        angles = engine.laser_mount.yaw + scan.angles
+        level = engine.level_scan()
+        scan, angles = level.scan, level.pose.yaw + level.scan.angles
         beam = int(np.abs((angles - bearing + math.pi) % math.tau - math.pi).argmin())
         wall = float(scan.ranges[beam])
         far = wall - 0.02 if kind == "poster" else float(rng.uniform(1.0, max(min(wall, 7.0) - 0.5, 1.1)))

@@ -6,7 +6,8 @@
     |- WorldError         a world, robot or actor description of the simulator
     |- TransformError     a pose that cannot be had
     |  |- TransformNotYet  it may still come
-    |  `- TransformTooOld  what was known of that time is no longer kept
+    |  |- TransformTooOld  what was known of that time is no longer kept
+    |  `- LaserTilted      a laser whose scan is no plan of the room
     |- BagError           a recorded bag that cannot be used
     |- ResultError        a stored result of a replay that cannot be used
     |- PlanningError      no global plan
@@ -26,6 +27,8 @@ A constructor takes facts and writes the sentence, so that a reader is told what
 """
 
 from __future__ import annotations
+
+import math
 
 
 class PatrolError(Exception):
@@ -76,6 +79,25 @@ class TransformNotYet(TransformError):
 
 class TransformTooOld(TransformError):
     """The pose will never be known: the time lies before all that is kept."""
+
+
+class LaserTilted(TransformError):
+    """A laser is mounted so that its scan cannot be laid into the plane of the floor.
+
+    Args:
+        target: frame in which it should be level.
+        source: frame of the laser.
+        tilt: of its plane against that of the floor [rad].
+    """
+
+    def __init__(self, target: str, source: str, tilt: float) -> None:
+        PatrolError.__init__(
+            self,
+            f"the laser '{source}' is tilted by {math.degrees(tilt):.0f} deg in '{target}', so that its scan is no"
+            " plan of the room: mount it level, or mend its transform",
+        )
+        self.target, self.source = target, source
+        self.tilt = tilt
 
 
 class BagError(_FileError):

@@ -30,6 +30,44 @@ class Pose2D(NamedTuple):
         return compose(self, other)
 
 
+class Transform(NamedTuple):
+    """a_from_b in space: a place [m] and a quaternion of length 1."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    qx: float = 0.0
+    qy: float = 0.0
+    qz: float = 0.0
+    qw: float = 1.0
+
+    @property
+    def pose(self) -> Pose2D:
+        """The planar part; roll and pitch are dropped, so that a laser's scan needs `scan.level_scan`."""
+        return Pose2D(self.x, self.y, yaw_from_quaternion(self.qx, self.qy, self.qz, self.qw))
+
+    @property
+    def rotation(self) -> Array:
+        """Rotation matrix, shape (3, 3); the quaternion may have any length but zero."""
+        x, y, z, w = self.qx, self.qy, self.qz, self.qw
+        s = 2.0 / (x * x + y * y + z * z + w * w)
+        return np.array(
+            [
+                [1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+                [s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)],
+                [s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)],
+            ]
+        )
+
+    @property
+    def matrix(self) -> Array:
+        """Homogeneous matrix, shape (4, 4)."""
+        out = np.eye(4)
+        out[:3, :3] = self.rotation
+        out[:3, 3] = self.x, self.y, self.z
+        return out
+
+
 class Twist2D(NamedTuple):
     """Velocity of a base: forward [m/s], sideways [m/s], turning [rad/s]."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.scan import LaserScan, Mount
+from rosbot_patrol.scan import LaserScan
 
 GIVE_UP_S, GIVE_UP_WAITING_S = 1.0, 2.0  # a scan this much older than the newest, or waiting for so long, is dropped
 FARTHEST_M = 1e6  # from where the odometry began: what says more is a bit fault on the way from the wheels
@@ -20,11 +20,11 @@ FARTHEST_M = 1e6  # from where the odometry began: what says more is a bit fault
 
 @dataclass(frozen=True)
 class PlacedScan:
-    """A scan, the robot in the odometry's frame at its time, and how the laser sits on the robot."""
+    """A level scan, the robot in the odometry's frame at its time, and the pose of the scan's laser on the robot."""
 
     scan: LaserScan
     odom_from_base: Pose2D
-    mount: Mount
+    base_from_laser: Pose2D
 
 
 @dataclass(frozen=True, eq=False)

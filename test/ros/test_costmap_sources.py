@@ -7,14 +7,17 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, Range
+from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.costmap.costs import LETHAL
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, Transform
 from rosbot_patrol.ros import costmap_sources
 from rosbot_patrol.ros import simulator_messages as messages
+from rosbot_patrol.ros.convert import scan_to_msg
+from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.camera import CameraParams
 from rosbot_patrol.simulation.range_sensors import RangeParams
 
@@ -39,7 +42,7 @@ class Topics:
                 topics.callbacks[topic].remove(callback)
 
         self.callbacks.setdefault(topic, []).append(callback)
-        assert kind in (Image, CameraInfo, PointCloud2, Range)
+        assert kind in (Image, CameraInfo, PointCloud2, Range, LaserScanMsg)
         return Subscription()
 
     def send(self, topic, msg):
@@ -57,10 +60,18 @@ class Frames:
         if stamp > self.known_until:
             raise TransformError("odom", "camera_depth_frame", "not yet")
 
+    laser = Transform(0.1, 0.0, 0.2)
+
     def lookup(self, target, source, stamp):
         del target, source
         self._check(stamp)
         return Pose2D(0.1, 0.0, 0.0)
+
+    def transform(self, target, source, stamp):
+        del target
+        assert source == "laser"
+        self._check(stamp)
+        return self.laser
 
     def lookup_matrix(self, target, source, stamp):
         del target
@@ -235,3 +246,97 @@ def test_a_cloud_marks(topics):
     topics.send("points", cloud)
     assert update(costmap, sources, Frames(), 100.0) == 1
     assert costmap.grid.at(1.52, 0.0) == LETHAL or costmap.grid.at(1.5, -0.02) == LETHAL
+
+
+# ---- scans
+
+
+def make_scans(**source):
+    tree = {
+        "plugins": [{"name": "obstacles", "type": "costmap_2d::ObstacleLayer"}],
+        "obstacles": {
+            "observation_sources": "laser",
+            "laser": {"data_type": "LaserScan", "topic": "scan", "clearing": True, "inf_is_valid": True, **source},
+        },
+        "rolling_window": True,
+        "width": 6.0,
+        "height": 6.0,
+        "resolution": 0.05,
+        "footprint": [[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]],
+    }
+    costmap = LayeredCostmap(read_costmap(tree))
+    return costmap, costmap_sources.subscribe_sources(costmap)
+
+
+def scan(stamp, **changes):
+    """A post 1 m ahead on the left of a laser that looks ahead; else nothing."""
+    angles = -np.pi + np.pi / 180.0 * np.arange(360)
+    values = {
+        "stamp": stamp,
+        "frame_id": "laser",
+        "angle_min": -np.pi,
+        "angle_increment": np.pi / 180.0,
+        "range_min": 0.1,
+        "range_max": 12.0,
+        "ranges": np.where(np.abs(angles - 0.5) < 0.06, 1.0, np.inf),
+    }
+    return scan_to_msg(LaserScan(**{**values, **changes}))
+
+
+LEFT, RIGHT = (0.1 + np.cos(0.5), np.sin(0.5)), (0.1 + np.cos(0.5), -np.sin(0.5))
+
+
+@pytest.mark.parametrize("limit", [12.0, np.inf, 3.4028234663852886e38])
+@pytest.mark.parametrize(("laser", "there"), [((0.0, 0.0, 0.0, 1.0), LEFT), ((1.0, 0.0, 0.0, 0.0), RIGHT)])
+def test_a_scan_marks_on_the_side_where_the_thing_stands(topics, limit, laser, there):
+    costmap, sources = make_scans()
+    frames = Frames()
+    frames.laser = Transform(0.1, 0.0, 0.2, *laser)
+    topics.send("scan", scan(100.0, range_max=limit))
+    assert 3 <= update(costmap, sources, frames, 100.0) <= 12
+    iy, ix = np.nonzero(costmap.cells == LETHAL)
+    place = costmap.info.origin_x + (ix.mean() + 0.5) * 0.05, costmap.info.origin_y + (iy.mean() + 0.5) * 0.05
+    assert place == pytest.approx(there, abs=0.06)
+
+
+@pytest.mark.parametrize("limit", [0.0, 0.5])
+def test_scans_that_say_nothing_stop_the_robot_and_are_named(topics, caplog, limit):
+    costmap, (source,) = make_scans(expected_update_rate=limit)
+    frames = Frames()
+    topics.send("scan", scan(100.0))
+    update(costmap, [source], frames, 100.0)
+    for k in range(1, 20):
+        topics.time = 100.0 + 0.1 * k
+        topics.send("scan", scan(topics.time, ranges=np.zeros(360)))
+        update(costmap, [source], frames, topics.time)
+        assert source.blind(topics.time) == (0.1 * k > (limit or 1.0))
+    assert "say nothing" in source.trouble(topics.time)
+    assert len([record for record in caplog.records if "say nothing" in record.getMessage()]) == 1
+    topics.send("scan", scan(topics.time))
+    update(costmap, [source], frames, topics.time)
+    assert (source.blind(topics.time), source.trouble(topics.time)) == (False, "")
+
+
+def test_a_tilted_laser_and_one_too_low_stop_the_robot_and_are_named(topics):
+    for laser, named in (
+        (Transform(0.0, 0.0, 0.2, 0.5, 0.0, 0.0, 0.75**0.5), "the laser 'laser' is tilted by 60 deg in 'odom'"),
+        (Transform(0.0, 0.0, -0.05), "min_obstacle_height"),
+    ):
+        costmap, (source,) = make_scans()
+        frames = Frames()
+        frames.laser = laser
+        topics.send("scan", scan(100.0))
+        assert update(costmap, [source], frames, 100.0) == 0
+        assert source.blind(100.0)
+        assert named in source.trouble(100.0)
+
+
+def test_scans_that_find_no_place_are_named(topics):
+    costmap, (source,) = make_scans(expected_update_rate=0.5)
+    frames = Frames()
+    frames.known_until = 99.0
+    for k in range(10):
+        topics.time = 100.0 + 0.1 * k
+        topics.send("scan", scan(topics.time))
+        update(costmap, [source], frames, topics.time)
+    assert "cannot be placed: no transform" in source.trouble(topics.time)

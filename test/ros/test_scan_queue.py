@@ -5,9 +5,8 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, Transform
 from rosbot_patrol.ros import scan_queue
 from rosbot_patrol.ros.scan_queue import ScanQueue
 from rosbot_patrol.scan import LaserScan
@@ -18,6 +17,9 @@ class LateTf:
 
     def __init__(self, known, step=0.0, first=0.0):
         self.first, self.known, self.step = first, known, step
+
+    def transform(self, target, source):
+        return Transform()
 
     def lookup(self, target, source, stamp):
         try:
@@ -42,7 +44,6 @@ def scan_at(stamp):
 
 @pytest.fixture
 def queued(monkeypatch):
-    monkeypatch.setattr(scan_queue, "mount_of", lambda *_: Mount())
     monkeypatch.setattr(scan_queue, "POLL_S", 0.0)
     monkeypatch.setattr(scan_queue, "IDLE_S", 0.0)
 

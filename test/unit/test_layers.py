@@ -16,7 +16,7 @@ ROWS: list[set[str]] = [
     {"params", "files", "yaml_files"},
     {"geometry", "tunable"},
     {"grid", "scan"},
-    {"maps", "images", "scan_line"},
+    {"maps", "images", "scan_line", "scan_check"},
     {"costmap"},
     {"planning", "amcl", "gmapping", "detection", "rosserial", "control"},
     {"navigation", "patrol", "alerts", "sensors", "simulation"},

@@ -7,7 +7,7 @@ import pytest
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.scan import LaserScan, Mount, level_mount
+from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.scan_line import PlacedScan, ScanLine
 
 
@@ -32,7 +32,7 @@ class Odometry:
     def __call__(self, scan: LaserScan) -> PlacedScan:
         if scan.stamp > self.known:
             raise TransformError("odom", "base_link", "not yet")
-        return PlacedScan(scan, self.places.get(scan.stamp, Pose2D(scan.stamp)), Mount())
+        return PlacedScan(scan, self.places.get(scan.stamp, Pose2D(scan.stamp)), Pose2D())
 
 
 def taken(line: ScanLine, now: float = 0.0) -> list[float]:
@@ -91,10 +91,3 @@ def test_an_odometry_that_is_no_place_is_never_handed_on(place: Pose2D) -> None:
         line.put(scan_at(stamp), stamp)
     assert taken(line, 2.2) == [1.1, 2.2]
     assert line.dropped == 1
-
-
-def test_mounts_of_a_level_laser() -> None:
-    assert level_mount(0.1, 0.2, (0.0, 0.0, 0.0, 1.0)) == Mount(Pose2D(0.1, 0.2, 0.0))
-    assert level_mount(0.1, 0.2, (1.0, 0.0, 0.0, 0.0)).is_upside_down
-    with pytest.raises(ValueError, match="not mounted level"):
-        level_mount(0.0, 0.0, (0.5**0.5, 0.0, 0.0, 0.5**0.5))

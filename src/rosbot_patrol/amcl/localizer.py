@@ -20,7 +20,7 @@ from rosbot_patrol.amcl.odometry_track import OdometryTrack, Reading
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.particle_filter import Estimate, ParticleFilter
 from rosbot_patrol.amcl.seeker import Seeker
-from rosbot_patrol.amcl.sensor_model import Beams, Mount, pick_beams
+from rosbot_patrol.amcl.sensor_model import Beams, pick_beams
 from rosbot_patrol.amcl.trust import State, Trust, Witness, agreement
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid
@@ -176,13 +176,13 @@ class Localizer:
         """Update at the next scan even without motion."""
         self._forced = True
 
-    def update(self, scan: LaserScan, odom_from_base: Pose2D, mount: Mount) -> Outcome:
+    def update(self, scan: LaserScan, odom_from_base: Pose2D, base_from_laser: Pose2D) -> Outcome:
         """Take in a scan and the odometry at its time.
 
         Args:
             scan: one sweep.
             odom_from_base: the robot in the odometry's frame at the scan's stamp.
-            mount: how the laser sits on the robot.
+            base_from_laser: of the level scan.
         """
         known = self._map
         if known is None:
@@ -193,7 +193,7 @@ class Localizer:
         if reading is Reading.RESTART:
             self._restart(odom_from_base)
         self._track.follow(scan.stamp, odom_from_base)
-        beams = pick_beams(scan, mount, self._params)
+        beams = pick_beams(scan, base_from_laser, self._params)
         outcome = Outcome()
         if self._is_due(scan.frame_id, odom_from_base):
             outcome = self._update(known, beams, odom_from_base)

@@ -20,7 +20,7 @@ from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances, obstac
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.scan import LaserScan, Mount
+from rosbot_patrol.scan import LaserScan
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,7 @@ class Beams:
     Attributes:
         xs, ys: end points of those that hit, in the robot's frame [m], shapes (K,).
         mount: pose of the sensor on the robot.
-        angles, ranges: all beams in the sensor's frame turned upright [rad, m], `reach` where nothing was hit,
-            shapes (L,).
+        angles, ranges: all beams in the sensor's frame [rad, m], `reach` where nothing was hit, shapes (L,).
         reach: largest range [m].
         frame: of the laser.
     """
@@ -71,8 +70,8 @@ class SensorModel(Protocol):
         """Likelihood and fit of each pose, shape (N, 3); None where the scan says nothing."""
 
 
-def pick_beams(scan: LaserScan, mount: Mount, params: AmclParams) -> Beams:
-    """The evenly spread beams that the parameters ask for.
+def pick_beams(scan: LaserScan, base_from_laser: Pose2D, params: AmclParams) -> Beams:
+    """The evenly spread beams of a level scan that the parameters ask for.
 
     Readings at or below the least range count as misses; NaN and readings beyond the largest range are no hits.
     """
@@ -80,19 +79,17 @@ def pick_beams(scan: LaserScan, mount: Mount, params: AmclParams) -> Beams:
     step = max((count - 1) // (params.laser_max_beams - 1), 1)
     picked = np.arange(0, count, step)
     ranges = scan.ranges[picked]
-    reach = min(scan.range_max, params.laser_max_range) if params.laser_max_range > 0.0 else scan.range_max
+    reach = min(scan.reach, params.laser_max_range) if params.laser_max_range > 0.0 else scan.reach
     least = max(scan.range_min, params.laser_min_range) if params.laser_min_range > 0.0 else scan.range_min
     angles = scan.angle_min + scan.angle_increment * picked
-    if mount.is_upside_down:
-        angles = -angles
     with np.errstate(invalid="ignore"):
         is_hit = (ranges > least) & (ranges < reach)
         known = ~np.isnan(ranges)
-    directions = mount.pose.yaw + angles[is_hit]
+    directions = base_from_laser.yaw + angles[is_hit]
     return Beams(
-        xs=mount.pose.x + ranges[is_hit] * np.cos(directions),
-        ys=mount.pose.y + ranges[is_hit] * np.sin(directions),
-        mount=mount.pose,
+        xs=base_from_laser.x + ranges[is_hit] * np.cos(directions),
+        ys=base_from_laser.y + ranges[is_hit] * np.sin(directions),
+        mount=base_from_laser,
         angles=angles[known],
         ranges=np.where(is_hit, ranges, reach)[known],
         reach=reach,

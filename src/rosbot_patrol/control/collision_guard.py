@@ -6,6 +6,8 @@ blocks only a motion that goes deeper, so the robot can always leave. The lidar 
 what was last seen there is remembered for a while. Range sensors near the floor see what the lidar passes over: a
 distance that two readings in a row agree on counts as `min_points` points, and is remembered for a while too, since
 their cones are narrow.
+
+A scan that says nothing (see `scan.scan_problem`) is no scan: it frees nothing, and the base creeps as without one.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, driven, invert, transform_points
 from rosbot_patrol.params import param
-from rosbot_patrol.scan import LaserScan, is_silent_range, scan_points
+from rosbot_patrol.scan import LaserScan, is_silent_range, scan_points, scan_problem
 
 Array = NDArray[np.float64]
 
@@ -90,9 +92,13 @@ class CollisionGuard:
 
     Args:
         params: sizes, decelerations, limits.
+
+    Attributes:
+        problem: why the newest scan was left out, "" where it was not.
     """
 
     def __init__(self, params: GuardParams) -> None:
+        self.problem = ""
         self._params = params
         self._stamp = -math.inf
         self._seen: Array = np.empty((0, 2))  # in the base's frame at the scan
@@ -103,11 +109,18 @@ class CollisionGuard:
         self._met: list[_Met] = []
 
     def see(self, scan: LaserScan, base_from_laser: Pose2D, now: float, odom_from_base: Pose2D | None = None) -> None:
-        """Take a scan."""
+        """Take a scan that was laid level; one that says nothing is left out."""
+        self.problem = scan_problem(scan)
+        if self.problem:
+            return
         if odom_from_base is not None:
             self._remember(scan.range_min, compose(odom_from_base, base_from_laser), now)
         self._seen = transform_points(base_from_laser, scan_points(scan))
         self._pose, self._stamp = odom_from_base, now
+
+    def refuse(self, problem: str) -> None:
+        """Leave the newest scan out for a reason that the guard cannot know, such as a tilted laser."""
+        self.problem = problem
 
     def see_range(self, name: str, reading: RangeReading, now: float, odom_from_base: Pose2D | None = None) -> None:
         """Take a reading of a range sensor; NaN and negative numbers say nothing."""
@@ -140,8 +153,9 @@ class CollisionGuard:
         """The part of a commanded velocity that is safe."""
         if wish == STOP:
             return Verdict(STOP, 1.0, "")
-        if abs(now - self._stamp) > self._params.stale_after:  # it may have come after `now` was read
-            return self._without_sight(wish, now)
+        reason = self.blind(now)
+        if reason:
+            return self._without_sight(wish, reason)
         points = self._points(now, odom_from_base)
         scale = self._free_part(wish, points)
         if scale >= _CREEP or wish.wz == 0.0:
@@ -157,7 +171,16 @@ class CollisionGuard:
             return Verdict(twist, 0.0, "something is in the way, turning only")
         return Verdict(twist, scale, "" if scale >= 0.999 else "something is near on the way")
 
-    def _without_sight(self, wish: Twist2D, now: float) -> Verdict:
+    def blind(self, now: float) -> str:
+        """Why nothing is seen now, "" where the last scan is fresh."""
+        age = abs(now - self._stamp)  # it may have come after `now` was read
+        if age <= self._params.stale_after:
+            return ""
+        what = "usable scan" if self.problem else "scan"
+        reason = f"no {what} yet" if math.isinf(age) else f"the last {what} is {age:.1f} s old"
+        return f"{reason}: {self.problem}" if self.problem else reason
+
+    def _without_sight(self, wish: Twist2D, reason: str) -> Verdict:
         p = self._params
         speed = math.hypot(wish.vx, wish.vy)
         parts = [1.0]
@@ -166,8 +189,6 @@ class CollisionGuard:
         if wish.wz != 0.0:
             parts.append(p.stale_turn / abs(wish.wz))
         scale = min(parts)
-        age = now - self._stamp
-        reason = "no scan yet" if math.isinf(age) else f"the last scan is {abs(age):.1f} s old"
         return Verdict(Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale), scale, reason)
 
     def _points(self, now: float, odom_from_base: Pose2D | None) -> Array:

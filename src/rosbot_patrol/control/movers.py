@@ -104,7 +104,7 @@ class _Track:
         distances = np.hypot(*points.T)
         turned = (np.arctan2(points[:, 1], points[:, 0]) - scan.angle_min) * np.sign(scan.angle_increment)
         beams = np.rint(turned % math.tau / abs(scan.angle_increment)).astype(int)
-        ranges = np.where(scan.is_hit, scan.ranges, scan.range_max)
+        ranges = np.where(scan.is_hit, scan.ranges, scan.reach)
         beside = ranges[(beams[:, None] + [-1, 0, 1]).clip(0, len(ranges) - 1)]  # along a wall they differ by much
         is_through = distances < beside.min(axis=1) - _THERE
         is_before = distances > beside.max(axis=1) + _THERE
@@ -156,7 +156,7 @@ class MoverWatch:
         self._now = _NEVER
 
     def see(self, scan: LaserScan, odom_from_laser: Pose2D) -> list[Mover]:
-        """Take a scan; returns what moves, `movers` later too."""
+        """Take a level scan; returns what moves, `movers` later too."""
         now = scan.stamp
         if now < self._now - 1.0:
             self._forget()
@@ -232,7 +232,7 @@ class MoverWatch:
         self._hit_last[rows, columns] = now
 
     def _mark_free(self, scan: LaserScan, units: Array, odom_from_laser: Pose2D, now: float) -> None:
-        ranges = np.where(np.isposinf(scan.ranges), scan.range_max, scan.ranges)
+        ranges = np.where(np.isposinf(scan.ranges), scan.reach, scan.ranges)
         valid = (ranges >= scan.range_min) & ~np.isnan(ranges)
         lengths = np.minimum(ranges[valid] - _MARGIN, self._params.reach)
         units = units[valid]
@@ -278,7 +278,7 @@ def _is_veil(scan: LaserScan) -> NDArray[np.bool_]:
 
     Such points wander with the robot; laser_filters' ScanShadowsFilter takes them out by the same sign.
     """
-    ranges = np.where(scan.is_hit, scan.ranges, scan.range_max)
+    ranges = np.where(scan.is_hit, scan.ranges, scan.reach)
     steps = np.diff(ranges, prepend=ranges[:1], append=ranges[-1:])
     before, after = steps[:-1], steps[1:]
     return ((before > _VEIL) & (after > _VEIL)) | ((before < -_VEIL) & (after < -_VEIL))

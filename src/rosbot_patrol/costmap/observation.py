@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.costmap.params import SourceParams
 from rosbot_patrol.geometry import Pose2D, transform_points
-from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan import LaserScan, LevelScan
 
 Array = NDArray[np.float64]
 
 _EPSILON = 1e-4  # upstream's step back from range_max for a beam that hit nothing [m]
+_HAIR = 1e-6  # of heights: rounding of a transform [m]
 
 
 @dataclass(frozen=True)
@@ -68,10 +69,10 @@ class Observation:
 
 
 def observe(scan: LaserScan, pose: Pose2D, *, inf_is_valid: bool = False, height: float = 0.1) -> Observation:
-    """A scan taken at `pose` (of the sensor, in the costmap's frame; no flip) as an observation.
+    """A level scan taken at `pose` (of the sensor, in the costmap's frame) as an observation.
 
     Beams outside the scan's own limits, range_max included, say nothing, as in laser_geometry; with `inf_is_valid` a
-    beam that hit nothing clears up to the range's end.
+    beam that hit nothing clears up to the range's end, or for 100 m where the scan has no upper limit.
 
     Differs: upstream makes such a beam's end an obstacle where obstacle_range reaches that far; here it never marks.
     """
@@ -82,7 +83,7 @@ def observe(scan: LaserScan, pose: Pose2D, *, inf_is_valid: bool = False, height
     ends = hits
     is_open = np.isposinf(scan.ranges)
     if inf_is_valid:
-        far = transform_points(pose, units[is_open] * (scan.range_max - _EPSILON))
+        far = transform_points(pose, units[is_open] * (scan.reach - _EPSILON))
         ends = np.concatenate((hits, far))
     clear = np.where(hit, scan.ranges, np.where(is_open, np.inf, 0.0))
     return Observation(
@@ -92,6 +93,42 @@ def observe(scan: LaserScan, pose: Pose2D, *, inf_is_valid: bool = False, height
         ends=np.ascontiguousarray(ends),
         height=height,
         view=View(scan.angle_min + pose.yaw, scan.angle_increment, clear),
+    )
+
+
+def observe_level(level: LevelScan, source: SourceParams, top: float = math.inf) -> Observation:
+    """A scan that was laid level in the costmap's frame as an observation.
+
+    Points of a tilted laser have heights of their own: those outside the source's limits neither mark nor clear, as in
+    costmap_2d::ObservationBuffer.
+
+    Args:
+        level: the scan.
+        source: its limits.
+        top: the layer's `max_obstacle_height` [m]: what is higher clears, and is not marked.
+    """
+    scan = level.scan
+    if level.rises is None:
+        return observe(scan, level.pose, inf_is_valid=source.inf_is_valid, height=level.height)
+    lengths = np.where(np.isposinf(scan.ranges), scan.reach, scan.ranges)
+    with np.errstate(invalid="ignore"):
+        heights = level.height + level.rises * lengths
+        counts = (heights >= source.min_obstacle_height) & (heights <= source.max_obstacle_height)
+    inside = replace(scan, ranges=np.where(counts, scan.ranges, math.nan))
+    marked = replace(scan, ranges=np.where(counts & (heights <= top), scan.ranges, math.nan))
+    seen = observe(inside, level.pose, inf_is_valid=source.inf_is_valid)
+    height = min(max(level.height, source.min_obstacle_height), source.max_obstacle_height, top)
+    return replace(seen, hits=observe(marked, level.pose).hits, height=height)
+
+
+def height_problem(level: LevelScan, source: SourceParams) -> str:
+    """Why a source takes nothing of a scan, "" where it does: upstream's then marks and clears nothing, in silence."""
+    low, high = source.min_obstacle_height, source.max_obstacle_height
+    if level.rises is not None or low - _HAIR <= level.height <= high + _HAIR:
+        return ""
+    return (
+        f"the laser '{level.scan.frame_id}' is {level.height:.2f} m high in the costmap's frame, outside"
+        f" min_obstacle_height {low:g} to max_obstacle_height {high:g}: its scan would mark and clear nothing"
     )
 
 
@@ -117,7 +154,7 @@ class ObservationBuffer:
     def all(self) -> list[Observation]:
         """What an update uses, oldest first; none where the points' height is outside the source's limits."""
         lowest, highest = self.params.min_obstacle_height, self.params.max_obstacle_height
-        return [o for o in self._kept if lowest <= o.height <= highest]
+        return [o for o in self._kept if lowest - _HAIR <= o.height <= highest + _HAIR]
 
     def clear(self) -> None:
         """Forget all, so that what was cleared does not come back from an old scan."""

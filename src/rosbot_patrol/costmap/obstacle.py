@@ -14,13 +14,13 @@ from rosbot_patrol.costmap.depth import DepthObservation
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.costmap.layer import Layer
 from rosbot_patrol.costmap.marks import MarkMemory, Seen
-from rosbot_patrol.costmap.observation import Observation, ObservationBuffer, observe
+from rosbot_patrol.costmap.observation import Observation, ObservationBuffer, height_problem, observe, observe_level
 from rosbot_patrol.costmap.params import ObstacleParams, SourceParams, VoxelParams
 from rosbot_patrol.costmap.scrolling import ScrollingCells, fill_outside
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.grid import GridInfo
 
-__all__ = ["Observation", "ObservationBuffer", "ObstacleLayer", "observe"]
+__all__ = ["Observation", "ObservationBuffer", "ObstacleLayer", "height_problem", "observe", "observe_level"]
 
 _CLEARED = 1 << 16  # lethal cells that one update can clear without a search for them
 _LOW, _HIGH = np.iinfo(np.int64).max, np.iinfo(np.int64).min

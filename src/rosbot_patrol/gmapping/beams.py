@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.gmapping.beam_kernels import find_normals
 from rosbot_patrol.gmapping.parameters import GmappingParams
-from rosbot_patrol.scan import LaserScan, Mount
+from rosbot_patrol.scan import LaserScan
 
 Array = NDArray[np.float64]
 
@@ -55,24 +56,22 @@ class Beams:
         return float(np.hypot(*self.ends.T).max(initial=0.0))
 
 
-def pick_beams(scan: LaserScan, mount: Mount, params: GmappingParams) -> Beams:
-    """The beams that the parameters let through.
+def pick_beams(scan: LaserScan, base_from_laser: Pose2D, params: GmappingParams) -> Beams:
+    """The beams of a level scan that the parameters let through.
 
     A beam that is no number or shorter than `range_min` says nothing. One that met nothing (inf, or `range_max` and
     more) shows free space up to `maxUrange` where `maxRange` is set to `range_max` or more, and says nothing else.
+    A scan without an upper limit counts as one with a `range_max` of 100 m.
     """
-    longest = params.maxRange if params.maxRange > 0.0 else scan.range_max - 0.01
+    longest = params.maxRange if params.maxRange > 0.0 else scan.reach - 0.01
     usable = min(params.maxUrange, longest) if params.maxUrange > 0.0 else longest
-    lengths = np.minimum(scan.ranges, scan.range_max)
+    lengths = np.minimum(scan.ranges, scan.reach)
     with np.errstate(invalid="ignore"):
         counts = (scan.ranges >= max(scan.range_min, 1e-6)) & (lengths <= longest)
     lengths = lengths[counts]
-    is_miss = (scan.ranges[counts] >= scan.range_max) | (lengths >= usable)
-    angles = scan.angles[counts]
-    if mount.is_upside_down:
-        angles = -angles
-    angles = angles + mount.pose.yaw
+    is_miss = (scan.ranges[counts] >= scan.reach) | (lengths >= usable)
+    angles = scan.angles[counts] + base_from_laser.yaw
     directions = np.column_stack((np.cos(angles), np.sin(angles)))
-    sensor = np.array([mount.pose.x, mount.pose.y])
+    sensor = np.array([base_from_laser.x, base_from_laser.y])
     ends = sensor + np.minimum(lengths, usable)[:, None] * directions
     return Beams(ends=ends, directions=directions, is_hit=~is_miss, sensor=sensor, spacing=abs(scan.angle_increment))

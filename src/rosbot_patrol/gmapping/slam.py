@@ -23,7 +23,7 @@ from rosbot_patrol.gmapping.particle_map import ParticleMaps
 from rosbot_patrol.gmapping.scan_matcher import ScanMatcher
 from rosbot_patrol.gmapping.trajectories import Trajectories
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.scan import LaserScan, Mount
+from rosbot_patrol.scan import LaserScan
 
 log = logging.getLogger(__name__)
 
@@ -112,16 +112,16 @@ class Slam:
         """The best particle's map, int8 cells (-1 unknown, 0 free, 100 occupied)."""
         return self.maps.grid(self.best, self._params.occ_thresh)
 
-    def update(self, scan: LaserScan, odom_from_base: Pose2D, mount: Mount) -> Outcome:
+    def update(self, scan: LaserScan, odom_from_base: Pose2D, base_from_laser: Pose2D) -> Outcome:
         """Take in a scan and the odometry at its time.
 
         Args:
             scan: one sweep.
             odom_from_base: the robot in the odometry's frame at the scan's stamp.
-            mount: how the laser sits on the robot.
+            base_from_laser: of the level scan.
         """
         if self._odometry is None:
-            return self._begin(scan.stamp, odom_from_base, pick_beams(scan, mount, self._params))
+            return self._begin(scan.stamp, odom_from_base, pick_beams(scan, base_from_laser, self._params))
         self._check_restart(scan.stamp, odom_from_base)
         self._way += math.hypot(odom_from_base.x - self._odometry.x, odom_from_base.y - self._odometry.y)
         self._turn += abs(angle_difference(odom_from_base.yaw, self._odometry.yaw))
@@ -129,7 +129,7 @@ class Slam:
         if not self._is_due():
             return Outcome()
         move = compose(invert(self._updated_at), odom_from_base)
-        outcome = self._step(move, pick_beams(scan, mount, self._params))
+        outcome = self._step(move, pick_beams(scan, base_from_laser, self._params))
         self._note(scan.stamp, odom_from_base)
         return outcome
 

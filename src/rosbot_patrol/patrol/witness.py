@@ -187,5 +187,5 @@ def _is_looked_through(points: Array, scan: LaserScan, map_from_laser: Pose2D) -
     whole = round(math.tau / abs(scan.angle_increment))
     beams = np.where(beams >= whole, beams - whole, beams)
     known = beams < len(scan.ranges)
-    ranges = np.where(scan.is_hit, scan.ranges, scan.range_max)[np.where(known, beams, 0)]
+    ranges = np.where(scan.is_hit, scan.ranges, scan.reach)[np.where(known, beams, 0)]
     return bool((known & (ranges > away + 0.2)).mean() >= 0.7)

@@ -146,7 +146,7 @@ class AmclReplay:
             self._localizer.request_update()
 
     def _step(self, placed: PlacedScan) -> None:
-        outcome = self._localizer.update(placed.scan, placed.odom_from_base, placed.mount)
+        outcome = self._localizer.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
         if not outcome.is_late:
             self._odom_from_base = placed.odom_from_base
         for name, happened in (

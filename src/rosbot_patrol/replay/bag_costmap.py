@@ -7,15 +7,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import ObservationBuffer, observe
+from rosbot_patrol.costmap.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
 from rosbot_patrol.costmap.params import read_costmap
-from rosbot_patrol.errors import TransformError
+from rosbot_patrol.errors import LaserTilted, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.replay.transform_tree import TransformTree
-from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan import LaserScan, level_scan
+from rosbot_patrol.scan_check import ScanCheck
 
 KEPT = 5  # scans that wait for tf
+PATIENCE = 1.0  # where the parameters set no limit, scans that say nothing stop the robot after so long [s]
 
 
 class BagCostmap:
@@ -41,13 +43,16 @@ class BagCostmap:
         self._transforms = transforms
         self._scans: deque[LaserScan] = deque(maxlen=KEPT)
         self._next = 0.0
+        self._check = ScanCheck(f"the {name} sees nothing by it")
 
-    @property
-    def buffers(self) -> list[ObservationBuffer]:
+    def _buffers(self) -> list[tuple[ObstacleLayer, ObservationBuffer]]:
         """Those of its layers that take scans."""
         layers = self.costmap.obstacle_layers
         return [
-            buffer for layer in layers for buffer in layer.buffers.values() if buffer.params.data_type == "LaserScan"
+            (layer, buffer)
+            for layer in layers
+            for buffer in layer.buffers.values()
+            if buffer.params.data_type == "LaserScan"
         ]
 
     def hear_map(self, grid: Grid) -> None:
@@ -55,9 +60,10 @@ class BagCostmap:
         for layer in self.costmap.static_layers:
             layer.set_map(grid)
 
-    def hear_scan(self, scan: LaserScan) -> None:
-        """Keep a scan until the next update."""
-        self._scans.append(scan)
+    def hear_scan(self, scan: LaserScan, now: float) -> None:
+        """Keep a scan until the next update; one that says nothing is left out."""
+        if self._check.accepts(scan, now):
+            self._scans.append(scan)
 
     def robot_pose(self, now: float) -> Pose2D:
         """The robot in this costmap's frame; raises TransformError where it is not known or too old."""
@@ -76,23 +82,33 @@ class BagCostmap:
         except TransformError as err:
             self.problem = str(err)
             return
-        self._place_scans()
+        self._place_scans(now)
         self.costmap.update(now, pose)
         self.last = Grid(self.costmap.info, self.costmap.cells.copy())
         self.problem = ""
 
     def is_current(self, now: float) -> bool:
         """Whether what drives by this costmap can trust it."""
-        return not self.problem and self.costmap.is_current(now)
+        limits = [buffer.params.expected_update_rate for _, buffer in self._buffers()]
+        is_blind = self._check.lasts(now, max(limits, default=0.0) or PATIENCE)
+        return not self.problem and not is_blind and self.costmap.is_current(now)
 
-    def _place_scans(self) -> None:
+    def _place_scans(self, now: float) -> None:
         waiting, self._scans = list(self._scans), deque(maxlen=KEPT)
         for scan in waiting:
             try:
-                pose = self._transforms.pose(self.frame, scan.frame_id, scan.stamp)
+                level = level_scan(scan, self._transforms.lookup(self.frame, scan.frame_id, scan.stamp), self.frame)
+            except LaserTilted as err:
+                self._check.refuse(str(err), now)
+                continue
             except TransformError:
                 if waiting[-1].stamp - scan.stamp <= 1.0:
                     self._scans.append(scan)
                 continue
-            for buffer in self.buffers:
-                buffer.add(observe(scan, pose, inf_is_valid=buffer.params.inf_is_valid))
+            for layer, buffer in self._buffers():
+                problem = height_problem(level, buffer.params)
+                if problem:
+                    self._check.refuse(problem, now)
+                    continue
+                self._check.clear(now)
+                buffer.add(observe_level(level, buffer.params, layer.params.max_obstacle_height))

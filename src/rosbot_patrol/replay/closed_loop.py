@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,11 @@ import numpy as np
 
 from rosbot_patrol.amcl.localizer import Localizer
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams
 from rosbot_patrol.control.give_way import GiveWay, GiveWayParams
 from rosbot_patrol.control.movers import MoverParams, MoverWatch
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import observe
+from rosbot_patrol.costmap.obstacle import observe_level
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert
 from rosbot_patrol.grid import Grid
@@ -36,6 +35,7 @@ from rosbot_patrol.planning.registry import make_global_planner, make_local_plan
 from rosbot_patrol.replay.delayed_plans import DelayedPlans
 from rosbot_patrol.replay.low_sight import LowSight
 from rosbot_patrol.replay.profile_files import read_move_base
+from rosbot_patrol.scan import LevelScan
 from rosbot_patrol.simulation.engine import STEP, Engine
 from rosbot_patrol.yaml_files import read_mapping
 
@@ -216,17 +216,16 @@ class ClosedLoop:
     def _tick(self) -> None:
         """One scan, and everything that follows from it."""
         now, odom = self.now, self.odom_pose
-        scan = self.engine.scan()
-        base_from_laser = self.engine.laser_mount
-        localized = self._localizer.update(scan, odom, Mount(base_from_laser))
+        level = self.engine.level_scan()
+        localized = self._localizer.update(level.scan, odom, level.pose)
         if localized.estimate is not None and self._localizer.map_from_odom is not None:
             self._map_from_odom = self._localizer.map_from_odom
-        self._guard.see(scan, base_from_laser, now, odom)
+        self._guard.see(level.scan, level.pose, now, odom)
         self._low_sight.look(now, odom, (odom, self.map_pose))
-        self._movers.see(scan, compose(odom, base_from_laser))
-        self._update(self.local_costmap, self.odom_pose, scan, base_from_laser)
+        self._movers.see(level.scan, compose(odom, level.pose))
+        self._update(self.local_costmap, self.odom_pose, level)
         if self._ticks % (5 * self._every) == 0:
-            self._update(self.global_costmap, self.map_pose, scan, base_from_laser)
+            self._update(self.global_costmap, self.map_pose, level)
         command = self.navigator.step(now, self._view(now))
         if command.outcome is not None:
             self.drive.outcome = command.outcome
@@ -243,12 +242,12 @@ class ClosedLoop:
             self.drive.waited += self._every * STEP
         self._commands.append((now + self._delays.command, verdict.twist))
 
-    def _update(self, costmap: LayeredCostmap, pose: Pose2D, scan: Any, base_from_laser: Pose2D) -> None:
+    def _update(self, costmap: LayeredCostmap, pose: Pose2D, seen: LevelScan) -> None:
+        level = replace(seen, pose=compose(pose, seen.pose))
         for layer in costmap.obstacle_layers:
             for buffer in layer.buffers.values():
                 if buffer.params.data_type == "LaserScan":
-                    valid = buffer.params.inf_is_valid
-                    buffer.add(observe(scan, compose(pose, base_from_laser), inf_is_valid=valid))
+                    buffer.add(observe_level(level, buffer.params, layer.params.max_obstacle_height))
         costmap.update(self.now, pose)
 
     def _view(self, now: float) -> NavigatorView:

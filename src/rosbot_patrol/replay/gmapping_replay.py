@@ -95,7 +95,7 @@ class GmappingReplay:
         return Result("slam_gmapping", self._feed.facts(), counts, tables, maps)
 
     def _step(self, placed: PlacedScan) -> None:
-        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.mount)
+        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
         if not outcome.updated:
             self._counts["blind"] += outcome.is_blind
             return

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.geometry import Pose2D, compose, invert
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.gmapping.slam import Outcome, Slam
-from rosbot_patrol.scan import LaserScan, Mount
+from rosbot_patrol.scan import LaserScan
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def map_log(
     odometry: Array,
     params: GmappingParams,
     *,
-    mount: Mount | None = None,
+    base_from_laser: Pose2D | None = None,
     heard: Callable[[int, Outcome], None] | None = None,
 ) -> Mapping:
     """Map a whole log.
@@ -47,14 +47,13 @@ def map_log(
         scans: in their order.
         odometry: of the robot at each scan, shape (N, 3).
         params: of slam_gmapping.
-        mount: how the laser sits on the robot.
+        base_from_laser: of the level scans, None for the robot's own pose.
         heard: called with each scan's number and outcome.
     """
     slam, resamplings = Slam(params), 0
     last_update: list[int] = []
-    mount = mount or Mount()
     for i, (scan, row) in enumerate(zip(scans, odometry, strict=True)):
-        outcome = slam.update(scan, Pose2D(*row), mount)
+        outcome = slam.update(scan, Pose2D(*row), base_from_laser or Pose2D())
         last_update.append(i if outcome.updated else (last_update[-1] if i else -1))
         resamplings += outcome.resampled
         if heard is not None:

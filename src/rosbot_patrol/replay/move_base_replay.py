@@ -31,7 +31,7 @@ from rosbot_patrol.replay.records import MapRecord
 from rosbot_patrol.replay.results import STAMP, Result, Rows
 from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree
-from rosbot_patrol.scan import LaserScan, scan_problem
+from rosbot_patrol.scan import LaserScan, level_scan, scan_problem
 
 PLAN_S = 0.2  # from a request to its plan
 LATEST_S = 1.0  # a scan older than that tells of nobody
@@ -121,7 +121,7 @@ class MoveBaseReplay:
         self._step_until(now)
         match content:
             case LaserScan():
-                self._hear_scan(content)
+                self._hear_scan(content, now)
             case heard.VelocityRecord():
                 self._velocity = content.twist, now
             case heard.GoalPoseRecord():
@@ -150,12 +150,12 @@ class MoveBaseReplay:
 
     # -- what it hears
 
-    def _hear_scan(self, scan: LaserScan) -> None:
+    def _hear_scan(self, scan: LaserScan, now: float) -> None:
+        self._global.hear_scan(scan, now)
+        self._local.hear_scan(scan, now)
         if scan_problem(scan):
             self._counts["refused"] += 1
             return
-        self._global.hear_scan(scan)
-        self._local.hear_scan(scan)
         self._unseen = scan
 
     def _hear_map(self, record: MapRecord) -> None:
@@ -216,11 +216,12 @@ class MoveBaseReplay:
         """Show the newest scan to the watch for people, once its place is known."""
         if self._unseen is None:
             return
+        frame, scan = self._local.frame, self._unseen
         try:
-            pose = self._tree.pose(self._local.frame, self._unseen.frame_id, self._unseen.stamp)
+            level = level_scan(scan, self._tree.lookup(frame, scan.frame_id, scan.stamp), frame)
         except TransformError:
             return
-        self._watch.see(self._unseen, pose)
+        self._watch.see(level.scan, level.pose)
         self._unseen = None
 
     def _view(self, now: float) -> NavigatorView | None:

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import transform_points
 from rosbot_patrol.patrol.eyes import Eyes
 from rosbot_patrol.patrol.inputs import Battery, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.judge import Judge
@@ -37,7 +36,7 @@ from rosbot_patrol.replay.records import KINDS, MapRecord, Refused
 from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.runner import TF_TYPES, Input
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree
-from rosbot_patrol.scan import LaserScan, scan_points, scan_problem
+from rosbot_patrol.scan import LaserScan, level_scan, scan_problem
 from rosbot_patrol.sensors.sensor_file import SensorList
 
 STOPPED = "the emergency stop was pressed (topic /e_stop)"
@@ -252,10 +251,10 @@ class PatrolReplay:
         if scan is None:
             return None
         if self._nearest is None or self._nearest[0] is not scan:
+            base = self._frames.base_frame
             try:
-                base_from_laser = self._tree.pose(self._frames.base_frame, scan.frame_id)
+                points = level_scan(scan, self._tree.lookup(base, scan.frame_id), base).points
             except TransformError:
                 return None
-            points = transform_points(base_from_laser, scan_points(scan))
             self._nearest = scan, float(np.hypot(*points.T).min()) if len(points) else None
         return self._nearest[1]

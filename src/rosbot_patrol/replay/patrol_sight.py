@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.errors import MapError, TransformError
+from rosbot_patrol.errors import LaserTilted, MapError, TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.patrol.floor import floor_of
@@ -24,8 +24,8 @@ from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.witness import off_the_map
 from rosbot_patrol.replay.patrol_records import LensRecord
-from rosbot_patrol.replay.transform_tree import Transform, TransformTree
-from rosbot_patrol.scan import LaserScan, scan_points
+from rosbot_patrol.replay.transform_tree import TransformTree
+from rosbot_patrol.scan import LaserScan, level_scan, scan_points
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class PatrolSight:
         self._classes = frozenset(alarm_classes)
         self._camera: LensRecord | None = None
         self._waiting: deque[_Pending] = deque(maxlen=50)
-        self._scan: ScanView | None = None
+        self._scan: tuple[LaserScan, ScanView] | None = None  # as it was heard, and laid level
         self.house: RoomRegions | None = None
 
     def hear_lens(self, record: LensRecord) -> None:
@@ -85,14 +85,17 @@ class PatrolSight:
         """The newest scan with its place in map, None where either is not known."""
         if scan is None:
             return None
-        if self._scan is not None and self._scan.scan is scan:
-            return self._scan
+        if self._scan is not None and self._scan[0] is scan:
+            return self._scan[1]
+        world = self._frames.map_frame
         try:
-            pose = self._tree.pose(self._frames.map_frame, scan.frame_id, scan.stamp)
+            level = level_scan(scan, self._tree.lookup(world, scan.frame_id, scan.stamp), world)
+        except LaserTilted:
+            return None
         except TransformError:
-            return self._scan if self._scan is not None and abs(scan.stamp - self._scan.scan.stamp) < 0.5 else None
-        self._scan = ScanView(scan=scan, map_from_laser=pose)
-        return self._scan
+            return self._scan[1] if self._scan is not None and abs(scan.stamp - self._scan[0].stamp) < 0.5 else None
+        self._scan = scan, ScanView(scan=level.scan, map_from_laser=level.pose)
+        return self._scan[1]
 
     def take(self, now: float, *, is_busy: bool) -> tuple[Frame, ...]:
         """The frames that are ready; without a mission nothing is measured."""
@@ -124,11 +127,11 @@ class PatrolSight:
         """Of the camera in map at a moment, z from the floor, shape (4, 4); None where it is not known."""
         world, odom = self._frames.map_frame, self._frames.odom_frame
         try:
-            pose = matrix_of(self._tree.lookup(world, frame, stamp))
+            pose = self._tree.lookup(world, frame, stamp).matrix
         except TransformError:
             try:  # the map's part of it comes later than odometry
                 self._place.map_from_odom(stamp)  # raises where it is too old
-                pose = matrix_of(self._tree.lookup(world, odom)) @ matrix_of(self._tree.lookup(odom, frame, stamp))
+                pose = self._tree.lookup(world, odom).matrix @ self._tree.lookup(odom, frame, stamp).matrix
             except TransformError:
                 return None
         pose[2, 3] -= self._topics.floor_height
@@ -138,23 +141,11 @@ class PatrolSight:
         """What the lidar hits where the map shows nothing [m]."""
         if self._scan is None or self.house is None:
             return None
-        points = transform_points(self._scan.map_from_laser, scan_points(self._scan.scan))
+        view = self._scan[1]
+        points = transform_points(view.map_from_laser, scan_points(view.scan))
         return off_the_map(self.house.floor, points, self._topics.off_map)
 
 
 def _eye(view: View, lens: Lens) -> Eye:
     pose = view.map_from_optical
     return Eye(pose=Pose2D(float(pose[0, 3]), float(pose[1, 3]), view.yaw), width=lens.view_width, columns=lens.width)
-
-
-def matrix_of(transform: Transform) -> Array:
-    """A transform as a matrix, shape (4, 4)."""
-    x, y, z, w = transform[3:]
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w), transform.x],
-            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w), transform.y],
-            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y), transform.z],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )

@@ -7,6 +7,7 @@ rosbags' to read.
 
 from __future__ import annotations
 
+import math
 import struct
 
 import numpy as np
@@ -27,7 +28,7 @@ _TRANSFORM = struct.Struct("<7d")  # x, y, z and the quaternion
 
 
 def read_scan(raw: bytes) -> LaserScan:
-    """A sensor_msgs/LaserScan; NaN beams become inf (no measurement).
+    """A sensor_msgs/LaserScan; a stamp of 0 is none (NaN).
 
     Raises:
         struct.error, ValueError: the bytes end too early.
@@ -37,9 +38,8 @@ def read_scan(raw: bytes) -> LaserScan:
     frame = raw[_HEADER.size : at].decode()
     angle_min, _, increment, _, _, range_min, range_max, count = _BEAMS.unpack_from(raw, at)
     ranges = np.frombuffer(raw, dtype="<f4", count=count, offset=at + _BEAMS.size).astype(np.float64)
-    ranges[np.isnan(ranges)] = np.inf
     return LaserScan(
-        stamp=seconds + nanoseconds / 1e9,
+        stamp=(seconds + nanoseconds / 1e9) or math.nan,
         frame_id=frame.lstrip("/"),
         angle_min=angle_min,
         angle_increment=increment,

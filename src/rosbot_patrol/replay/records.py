@@ -68,17 +68,15 @@ def stamp_of(stamp: Any) -> float:
 
 
 def scan_of(message: Any) -> LaserScan:
-    """sensor_msgs/LaserScan; NaN beams become inf (no measurement)."""
-    ranges = np.array(message.ranges, dtype=np.float64)
-    ranges[np.isnan(ranges)] = np.inf
+    """sensor_msgs/LaserScan; a stamp of 0 is none (NaN)."""
     return LaserScan(
-        stamp=stamp_of(message.header.stamp),
+        stamp=stamp_of(message.header.stamp) or math.nan,
         frame_id=message.header.frame_id.lstrip("/"),
         angle_min=message.angle_min,
         angle_increment=message.angle_increment,
         range_min=message.range_min,
         range_max=message.range_max,
-        ranges=ranges,
+        ranges=np.array(message.ranges, dtype=np.float64),
     )
 
 

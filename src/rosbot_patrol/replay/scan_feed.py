@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree
-from rosbot_patrol.scan import LaserScan, Mount, scan_problem
+from rosbot_patrol.scan import LaserScan, level_scan, scan_problem
 from rosbot_patrol.scan_line import PlacedScan, ScanLine
 
 
@@ -22,7 +22,6 @@ class ScanFeed:
         self.odom, self.base = odom.lstrip("/"), base.lstrip("/")
         self.tree = TransformTree()
         self._line = ScanLine(self._place, size)
-        self._mounts: dict[str, Mount] = {}
         self.heard = self.refused = 0
         self.problem = ""  # why the last scan was left out or dropped
 
@@ -69,7 +68,5 @@ class ScanFeed:
         return {"left out": self.problem} if self.problem else {}
 
     def _place(self, scan: LaserScan) -> PlacedScan:
-        mount = self._mounts.get(scan.frame_id)
-        if mount is None:
-            mount = self._mounts[scan.frame_id] = self.tree.mount(self.base, scan.frame_id)
-        return PlacedScan(scan, self.tree.pose(self.odom, self.base, scan.stamp), mount)
+        level = level_scan(scan, self.tree.lookup(self.base, scan.frame_id), self.base)
+        return PlacedScan(level.scan, self.tree.pose(self.odom, self.base, scan.stamp), level.pose)

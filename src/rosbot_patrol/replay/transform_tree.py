@@ -11,8 +11,8 @@ from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 from rosbot_patrol.errors import TransformError, TransformNotYet, TransformTooOld
-from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
-from rosbot_patrol.scan import Mount, level_mount
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Transform as Transform
 
 UNIT_WITHIN = 1e-3  # of a quaternion's length from 1; tf2 refuses others, and so do we
 
@@ -30,23 +30,6 @@ class Edge(NamedTuple):
     qy: float
     qz: float
     qw: float
-
-
-class Transform(NamedTuple):
-    """a_from_b in space: a place [m] and a quaternion of length 1."""
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    qx: float = 0.0
-    qy: float = 0.0
-    qz: float = 0.0
-    qw: float = 1.0
-
-    @property
-    def pose(self) -> Pose2D:
-        """The planar part."""
-        return Pose2D(self.x, self.y, yaw_from_quaternion(self.qx, self.qy, self.qz, self.qw))
 
 
 IDENTITY = Transform()
@@ -115,18 +98,6 @@ class TransformTree:
         """The planar part of `newest`."""
         found, stamp = self.newest(target, source)
         return found.pose, stamp
-
-    def mount(self, base: str, laser: str) -> Mount:
-        """How a laser sits on the robot.
-
-        Raises:
-            TransformError: it is not known, or the laser does not look along the floor.
-        """
-        found = self.lookup(base, laser)
-        try:
-            return level_mount(found.x, found.y, found[3:])
-        except ValueError as err:
-            raise TransformError(base, laser, str(err)) from err
 
     def _is_parent(self, frame: str) -> bool:
         return any(frame in above.parents for above in self._above.values())

@@ -193,7 +193,7 @@ class AmclNode:
             self._is_first = False
             self._resume(placed)
         with self._lock:
-            outcome = self._localizer.update(scan, placed.odom_from_base, placed.mount)
+            outcome = self._localizer.update(scan, placed.odom_from_base, placed.base_from_laser)
             correction = self._localizer.map_from_odom
             poses = self._localizer.filter.poses
             if not outcome.is_late:

@@ -89,17 +89,15 @@ def scan_to_msg(scan: LaserScan) -> LaserScanMsg:
 
 
 def scan_from_msg(msg: LaserScanMsg) -> LaserScan:
-    """A scan as a record; NaN beams become inf (no measurement)."""
-    ranges = np.array(msg.ranges, dtype=np.float64)
-    ranges[np.isnan(ranges)] = np.inf
+    """A scan as a record; a stamp of 0 is none (NaN)."""
     return LaserScan(
-        stamp=msg.header.stamp.to_sec(),
+        stamp=msg.header.stamp.to_sec() or math.nan,
         frame_id=msg.header.frame_id.lstrip("/"),
         angle_min=msg.angle_min,
         angle_increment=msg.angle_increment,
         range_min=msg.range_min,
         range_max=msg.range_max,
-        ranges=ranges,
+        ranges=np.array(msg.ranges, dtype=np.float64),
     )
 
 

@@ -21,16 +21,17 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 from rosbot_patrol.costmap.cloud import CloudLayout, cloud_points, observe_cloud
 from rosbot_patrol.costmap.depth import DepthPicture, Optics, observe_depth
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import ObservationBuffer, ObstacleLayer, observe
+from rosbot_patrol.costmap.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
 from rosbot_patrol.costmap.range_layer import RangeReading, RangeSensorLayer
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams
-from rosbot_patrol.errors import ImageError, SensorError, TransformError
+from rosbot_patrol.errors import ImageError, LaserTilted, SensorError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.ros.convert import scan_from_msg
 from rosbot_patrol.ros.convert_images import picture_from_msg
 from rosbot_patrol.ros.node import now
 from rosbot_patrol.ros.transforms import NO_FRAME, Transforms
-from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan import LaserScan, level_scan
+from rosbot_patrol.scan_check import ScanCheck
 
 log = logging.getLogger(__name__)
 
@@ -38,6 +39,7 @@ T = TypeVar("T")
 
 _KEPT = 5  # messages that wait for their transform
 _OLDEST = 1.0  # older than the newest that waits by more, a message waits no longer [s]
+_PATIENCE = 1.0  # where the parameters set no limit, scans that say nothing stop the robot after so long [s]
 _SILENT = 5.0  # where the parameters set no limit, a topic silent for so long is told of [s]
 
 
@@ -62,7 +64,8 @@ class Source(ABC, Generic[T]):
         self._period = 0.95 / max_rate if max_rate > 0.0 else 0.0
         self._newest_only = newest_only
         self._heard = self._used = -math.inf
-        self._born = now()
+        self._born = self._placed = now()
+        self._unplaced = ""
         self._waiting: deque[tuple[float, str, T]] = deque(maxlen=_KEPT)
 
     @abstractmethod
@@ -99,9 +102,11 @@ class Source(ABC, Generic[T]):
             stamp, frame, item = entry
             try:
                 self._place(item, stamp, frame, transforms, target)
-            except TransformError:
+            except TransformError as err:
+                self._unplaced = self._unplaced or str(err)
                 later.append(entry)
                 continue
+            self._placed, self._unplaced = now(), ""
             if self._newest_only:
                 break
         newest = max((entry[0] for entry in later), default=0.0)
@@ -112,14 +117,24 @@ class Source(ABC, Generic[T]):
         """What is wrong with it, "" for nothing."""
         if self.refused:
             return f"{self.name}: {self.refused}"
+        limit = self._limit or _SILENT
         silent = time - max(self._heard, self._born)
-        if silent <= (self._limit or _SILENT):
-            return ""
-        return f"{self.name} has been silent for {silent:.1f} s"
+        if silent > limit:
+            return f"{self.name} has been silent for {silent:.1f} s"
+        if self._unplaced and time - self._placed > limit:
+            return f"{self.name} cannot be placed: {self._unplaced}"
+        return ""
+
+    def blind(self, time: float) -> bool:
+        """Whether nothing can be seen by it though messages come, so that the robot has to stand."""
+        del time
+        return False
 
 
 class _Scans(Source[LaserScan]):
-    def __init__(self, name: str, buffer: ObservationBuffer) -> None:
+    """Scans; those that say nothing, or of a laser that cannot be laid level, are as none and stop the robot."""
+
+    def __init__(self, name: str, buffer: ObservationBuffer, layer: ObstacleLayer) -> None:
         p = buffer.params
         super().__init__(
             name,
@@ -128,15 +143,34 @@ class _Scans(Source[LaserScan]):
             max_rate=p.max_rate,
             newest_only=p.observation_persistence == 0.0,
         )
-        self._buffer = buffer
+        self._buffer, self._layer = buffer, layer
+        self._check = ScanCheck(f"{name} sees nothing by it")
         rospy.Subscriber(p.topic, LaserScanMsg, self.receive, queue_size=1, buff_size=2**18, tcp_nodelay=True)
 
-    def _decode(self, msg: LaserScanMsg) -> LaserScan:
-        return scan_from_msg(msg)
+    def _decode(self, msg: LaserScanMsg) -> LaserScan | None:
+        scan = scan_from_msg(msg)
+        return scan if self._check.accepts(scan, now()) else None
 
     def _place(self, item: LaserScan, stamp: float, frame: str, transforms: Transforms, target: str) -> None:
-        pose = transforms.lookup(target, frame, stamp)
-        self._buffer.add(observe(item, pose, inf_is_valid=self._buffer.params.inf_is_valid))
+        p = self._buffer.params
+        try:
+            level = level_scan(item, transforms.transform(target, frame, stamp), target)
+            problem = height_problem(level, p)
+        except LaserTilted as err:
+            problem = str(err)
+        if problem:
+            self._check.refuse(problem, now())
+            return
+        self._check.clear(now())
+        self._buffer.add(observe_level(level, p, self._layer.params.max_obstacle_height))
+
+    def trouble(self, time: float) -> str:
+        """What is wrong with it, "" for nothing."""
+        return f"{self.name}: {self._check.problem}" if self._check.problem else super().trouble(time)
+
+    def blind(self, time: float) -> bool:
+        """Whether nothing can be seen by it though scans come."""
+        return self._check.lasts(time, self._limit or _PATIENCE)
 
 
 class _Clouds(Source["NDArray[np.float64]"]):
@@ -238,7 +272,7 @@ def subscribe_sources(costmap: LayeredCostmap) -> list[Source]:
             if isinstance(buffer.params, DepthSourceParams):
                 sources.append(_Depths(name, buffer, buffer.params))
             elif buffer.params.data_type == "LaserScan":
-                sources.append(_Scans(name, buffer))
+                sources.append(_Scans(name, buffer, layer))
             else:
                 sources.append(_Clouds(name, buffer, layer))
     for ranges in costmap.range_layers:

@@ -112,7 +112,7 @@ class GmappingNode:
     # Step and outputs
 
     def _step(self, placed: PlacedScan) -> None:
-        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.mount)
+        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
         if self._slam.map_from_odom is not None:
             self._correction = self._slam.map_from_odom
         self._note = self._describe(outcome, placed.scan)

@@ -215,7 +215,8 @@ class CostmapNode:
 
     def is_current(self, now: float) -> bool:
         """Whether what drives by this costmap can trust it."""
-        return not self.problem and self.costmap.is_current(now)
+        is_blind = any(source.blind(now) for source in self._sources)
+        return not self.problem and not is_blind and self.costmap.is_current(now)
 
     def troubles(self, now: float) -> list[str]:
         """Which inputs are silent or cannot be used."""

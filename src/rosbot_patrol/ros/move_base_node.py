@@ -6,6 +6,7 @@ Differs:
     - Cancelling works inside recovery behaviours, and at once whatever the controller's frequency.
     - When a node has died that the pose comes from (amcl, the base), the robot stands at once, not only when its last
       transform is too old; with `stop_without_map` it also stands while the map server is down.
+    - Scans that say nothing, or of a laser that is tilted, stop the robot as old sensor data do, and are named.
     - Odometry that is older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
     - A goal in a frame that tf does not know is aborted at once with the planner's text, instead of after recoveries.
     - It stands still for somebody whose way it would cross, and goes on when they have passed (`~give_way`).
@@ -304,6 +305,7 @@ class MoveBaseNode:
         problem = "" if moving_known else f"no odometry on {self.params.odom_topic} for {timeout} s"
         if not self._local.is_current(time):
             problem = "Sensor data is out of date, we're not going to allow commanding of the base for safety"
+            problem = ": ".join([problem, *self._local.troubles(time)])
         view = NavigatorView(
             local=local,
             recovery=recovery,

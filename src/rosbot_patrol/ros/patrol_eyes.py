@@ -20,7 +20,7 @@ from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
-from rosbot_patrol.errors import MapError, TransformError
+from rosbot_patrol.errors import LaserTilted, MapError, TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points, wrap_angles
 from rosbot_patrol.patrol.floor import floor_of
 from rosbot_patrol.patrol.inputs import Box, Eye, Frame, ScanView
@@ -37,7 +37,8 @@ from rosbot_patrol.ros.grids import GridMsg
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import Worker, now
 from rosbot_patrol.ros.transforms import Transforms
-from rosbot_patrol.scan import LaserScan, scan_points
+from rosbot_patrol.scan import LaserScan, level_scan, scan_points
+from rosbot_patrol.scan_check import ScanCheck
 
 log = logging.getLogger(__name__)
 
@@ -82,7 +83,9 @@ class PatrolEyes:
         self._lenses = Lenses(topics.camera_info_topic)
         self.depth = DepthRing(topics.depth_topic, topics.depth_info_topic, health)
         self._waiting: deque[_Pending] = deque(maxlen=50)
-        self._scan: tuple[LaserScanMsg, ScanView] | None = None
+        self._heard: tuple[LaserScanMsg, LaserScan | None] | None = None
+        self._scan: tuple[LaserScan, ScanView] | None = None  # as it was heard, and laid level
+        self._check = ScanCheck("the patrol looks as without a lidar")
         self._maps: Latest[OccupancyGrid] = Latest()
         self._has_map = threading.Event()
         self.house: RoomRegions | None = None
@@ -166,22 +169,44 @@ class PatrolEyes:
 
     # -- lidar
 
-    def look(self, message: LaserScanMsg | None) -> ScanView | None:
-        """The newest scan with its place in map, None where either is not known; a scan is converted once."""
+    def usable(self, message: LaserScanMsg | None) -> LaserScan | None:
+        """A scan as a record, None where it says nothing; it is converted and judged once."""
         if message is None:
             return None
-        if self._scan is not None and self._scan[0] is message:
+        if self._heard is None or self._heard[0] is not message:
+            scan = convert.scan_from_msg(message)
+            self._heard = message, scan if self._check.accepts(scan, now()) else None
+            if self._check.problem:
+                self._tell_lidar()
+        return self._heard[1]
+
+    def look(self, scan: LaserScan | None) -> ScanView | None:
+        """The newest scan, level and with its place in map; None where either is not known."""
+        if scan is None:
+            return None
+        if self._scan is not None and self._scan[0] is scan:
             return self._scan[1]
-        scan: LaserScan = convert.scan_from_msg(message)
         try:
-            pose = self._transforms.lookup(self._map_frame, scan.frame_id, scan.stamp)
+            map_from_laser = self._transforms.transform(self._map_frame, scan.frame_id, scan.stamp)
+            level = level_scan(scan, map_from_laser, self._map_frame)
+        except LaserTilted as err:
+            self.refuse(err)
+            return None
         except TransformError:
-            return (
-                self._scan[1] if self._scan is not None and abs(scan.stamp - self._scan[1].scan.stamp) < 0.5 else None
-            )
-        view = ScanView(scan=scan, map_from_laser=pose)
-        self._scan = message, view
-        return view
+            return self._scan[1] if self._scan is not None and abs(scan.stamp - self._scan[0].stamp) < 0.5 else None
+        self._check.clear(now())
+        self._tell_lidar()
+        self._scan = scan, ScanView(scan=level.scan, map_from_laser=level.pose)
+        return self._scan[1]
+
+    def refuse(self, err: LaserTilted) -> None:
+        """Leave out a scan that cannot be laid level, and say so."""
+        self._check.refuse(str(err), now())
+        self._tell_lidar()
+
+    def _tell_lidar(self) -> None:
+        problem = self._check.problem
+        self.health.set("lidar", WARN if problem else OK, problem or "scans can be used")
 
     def _off(self) -> NDArray[np.float64] | None:
         """What the lidar hits where the map shows nothing [m]."""

@@ -18,8 +18,8 @@ from sensor_msgs.msg import BatteryState
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.alerts.incident import Event
-from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import Pose2D, transform_points
+from rosbot_patrol.errors import LaserTilted, TransformError
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.msg import EspTrigger, SensorEvent
 from rosbot_patrol.patrol.battery import battery_of
 from rosbot_patrol.patrol.inputs import Battery, Box, Frame, Guarded, Inputs
@@ -30,13 +30,12 @@ from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.robot_place import RobotPlace
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.store import PatrolStore
-from rosbot_patrol.ros import convert
 from rosbot_patrol.ros.diagnostics import OK, WARN
 from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import now
 from rosbot_patrol.ros.patrol_eyes import PatrolEyes
 from rosbot_patrol.ros.transforms import Transforms
-from rosbot_patrol.scan import scan_points
+from rosbot_patrol.scan import LaserScan, level_scan
 from rosbot_patrol.sensors.sensor_file import SensorList
 
 log = logging.getLogger(__name__)
@@ -94,7 +93,7 @@ class PatrolInputs:
         )
         self.taken = max((number for number, *_ in journal.left), default=store.taken)
         self._heard: deque[Event] = deque(maxlen=1000)
-        self._nearest: tuple[LaserScanMsg, float | None] | None = None
+        self._nearest: tuple[LaserScan, float | None] | None = None
         self._detector: Latest[int] = Latest()
         self._scan: Latest[LaserScanMsg] = Latest()
         self._battery: Latest[Battery] = Latest()
@@ -223,7 +222,7 @@ class PatrolInputs:
             is_busy: a mission runs, so that the scan is looked at.
         """
         self._guarded = guarded
-        scan = self._fresh_scan(time_now) if is_busy else None
+        scan = self.eyes.usable(self._fresh_scan(time_now)) if is_busy else None
         view = self.eyes.look(scan)
         return Inputs(
             wall=time.time(),
@@ -282,18 +281,20 @@ class PatrolInputs:
     def _fresh_scan(self, time_now: float) -> LaserScanMsg | None:
         return self._scan.get() if self._scan.fresh(time_now, self.params.scan_timeout) else None
 
-    def _clearance(self, message: LaserScanMsg | None) -> float | None:
+    def _clearance(self, scan: LaserScan | None) -> float | None:
         """From the robot's centre to the nearest thing [m]; reckoned once for each scan."""
-        if message is None:
+        if scan is None:
             return None
-        if self._nearest is None or self._nearest[0] is not message:
-            scan = convert.scan_from_msg(message)
+        if self._nearest is None or self._nearest[0] is not scan:
+            base = self.params.base_frame
             try:
-                base_from_laser = self.transforms.lookup(self.params.base_frame, scan.frame_id)
+                points = level_scan(scan, self.transforms.transform(base, scan.frame_id), base).points
+            except LaserTilted as err:
+                self.eyes.refuse(err)
+                return None
             except TransformError:
                 return None
-            points = transform_points(base_from_laser, scan_points(scan))
-            self._nearest = message, float(np.hypot(*points.T).min()) if len(points) else None
+            self._nearest = scan, float(np.hypot(*points.T).min()) if len(points) else None
         return self._nearest[1]
 
 

@@ -7,11 +7,14 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.control.give_way import GiveWay, GiveWayParams
 from rosbot_patrol.control.movers import Mover, MoverParams, MoverWatch
-from rosbot_patrol.errors import TransformError
+from rosbot_patrol.errors import LaserTilted, TransformError
 from rosbot_patrol.geometry import Pose2D, Twist2D
 from rosbot_patrol.ros.convert import scan_from_msg
 from rosbot_patrol.ros.inputs import Latest
+from rosbot_patrol.ros.node import now
 from rosbot_patrol.ros.transforms import Transforms
+from rosbot_patrol.scan import level_scan
+from rosbot_patrol.scan_check import ScanCheck
 
 LATEST = 1.0  # a scan older than that tells of nobody [s]
 
@@ -33,6 +36,7 @@ class People:
         self._watch = MoverWatch(movers)
         self._give_way = GiveWay(give_way)
         self._scans: Latest[LaserScanMsg] = Latest()
+        self._check = ScanCheck("nobody is waited for")
         if topic and give_way.horizon > 0.0:
             rospy.Subscriber(topic, LaserScanMsg, self._on_scan, queue_size=1, buff_size=2**18, tcp_nodelay=True)
 
@@ -42,12 +46,20 @@ class People:
         if message is None:
             return
         scan = scan_from_msg(message)
+        if not self._check.accepts(scan, now()):
+            self._scans.take()
+            return
         try:
-            pose = self._transforms.lookup(self._frame, scan.frame_id, scan.stamp)
+            level = level_scan(scan, self._transforms.transform(self._frame, scan.frame_id, scan.stamp), self._frame)
+        except LaserTilted as err:
+            self._check.refuse(str(err), now())
+            self._scans.take()
+            return
         except TransformError:
             return  # not yet: it is asked again with the next look
         self._scans.take()
-        self._watch.see(scan, pose)
+        self._check.clear(now())
+        self._watch.see(level.scan, level.pose)
 
     def waits(self, wish: Twist2D, odom_from_base: Pose2D, now: float) -> str:
         """For whom the robot has to wait instead of driving a velocity, "" for nobody."""

@@ -5,30 +5,12 @@ from __future__ import annotations
 import threading
 import time
 
-import rospy
-import tf2_ros
-
-from rosbot_patrol.errors import TransformError
 from rosbot_patrol.ros.transforms import Transforms
-from rosbot_patrol.scan import LaserScan, Mount, level_mount
+from rosbot_patrol.scan import LaserScan, level_scan
 from rosbot_patrol.scan_line import PlacedScan as PlacedScan
 from rosbot_patrol.scan_line import ScanLine
 
 POLL_S, IDLE_S = 0.008, 0.2
-
-
-def mount_of(transforms: Transforms, base: str, laser: str) -> Mount:
-    """How the laser sits on the robot.
-
-    Raises:
-        TransformError: tf does not know it, or the laser does not look along the floor.
-    """
-    try:
-        found = transforms.buffer.lookup_transform(base, laser, rospy.Time(0)).transform
-        t, q = found.translation, found.rotation
-        return level_mount(t.x, t.y, (q.x, q.y, q.z, q.w))
-    except (tf2_ros.TransformException, ValueError) as err:
-        raise TransformError(base, laser, str(err)) from err
 
 
 class ScanQueue:
@@ -45,7 +27,6 @@ class ScanQueue:
         self._transforms = transforms
         self._odom, self._base = odom, base
         self._arrived = threading.Event()
-        self._mounts: dict[str, Mount] = {}
         self._line = ScanLine(self._place, size)
 
     @property
@@ -74,10 +55,5 @@ class ScanQueue:
         return found
 
     def _place(self, scan: LaserScan) -> PlacedScan:
-        mount = self._mount(scan.frame_id)
-        return PlacedScan(scan, self._transforms.lookup(self._odom, self._base, scan.stamp), mount)
-
-    def _mount(self, frame: str) -> Mount:
-        if frame not in self._mounts:
-            self._mounts[frame] = mount_of(self._transforms, self._base, frame)
-        return self._mounts[frame]
+        level = level_scan(scan, self._transforms.transform(self._base, scan.frame_id), self._base)
+        return PlacedScan(level.scan, self._transforms.lookup(self._odom, self._base, scan.stamp), level.pose)

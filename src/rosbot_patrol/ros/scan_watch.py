@@ -9,10 +9,12 @@ import rospy
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.node import now
 from rosbot_patrol.ros.transforms import Transforms
-from rosbot_patrol.scan import LaserScan, scan_problem
+from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan_check import ScanCheck
 
 log = logging.getLogger(__name__)
 
+PATIENCE_S = 1.0  # single bad scans among good ones are only logged
 SILENT_S = 15.0  # as upstream's amcl: a lidar that says nothing for so long is warned of
 
 
@@ -26,6 +28,7 @@ class ScanWatch:
 
     def __init__(self, transforms: Transforms, lost: str) -> None:
         self._transforms, self._lost = transforms, lost
+        self._check = ScanCheck(lost)
         self._last_scan = self._last_time = now()
         self._beams: dict[str, int] = {}  # of the last scan of each frame
 
@@ -35,11 +38,11 @@ class ScanWatch:
 
     def is_usable(self, scan: LaserScan) -> bool:
         """Whether a scan can be used; a warning says why not, and where the number of its beams has changed."""
-        name, beams = f"scan of frame '{scan.frame_id}'", len(scan.ranges)
-        problem = scan_problem(scan)
-        if problem:
-            rospy.logwarn_throttle(10.0, f"{name}: {problem}; it is left out")
+        current = now()
+        if not self._check.accepts(scan, current):
             return False
+        self._check.clear(current)
+        name, beams = f"scan of frame '{scan.frame_id}'", len(scan.ranges)
         before, self._beams[scan.frame_id] = self._beams.get(scan.frame_id, beams), beams
         if beams != before:
             many = count_of(beams, "beam")
@@ -53,7 +56,7 @@ class ScanWatch:
             current: time now [s].
 
         Returns:
-            What is wrong with the lidar, empty where it speaks.
+            What is wrong with the lidar, empty where it speaks and makes sense.
         """
         if current < self._last_time - 1.0:
             log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
@@ -63,7 +66,7 @@ class ScanWatch:
         self._last_time = current
         silent = current - self._last_scan
         if silent <= SILENT_S:
-            return ""
+            return f"{self._check.problem}; {self._lost}" if self._check.lasts(current, PATIENCE_S) else ""
         text = f"no laser scan received on {rospy.resolve_name('scan')} for {silent:.0f} seconds: {self._lost}"
         rospy.logwarn_throttle(SILENT_S, text[0].upper() + text[1:])
         return text

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
+from rosbot_patrol.geometry import Pose2D, Transform
 
 NO_FRAME = "set header.frame_id in its driver; a ROSbot's firmware before 0.14 leaves it empty"
 
@@ -55,50 +55,32 @@ class Transforms:
             frame = parent
         return ""
 
-    def lookup(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
-        """`target_from_source` at a time [s], or the newest.
+    def transform(self, target: str, source: str, stamp: float | None = None) -> Transform:
+        """`target_from_source` in space at a time [s], or the newest.
 
         Raises:
             TransformError: it is not known, or not at that time.
         """
         when = rospy.Time(0) if stamp is None else rospy.Time.from_sec(stamp)
-        try:
-            found = self.buffer.lookup_transform(target.lstrip("/"), source.lstrip("/"), when)
-        except tf2_ros.TransformException as err:
-            raise TransformError(target, source, str(err)) from err
-        t, q = found.transform.translation, found.transform.rotation
-        return Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
+        return self._find(target, source, when)[0]
+
+    def lookup(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
+        """The planar part of `transform`; raises as that does."""
+        return self.transform(target, source, stamp).pose
 
     def lookup_matrix(self, target: str, source: str, stamp: float) -> NDArray[np.float64]:
         """`target_from_source` in space at a time [s], shape (4, 4); raises TransformError."""
-        when = rospy.Time.from_sec(stamp)
+        return self.transform(target, source, stamp).matrix
+
+    def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
+        """The newest `target_from_source` and its stamp [s]; raises TransformError."""
+        found, stamp = self._find(target, source, rospy.Time(0))
+        return found.pose, stamp
+
+    def _find(self, target: str, source: str, when: rospy.Time) -> tuple[Transform, float]:
         try:
             found = self.buffer.lookup_transform(target.lstrip("/"), source.lstrip("/"), when)
         except tf2_ros.TransformException as err:
             raise TransformError(target, source, str(err)) from err
         t, q = found.transform.translation, found.transform.rotation
-        matrix = np.eye(4)
-        matrix[:3, :3] = _rotation(q.x, q.y, q.z, q.w)
-        matrix[:3, 3] = t.x, t.y, t.z
-        return matrix
-
-    def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
-        """The newest `target_from_source` and its stamp [s]; raises TransformError."""
-        try:
-            found = self.buffer.lookup_transform(target.lstrip("/"), source.lstrip("/"), rospy.Time(0))
-        except tf2_ros.TransformException as err:
-            raise TransformError(target, source, str(err)) from err
-        t, q = found.transform.translation, found.transform.rotation
-        return Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w)), found.header.stamp.to_sec()
-
-
-def _rotation(x: float, y: float, z: float, w: float) -> NDArray[np.float64]:
-    """Of a quaternion of any length but zero, shape (3, 3)."""
-    s = 2.0 / (x * x + y * y + z * z + w * w)
-    return np.array(
-        [
-            [1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-            [s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)],
-            [s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)],
-        ]
-    )
+        return Transform(t.x, t.y, t.z, q.x, q.y, q.z, q.w), found.header.stamp.to_sec()

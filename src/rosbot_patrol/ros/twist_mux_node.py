@@ -6,7 +6,8 @@ Differs:
 - Whoever commands, the base stands still for somebody whose way it would cross (`~give_way`).
 - What is chosen goes through the collision guard (`~guard`, true), which slows and stops for what `scan` and the range
   sensors of `~range_topics` show in the direction of motion. A command is checked again with each scan, not only when
-  it comes.
+  it comes. A scan that says nothing, or of a laser that is tilted, counts as none: the base creeps, and /diagnostics
+  and the log say why.
 - When every source has fallen silent, or a lock closes, a zero is published; upstream publishes nothing.
 - A topic whose last publisher has gone is silent at once: on one host a program that dies is noticed within
   milliseconds. The time-out stays for one that hangs, or whose host has gone.
@@ -42,6 +43,8 @@ from rosbot_patrol.ros.inputs import Latest
 from rosbot_patrol.ros.node import load_params, now, run_node
 from rosbot_patrol.ros.priority import Priority
 from rosbot_patrol.ros.transforms import NO_FRAME, Transforms
+from rosbot_patrol.scan import LaserScan, level_scan
+from rosbot_patrol.scan_check import ScanCheck
 
 log = logging.getLogger(__name__)
 
@@ -73,6 +76,7 @@ class Eyes:
         self._params = params
         self._transforms = Transforms()
         self._scans: Latest[LaserScanMsg] = Latest()
+        self._check = ScanCheck("the collision guard lets the base creep only")
         self._mounts: dict[str, Pose2D] = {}
         self._told = float("-inf")
         self._wake = wake
@@ -88,16 +92,25 @@ class Eyes:
             if reading is not None:
                 self._look_low(topic, reading, latest.stamp)
         message = self._scans.take()
-        if message is None:
+        return message is not None and self._look_round(scan_from_msg(message), self._scans.stamp)
+
+    def _look_round(self, scan: LaserScan, stamp: float) -> bool:
+        """Show a scan that came at a time [s] to the guard; whether it could be used."""
+        base = self._params.base_frame
+        if not self._check.accepts(scan, stamp):
+            self.guard.refuse(self._check.problem)
             return False
-        mount = self._mount(message.header.frame_id, "the scan")
-        if mount is None:
+        try:
+            level = level_scan(scan, self._transforms.transform(base, scan.frame_id), base)
+        except TransformError as err:
+            self._check.refuse(f"the collision guard cannot place the scan: {err}", stamp)
+            self.guard.refuse(str(err))
             return False
-        pose = self.pose(message.header.stamp.to_sec())
-        scan = scan_from_msg(message)
-        self.guard.see(scan, mount, self._scans.stamp, pose)
+        self._check.clear(stamp)
+        pose = self.pose(scan.stamp)
+        self.guard.see(level.scan, level.pose, stamp, pose)
         if pose is not None:
-            self._movers.see(scan, compose(pose, mount))
+            self._movers.see(level.scan, compose(pose, level.pose))
         return True
 
     def _look_low(self, topic: str, message: Range, stamp: float) -> None:
@@ -109,7 +122,7 @@ class Eyes:
             self.guard.see_range(topic, reading, stamp, self.pose(message.header.stamp.to_sec()))
 
     def _mount(self, frame: str, what: str) -> Pose2D | None:
-        """base_from_sensor, None (and said) where it is not known."""
+        """base_from_sensor of a range sensor, None (and said) where it is not known."""
         frame = frame.lstrip("/")
         if not frame:
             self._complain("the collision guard cannot place %s: its messages name no frame: %s", what, NO_FRAME)
@@ -167,7 +180,7 @@ class TwistMuxNode:
         self._eyes = Eyes(params, self._wake) if params.guard else None
         self._last: Choice = Choice(None, STOP)
         self._stopped_at = float("-inf")
-        self._reason = ""
+        self._reason = self._blind = ""
         self._told = float("-inf")
         self._subscribers: dict[str, rospy.Subscriber] = {}
         for source in params.topics:
@@ -207,6 +220,7 @@ class TwistMuxNode:
             self._forget_the_gone()
             choice = self._mux.choose(current)
         seen = self._eyes.look() if self._eyes is not None else False
+        self._blind = self._eyes.guard.blind(current) if self._eyes is not None else ""
         if choice.source is None:
             self._stand(choice, current)
         elif choice.fresh or seen:
@@ -227,7 +241,10 @@ class TwistMuxNode:
             self._stopped_at = current
             self.stop()
         text = f"{choice.lock} is locked" if choice.lock else "nobody commands"
-        self._health.set("", WARN if choice.lock else OK, text)
+        is_refused = self._eyes is not None and bool(self._blind and self._eyes.guard.problem)
+        if is_refused:
+            text += f"; {self._blind}"
+        self._health.set("", WARN if choice.lock or is_refused else OK, text)
         if choice.lock and self._last.lock != choice.lock:
             log.warning("the base is stopped: %s is set", choice.lock)
         self._reason = ""
@@ -238,17 +255,18 @@ class TwistMuxNode:
         return self._eyes.limit(wish, current)
 
     def _tell(self, choice: Choice, verdict: Verdict) -> None:
+        is_held = verdict.scale < 0.05 or bool(self._blind)
         self._health.set(
             "",
-            WARN if verdict.scale < 0.05 else OK,
-            f"{choice.source} drives",
+            WARN if is_held else OK,
+            f"{choice.source} drives" + (f"; {self._blind}" if self._blind else ""),
             {"guard": verdict.reason or "free", "part of the wish": f"{verdict.scale:.2f}"},
         )
-        worth = verdict.scale < 0.05 or "scan" in verdict.reason
-        if worth and verdict.reason != self._reason and time.monotonic() - self._told > REPEAT_LOG:
+        kind = "blind" if self._blind else verdict.reason  # the age of the last scan is no news
+        if is_held and kind != self._reason and time.monotonic() - self._told > REPEAT_LOG:
             self._told = time.monotonic()
             log.warning("%s is held back: %s", choice.source, verdict.reason)
-        self._reason = verdict.reason
+        self._reason = kind
 
 
 def body() -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, compose
 from rosbot_patrol.params import param
-from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan import LaserScan, LevelScan, level_scan
 from rosbot_patrol.simulation.battery import Battery, BatteryParams
 from rosbot_patrol.simulation.boxes import box_body
 from rosbot_patrol.simulation.camera import Camera, CameraParams, Picture, poses_before
@@ -232,11 +232,6 @@ class Engine:
         """The robot's battery."""
         return self._need_robot().battery
 
-    @property
-    def laser_mount(self) -> Pose2D:
-        """base_from_laser; raises WorldError where the robot has no lidar."""
-        return self._need_robot().laser[1]
-
     def touches(self) -> list[Touch]:
         """What the robot touches, the floor apart."""
         return self._physics.touches()
@@ -257,6 +252,10 @@ class Engine:
             self.params.lidar, scene, compose(self.pose, base_from_laser), self.now, self._noise("lidar"),
             frame=frame, twist=robot.laser_twist(self.twist), flipped=robot.is_laser_flipped,
         )  # fmt: skip
+
+    def level_scan(self) -> LevelScan:
+        """One sweep of the lidar, laid level in base_link; raises LaserTilted where it cannot be."""
+        return level_scan(self.scan(), self._need_robot().laser_transform, "base_link")
 
     def ranges(self) -> dict[str, float]:
         """Frame and distance [m] of each range sensor."""

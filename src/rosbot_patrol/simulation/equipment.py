@@ -10,13 +10,13 @@ from typing import Protocol
 import numpy as np
 
 from rosbot_patrol.errors import WorldError
-from rosbot_patrol.geometry import Pose2D, Twist2D
+from rosbot_patrol.geometry import Pose2D, Transform, Twist2D
 from rosbot_patrol.simulation.battery import Battery, BatteryParams
 from rosbot_patrol.simulation.doors import planar_radius
 from rosbot_patrol.simulation.drive import Drive, DriveParams
 from rosbot_patrol.simulation.imu import Imu, ImuParams
 from rosbot_patrol.simulation.lidar import LidarParams
-from rosbot_patrol.simulation.matrices import Matrix, to_pose2d
+from rosbot_patrol.simulation.matrices import Matrix, to_pose2d, to_quaternion
 from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.odometry import EncoderOdometry, OdometryParams
 from rosbot_patrol.simulation.robot import FrameParams, RobotDescription
@@ -114,6 +114,15 @@ class Equipment:
         if self.description.laser is None or self.base_from_laser is None:
             raise WorldError(f"robot '{self.description.name}'", "has no lidar")
         return self.description.laser.frame, self.base_from_laser
+
+    @property
+    def laser_transform(self) -> Transform:
+        """base_from_laser in space; raises WorldError where the robot has no lidar."""
+        if self.description.laser is None:
+            raise WorldError(f"robot '{self.description.name}'", "has no lidar")
+        matrix = self.description.laser.pose
+        x, y, z = matrix[:3, 3].tolist()
+        return Transform(x, y, z, *to_quaternion(matrix))
 
     def laser_twist(self, twist: Twist2D) -> Twist2D:
         """Velocity of the lidar in its own plane, from that of the base."""

@@ -12,7 +12,6 @@ import numpy as np
 
 from rosbot_patrol.amcl.field_kernels import cast_ray
 from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances
-from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.scan import LaserScan
@@ -20,7 +19,7 @@ from rosbot_patrol.simulation.floor_plan import floor_plan
 from rosbot_patrol.simulation.world import load_world
 
 ROOT = Path(__file__).parents[3]
-MOUNT = Mount(Pose2D(0.02, 0.0, math.pi))
+MOUNT = Pose2D(0.02, 0.0, math.pi)
 START = Pose2D()
 ROUND = [(-0.6, 2.5), (-1.2, 4.8), (2.7, 7.35), (-2.5, 6.5), (-4.0, 4.0), (-1.0, 4.5), (-0.4, 2.5), (0.0, 0.0)]
 
@@ -48,7 +47,7 @@ def scan_at(
     pose: Pose2D, rng: np.random.Generator, *, stamp: float = 0.0, beams: int = 120, reach: float = 12.0
 ) -> LaserScan:
     """What the lidar sees from a pose of the robot, with 1 cm of noise."""
-    laser, field = compose(pose, MOUNT.pose), truth_field()
+    laser, field = compose(pose, MOUNT), truth_field()
     angles = np.linspace(-math.pi, math.pi, beams)
     ranges = np.array(
         [

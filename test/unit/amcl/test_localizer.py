@@ -14,11 +14,10 @@ from house_run import MOUNT, ROOT, drive, error, house_map, scan_at
 from rosbot_patrol import params
 from rosbot_patrol.amcl.localizer import Localizer
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.sensor_model import Mount
 from rosbot_patrol.errors import MapError
-from rosbot_patrol.geometry import Pose2D, compose
+from rosbot_patrol.geometry import Pose2D, Transform, compose
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.scan import scan_problem
+from rosbot_patrol.scan import level_scan, scan_problem
 
 CORRIDOR = [(-0.6, 2.5), (-1.2, 4.8)]
 
@@ -246,9 +245,11 @@ def test_a_laser_upside_down() -> None:
     made, rng = localizer(), np.random.default_rng(0)
     upright = scan_at(Pose2D(), rng)
     scan = replace(upright, ranges=upright.ranges[::-1].copy())
+    pitched_over = Transform(MOUNT.x, MOUNT.y, 0.2, 0.0, 1.0, 0.0, 0.0)  # upside down, and backwards as MOUNT
     made.set_pose(Pose2D(), np.diag([0.04, 0.04, 0.01]))
     for i in range(20):
         made.request_update()
-        made.update(replace(scan, stamp=0.1 * i), Pose2D(), Mount(MOUNT.pose, is_upside_down=True))
+        level = level_scan(replace(scan, stamp=0.1 * i), pitched_over, "base_link")
+        made.update(level.scan, Pose2D(), level.pose)
     assert made.estimate is not None
     assert error(made.estimate.pose, Pose2D())[0] < 0.05

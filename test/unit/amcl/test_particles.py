@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -172,6 +173,21 @@ def test_beams_are_spread_evenly_and_readings_sorted() -> None:
     assert len(beams.xs) == 3
     assert beams.ranges.tolist() == [1.0, 12.0, 12.0, 12.0, 12.0, 2.0, 12.0, 3.0]
     assert len(pick_beams(scan_at(Pose2D(), np.random.default_rng(0), beams=720), MOUNT, AmclParams()).ranges) == 30
+
+
+@pytest.mark.parametrize("limit", [math.inf, float(np.finfo(np.float32).max)])
+@pytest.mark.parametrize("name", MODELS)
+def test_a_scan_without_an_upper_limit_finds_the_true_pose(name: str, limit: float) -> None:
+    parameters = AmclParams(laser_model_type=name, laser_max_beams=60)
+    scan = replace(scan_at(Pose2D(), np.random.default_rng(0)), range_max=limit)
+    beams = pick_beams(scan, MOUNT, parameters)
+    assert beams.reach == 100.0
+    assert pick_beams(scan, MOUNT, replace(parameters, laser_max_range=9.0)).reach == 9.0
+    weighing = MODELS[name](house_map(), parameters).weigh(np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]), beams)
+    assert weighing is not None
+    assert weighing.likelihood.argmax() == 0
+    assert np.isfinite(weighing.likelihood).all()
+    assert (weighing.likelihood > 0.0).all()
 
 
 def test_upstreams_range_parameters() -> None:

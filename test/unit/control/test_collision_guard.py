@@ -1,5 +1,6 @@
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ AHEAD, BACK, LEFT = Twist2D(0.5), Twist2D(-0.5), Twist2D(0.0, 0.0, 1.0)
 def cast(segments, map_from_base, noise=0.0, seed=1):
     """A scan of 720 beams of wall segments, shape (N, 4), by intersecting each beam with each."""
     map_from_laser = compose(map_from_base, BASE_FROM_LASER)
-    walls = np.asarray(segments, dtype=float)
+    walls = np.asarray(segments, dtype=float).reshape(-1, 4)
     a = transform_points(invert(map_from_laser), walls[:, :2])
     b = transform_points(invert(map_from_laser), walls[:, 2:])
     angles = -math.pi + np.arange(720) * math.tau / 720
@@ -168,6 +169,56 @@ def test_a_scan_that_comes_while_a_command_is_looked_at_is_fresh():
     guard = CollisionGuard(GuardParams())
     guard.see(cast(wall_ahead(3.0), Pose2D()), BASE_FROM_LASER, 10.02)
     assert guard.limit(AHEAD, 10.0).scale == 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"ranges": np.zeros(720)}, "say nothing"),
+        ({"ranges": np.full(720, math.nan)}, "say nothing"),
+        ({"range_max": 0.0}, "range_max 0"),
+        ({"angle_increment": 0.0}, "angle_increment is 0"),
+        ({"ranges": cast(wall_ahead(0.25), Pose2D()).ranges * 1000.0}, "millimetres"),
+        ({"ranges": cast(wall_ahead(0.25), Pose2D()).ranges * 1000.0, "range_max": 12000.0}, "millimetres"),
+    ],
+)
+def test_a_scan_that_says_nothing_is_no_scan(changes, named):
+    good, guard = cast([*wall_ahead(0.225), *wall_ahead(-3.0)], Pose2D()), CollisionGuard(GuardParams())
+    bad = replace(good, **changes)
+    guard.see(bad, BASE_FROM_LASER, 0.0, Pose2D())
+    verdict = guard.limit(Twist2D(0.3), 0.0, Pose2D())
+    assert verdict.twist.vx == pytest.approx(0.1)
+    assert "no usable scan yet" in verdict.reason
+    assert named in verdict.reason
+    guard.see(good, BASE_FROM_LASER, 1.0, Pose2D())
+    seen = guard.limit(Twist2D(0.3), 1.0, Pose2D())
+    assert seen.scale < 0.9
+    assert "on the way" in seen.reason
+    guard.see(bad, BASE_FROM_LASER, 1.1, Pose2D())
+    assert guard.limit(Twist2D(0.3), 1.1, Pose2D()) == seen  # what was seen is not forgotten for it
+    assert "the last usable scan is 0.7 s old" in guard.limit(Twist2D(0.3), 1.7, Pose2D()).reason
+    guard.see(good, BASE_FROM_LASER, 1.8, Pose2D())
+    assert (guard.problem, guard.blind(1.8)) == ("", "")
+
+
+def test_a_scan_that_was_refused_for_its_mount_is_none_either():
+    guard = CollisionGuard(GuardParams())
+    guard.refuse("the laser 'laser' is tilted by 30 deg")
+    assert guard.limit(LEFT, 0.0).twist.wz == pytest.approx(0.4)
+    assert "tilted by 30 deg" in guard.limit(LEFT, 0.0).reason
+
+
+def test_a_large_hall_is_free():
+    guard = CollisionGuard(GuardParams())
+    guard.see(replace(cast([], Pose2D()), ranges=np.full(720, math.inf)), BASE_FROM_LASER, 0.0)
+    assert guard.limit(AHEAD, 0.0) == (AHEAD, 1.0, "")
+
+
+@pytest.mark.parametrize("limit", [math.inf, 3.4028234663852886e38])
+def test_a_scan_without_an_upper_limit_is_seen(limit):
+    guard = CollisionGuard(GuardParams())
+    guard.see(replace(cast(wall_ahead(0.3), Pose2D()), range_max=limit), BASE_FROM_LASER, 0.0)
+    assert guard.limit(AHEAD, 0.0).scale < 0.8
 
 
 def test_moves_between_scans_are_accounted_for():

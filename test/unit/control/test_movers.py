@@ -34,7 +34,8 @@ def play(engine, watch, seconds, command=lambda now: Twist2D()):
         engine.command(command(engine.now))
         engine.step()
         if i % EVERY == 0:
-            seen = watch.see(engine.scan(), compose(engine.odometry[0], engine.laser_mount))
+            level = engine.level_scan()
+            seen = watch.see(level.scan, compose(engine.odometry[0], level.pose))
             found.append((engine.now, seen, [(*actor.pose[:2], actor.speed) for actor in engine.actors]))
     return found
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from rosbot_patrol.geometry import Pose2D, compose
+from rosbot_patrol.geometry import Pose2D, Transform, compose
 from rosbot_patrol.gmapping.parameters import GmappingParams
-from rosbot_patrol.scan import LaserScan, Mount
+from rosbot_patrol.scan import LaserScan
 
 # Walls as x0, y0, x1, y1 [m]: a room of 8 m x 6 m with a niche and a box in it.
 ROOM = np.array(
@@ -45,14 +45,15 @@ def scan_at(
     stamp: float = 0.0,
     beams: int = 180,
     walls: np.ndarray = ROOM,
-    mount: Mount | None = None,
+    mount: Transform | None = None,
     range_max: float = 20.0,
 ) -> LaserScan:
-    """What the lidar measures where the robot stands."""
-    mount = mount or Mount()
+    """What the lidar measures where the robot stands, by a laser that may be mounted upside down."""
+    mount = mount or Transform()
+    is_upside_down = mount.rotation[2, 2] < 0.0
     increment = 2.0 * math.pi / beams
     angles = -math.pi + increment * np.arange(beams)
-    seen = ranges_at(compose(pose, mount.pose), -angles if mount.is_upside_down else angles, walls)
+    seen = ranges_at(compose(pose, mount.pose), -angles if is_upside_down else angles, walls)
     return LaserScan(
         stamp=stamp,
         frame_id="laser",

@@ -12,7 +12,6 @@ from rosbot_patrol.gmapping import tile_kernels as kernels
 from rosbot_patrol.gmapping.beams import Beams, pick_beams
 from rosbot_patrol.gmapping.particle_map import ParticleMaps
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.scan import Mount
 
 STILL = np.zeros((1, 3))
 
@@ -22,7 +21,7 @@ def maps(count: int = 1, half: float = 8.0) -> ParticleMaps:
 
 
 def room_beams() -> Beams:
-    return pick_beams(scan_at(Pose2D()), Mount(), small())
+    return pick_beams(scan_at(Pose2D()), Pose2D(), small())
 
 
 def beam_to(x: float, y: float, *, is_hit: bool = True) -> Beams:

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from mapped_room import ROOM, scan_at, small
 
-from rosbot_patrol.geometry import Pose2D, compose, invert
+from rosbot_patrol.geometry import Pose2D, Transform, compose, invert
 from rosbot_patrol.gmapping.slam import Slam
 from rosbot_patrol.gmapping.trajectories import Trajectories
-from rosbot_patrol.scan import Mount
+from rosbot_patrol.scan import level_scan
 
 WAY = [Pose2D(0.1 * i, 0.3 * math.sin(0.2 * i), 0.06 * math.cos(0.2 * i)) for i in range(20)]
 SLIP = Pose2D(0.004, -0.003, 0.01)  # what each move of the odometry is off
+BACKWARDS, PITCHED_OVER = (0.0, 0.0, 1.0, 0.0), (0.0, 1.0, 0.0, 0.0)
 
 
 def odometry_of(way: list[Pose2D], slip: Pose2D = SLIP) -> list[Pose2D]:
@@ -27,11 +28,12 @@ def odometry_of(way: list[Pose2D], slip: Pose2D = SLIP) -> list[Pose2D]:
     return rows
 
 
-def driven(slam: Slam, way: list[Pose2D] = WAY, *, mount: Mount | None = None, beams: int = 180) -> np.ndarray:
+def driven(slam: Slam, way: list[Pose2D] = WAY, *, mount: Transform | None = None, beams: int = 180) -> np.ndarray:
     """Errors in place and heading at each scan, shape (N, 2)."""
-    mount, rows = mount or Mount(), []
+    mount, rows = mount or Transform(), []
     for i, (pose, odometry) in enumerate(zip(way, odometry_of(way), strict=True)):
-        slam.update(scan_at(pose, stamp=0.1 * i, beams=beams, mount=mount), odometry, mount)
+        level = level_scan(scan_at(pose, stamp=0.1 * i, beams=beams, mount=mount), mount, "base_link")
+        slam.update(level.scan, odometry, level.pose)
         assert slam.map_from_odom is not None
         found = compose(slam.map_from_odom, odometry)
         rows.append((math.hypot(found.x - pose.x, found.y - pose.y), abs(found.yaw - pose.yaw)))
@@ -69,12 +71,12 @@ def test_the_map_has_the_rooms_walls() -> None:
 @pytest.mark.parametrize(
     "mount",
     [
-        Mount(Pose2D(0.05, 0.0, math.pi)),
-        Mount(Pose2D(0.1, -0.02, 0.4), is_upside_down=True),
-        Mount(Pose2D(-0.1, 0.0, math.pi), is_upside_down=True),
+        Transform(0.05, 0.0, 0.2, *BACKWARDS),
+        Transform(0.1, -0.02, 0.2, math.cos(0.2), math.sin(0.2), 0.0, 0.0),  # roll pi, then yaw 0.4
+        Transform(-0.1, 0.0, 0.2, *PITCHED_OVER),
     ],
 )
-def test_lasers_may_hang_upside_down_and_look_backwards(mount: Mount) -> None:
+def test_lasers_may_hang_upside_down_and_look_backwards(mount: Transform) -> None:
     errors = driven(Slam(small()), WAY[:10], mount=mount)
     assert errors[:, 0].max() < 0.03
     assert errors[:, 1].max() < math.radians(1.0)
@@ -95,7 +97,7 @@ def test_an_update_waits_for_a_way_a_turn_or_a_time() -> None:
     slam = Slam(small(linearUpdate=0.2, angularUpdate=0.3, temporalUpdate=1.0))
 
     def updated(pose: Pose2D, stamp: float) -> bool:
-        return slam.update(scan_at(pose, stamp=stamp), pose, Mount()).updated
+        return slam.update(scan_at(pose, stamp=stamp), pose, Pose2D()).updated
 
     assert updated(Pose2D(), 0.0)
     assert not updated(Pose2D(0.15, 0.0, 0.0), 0.1)
@@ -110,18 +112,18 @@ def test_an_update_waits_for_a_way_a_turn_or_a_time() -> None:
 def test_the_map_begins_where_the_odometry_is() -> None:
     slam = Slam(small())
     start = Pose2D(2.0, 1.0, 0.5)
-    slam.update(scan_at(start), start, Mount())
+    slam.update(scan_at(start), start, Pose2D())
     assert slam.map_from_odom == pytest.approx((0.0, 0.0, 0.0))
 
 
 def test_a_scan_that_sees_nothing_leaves_the_map_alone() -> None:
     slam = Slam(small())
     empty = replace(scan_at(Pose2D()), ranges=np.full(180, np.inf))
-    assert slam.update(empty, Pose2D(), Mount()).is_blind
+    assert slam.update(empty, Pose2D(), Pose2D()).is_blind
     assert slam.map_from_odom is None
     driven(slam, WAY[:3])
     before = slam.grid().cells
-    blind = slam.update(replace(empty, stamp=1.0), compose(WAY[2], Pose2D(0.5, 0.0, 0.0)), Mount())
+    blind = slam.update(replace(empty, stamp=1.0), compose(WAY[2], Pose2D(0.5, 0.0, 0.0)), Pose2D())
     assert blind.updated
     assert blind.is_blind
     assert (slam.grid().cells == before).all()
@@ -132,7 +134,7 @@ def test_another_number_of_beams_is_no_matter() -> None:
     slam = Slam(small())
     driven(slam, WAY[:5])
     for i, (pose, odometry) in enumerate(zip(WAY[5:10], odometry_of(WAY)[5:10], strict=True)):
-        slam.update(scan_at(pose, stamp=1.0 + i, beams=100 + 60 * i), odometry, Mount())
+        slam.update(scan_at(pose, stamp=1.0 + i, beams=100 + 60 * i), odometry, Pose2D())
     assert math.hypot(slam.poses[0, 0] - WAY[9].x, slam.poses[0, 1] - WAY[9].y) < 0.03
 
 
@@ -143,13 +145,13 @@ def test_a_restart_of_time_or_wheels_is_no_motion(
     slam = Slam(small())
     driven(slam)
     with caplog.at_level(logging.WARNING):
-        slam.update(scan_at(WAY[-1], stamp=stamp), odometry, Mount())
+        slam.update(scan_at(WAY[-1], stamp=stamp), odometry, Pose2D())
     assert "time went back" in caplog.text or "the odometry jumped" in caplog.text
     assert slam.map_from_odom is not None
     found = compose(slam.map_from_odom, odometry)
     assert math.hypot(found.x - WAY[-1].x, found.y - WAY[-1].y) < 0.03
     ahead = compose(odometry, Pose2D(0.1, 0.0, 0.0))
-    slam.update(scan_at(compose(WAY[-1], Pose2D(0.1, 0.0, 0.0)), stamp=stamp + 0.1), ahead, Mount())
+    slam.update(scan_at(compose(WAY[-1], Pose2D(0.1, 0.0, 0.0)), stamp=stamp + 0.1), ahead, Pose2D())
     assert abs(slam.poses[0, 0] - WAY[-1].x - 0.1) < 0.03
 
 
@@ -157,7 +159,7 @@ def test_scans_out_of_order_are_followed(caplog: pytest.LogCaptureFixture) -> No
     slam = Slam(small())
     driven(slam, WAY[:5])
     with caplog.at_level(logging.WARNING):
-        slam.update(scan_at(WAY[6], stamp=0.35), odometry_of(WAY)[6], Mount())
+        slam.update(scan_at(WAY[6], stamp=0.35), odometry_of(WAY)[6], Pose2D())
     assert not caplog.records
     assert abs(slam.poses[0, 0] - WAY[6].x) < 0.03
 
@@ -168,7 +170,7 @@ def test_weights_entropy_and_resampling() -> None:
     assert slam.entropy == pytest.approx(math.log(30))
     outcomes = []
     for i, (pose, odometry) in enumerate(zip(WAY[1:12], odometry_of(WAY)[1:12], strict=True)):
-        outcomes.append(slam.update(scan_at(pose, stamp=0.1 * i), odometry, Mount()))
+        outcomes.append(slam.update(scan_at(pose, stamp=0.1 * i), odometry, Pose2D()))
         assert slam.weights.sum() == pytest.approx(1.0)
         assert outcomes[-1].resampled == (outcomes[-1].effective < 15.0)
         assert slam.entropy <= math.log(30) + 1e-9
@@ -181,7 +183,7 @@ def test_a_saved_map_is_gone_on_with_from_a_start() -> None:
     saved = first.grid()
     start = Pose2D(WAY[8].x + 0.12, WAY[8].y - 0.1, WAY[8].yaw + 0.05)
     again = Slam(small(), saved=saved, start=start)
-    again.update(scan_at(WAY[8]), Pose2D(), Mount())
+    again.update(scan_at(WAY[8]), Pose2D(), Pose2D())
     assert again.map_from_odom is not None
     assert math.hypot(again.map_from_odom.x - WAY[8].x, again.map_from_odom.y - WAY[8].y) < 0.04
     both = (saved.cells == 100) & (again.grid().cells == 100) if saved.info == again.grid().info else None

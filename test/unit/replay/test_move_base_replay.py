@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import made_patrol
@@ -18,6 +20,7 @@ from rosbot_patrol.replay.move_base_replay import FIELDS
 from rosbot_patrol.replay.results import Result
 from rosbot_patrol.replay.runner import run_replay
 from rosbot_patrol.replay.setup import Setup, build_replay
+from rosbot_patrol.scan import LaserScan
 
 SECONDS, GOAL = 7.0, Pose2D(1.9, 0.0, 0.0)
 ODOMETRY, CANCEL = "nav_msgs/msg/Odometry", "actionlib_msgs/msg/GoalID"
@@ -43,9 +46,23 @@ def odometry_message(maker: Maker, stamp: float, pose: Pose2D, speed: float) -> 
     )
 
 
-def drive_bag(folder: Path, *more: tuple[float, str, object]) -> Path:
+def as_measured(scan: LaserScan) -> LaserScan:
+    return scan
+
+
+def upside_down(scan: LaserScan) -> LaserScan:
+    """The same room by a laser that was pitched over: its beam at -a looks where the other's at a did."""
+    return replace(scan, ranges=np.roll(scan.ranges[::-1], 1))
+
+
+def drive_bag(
+    folder: Path,
+    *more: tuple[float, str, object],
+    laser: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0),
+    measured: Callable[[LaserScan], LaserScan] = as_measured,
+) -> Path:
     maker, rng = Maker(), np.random.default_rng(1)
-    mount = maker.transform("base_link", "laser", BEGIN, (LASER.x, LASER.y, 0.1), (0.0, 0.0, 1.0, 0.0))
+    mount = maker.transform("base_link", "laser", BEGIN, (LASER.x, LASER.y, 0.1), laser)
     found = [(BEGIN, "/tf_static", maker.tf(mount)), (BEGIN, "/map", maker.map(room_map())), *more]
     found.append((BEGIN + 0.55, "/move_base/goal", goal_message(maker, BEGIN + 0.55, GOAL, "goal-1")))
     moments = list(drive(SECONDS))
@@ -61,7 +78,7 @@ def drive_bag(folder: Path, *more: tuple[float, str, object]) -> Path:
         found.append((stamp + 0.01, "/tf", maker.tf(*moves)))
         found.append((stamp + 0.011, "/odom", odometry_message(maker, stamp, moment.odometry, 0.4 * (not is_there))))
         if i % 2 == 1:
-            found.append((stamp + 0.005, "/scan", maker.scan(scan_at(moment.truth, stamp, rng))))
+            found.append((stamp + 0.005, "/scan", maker.scan(measured(scan_at(moment.truth, stamp, rng)))))
     return write_bag(folder / "drive.bag", sorted(found, key=lambda each: each[0]))
 
 
@@ -96,6 +113,25 @@ def test_the_same_bit_for_bit_and_a_planted_fault_is_named(tmp_path: Path, monke
     monkeypatch.setattr(trajectory_planner.TrajectoryPlanner, "compute", slow)
     names = [each.name for each in compare(stored, replayed(path), FIELDS)]
     assert "commands.vx" in names
+
+
+def test_a_laser_that_is_pitched_over_drives_as_an_upright_one(tmp_path: Path) -> None:
+    stored = replayed(drive_bag(tmp_path))
+    (tmp_path / "drive.bag").unlink()
+    turned = replayed(drive_bag(tmp_path, laser=(0.0, 1.0, 0.0, 0.0), measured=upside_down))
+    assert compare(stored, turned, FIELDS) == []
+
+
+def test_a_lidar_that_goes_blind_on_the_way_stops_the_robot(tmp_path: Path) -> None:
+    def blinded(scan: LaserScan) -> LaserScan:
+        return replace(scan, ranges=np.zeros(len(scan.ranges))) if scan.stamp > BEGIN + 2.0 else scan
+
+    result = replayed(drive_bag(tmp_path, measured=blinded))
+    commands = result.tables["commands"]
+    later = commands["stamp"] > BEGIN + 3.5
+    assert later.any()
+    assert commands["vx"][later].max() == 0.0
+    assert result.counts["refused"] > 10
 
 
 def test_a_cancelled_goal_ends(tmp_path: Path) -> None:

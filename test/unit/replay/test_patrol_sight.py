@@ -11,7 +11,7 @@ from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
 from rosbot_patrol.patrol.person_place import Lens
 from rosbot_patrol.patrol.rooms import Room, Rooms
 from rosbot_patrol.replay.patrol_records import LensRecord
-from rosbot_patrol.replay.patrol_sight import HELD, PatrolSight, matrix_of
+from rosbot_patrol.replay.patrol_sight import HELD, PatrolSight
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree
 from rosbot_patrol.scan import LaserScan
 
@@ -85,5 +85,5 @@ def test_a_scan_has_its_place_in_map() -> None:
 def test_a_transform_as_a_matrix() -> None:
     tree = TransformTree()
     tree.add(Edge("a", "b", 0.0, 1.0, 2.0, 3.0, *OPTICAL), is_static=True)
-    matrix = matrix_of(tree.lookup("a", "b"))
+    matrix = tree.lookup("a", "b").matrix
     assert (matrix @ [0.0, 0.0, 1.0, 1.0]).tolist() == pytest.approx([2.0, 2.0, 3.0, 1.0])

@@ -123,17 +123,3 @@ def test_a_loop_of_frames_is_a_sentence() -> None:
         tree.lookup("odom", "a", 1.0)
     with pytest.raises(TransformError):
         tree.lookup("odom", "a")
-
-
-def test_lasers_upside_down_backwards_and_tilted() -> None:
-    tree = TransformTree()
-    half = math.sqrt(0.5)
-    tree.add(Edge("base_link", "upside_down", 0.0, 0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0), is_static=True)
-    tree.add(Edge("base_link", "backwards", 0.0, 0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0), is_static=True)
-    tree.add(Edge("base_link", "upright", 0.0, 0.1, 0.2, 0.3, 0.0, half, 0.0, half), is_static=True)
-    mount = tree.mount("base_link", "upside_down")
-    assert (mount.is_upside_down, mount.pose) == (True, Pose2D(0.1, 0.2, 0.0))
-    mount = tree.mount("base_link", "backwards")
-    assert (mount.is_upside_down, mount.pose.yaw) == (False, pytest.approx(math.pi))
-    with pytest.raises(TransformError, match="not mounted level"):
-        tree.mount("base_link", "upright")

@@ -1,0 +1,58 @@
+"""What a user of scans keeps about them: whether they can be used, and what was said of those that cannot."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+from rosbot_patrol.scan import LaserScan, scan_problem
+
+log = logging.getLogger(__name__)
+
+_WELL = 10.0  # after so long without a problem, one is news again [s]
+_SAID = 20  # most problems that are remembered
+
+
+class ScanCheck:
+    """Judges the scans of one topic and logs each problem once. Times [s] are of one clock.
+
+    Args:
+        lost: what happens without a scan, such as "the base creeps".
+
+    Attributes:
+        problem: why the newest scan was left out, "" where it was not.
+    """
+
+    def __init__(self, lost: str) -> None:
+        self.problem = ""
+        self._lost = lost
+        self._said: set[str] = set()
+        self._bad_at = self._good_at = -math.inf
+
+    def accepts(self, scan: LaserScan, now: float) -> bool:
+        """Whether a scan says something; one that does not is refused."""
+        problem = scan_problem(scan)
+        if problem:
+            self.refuse(f"the scan of frame '{scan.frame_id}' is left out: {problem}", now)
+        return not problem
+
+    def clear(self, now: float) -> None:
+        """Note that the newest scan was used."""
+        self.problem, self._good_at = "", now
+        if self._said and abs(now - self._bad_at) > _WELL:
+            self._said.clear()
+            log.info("scans can be used again")
+
+    def refuse(self, problem: str, now: float) -> None:
+        """Leave the newest scan out for another reason, such as a tilted laser."""
+        self.problem, self._bad_at = problem, now
+        if problem in self._said:
+            return
+        if len(self._said) >= _SAID:
+            self._said.clear()
+        self._said.add(problem)
+        log.warning("%s; %s", problem, self._lost)
+
+    def lasts(self, now: float, patience: float) -> bool:
+        """Whether no scan could be used for some time [s], though they come."""
+        return bool(self.problem) and abs(now - self._good_at) > patience
