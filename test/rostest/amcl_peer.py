@@ -43,16 +43,17 @@ class Peer:
         while time.time() < end and not (self.scan.get_num_connections() and self.tf.pub_tf.get_num_connections() > 1):
             time.sleep(0.05)
 
-    def drive(self, scans, step=0.0, broken="", frame="laser"):
+    def drive(self, scans, step=0.0, broken="", frame="laser", range_max=8.0):
         self.wait_for_ears()
         for _ in range(scans):
             stamp = rospy.Time.now()
             self.tf.sendTransform(transform("odom", "base_link", 5.0 + self.x, 0.0, 0.0, stamp))
-            message = LaserScan(angle_min=-math.pi, angle_max=math.pi, range_min=0.1, range_max=8.0)
+            message = LaserScan(angle_min=-math.pi, angle_max=math.pi, range_min=0.1, range_max=range_max)
             message.header.frame_id, message.header.stamp = frame, stamp
             ranges = ranges_at(self.x, 0.0)
             self.sent += 1
-            ranges = {"nan": [math.nan] * 180, "none": [], "few": ranges[:20]}.get(broken, ranges)
+            broken_ranges = {"nan": [math.nan] * 180, "inf": [math.inf] * 180, "none": [], "few": ranges[:20]}
+            ranges = broken_ranges.get(broken, ranges)
             message.ranges, message.angle_increment = ranges, 2 * math.pi / 179
             self.scan.publish(message)
             time.sleep(0.05)

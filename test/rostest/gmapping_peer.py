@@ -36,11 +36,11 @@ class Peer:
     def hear_tf(self, message):
         self.corrections += [t for t in message.transforms if t.child_frame_id == "odom"]
 
-    def drive(self, scans, step=0.0, slip=0.0, broken="", frame="laser", back=0.0):
+    def drive(self, scans, step=0.0, slip=0.0, broken="", frame="laser", back=0.0, range_max=8.0):
         for _ in range(scans):
             stamp = rospy.Time.now() - rospy.Duration.from_sec(back)
             self.tf.sendTransform(transform("odom", "base_link", self.x + self.slip, 0.0, 0.0, stamp))
-            message = LaserScan(angle_min=-math.pi, angle_max=math.pi, range_min=0.1, range_max=8.0)
+            message = LaserScan(angle_min=-math.pi, angle_max=math.pi, range_min=0.1, range_max=range_max)
             message.header.frame_id, message.header.stamp = frame, stamp
             ranges = ranges_at(self.x, 0.0)
             broken_ranges = {"nan": [math.nan] * 180, "inf": [math.inf] * 180, "none": [], "few": ranges[:90]}

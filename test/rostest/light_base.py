@@ -2,7 +2,7 @@
 """A base for move_base's tests in place of simulator, amcl and map_server: it drives as told in a field that is empty.
 
 It publishes the map (100 m x 100 m, a square of walls 4 m off at (4, 4) that nothing leads into), /odom, tf and a scan
-that hits nothing, and obeys /cmd_vel for half a second. ~silent: topics not to publish.
+that hits nothing, and obeys /cmd_vel for half a second. ~silent: topics not to publish. ~blind: all beams are 0.
 """
 
 import math
@@ -76,7 +76,8 @@ class Base:
             if self.ticks % 5 == 0 and "scan" not in silent:
                 message = LaserScan(angle_min=-math.pi, angle_max=math.pi, angle_increment=math.tau / 180)
                 message.header.stamp, message.header.frame_id = now, "base_link"
-                message.range_min, message.range_max, message.ranges = 0.1, 12.0, [math.inf] * 181
+                beam = 0.0 if rospy.get_param_cached("~blind", False) else math.inf
+                message.range_min, message.range_max, message.ranges = 0.1, 12.0, [beam] * 181
                 self.scan.publish(message)
 
 

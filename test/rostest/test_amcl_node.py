@@ -1,5 +1,6 @@
 """amcl as a process before a real master, with a made-up room; needs the built workspace."""
 
+import math
 import subprocess
 
 import numpy as np
@@ -49,14 +50,17 @@ def test_bad_scans_are_named_and_survived(ros, room):
     node, peer = started(ros, room)
     peer.do("drive", scans=3)
     peer.do("drive", scans=2, broken="none")
-    node.says("it has no beams; it is left out")
+    node.says("the scan of frame 'laser' is left out: it has no beams; no pose is published")
     peer.do("drive", scans=6, step=0.12, broken="nan")
+    node.says("the scan of frame 'laser' is left out: its beams say nothing")
+    peer.do("drive", scans=6, step=0.12, broken="inf")
     node.says("no beam of the scan of frame 'laser' measured anything")
     peer.do("drive", scans=2, broken="few")
     node.says("it has 20 beams, 180 before; it is taken as it is")
     peer.do("drive", scans=2, frame="nowhere")
     after = peer.do("drive", scans=10)
     assert after["tf"] >= 10
+    assert peer.do("drive", scans=10, range_max=math.inf)["tf"] == 10
     assert node.popen.poll() is None
 
 

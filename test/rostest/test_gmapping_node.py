@@ -51,13 +51,15 @@ def test_bad_scans_are_named_and_survived(ros):
     assert "there is no map yet" in peer.do("call")["answer"]
     until_map(peer)
     peer.do("drive", scans=2, broken="none")
-    node.says("it has no beams; it is left out")
+    node.says("the scan of frame 'laser' is left out: it has no beams; nothing is mapped")
     peer.do("drive", scans=3, step=0.12, broken="nan")
+    node.says("the scan of frame 'laser' is left out: its beams say nothing")
+    peer.do("drive", scans=3, step=0.12, broken="inf")
     node.says("no beam of the scan of frame 'laser' measured anything")
     peer.do("drive", scans=2, broken="few")
     node.says("it has 90 beams, 180 before; it is taken as it is")
     peer.do("drive", scans=2, back=3.0)
-    wait_for(lambda: peer.do("drive", scans=10, frame="tilted") and "is not mounted level" in node.output)
+    wait_for(lambda: peer.do("drive", scans=10, frame="tilted") and "the laser 'tilted' is tilted by" in node.output)
     assert peer.do("drive", scans=2)["tf"] > 0
     assert node.popen.poll() is None
 

@@ -69,6 +69,19 @@ def test_a_goal_is_told_of_while_driving_and_reached(client):
     assert twists[-1]["v"] == twists[-1]["w"] == 0.0
 
 
+def test_it_stands_while_the_lidar_is_blind_and_says_why(client, started, master):
+    node, _, _ = started
+    begin(client, "controlling")
+    subprocess.run(["rosparam", "set", "/light_base/blind", "true"], env=master.env, check=True)
+    node.says("we're not going to allow commanding of the base for safety: local_costmap/")
+    node.says("the scan of frame 'base_link' is left out: its beams say nothing")
+    wait_for(lambda: client.speed() == (0.0, 0.0), 3.0, "a zero")
+    time.sleep(0.5)
+    assert client.speed() == (0.0, 0.0)
+    subprocess.run(["rosparam", "set", "/light_base/blind", "false"], env=master.env, check=True)
+    wait_for(lambda: client.speed()[0] > 0.2, 5.0, "the drive")
+
+
 def begin(client, state):
     """Bring it into a state; returns when."""
     t = client.tells(send=AWAY if state == "controlling" else CLOSED)

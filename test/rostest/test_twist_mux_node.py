@@ -1,10 +1,12 @@
 """twist_mux with the collision guard, and teleop in a terminal, before a real master; needs the built workspace."""
 
+import math
 import os
 import pty
 import signal
 import subprocess
 import termios
+import time
 from pathlib import Path
 
 import pytest
@@ -72,6 +74,95 @@ def test_without_a_scan_it_creeps_and_says_so(ros, base):
     mux = ros.node("twist_mux", "cmd_vel_out:=/cmd_vel")
     drive(base, "patrol", 0.5, 0.1)
     mux.says("patrol is held back: no scan yet")
+
+
+UPRIGHT, UPSIDE_DOWN, PITCHED_OVER = (0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
+ON_ITS_SIDE = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+POST = math.radians(58.0)  # direction of the post on the left of the robot
+BEAMS = 360
+
+
+def stamp_now():
+    seconds = time.time()
+    return {"secs": int(seconds), "nsecs": int(seconds % 1.0 * 1e9)}
+
+
+def ranges_of(post):
+    """A post 0.245 m away in a direction of the laser, and 5 m else."""
+    angles = [-math.pi + math.tau / BEAMS * i for i in range(BEAMS)]
+    return [0.245 if math.cos(angle - post) > 0.99 else 5.0 for angle in angles]
+
+
+class Lidar:
+    """Tells where the laser is and what it measures."""
+
+    def __init__(self, base, quaternion, **changes):
+        self._base, self._quaternion, self._changes = base, dict(zip("xyzw", quaternion, strict=True)), changes
+        base.tell(
+            subscribe=["/diagnostics", "diagnostic_msgs/DiagnosticArray"], advertise=["/tf", "tf2_msgs/TFMessage"]
+        )
+        base.tell(advertise=["/scan", "sensor_msgs/LaserScan"])
+
+    def scan(self):
+        place = {"translation": {"x": 0.0, "y": 0.0, "z": 0.2}, "rotation": self._quaternion}
+        header = {"stamp": stamp_now(), "frame_id": "base_link"}
+        edge = {"header": header, "child_frame_id": "laser", "transform": place}
+        values = {
+            "header": {"stamp": stamp_now(), "frame_id": "laser"},
+            "angle_min": -math.pi,
+            "angle_max": math.pi - math.tau / BEAMS,
+            "angle_increment": math.tau / BEAMS,
+            "range_min": 0.1,
+            "range_max": 12.0,
+        }
+        self._base.tell(publish=["/tf", {"transforms": [edge]}])
+        self._base.tell(publish=["/scan", {**values, **self._changes}])
+
+    def told(self):
+        """What /diagnostics last said, level and all."""
+        return ([said["status"] for said in self._base.heard(topic="/diagnostics")] or [""])[-1]
+
+
+def turned(base, lidar, speed):
+    """The turn [rad/s] that comes of a wish, after a second of scans."""
+    for _ in range(20):
+        lidar.scan()
+        base.tell(publish=["/cmd_vel/patrol", {"angular": {"z": speed}}])
+        time.sleep(0.05)
+    return float(base.heard(topic="/cmd_vel")[-1]["angular"].split("z: ")[1].split()[0])
+
+
+@pytest.mark.parametrize(
+    ("quaternion", "post"),
+    [(UPRIGHT, POST), (UPSIDE_DOWN, -POST), (PITCHED_OVER, math.pi - POST)],
+    ids=["upright", "roll pi", "pitch pi"],
+)
+def test_a_post_on_the_left_slows_the_turn_to_it_however_the_laser_hangs(ros, base, quaternion, post):
+    subprocess.run(["rosparam", "set", "/twist_mux/collision_guard/half_length", "0.25"], env=ros.env, check=True)
+    ros.node("twist_mux", "cmd_vel_out:=/cmd_vel")
+    lidar = Lidar(base, quaternion, ranges=ranges_of(post))
+    assert 0.0 < turned(base, lidar, 1.5) < 1.4
+    assert turned(base, lidar, -1.5) == pytest.approx(-1.5)
+
+
+@pytest.mark.parametrize(
+    ("quaternion", "changes", "named"),
+    [
+        (UPRIGHT, {"ranges": [0.0] * BEAMS}, "say nothing"),
+        (UPSIDE_DOWN, {"ranges": [170.0] * BEAMS}, "millimetres"),
+        (UPRIGHT, {"ranges": [5.0] * BEAMS, "header": {"frame_id": "laser"}}, "its stamp is 0"),
+        (ON_ITS_SIDE, {"ranges": [5.0] * BEAMS}, "the laser 'laser' is tilted by 90 deg in 'base_link'"),
+    ],
+    ids=["zeros", "millimetres", "no stamp", "tilted"],
+)
+def test_scans_that_are_none_leave_a_crawl_and_are_named(ros, base, quaternion, changes, named):
+    mux = ros.node("twist_mux", "cmd_vel_out:=/cmd_vel")
+    lidar = Lidar(base, quaternion, **changes)
+    assert turned(base, lidar, 1.5) == pytest.approx(0.4)
+    mux.says(named)
+    wait_for(lambda: named in lidar.told() and "level: 1" in lidar.told(), 5.0, "a warning on /diagnostics")
+    assert "patrol drives; no usable scan yet" in lidar.told()
+    assert sum("is left out" in line or "cannot place the scan" in line for line in mux.output.splitlines()) == 1
 
 
 def test_two_sources_of_one_priority_are_one_sentence(ros, base):
