@@ -75,14 +75,15 @@ def draw_places(engine: Engine, rng: np.random.Generator, count: int) -> Iterato
 def place_person(engine: Engine, place: Pose2D, rng: np.random.Generator, looks: list[str]) -> bool:
     """A person whom the robot could see from there; False where chance found no spot."""
     engine.carry(place)
-    scan = engine.scan()
+    level = engine.level_scan()
+    scan = level.scan
     for _ in range(40):
         beam = int(rng.integers(len(scan.ranges)))
         far = min(float(scan.ranges[beam]), 6.5) - 0.5
         if far < 1.0:
             continue
         reach = float(rng.uniform(1.0, far))
-        bearing = place.yaw + math.pi + scan.angle_min + beam * scan.angle_increment
+        bearing = place.yaw + level.pose.yaw + scan.angle_min + beam * scan.angle_increment
         spot = Pose2D(place.x + reach * math.cos(bearing), place.y + reach * math.sin(bearing), rng.uniform(-3, 3))
         near = scan.ranges[np.arange(beam - 8, beam + 9) % len(scan.ranges)]
         if near.min() < reach + 0.3:

@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 MAX_TILT = math.radians(10.0)  # a laser at 0.16 m then sees the floor from 0.9 m on: no plan of the room
 _LEVEL = math.radians(0.5)  # less is noise of the mount: lengths are off by 0.004 %
 _NO_LIMIT = 1e3  # no robot's lidar reaches so far: as inf or the largest float32, it stands for "no limit" [m]
+_ENDLESS = 1e9  # drivers write inf, or the largest float32, where nothing was hit [m]
 _FARTHEST = 100.0  # reach of a scan without a limit; where half of the readings are farther, they are no metres [m]
 _BLIND_TO = 3.0  # a larger range_min is no lidar's [m]
 _SHORTEST = 0.1  # nor is a smaller range_max [m]
@@ -63,7 +64,7 @@ class LaserScan:
         """Which beams measured something, shape (N,); 0 is what drivers send for "no echo"."""
         with np.errstate(invalid="ignore"):
             in_bounds = (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
-            return in_bounds & (self.ranges > 0.0) & np.isfinite(self.ranges)
+            return in_bounds & (self.ranges > 0.0) & (self.ranges < _ENDLESS)
 
     @property
     def reach(self) -> float:
@@ -202,7 +203,7 @@ def _reading_problem(scan: LaserScan) -> str:
     farthest = min(max(_BEYOND * high, high + _MARGIN), _FARTHEST)
     with np.errstate(invalid="ignore"):
         ahead = ranges >= max(scan.range_min, _NOTHING)  # hits, what lies beyond, and +inf
-        nothing = np.count_nonzero(ranges == math.inf)
+        nothing = np.count_nonzero(ranges >= _ENDLESS)
         absurd = np.count_nonzero(ranges > farthest) - nothing
         sensible = np.count_nonzero(ahead & (ranges <= min(high, farthest)))
         answers = np.count_nonzero(ahead) - nothing

@@ -108,6 +108,7 @@ def test_a_scan_that_is_none_is_named(changes: dict[str, object], named: str) ->
     [
         {},
         {"ranges": np.full(BEAMS, math.inf)},  # REP 117: nothing is there
+        {"ranges": np.full(BEAMS, FLOAT32_MAX), "range_max": FLOAT32_MAX},  # the same, by a driver that knows no inf
         {"ranges": np.full(BEAMS, 13.0)},  # the same, as some drivers say it
         {"ranges": np.full(BEAMS, 65.533), "range_max": 30.0},
         {"ranges": mixed(3.0, 10, math.inf)},  # a hall
@@ -162,6 +163,7 @@ def test_a_scan_without_an_upper_limit_has_a_reach(limit: float) -> None:
     assert scan.reach == 100.0
     assert scan.is_hit.sum() == np.isfinite(scan.ranges).sum()
     assert scan_of(wall()).reach == 12.0
+    assert not scan_of(np.full(BEAMS, FLOAT32_MAX), range_max=limit).is_hit.any()
 
 
 # ---- laid level

@@ -10,6 +10,7 @@ import logging
 import math
 from abc import ABC, abstractmethod
 from collections import deque
+from dataclasses import replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -154,7 +155,7 @@ class _Scans(Source[LaserScan]):
     def _place(self, item: LaserScan, stamp: float, frame: str, transforms: Transforms, target: str) -> None:
         p = self._buffer.params
         try:
-            level = level_scan(item, transforms.transform(target, frame, stamp), target)
+            level = level_scan(replace(item, frame_id=frame), transforms.transform(target, frame, stamp), target)
             problem = height_problem(level, p)
         except LaserTilted as err:
             problem = str(err)
