@@ -44,6 +44,16 @@ class Health:
     def set(self, part, level, message, values=None):
         self.parts[part] = level, message
 
+    def drop(self, part):
+        self.parts.pop(part)
+
+
+class Depth:
+    """No depth camera."""
+
+    def tend(self, wall, *, is_over):
+        pass
+
 
 @pytest.fixture
 def made(monkeypatch):
@@ -101,6 +111,16 @@ def test_a_scan_that_says_nothing_is_as_none_and_is_told(made, caplog, changes):
     assert len(caplog.records) == 1
     assert eyes.look(eyes.usable(message())) is not None
     assert health.parts["lidar"][0] == OK
+
+
+def test_what_is_told_of_the_lidar_ends_with_the_mission(made, monkeypatch):
+    eyes, health = made(Frames())
+    monkeypatch.setattr(eyes, "depth", Depth())
+    eyes.usable(message(ranges=np.zeros(360)))
+    eyes.take(is_busy=True)
+    assert "lidar" in health.parts
+    eyes.take(is_busy=False)
+    assert "lidar" not in health.parts
 
 
 def test_a_tilted_laser_is_as_none_and_is_told(made, caplog):
