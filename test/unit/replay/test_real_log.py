@@ -14,6 +14,7 @@ from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.replay.carmen import noisy_odometry, read_log
 from rosbot_patrol.replay.mapping import map_log
 from rosbot_patrol.replay.relations import consecutive_pairs, relation_errors
+from rosbot_patrol.scan import scan_problem
 
 ROOT = Path(__file__).parents[3]
 LOG = ROOT.parent / "shared" / "datasets" / "intel-corrected.log.gz"
@@ -33,3 +34,11 @@ def test_the_first_rooms_of_intel_are_mapped() -> None:
     assert errors.turn < math.radians(2.0)
     assert relation_errors(odometry, reference, pairs).turn > math.radians(2.0)
     assert relation_errors(found.poses, reference, consecutive_pairs(80)).turn < math.radians(0.8)
+
+
+@pytest.mark.skipif(not LOG.exists(), reason=f"the data sets are not at {LOG.parent}")
+@pytest.mark.parametrize("name", ["csail", "fhw", "intel", "orebro"])
+def test_no_scan_of_a_real_robot_is_refused(name: str) -> None:
+    scans = read_log(LOG.parent / f"{name}-corrected.log.gz").scans
+    assert len(scans) > 200
+    assert {scan_problem(scan) for scan in scans} == {""}
