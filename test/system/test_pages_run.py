@@ -59,7 +59,7 @@ class Reader:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._home = folder / "home"
+        self._home = folder / "Jörg Müller"  # names of homes hold such letters
         self._desk = folder / "rosbot_patrol"
         self._home.mkdir()
         self._desk.mkdir()
