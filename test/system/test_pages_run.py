@@ -102,10 +102,12 @@ class Reader:
 
     def leave(self) -> None:
         """End all that runs."""
-        self._interrupt()
-        if self._house is not None:
-            self._house.stop()
-            self._house = None
+        try:
+            self._interrupt()
+        finally:
+            if self._house is not None:
+                self._house.stop()
+                self._house = None
 
     def _launch(self, command: Command) -> None:
         self.leave()
@@ -167,6 +169,7 @@ class Reader:
         return str(newest["id"])
 
     def _begin(self, command: Command) -> None:
+        before = _nodes()
         output = self._home / f"output{len(list(self._home.glob('output*')))}"
         with output.open("wb") as out:
             process = subprocess.Popen(
@@ -181,8 +184,11 @@ class Reader:
         self._running.append((command, process, output))
         if "mark_rooms" in command.typed:
             self._click(process, output)
+        elif command.typed.startswith("scripts/"):
+            _wait_for(lambda: "On guard" in output.read_text() or process.poll() is not None, "its house", 120.0)
         else:
-            time.sleep(3.0)
+            _wait_for(lambda: bool(_nodes() - before) or process.poll() is not None, f"the node of {command.where}")
+            time.sleep(1.0)  # its subscriptions
         assert process.poll() is None, f"{command.where}: it ended by itself: {command.text}\n{output.read_text()}"
 
     def _click(self, process: subprocess.Popen[bytes], output: Path) -> None:
@@ -203,16 +209,19 @@ class Reader:
         publisher.unregister()
 
     def _interrupt(self) -> None:
-        for command, process, output in self._running:
-            assert process.poll() is None, f"{command.where}: it ended by itself: {command.text}\n{output.read_text()}"
-            os.killpg(process.pid, signal.SIGINT)
+        """Ctrl-C for each program that runs on."""
+        while self._running:
+            command, process, output = self._running.pop()
+            by_itself = process.poll() is not None
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(20.0)
-            said = output.read_text()
-            assert process.poll() in (0, 130, -signal.SIGINT), f"{command.where}: {process.poll()} after Ctrl-C\n{said}"
-            assert "Traceback" not in said, f"{command.where}: {command.text}\n{said}"
+                process.wait(30.0)
+            status, said = process.poll(), output.read_text()
             end_group(process)
-        self._running = []
+            assert not by_itself, f"{command.where}: it ended by itself: {command.text}\n{said}"
+            assert status in (0, 130, -signal.SIGINT), f"{command.where}: {status} after Ctrl-C: {command.text}\n{said}"
+            assert "Traceback" not in said, f"{command.where}: {command.text}\n{said}"
 
 
 def _is_settled() -> bool:
