@@ -10,6 +10,9 @@ and mail server, with the real nodes).
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os

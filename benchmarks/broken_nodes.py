@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Each node of the house killed, and hung and then restarted, in mid-patrol: what the owner is told, when all is well.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/broken_nodes.py [--json FILE] [--nodes amcl ...] [--hung 15]
+    python3 benchmarks/broken_nodes.py [--json FILE] [--nodes amcl ...] [--hung 15]
 
 Somebody stands in the room; a call starts a mission. In mid-drive (the detector, the camera's republish and the
 sensors' bridge: as the robot begins to look) the node gets SIGKILL, or SIGSTOP and `--hung` seconds later, by the
@@ -12,6 +12,9 @@ before. Times are simulated seconds from the fault on.
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import contextlib
 import email
@@ -183,6 +186,7 @@ def main() -> None:
         house.stop()
     finally:
         master.stop()
+    in_workspace.require_figures(rows, "no node was broken")
     print(f"\n{table(rows)}")
     if options.json:
         figures = {f"{row.node} {row.how}": asdict(row) for row in rows}

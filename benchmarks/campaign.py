@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A campaign of 100 patrols in three houses, something broken in every other one: how many are as they should be.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/campaign.py [FOLDER] [--patrols N] [--seed N] [--json FILE]
+    python3 benchmarks/campaign.py [FOLDER] [--patrols N] [--seed N] [--json FILE]
 
 Runs `rosrun rosbot_patrol campaign` and goes on where FOLDER has results already; the page is FOLDER/index.html.
 Minutes are those of the patrols, wherever they were played: the sum of their real times by those at once.
@@ -9,6 +9,9 @@ Minutes are those of the patrols, wherever they were played: the sum of their re
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os
@@ -49,6 +52,7 @@ def main() -> None:
     if status not in (0, 1):  # 1: some patrol was not as it should be, which the figures say
         sys.exit(status)
     figures = figures_of(folder, jobs)
+    in_workspace.require_figures(figures)
     print(f"\n{'figure':24s} {'value':>9s} {'aim':>9s}")
     for name, value in figures.items():
         print(f"{name:24s} {value:9.3f} {AIMS.get(name, ''):>9s}")

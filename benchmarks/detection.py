@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The detector: how long a picture takes, against Debian's darknet, in what memory; and what republish costs.
 
-    . scripts/env; python3 benchmarks/detection.py [--json FILE] [--repeats N]
+    python3 benchmarks/detection.py [--json FILE] [--repeats N]
 
 yolov2_tiny_ms: bytes of a sensor_msgs/Image (640x480 rgb8) to bytes of a BoundingBoxes message, yolov2-tiny at 416 with
 random weights, pinned to two cores; everything that the node does, transport apart. yolov2_tiny_vs_darknet: the forward
@@ -19,8 +19,10 @@ A figure that cannot be had here (no weights, no darknet) is left out, and the t
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
-import importlib.util
 import io
 import json
 import os
@@ -239,26 +241,30 @@ def main() -> None:
     if arguments.part:
         print(json.dumps(part(arguments.part, arguments.repeats, arguments.folder)))
         return
-    if importlib.util.find_spec("rosbot_patrol") is None:
-        sys.exit("benchmarks/detection.py: there is no rosbot_patrol in this shell; `. scripts/env` brings it")
     figures: dict[str, float] = {}
+    failed = []
     with tempfile.TemporaryDirectory() as folder:
         for name in PARTS:
             command = [sys.executable, __file__, "--part", name, "--repeats", str(arguments.repeats)]
             done = subprocess.run([*command, "--folder", folder], capture_output=True, text=True, check=False)
             if done.returncode:
-                print(f"{name}: {done.stderr.strip().splitlines()[-1]}", file=sys.stderr)
+                failed.append(name)
+                said = done.stderr.strip().splitlines() or [f"ended with {done.returncode}"]
+                print(f"{name}: {said[-1]}", file=sys.stderr)
                 continue
             figures |= json.loads(done.stdout.splitlines()[-1])
             if name == "quality":
                 print(done.stderr, file=sys.stderr)
     if not LIBRARY.exists():
         print("yolov2_tiny_vs_darknet: Debian's package darknet is not installed", file=sys.stderr)
+    in_workspace.require_figures(figures, f"no part gave figures, all failed: {', '.join(failed)}")
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}\n\n| figure | value | aim |\n|---|---|---|")
     for name, value in figures.items():
         print(f"| {name} | {value:.2f} | {AIMS.get(name, '')} |")
     if arguments.json:
         Path(arguments.json).write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    if failed:
+        sys.exit(f"detection.py: no figures of: {', '.join(failed)}")
 
 
 if __name__ == "__main__":

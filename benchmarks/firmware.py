@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The firmware's host build before serial_node.py and a real master: from the motion interrupt to the topic.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/firmware.py [--json FILE] [--motions 200]
+    python3 benchmarks/firmware.py [--json FILE] [--motions 200]
 
 The time runs from the call of the sketch's interrupt handler to the callback of a rospy subscriber: the 5 ms that an
 output must stay high, the loop's turn, TCP over loopback, the bridge, and rospy. Wi-Fi is not in it. The sketch is
@@ -10,6 +10,9 @@ built without sanitizers. Its CPU is of one core while it sends heartbeats only;
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os

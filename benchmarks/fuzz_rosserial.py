@@ -12,6 +12,9 @@ What is found lies in the current folder; put it into test/unit/rosserial/corpus
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os

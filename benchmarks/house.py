@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The whole house: how soon it is on guard, how fast it runs, and what each node costs.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/house.py [--json FILE] [--runs 3] [--room 7] [--setup]
+    python3 benchmarks/house.py [--json FILE] [--runs 3] [--room 7] [--setup]
 
 ready_s: from `roslaunch` to on guard, at real time, medians of the runs; the first run warms the caches and does not
 count. realtime_factor: simulated over wall time of a whole mission with a person in the room, rate:=0, colour and depth
@@ -12,6 +12,9 @@ installed already.
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """amcl: how long an update takes, and how well it knows where the robot is.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/localization.py [--json FILE] [--quick] [--parts NAME ...]
+    python3 benchmarks/localization.py [--json FILE] [--quick] [--parts NAME ...]
         [--seeds 3] [--starts 100] [--carried 30] [--seconds 120]
 
 update: amcl_update_NxK_ms: motion, sensor model and resampling together for N particles and K beams of the likelihood
@@ -20,6 +20,9 @@ path has the original amcl, it is the one that is measured, and said so.
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import math
@@ -151,6 +154,7 @@ def main() -> None:
         figures |= global_starts(3 if wanted.quick else wanted.starts)
     if "carried" in wanted.parts:
         figures |= kidnappings(3 if wanted.quick else wanted.carried)
+    in_workspace.require_figures(figures)
     print(f"\n{'figure':34s} {'value':>9s} {'aim':>9s}")
     for name, value in figures.items():
         print(f"{name:34s} {value:9.3f} {AIMS.get(name, ''):>9s}")

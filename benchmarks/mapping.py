@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """slam_gmapping: real robots' logs against their references, the house against its walls, speed and memory.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/mapping.py [--json FILE] [--only logs|house|nodes] [--seeds 5]
+    python3 benchmarks/mapping.py [--json FILE] [--only logs|house|nodes] [--seeds 5]
         [--quick] [--datasets FOLDER] [--log FILE ...] [--pictures FOLDER] [--keep FILE] [--anew]
 
 The logs run with the tutorial's parameters (config/gmapping.yaml), odometry made from the reference's increments with
@@ -23,6 +23,9 @@ ours alone where there is no original.
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import hashlib
 import json
@@ -252,6 +255,7 @@ def main() -> None:
         figures |= measure_logs(options)
     if options.only == "nodes" or (options.only is None and original("gmapping", "slam_gmapping")):
         figures |= measure_nodes(options)
+    in_workspace.require_figures(figures)
     show(figures)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")

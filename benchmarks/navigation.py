@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Navigation: one table of what its parts take and what the whole achieves.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/navigation.py [--json FILE] [--quick] [--goals N] [--only PART ...]
+    python3 benchmarks/navigation.py [--json FILE] [--quick] [--goals N] [--only PART ...]
 
 It runs the programs beside it, each in a process of its own, one after the other: navigation_costmap (inflation),
 navigation_planning (global planners), navigation_control (local planners), navigation_node (the node move_base in a
@@ -12,6 +12,9 @@ Where the original C++ nodes are on the ROS package path, navigation_node measur
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os
@@ -86,6 +89,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, metavar="PART")
     wanted = parser.parse_args()
     found: dict[str, float] = {}
+    failed: list[str] = []
     for part in wanted.only:
         if part == "node" and "ROS_PACKAGE_PATH" not in os.environ:
             print("\n== node: left out, it needs `. scripts/env`", file=sys.stderr)
@@ -93,10 +97,15 @@ def main() -> None:
         arguments = ["--quick"] if wanted.quick and part != "goals" else []
         if part == "goals":
             arguments = ["--goals", str(12 if wanted.quick else wanted.goals)]
-        found.update(run_part(part, arguments))
+        figures = run_part(part, arguments)
+        failed += [] if figures else [part]
+        found.update(figures)
+    in_workspace.require_figures(found, "no part gave figures")
     print(f"\n{os.cpu_count()} cores\n\n{table(found)}")
     if wanted.json:
         wanted.json.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    if failed:
+        sys.exit(f"navigation.py: no figures of: {', '.join(failed)}")
 
 
 if __name__ == "__main__":

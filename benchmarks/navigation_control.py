@@ -13,6 +13,9 @@ control_cycle_DWAPlannerROS_ms is the same for DWAPlannerROS with its defaults (
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import logging
 import math
 import statistics

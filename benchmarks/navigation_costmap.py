@@ -13,6 +13,9 @@ An update after 0.1 m is all of `LayeredCostmap.update`: shift, clearing, markin
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import itertools
 import math
 import statistics

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The node move_base in a patrol of the simulated house: what it costs, and whether it keeps its rate.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/navigation_node.py [--json FILE] [--quick] [--seconds 120]
+    python3 benchmarks/navigation_node.py [--json FILE] [--quick] [--seconds 120]
 
 For each profile the whole house runs at real time without the detector, and the robot is sent from room to room.
 CPU of the process counts while the robot drives, as a share of one core; memory is what is resident at the end.
@@ -12,6 +12,9 @@ one that is measured, and said so.
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os

@@ -19,6 +19,9 @@ pulled straight in the same way, and the cheaper one counts.
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import math
 import os
 import statistics

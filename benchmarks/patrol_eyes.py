@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What seeing costs the patrol: coverage, witness, boxes with depth, viewpoints, and the floor of our largest house.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/patrol_eyes.py [--json FILE]
+    python3 benchmarks/patrol_eyes.py [--json FILE]
 
 On one core, in this process, over the office's map from its largest room. Each part is also given as the share of a
 core that it takes at the rates of a mission: 10 pictures and 10 scans a second (the witness takes 5), a box in each
@@ -10,6 +10,9 @@ picture. Depth pictures coming in cost rospy besides (1.2 MB each), for the seco
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import math

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How near to the truth a person is placed on the map, and what is refused: people, pets and posters in the houses.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/person_place.py [--number N] [--json FILE]
+    python3 benchmarks/person_place.py [--number N] [--json FILE]
 
 The robot is put at places by chance; a person, a pet or a poster 1 to 6.5 m off is photographed once, with depth and
 scan, through the simulator's camera and the shipped network, without ROS. Places are measured with depth and without
@@ -10,6 +10,9 @@ scan, through the simulator's camera and the shipped network, without ROS. Place
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import math
@@ -151,6 +154,7 @@ def house_text(stage: Stage, kind: str, there: Pose2D, box: Box, refusal: str) -
 def report(errors: dict[str, list[float]], told: dict[str, Counter[str]], file: Path | None) -> None:
     """Tables."""
     figures: dict[str, float] = {}
+    in_workspace.require_figures([e for found in errors.values() for e in found], "no person was measured")
     print("| place by | persons | median off [m] | 95 % | within 0.3 m |\n|---|---|---|---|---|")
     for source, values in errors.items():
         if values:

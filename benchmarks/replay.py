@@ -12,6 +12,9 @@ of its own. Medians of the repeats.
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import logging

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Every room of the house, without and with a person in it: does the robot get there, turn, mail, and come home?
 
-    . scripts/env; .ws/venv/bin/python benchmarks/rooms.py [--rooms 1 2 3] [--rate 1] [--profile tutorial]
+    python3 benchmarks/rooms.py [--rooms 1 2 3] [--rate 1] [--profile tutorial]
 
 The table is by ground truth: distance from the room's point where the turn began, degrees turned, distance from home
 in the end, contacts with anything but the floor, and the mails in the Maildir.
@@ -9,6 +9,9 @@ in the end, contacts with anything but the floor, and the mails in the Maildir.
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import math
 import sys
@@ -90,6 +93,7 @@ def main() -> int:
     except ImportError as err:
         print(f"{err}: `. scripts/env` first", file=sys.stderr)
         return 1
+    in_workspace.require_figures(options.rooms, "no room to visit")
     points = {room.id: room.pose for room in load_rooms(ROOT / "params" / "room_points.yaml")}
     print(f"| {' | '.join(TITLES)} |\n|{'---|' * len(TITLES)}", flush=True)
     faults = []

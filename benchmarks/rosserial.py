@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The rosserial bridge under the load of a building's sensors, over loopback, before a real master.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/rosserial.py [--json FILE] [--quick] [--sensors 500] [--seconds 60]
+    python3 benchmarks/rosserial.py [--json FILE] [--quick] [--sensors 500] [--seconds 60]
 
 The sensors (rosserial_fleet.py) and those who listen (rosserial_ear.py) are processes of their own and do not count.
 CPU is the bridge's, of one core, with one rospy subscriber, diagnostics and all. Memory is read after that:
@@ -13,6 +13,9 @@ socket; nothing may be missing. Where the package path has the original rosseria
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os
@@ -271,6 +274,7 @@ def main() -> int:
             figures = measure(Path(name), options)
         finally:
             master.stop()
+    in_workspace.require_figures(figures)
     print("\n| figure | value | aim |\n|---|---|---|")
     for figure, value in figures.items():
         print(f"| {figure} | {value:.3g} | {'<= ' + str(AIMS[figure]) if figure in AIMS else ''} |")

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What honest sensors notice of an attacker on the bridge's port, over loopback, before a real master.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/rosserial_attack.py [--json FILE] [--quick] [--sensors 100]
+    python3 benchmarks/rosserial_attack.py [--json FILE] [--quick] [--sensors 100]
 
 The attacks are those of the tests (test/unit/rosserial/attacks.py), one after the other and then all at once from eight
 addresses, each against a bridge with lists and against one with keys. The attacker is a process of its own at low
@@ -13,6 +13,9 @@ may be where there are lists.
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os
@@ -160,6 +163,7 @@ def main() -> int:
                 house.stop()
         finally:
             master.stop()
+    in_workspace.require_figures(figures)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     return 0

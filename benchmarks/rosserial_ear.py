@@ -8,6 +8,9 @@ bridge and not rospy's receiving side. Commands: {"clear": true}, {"count": N, "
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import json
 import socket
 import sys

@@ -14,6 +14,9 @@ Times are CLOCK_MONOTONIC in ns, the same clock in all processes of a machine.
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import heapq
 import json
 import random

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """sensor_watch and what it costs the bridge, over loopback, before a real master, with 12 and with 250 sensors at 2 Hz.
 
-    . scripts/env; .ws/venv/bin/python benchmarks/sensor_watch.py [--json FILE] [--sensors 12 250] [--seconds 30]
+    python3 benchmarks/sensor_watch.py [--json FILE] [--sensors 12 250] [--seconds 30]
 
 The sensors (rosserial_fleet.py) are a process of their own and do not count. CPU is of one core; the bridge's is given
 without and with sensor_watch, which is its one subscriber.
@@ -9,6 +9,9 @@ without and with sensor_watch, which is its one subscriber.
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os
@@ -100,6 +103,7 @@ def main() -> int:
                 figures |= measure(folder, sensors, options.seconds)
         finally:
             master.stop()
+    in_workspace.require_figures(figures)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     return 0

@@ -18,6 +18,9 @@ engine, and the robot spawned. steps_ratio_2000_boxes: rtf_lidar there against t
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import math

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """An hour (or so) of detection at the camera's full rate: does the memory of darknet_ros and republish stay flat?
 
-    . scripts/env; python3 benchmarks/soak_detection.py [--minutes 60] [--rate 30] [--json FILE] [--log FILE]
+    python3 benchmarks/soak_detection.py [--minutes 60] [--rate 30] [--json FILE] [--log FILE]
 
 Starts a master on a free port, the node darknet_ros with our network, and two republish (to jpeg and back) before it,
 as in the tutorial; sends 640x480 rgb8 pictures with people at the rate, has somebody listen to all that the nodes
@@ -14,6 +14,9 @@ is in the table, and the slope of the straight line through the values is told a
 
 from __future__ import annotations
 
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
 import argparse
 import json
 import os

@@ -11,6 +11,9 @@ Several settings of the watch are judged on the same boxes; the first is the one
 
 from __future__ import annotations
 
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
 import argparse
 import dataclasses
 import json
@@ -174,6 +177,7 @@ def main() -> None:
             engine.remove_actor("person_there")
         sys.stderr.write(f"\r{turns} of {arguments.turns} places ")
     engine.close()
+    in_workspace.require_figures(range(turns), "no place was looked from")
     print(f"\n{os.cpu_count()} cores; {turns} turns in the empty house, {pictures} pictures with {boxes} false boxes")
     print(f"\n| watch | false alarms, {turns} turns | persons found, {persons} turns |\n|---|---|---|")
     for name in chosen:
