@@ -108,7 +108,7 @@ class PatrolEyes:
         self.depth.tend(wall, is_over=not is_busy)
         if not is_busy and self._check.problem:  # nobody looks at scans now: what was wrong may be mended
             self._check.problem = ""
-            self._health.drop("lidar")
+            self.health.drop("lidar")
         out: list[Frame] = []
         while self._waiting:
             pending = self._waiting[0]

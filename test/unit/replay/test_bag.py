@@ -292,7 +292,7 @@ def test_a_sender_without_a_name_is_taken(tmp_path: Path, callerid: bytes | None
 def test_an_empty_definition_is_that_of_noetic_where_the_sum_is(tmp_path: Path) -> None:
     path = bag_with_header(tmp_path / "made.bag", message_definition=b"")
     (found,) = read(path, "/scan")
-    np.testing.assert_array_equal(found.content.ranges, [1.0, 2.0, np.inf, np.inf])
+    np.testing.assert_array_equal(found.content.ranges, [1.0, 2.0, np.nan, np.inf])
     with Bag(path) as bag:
         (said,) = [each for each in bag._reader.connections if each.topic == "/said"]
         assert said.msgdef.startswith("string data")
