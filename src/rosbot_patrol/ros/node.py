@@ -16,7 +16,6 @@ import rospy
 from rospy.core import is_shutdown_requested
 
 from rosbot_patrol import params
-from rosbot_patrol.alerts.mail import one_line
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.ros import greeting, logs
 from rosbot_patrol.ros.by_hand import require_master
@@ -25,9 +24,6 @@ from rosbot_patrol.ros.priority import Priority, take
 T = TypeVar("T")
 
 log = logging.getLogger(__name__)
-
-_LONGEST_NAME = 100  # of a caller, who chooses it
-_PEER = "rosbot_patrol_peer"  # in a connection's header: the caller's address
 
 
 def run_node(
@@ -125,27 +121,6 @@ def sender_of(message: object) -> str:
     """Name of the node that published a message, "" where it did not come by a topic."""
     header = getattr(message, "_connection_header", None) or {}
     return str(header.get("callerid", ""))
-
-
-class CallerService(rospy.Service):  # type: ignore[misc]
-    """A service that knows the address of who calls it."""
-
-    def handle(self, transport: Any, header: dict[str, str]) -> None:
-        """Note the address beside the caller's name, then answer."""
-        try:
-            header[_PEER] = str(transport.socket.getpeername()[0])
-        except OSError as err:  # it has hung up
-            log.debug("the address of a caller is not known: %s", err)
-        super().handle(transport, header)
-
-
-def caller_of(request: object) -> str:
-    """Who calls a `CallerService`, and from which machine, for people."""
-    header = getattr(request, "_connection_header", None) or {}
-    peer = str(header.get(_PEER, ""))
-    is_here = peer.startswith("127.") or peer == "::1"
-    where = "this machine" if is_here else f"the machine {peer}" if peer else "an unknown machine"
-    return f"{one_line(str(header.get('callerid') or 'an unnamed program'))[:_LONGEST_NAME]} on {where}"
 
 
 def now() -> float:

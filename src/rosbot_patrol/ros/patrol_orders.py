@@ -25,7 +25,7 @@ from rosbot_patrol.patrol.request import Origin, Request
 from rosbot_patrol.patrol.rooms import Rooms
 from rosbot_patrol.patrol.schedule import all_rooms
 from rosbot_patrol.ros import convert
-from rosbot_patrol.ros.node import CallerService, caller_of
+from rosbot_patrol.ros.callers import CallerService, caller_of
 from rosbot_patrol.ros.patrol_goal import MoveBase
 from rosbot_patrol.srv import Arm, ArmRequest, ArmResponse
 
