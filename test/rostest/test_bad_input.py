@@ -12,6 +12,7 @@
 | garbage on the sensor port     | here, as a flood; wrong topics and types: test_serial_node: test_strangers_get...   |
 | mail server that is down       | here, for a mail that waits; test_patrol_node: test_unreachable_mail_server...      |
 | mail server that says nothing  | here                                                                                |
+| mail addresses that are refused | here, of three: one put off, one unknown; test_recipients                          |
 | world, sensors, configuration  | here; launch arguments: test_launch_files                                           |
 | move_base: parameters, plug-ins | here; every parameter: test/unit/{costmap,planning}, test_params                   |
 | goals: NaN, frame, quaternion, wall, off the map | test_move_base_actions                                            |
@@ -331,6 +332,24 @@ def test_a_mail_server_that_is_down_and_comes_up(ros, tmp_path, smtp_server):
         time.sleep(0.5)
         assert len(server.mails) == 1
     assert "Traceback" not in patrol.output
+
+
+def test_a_mail_server_that_puts_off_one_of_two_recipients_and_one_that_refuses(ros, tmp_path, smtp_server):
+    to = [f"{name}@house.test" for name in "abc"]
+    said = {to[1]: ["451 4.3.0 later", "451 4.3.0 later", "250 ok"], to[2]: ["550 5.1.1 no such user"]}
+    waiting = put_a_mail_into_the_outbox(tmp_path)
+    with smtp_server(recipients=said) as server:
+        mail = smtp(server.port, email_to=",".join(to), mail_interval=0.0)
+        watch = start(ros, "sensor_watch", path_to_params=ROOMS, state_dir=tmp_path / "state", **mail)
+        watch.says("delivered by smtp: b@house.test")
+        watch.says("is given up for 'mail:c@house.test', others of 'mail' have it")
+        wait_for(lambda: not waiting(), 20.0, "an empty outbox")
+        first = server.took[0][1]
+        took = [taker for taker, mail_id in server.took if mail_id == first]
+    assert sorted(took) == to[:2]
+    assert server.asked.count(to[2]) == 1
+    assert watch.popen.poll() is None
+    assert "Traceback" not in watch.output
 
 
 def test_a_mail_server_that_says_nothing(ros, tmp_path, smtp_server):
