@@ -18,6 +18,8 @@ p { margin: .3rem 0; }
 .unreachable { color: var(--unreachable); } .unverified { color: var(--unverified); }
 table { border-collapse: collapse; width: 100%; }
 th, td { text-align: left; vertical-align: top; padding: .3rem .6rem .3rem 0; border-bottom: 1px solid var(--line); }
+th, td { overflow-wrap: break-word; } /* a column is as wide as its longest word */
+td:last-child { overflow-wrap: anywhere; } /* but paths and digests must not widen the page */
 th { color: var(--faint); font-weight: 500; white-space: nowrap; }
 td.time { white-space: nowrap; font-variant-numeric: tabular-nums; }
 figure { margin: 0 0 .8rem; }
@@ -27,8 +29,8 @@ figure img { display: block; width: 100%; height: auto; border-radius: .4rem; ba
 .strip { display: grid; gap: .3rem; grid-template-columns: repeat(auto-fill, minmax(6.5rem, 1fr)); }
 .strip figure { margin: 0; } .strip figcaption { font-size: .7rem; text-align: center; }
 .strip .after img { outline: 2px solid var(--confirmed); outline-offset: -2px; }
-.phases { display: flex; border-radius: .4rem; overflow: hidden; margin: .4rem 0; font-size: .8rem; }
-.phases span { padding: .35rem .2rem; color: #fff; text-align: center; overflow: hidden; white-space: nowrap; }
+.phases { display: flex; flex-wrap: wrap; border-radius: .4rem; overflow: hidden; margin: .4rem 0; font-size: .8rem; }
+.phases span { padding: .35rem .2rem; color: #fff; text-align: center; min-width: max-content; white-space: nowrap; }
 .waiting, .starting { background: #77808c; } .driving { background: #2a5db0; } .looking { background: #7a3f9d; }
 .returning { background: #3c7d80; } .stopped { background: #a33; } .other { background: #556; }
 code { font: .8rem/1.3 ui-monospace, "DejaVu Sans Mono", monospace; word-break: break-all; }
