@@ -94,7 +94,8 @@ class LostFiles:
             place: who named it.
             error: what is wrong with it.
         """
-        file = uri if ":/" in uri else str(place.path.parent / uri)
+        is_the_same_everywhere = uri.startswith((*_SCHEMES, "http", "/", "file:///"))
+        file = uri if is_the_same_everywhere else f"{place.path.parent}/{uri}"
         told = str(error) if error.path == str(place.path) else str(place.error(str(error)))
         self._sentences.setdefault(file, told)
         self._wanted[file] += 1

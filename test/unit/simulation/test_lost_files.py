@@ -172,9 +172,10 @@ def test_each_file_is_one_line_and_the_last_line_counts(tmp_path: Path, caplog: 
     )
 
 
-def test_files_of_one_name_in_two_models_are_two(tmp_path: Path) -> None:
+@pytest.mark.parametrize("uri", ["meshes/a.stl", "file://meshes/a.stl"])
+def test_files_of_one_name_in_two_models_are_two(tmp_path: Path, uri: str) -> None:
     for name in ("cup", "jug"):
-        put(tmp_path, name, model_sdf=f"<sdf version='1.6'>{mesh('meshes/a.stl', name=name)}</sdf>")
+        put(tmp_path, name, model_sdf=f"<sdf version='1.6'>{mesh(uri, name=name)}</sdf>")
     world = read(tmp_path, include("model://cup") + include("model://jug"))
     assert len(world.lost) == 2
 
