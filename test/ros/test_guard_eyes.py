@@ -9,15 +9,18 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 import numpy as np
+from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
 from rosbot_patrol.control.collision_guard import GuardParams
+from rosbot_patrol.control.mux import SourceParams
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import STOP, Pose2D, Transform, Twist2D
 from rosbot_patrol.ros import simulator_messages as messages
 from rosbot_patrol.ros import twist_mux_node
 from rosbot_patrol.ros.convert import scan_to_msg
-from rosbot_patrol.ros.twist_mux_node import Eyes, TwistMuxParams
+from rosbot_patrol.ros.diagnostics import OK, WARN
+from rosbot_patrol.ros.twist_mux_node import Eyes, TwistMuxNode, TwistMuxParams
 from rosbot_patrol.scan import LaserScan as Scan
 from rosbot_patrol.simulation.range_sensors import RangeParams
 
@@ -160,3 +163,61 @@ def test_a_scan_without_an_upper_limit_drives(topics, limit):
     topics["scan"](open_scan(range_max=limit))
     assert eyes.look()
     assert eyes.limit(Twist2D(0.3), 10.0).scale == 1.0
+
+
+class Sent:
+    """Stands in for a publisher."""
+
+    def __init__(self, *_, **__):
+        self.messages = []
+
+    def publish(self, message):
+        self.messages.append(message)
+
+
+class Told:
+    """Stands in for Health: the last level and message."""
+
+    def __init__(self):
+        self.level = self.message = None
+
+    def set(self, part, level, message, values=None):
+        del part, values
+        self.level, self.message = level, message
+
+
+@pytest.fixture
+def mux(topics, monkeypatch):
+    monkeypatch.setattr(twist_mux_node.rospy, "Publisher", Sent)
+    monkeypatch.setattr(twist_mux_node, "Health", Told)
+    monkeypatch.setattr(TwistMuxNode, "_forget_the_gone", lambda self: None)
+    source = SourceParams(name="teleop", topic="teleop", timeout=0.5, priority=1)
+    return TwistMuxNode(TwistMuxParams(topics=(source,)))
+
+
+def test_diagnostics_warn_while_the_guard_is_blind_and_say_why(mux, topics, caplog):
+    wish = Twist()
+    wish.linear.x = 0.3
+    for k in range(30):
+        topics["scan"](open_scan(ranges=np.zeros(360)))
+        topics["teleop"](wish)
+        mux._step(10.0 + 0.01 * k)
+    assert mux._publisher.messages[-1].linear.x == pytest.approx(0.1)
+    assert mux._health.level == WARN
+    assert "teleop drives; no usable scan yet" in mux._health.message
+    assert "say nothing" in mux._health.message
+    assert len(caplog.records) == 2  # what is wrong with the scan, and who is held back
+    topics["scan"](open_scan())
+    topics["teleop"](wish)
+    mux._step(10.3)
+    assert mux._publisher.messages[-1].linear.x == pytest.approx(0.3)
+    assert (mux._health.level, mux._health.message) == (OK, "teleop drives")
+
+
+def test_diagnostics_warn_of_such_scans_while_nobody_commands_too(mux, topics):
+    mux._step(10.0)
+    assert (mux._health.level, mux._health.message) == (OK, "nobody commands")
+    topics["scan"](open_scan(range_max=0.0))
+    mux._step(10.1)
+    assert mux._health.level == WARN
+    assert "range_max 0" in mux._health.message
