@@ -86,6 +86,8 @@ class Reader:
         begin = time.monotonic()
         if command.wait:
             self._come_home()
+        if command.typed.startswith("scripts/"):
+            self.leave()  # it starts a house of its own, which wants the same ports
         if command.words[0] == "roslaunch":
             self._launch(command)
         elif RUNS_ON.match(command.typed):
