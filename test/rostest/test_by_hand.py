@@ -29,7 +29,7 @@ TOOLS = {
     ("gazebo_ros", "spawn_model", "-urdf", "-file", URDF): 1,
     ("teleop_twist_keyboard", "teleop_twist_keyboard.py"): 1,
 }
-LONGEST = 15.0  # [s] for all of them at once on a busy machine; each waits 5 s at most
+LONGEST = 40.0  # [s] for all of them at once on a busy machine; each waits 5 s at most
 
 
 def program(package, name):
