@@ -50,8 +50,8 @@ def _is_placeholder(word: str) -> bool:
 
 
 def _check_roslaunch(words: list[str]) -> str:
-    package, name, *arguments = words[1:]
     try:
+        package, name, *arguments = launched(words)
         path = launch_file(words)
     except rospkg.ResourceNotFound:
         return f"there is no package {package}"
@@ -68,7 +68,14 @@ def _check_roslaunch(words: list[str]) -> str:
 
 def launch_file(words: list[str]) -> Path:
     """That of a roslaunch command."""
-    return Path(rospkg.RosPack().get_path(words[1]), "launch", words[2])
+    package, name, *_ = launched(words)
+    return Path(rospkg.RosPack().get_path(package), "launch", name)
+
+
+def launched(words: list[str]) -> list[str]:
+    """Package, file and arguments of a roslaunch command, without its options."""
+    port = words.index("-p") + 1 if "-p" in words else 0
+    return [word for k, word in enumerate(words[1:], 1) if k != port and not word.startswith("-")]
 
 
 @functools.lru_cache
@@ -77,7 +84,8 @@ def launch_arguments(path: Path) -> frozenset[str]:
     names = set(roslaunch.arg_dump.get_args([str(path)]))
     text = path.read_text(encoding="utf-8")
     for package, name in re.findall(r'file="\$\(find (\w+)\)/launch/(\w+\.launch)" pass_all_args="true"', text):
-        names |= launch_arguments(Path(rospkg.RosPack().get_path(package), "launch", name))
+        if name != path.name:  # it includes itself in a namespace
+            names |= launch_arguments(Path(rospkg.RosPack().get_path(package), "launch", name))
     return frozenset(names)
 
 
@@ -159,8 +167,9 @@ def _service_request(name: str) -> Any:
 def _services() -> dict[str, str]:
     """Type of each service by the end of its name, as the nodes advertise them."""
     found = {}
+    offer = re.compile(r'\b(?:rospy\.|Caller)Service\(\s*f?"([^"]+)",\s*(\w+)')
     for path in (ROOT / "src/rosbot_patrol/ros").rglob("*.py"):
-        for name, kind in re.findall(r'rospy\.Service\(\s*f?"([^"]+)",\s*(\w+)', path.read_text(encoding="utf-8")):
+        for name, kind in offer.findall(path.read_text(encoding="utf-8")):
             found[name.rsplit("/", 1)[-1].lstrip("~")] = kind.removesuffix("Fast")
     return found
 
@@ -248,7 +257,7 @@ def _check_make(words: list[str]) -> str:
 
 
 def _check_python(words: list[str]) -> str:
-    if words[0] != ".ws/venv/bin/python":
+    if words[0] != ".ws/venv/bin/python" and not words[1].startswith("benchmarks/"):  # those find their interpreter
         return f"a shell of scripts/env has no {words[0]} that knows our packages: .ws/venv/bin/python has"
     if words[1:2] == ["-m"] and words[2].startswith("rosbot_patrol."):
         return "" if (ROOT / "src" / f"{words[2].replace('.', '/')}.py").is_file() else f"there is no module {words[2]}"

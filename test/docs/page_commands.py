@@ -15,6 +15,7 @@ code that begins with a command is checked as it stands, and not run.
 
 from __future__ import annotations
 
+import itertools
 import re
 import shlex
 from collections.abc import Iterator
@@ -51,6 +52,7 @@ _MARKER = re.compile(
 )
 _FENCE = re.compile(r"^ *```(\w*)$")
 _INLINE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
+_SETTING = re.compile(r"\w+=")  # of a variable, before the program
 _PLACEHOLDER = re.compile(r"[A-Z]+(_[A-Z]+)*")
 
 
@@ -80,8 +82,9 @@ class Command:
 
     @property
     def words(self) -> list[str]:
-        """Words as the shell would split them; variables and placeholders stand as they are."""
-        return shlex.split(self.text.replace("\\\n", " "), comments=True)
+        """Words as the shell would split them, from the program on; variables and placeholders stand as they are."""
+        words = shlex.split(self.text.replace("\\\n", " "), comments=True)
+        return list(itertools.dropwhile(_SETTING.match, words))
 
     @property
     def has_placeholder(self) -> bool:
@@ -127,7 +130,8 @@ def commands_of(page: str, text: str) -> list[Command]:
 
 def is_command(line: str) -> bool:
     """Whether a line begins with a program that the pages let the reader type."""
-    first = line.strip().partition(" ")[0]
+    words = line.split()
+    first = next(itertools.dropwhile(_SETTING.match, words), "")
     return first in PROGRAMS or bool(re.match(r"(scripts|\.ws/firmware)/\w+$", first))
 
 

@@ -1,7 +1,6 @@
 """rosrun rosbot_patrol incidents, as a person types it; no master."""
 
 import json
-import os
 import zipfile
 
 import pytest
@@ -12,13 +11,6 @@ from rosbot_patrol.alerts.incident import NO_ROOM, Event, Incident
 from rosbot_patrol.alerts.incident_files import NewFile
 from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.ros.incidents_tool import _command_first, _parser, main
-
-
-@pytest.fixture(autouse=True)
-def usual_umask():
-    before = os.umask(0o022)
-    yield
-    os.umask(before)
 
 
 @pytest.fixture

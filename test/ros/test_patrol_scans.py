@@ -11,7 +11,7 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, Transform
-from rosbot_patrol.patrol.node_params import EyesTopics
+from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
 from rosbot_patrol.patrol.rooms import Room, Rooms
 from rosbot_patrol.ros import patrol_eyes
 from rosbot_patrol.ros.convert import scan_from_msg, scan_to_msg
@@ -65,7 +65,7 @@ def made(monkeypatch):
 
     def make(frames):
         health = Health()
-        eyes = PatrolEyes(EyesTopics(), ROOMS, ["person"], frames, map_frame="map", odom_frame="odom", health=health)
+        eyes = PatrolEyes(EyesTopics(), ROOMS, ["person"], frames, frames=InputParams(), health=health)
         return eyes, health
 
     return make

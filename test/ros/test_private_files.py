@@ -19,13 +19,6 @@ from rosbot_patrol.alerts.postman import Postman
 from rosbot_patrol.ros.private_files import keep_private
 
 
-@pytest.fixture(autouse=True)
-def usual_umask():
-    before = os.umask(0o022)
-    yield
-    os.umask(before)
-
-
 def mode(path):
     return stat.S_IMODE(path.stat().st_mode)
 

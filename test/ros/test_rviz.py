@@ -14,9 +14,9 @@ DISPLAYS = yaml.safe_load((ROOT / "rviz" / "rosbot_patrol.rviz").read_text())["V
 # topic -> (rviz's display, where the code says what is published there)
 MARKERS = {
     PEOPLE: ("people_markers.py", "rospy.Publisher(TOPIC, MarkerArray"),
-    "/house_markers/markers": ("markers_node.py", 'rospy.Publisher("~markers", MarkerArray'),
-    "/explore/frontiers": ("explore_node.py", 'rospy.Publisher("~frontiers", MarkerArray'),
-    "/mark_rooms/markers": ("mark_rooms_node.py", 'rospy.Publisher("~markers", MarkerArray'),
+    "house_markers/markers": ("markers_node.py", 'rospy.Publisher("~markers", MarkerArray'),
+    "explore/frontiers": ("explore_node.py", 'rospy.Publisher("~frontiers", MarkerArray'),
+    "mark_rooms/markers": ("mark_rooms_node.py", 'rospy.Publisher("~markers", MarkerArray'),
 }
 
 
