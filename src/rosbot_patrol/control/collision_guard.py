@@ -113,9 +113,13 @@ class CollisionGuard:
         self.problem = scan_problem(scan)
         if self.problem:
             return
+        points = transform_points(base_from_laser, scan_points(scan))
+        if self._is_covered(scan, points):
+            self.problem = "its beams end on the robot itself: is the lidar covered?"
+            return
         if odom_from_base is not None:
             self._remember(scan.range_min, compose(odom_from_base, base_from_laser), now)
-        self._seen = transform_points(base_from_laser, scan_points(scan))
+        self._seen = points
         self._pose, self._stamp = odom_from_base, now
 
     def refuse(self, problem: str) -> None:
@@ -248,6 +252,11 @@ class CollisionGuard:
         last_free = np.maximum(hit.argmax(axis=1) - 1, 0)
         first = np.where(hit.any(axis=1), times[last_free], math.inf)
         return float(np.partition(first, self._params.min_points - 1)[self._params.min_points - 1])
+
+    def _is_covered(self, scan: LaserScan, points: Array) -> bool:
+        """Whether all that the lidar hits is the robot, and most of its beams hit something."""
+        is_open = np.count_nonzero(scan.ranges == math.inf) >= 0.5 * len(scan.ranges)
+        return bool(len(points)) and not is_open and bool(self._is_self(points).all())
 
     def _is_self(self, points: Array) -> NDArray[np.bool_]:
         p = self._params

@@ -332,3 +332,20 @@ def test_the_robot_stops_before_a_low_thing():
         twist = guard.limit(Twist2D(0.4), now, pose).twist
         pose = Pose2D(pose.x + twist.vx * 0.1)
     assert 0.02 < edge - pose.x - 0.12 < 0.12
+
+
+@pytest.mark.parametrize("lengths", ["cloth", "cloth and a slit", "posts in a hall"])
+def test_a_lidar_that_sees_only_the_robot_itself_is_covered(lengths):
+    scan = replace(cast([], Pose2D()), range_min=0.02, ranges=np.full(720, 0.03))
+    if lengths == "cloth and a slit":
+        scan.ranges[10:60] = math.inf
+    if lengths == "posts in a hall":
+        scan.ranges[10:700] = math.inf
+    guard = CollisionGuard(GuardParams())
+    guard.see(scan, BASE_FROM_LASER, 0.0, Pose2D())
+    verdict = guard.limit(AHEAD, 0.1, Pose2D())
+    if lengths == "posts in a hall":
+        assert verdict.scale == 1.0
+    else:
+        assert verdict.twist.vx == pytest.approx(GuardParams().stale_speed)
+        assert "is the lidar covered?" in verdict.reason
