@@ -162,7 +162,7 @@ def test_scans_that_are_none_leave_a_crawl_and_are_named(ros, base, quaternion, 
     mux.says(named)
     wait_for(lambda: named in lidar.told() and "level: 1" in lidar.told(), 5.0, "a warning on /diagnostics")
     assert "patrol drives; no usable scan yet" in lidar.told()
-    assert sum("is left out" in line or "cannot place the scan" in line for line in mux.output.splitlines()) == 1
+    assert sum(named in line and "lets the base creep only" in line for line in mux.output.splitlines()) == 1
 
 
 def test_two_sources_of_one_priority_are_one_sentence(ros, base):
