@@ -40,7 +40,7 @@ def plain_text(mail):
 
 
 def plain(header):
-    return str(make_header(decode_header(header)))
+    return " ".join(str(make_header(decode_header(header))).split())  # a long one is folded
 
 
 class Watch:
@@ -270,9 +270,9 @@ def test_people_at_home_are_no_mail_and_a_sensor_that_is_stuck_is_told_when_they
     watch.node.says("watching 2 sensors")
     bridge(ros, port)
     sensors = [EspClient("127.0.0.1", port, i, stuck_after=1.0).start() for i in (1, 2)]
-    time.sleep(0.5)
-    probe.tell(publish=["/patrol/arming", {"mode": "armed_home", "all_rooms": False, "rooms": [2]}])
-    time.sleep(0.5)
+    for _ in range(10):  # until the subscriber is there
+        probe.tell(publish=["/patrol/arming", {"mode": "armed_home", "all_rooms": False, "rooms": [2]}])
+        time.sleep(0.2)
     for sensor in sensors:
         sensor.set_motion(True)
     for i in (1, 2):
