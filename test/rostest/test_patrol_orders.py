@@ -154,7 +154,7 @@ def test_a_kill_right_after_a_call_loses_nothing(house):
     calls = house.folder / "state" / "calls.jsonl"
     house.send(3)
     deadline = time.monotonic() + 10.0
-    while not calls.stat().st_size and time.monotonic() < deadline:
+    while not (calls.exists() and calls.stat().st_size) and time.monotonic() < deadline:
         pass
     os.killpg(house.patrol.pid, signal.SIGKILL)
     house.patrol.wait()

@@ -244,7 +244,7 @@ def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp
     probe = ros.probe()
     probe.tell(subscribe=EVENTS)
     watch = Watch(ros, tmp_path, [{"id": 7, "room": 7}], start_grace=2.0)
-    watch.node.says("watching 1 sensors")
+    watch.node.says("watching 1 sensor")
     outbox = tmp_path / "state" / "outbox"
     outbox.rename(tmp_path / "aside")
     outbox.write_text("the disk takes nothing")

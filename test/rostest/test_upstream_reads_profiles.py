@@ -179,6 +179,7 @@ def test_upstreams_move_base_reads_the_profile(profile: str, simulation: str) ->
 @pytest.mark.parametrize("profile", ["tutorial", "tuned"])
 def test_nothing_of_a_profile_is_clamped_or_deprecated(profile: str, caplog: pytest.LogCaptureFixture) -> None:
     tree = move_base_tree(f"profile:={profile}")
+    caplog.clear()  # roslaunch's own lines
     for name in ("global_costmap", "local_costmap"):
         read_costmap(tree[name], name=f"/move_base/{name}/")
     assert not caplog.messages

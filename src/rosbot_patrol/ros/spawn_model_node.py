@@ -66,7 +66,7 @@ def main() -> None:
         urdf = _description(options)
         service = _service()
         if not service and not is_launched():
-            names = " nor ".join(map(rospy.resolve_name, SERVICES))
+            names = " nor ".join(dict.fromkeys(map(rospy.resolve_name, SERVICES)))
             raise NobodyThere(f"neither {names} is offered: is the simulator running?")
         while not service and not rospy.is_shutdown():
             rospy.loginfo_throttle(5.0, "spawn_model waits for the simulator")
