@@ -248,7 +248,7 @@ def test_what_was_told_is_not_told_again_by_a_watch_that_was_killed(sim_ros, tmp
     outbox = tmp_path / "state" / "outbox"
     outbox.rename(tmp_path / "aside")
     outbox.write_text("the disk takes nothing")
-    watch.node.says("is silent' cannot be written to")
+    watch.node.says("it is sent from memory")
     outbox.unlink()
     (tmp_path / "aside").rename(outbox)
     watch.mail("sensor 7 in room 7 (north-east hall) is silent")
