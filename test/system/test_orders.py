@@ -88,5 +88,6 @@ def test_the_emergency_stop_holds_whoever_wants_to_drive_and_modes_decide_who_is
         house.trigger(ROOM)
         time.sleep(2.0)
         assert house.state.state == PatrolState.IDLE
-        assert {mail.name.split("-")[0] for mail in house.mails()} == {"emergency_stop"}  # the owner is told of it
+        told = {mail.name.split("-")[0] for mail in house.mails()}
+        assert told == {"emergency_stop", "disarmed"}  # nothing else, but these the owner hears of
     subscriber.unregister()

@@ -182,6 +182,7 @@ class Reader:
                 stdout=out,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
+                preexec_fn=_heed_ctrl_c,
             )
         self._running.append((command, process, output))
         if "mark_rooms" in command.typed:
@@ -224,6 +225,11 @@ class Reader:
             assert not by_itself, f"{command.where}: it ended by itself: {command.text}\n{said}"
             assert status in (0, 130, -signal.SIGINT), f"{command.where}: {status} after Ctrl-C: {command.text}\n{said}"
             assert "Traceback" not in said, f"{command.where}: {command.text}\n{said}"
+
+
+def _heed_ctrl_c() -> None:
+    """A shell in the background starts its programs with SIGINT ignored, and they hand that on."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _is_settled() -> bool:
