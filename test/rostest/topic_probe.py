@@ -1,6 +1,6 @@
 """A ROS node driven by lines of JSON: commands on stdin, what it hears on stdout.
 
-{"subscribe": [topic, type]}  {"advertise": [topic, type]}  {"publish": [topic, fields]}
+{"subscribe": [topic, type]}  {"advertise": [topic, type]}  {"publish": [topic, fields]}  {"linked": topic}
 {"call": [service, type, arguments]}  {"serve": [service, type, answer]}  {"topics": prefix}
 """
 
@@ -35,6 +35,12 @@ def subscribe(topic, kind):
 
 def advertise(topic, kind):
     publishers[topic] = rospy.Publisher(topic, roslib.message.get_message_class(kind), queue_size=10)
+
+
+def linked(topic):
+    """Until somebody listens to what is advertised there."""
+    while not publishers[topic].get_num_connections() and not rospy.is_shutdown():
+        rospy.rostime.wallsleep(0.05)
 
 
 def publish(topic, values):
@@ -80,6 +86,8 @@ def main():
                 topics(arguments)
             elif name == "call":
                 threading.Thread(target=call, args=arguments, daemon=True).start()
+            elif name == "linked":
+                linked(arguments)
             else:
                 commands[name](*arguments)
         say(done=line.strip())
