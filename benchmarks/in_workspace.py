@@ -43,7 +43,7 @@ def _enter(program: Path) -> None:
     if not PYTHON.exists() or not (WORKSPACE / "devel" / "setup.bash").exists():
         if importlib.util.find_spec("rosbot_patrol") is None:
             sys.exit(f"{program.name}: the workspace is not built: run scripts/bootstrap")
-        return  # another workspace, in whose shell this is
+        return  # this shell belongs to another workspace
     env, python = shlex.quote(str(HERE.parent / "scripts" / "env")), shlex.quote(str(PYTHON))
     # in a function, so that catkin's setup does not take the benchmark's arguments for its own
     command = f'enter() {{ . {env}; }}; enter && exec {python} "$0" "$@"'
