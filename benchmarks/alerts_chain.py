@@ -100,7 +100,7 @@ class Senses:
 def measure(missions: int = MISSIONS) -> dict[str, float]:
     from real_smtp import RealSmtp
 
-    from rosbot_patrol.ros.house import Master
+    from rosbot_patrol.ros.campaign.house import Master
     from rosbot_patrol.rosserial.tcp_client import EspClient
 
     with tempfile.TemporaryDirectory(prefix="alerts-") as name:

@@ -27,7 +27,7 @@ from rosbot_patrol.patrol.commands import Commands, Notice, Report
 from rosbot_patrol.patrol.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.rooms import Room
 from rosbot_patrol.patrol.watch import Confirmation
-from rosbot_patrol.ros.incident_keeper import IncidentKeeper
+from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 
 ROOT = Path(__file__).resolve().parent.parent
 SECONDS, STEPS, PICTURES = 60, 25, 10

@@ -31,7 +31,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from rosbot_patrol.msg import PatrolState
 
-from rosbot_patrol.ros.house import House, HouseError, Master
+from rosbot_patrol.ros.campaign.house import House, HouseError, Master
 
 ROOM, INTRUDER = 5, (4.8, 7.8)
 LOOKING = ("darknet_ros", "rgb_compress", "esp_client1", "esp_client2", "esp_client3")

@@ -84,7 +84,7 @@ def message_bytes() -> bytes:
     from std_msgs.msg import Header
 
     from rosbot_patrol.images.encodings import Picture
-    from rosbot_patrol.ros.convert_images import picture_to_msg
+    from rosbot_patrol.ros.messages.images import picture_to_msg
 
     out = io.BytesIO()
     picture_to_msg(Picture(make_picture(), "rgb8"), Header()).serialize(out)
@@ -96,8 +96,8 @@ def detection_ms(cfg: str, weights: str, names: list[str], threads: int, repeats
     from sensor_msgs.msg import Image
 
     from rosbot_patrol.detection.detector import load_detector
-    from rosbot_patrol.ros.convert_images import picture_from_msg
-    from rosbot_patrol.ros.darknet_node import boxes_to_msg
+    from rosbot_patrol.ros.detector.node import boxes_to_msg
+    from rosbot_patrol.ros.messages.images import picture_from_msg
 
     detector = load_detector(cfg, weights, names, threads=threads)
     data = message_bytes()
@@ -125,7 +125,7 @@ def republish_times(repeats: int) -> list[Times]:
     from sensor_msgs.msg import CompressedImage, Image
 
     from rosbot_patrol.images.compressed import CompressedParams, compress
-    from rosbot_patrol.ros.convert_images import picture_from_msg
+    from rosbot_patrol.ros.messages.images import picture_from_msg
 
     cv2.setNumThreads(1)
     params, data = CompressedParams(), message_bytes()

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.ros.ports import free_port
+from rosbot_patrol.ros.campaign.ports import free_port
 
 ROOT = Path(__file__).resolve().parents[1]
 TICKS = os.sysconf("SC_CLK_TCK")

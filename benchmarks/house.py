@@ -50,7 +50,7 @@ def cost_of(pid: int) -> Cost | None:
 
 
 def ready_times(folder: Path, runs: int) -> list[float]:
-    from rosbot_patrol.ros.house import House
+    from rosbot_patrol.ros.campaign.house import House
 
     times = []
     for i in range(runs + 1):
@@ -64,8 +64,8 @@ def ready_times(folder: Path, runs: int) -> list[float]:
 def mission_run(folder: Path, room: int) -> tuple[float, list[tuple[str, float, float, float]], str]:
     import rospy
 
-    from rosbot_patrol.ros.demo_intruder_node import read_walk
-    from rosbot_patrol.ros.house import House
+    from rosbot_patrol.ros.campaign.house import House
+    from rosbot_patrol.ros.simulator.demo_intruder_node import read_walk
 
     walk = read_walk(ROOT / "config" / "house_demo.yaml", room).path
     with House(folder / "mission", rate=0) as house:
@@ -107,7 +107,7 @@ def main() -> int:
     parser.add_argument("--setup", action="store_true", help="time scripts/bootstrap in a fresh clone too")
     options = parser.parse_args()
     try:
-        from rosbot_patrol.ros.house import Master
+        from rosbot_patrol.ros.campaign.house import Master
     except ImportError as err:
         print(f"{err}: `. scripts/env` first", file=sys.stderr)
         return 1

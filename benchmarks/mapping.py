@@ -198,7 +198,7 @@ def measure_nodes(options: argparse.Namespace) -> dict[str, float]:
     """The logs through our node and the original."""
     from mapping_node import through_node
 
-    from rosbot_patrol.ros.house import Master
+    from rosbot_patrol.ros.campaign.house import Master
 
     elf, figures = original("gmapping", "slam_gmapping"), {}
     print(f"original: {elf or 'not on the package path'}")

@@ -64,7 +64,7 @@ def original(package: str, name: str = "") -> str:
 @contextmanager
 def busy_master(folder: Path, busy: int) -> Iterator[None]:
     """A master, and so many processes that run without a pause."""
-    from rosbot_patrol.ros.house import Master
+    from rosbot_patrol.ros.campaign.house import Master
 
     master = Master(folder / "roscore.log")
     spin = [sys.executable, "-c", "while True: pass"]
@@ -84,7 +84,7 @@ def measure(folder: Path, profile: str, seconds: float, nodes: Sequence[str]) ->
     from rosbot_patrol.msg import PatrolState
     from rosgraph_msgs.msg import Log
 
-    from rosbot_patrol.ros.house import House
+    from rosbot_patrol.ros.campaign.house import House
 
     costs = {node: Cost() for node in nodes}
 

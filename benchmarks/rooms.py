@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rosbot_patrol.ros.house import House
+    from rosbot_patrol.ros.campaign.house import House
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -88,8 +88,8 @@ def main() -> int:
     options = parser.parse_args()
     try:
         from rosbot_patrol.patrol.rooms import load_rooms
-        from rosbot_patrol.ros.demo_intruder_node import read_walk
-        from rosbot_patrol.ros.house import House, Master
+        from rosbot_patrol.ros.campaign.house import House, Master
+        from rosbot_patrol.ros.simulator.demo_intruder_node import read_walk
     except ImportError as err:
         print(f"{err}: `. scripts/env` first", file=sys.stderr)
         return 1

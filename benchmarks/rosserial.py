@@ -29,7 +29,7 @@ from typing import Any
 
 import numpy as np
 
-from rosbot_patrol.ros.ports import free_port
+from rosbot_patrol.ros.campaign.ports import free_port
 
 HERE = Path(__file__).resolve().parent
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -263,7 +263,7 @@ def main() -> int:
     if options.quick:
         options.seconds = 10.0
     try:
-        from rosbot_patrol.ros.house import Master
+        from rosbot_patrol.ros.campaign.house import Master
     except ImportError as err:
         print(f"{err}: `. scripts/env` first", file=sys.stderr)
         return 1

@@ -144,7 +144,7 @@ def main() -> int:
     import attacks
 
     try:
-        from rosbot_patrol.ros.house import Master
+        from rosbot_patrol.ros.campaign.house import Master
     except ImportError as err:
         print(f"{err}: `. scripts/env` first", file=sys.stderr)
         return 1

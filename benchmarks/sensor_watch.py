@@ -88,7 +88,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=30.0, help="of heartbeats")
     options = parser.parse_args()
     try:
-        from rosbot_patrol.ros.house import Master
+        from rosbot_patrol.ros.campaign.house import Master
     except ImportError as err:
         print(f"{err}: `. scripts/env` first", file=sys.stderr)
         return 1

@@ -30,7 +30,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.ros.ports import free_port
+from rosbot_patrol.ros.campaign.ports import free_port
 
 ROOT = Path(__file__).resolve().parents[1]
 NODES = ("darknet_ros", "rgb_compress", "rgb_decompress")
@@ -112,7 +112,7 @@ class Camera:
         from std_msgs.msg import Header
 
         from rosbot_patrol.images.encodings import Picture
-        from rosbot_patrol.ros.convert_images import picture_to_msg
+        from rosbot_patrol.ros.messages.images import picture_to_msg
 
         rospy.init_node("soak", disable_signals=True)
         self._rate = rate

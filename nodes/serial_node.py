@@ -1,4 +1,4 @@
 #!/usr/bin/env python3
-from rosbot_patrol.ros.serial_server_node import main
+from rosbot_patrol.ros.bridge.node import main
 
 main()

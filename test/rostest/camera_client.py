@@ -27,7 +27,7 @@ from std_srvs.srv import SetBool
 
 from rosbot_patrol.images.compressed import CompressedParams, compress
 from rosbot_patrol.images.encodings import ENCODINGS, Picture
-from rosbot_patrol.ros.convert_images import picture_from_msg, picture_to_msg
+from rosbot_patrol.ros.messages.images import picture_from_msg, picture_to_msg
 
 CAMERA = "/camera/rgb/image_raw"
 COLOURS = {"red": (255, 0, 0), "blue": (0, 0, 255), "black": (0, 0, 0)}

@@ -9,7 +9,7 @@ import threading
 import time
 from pathlib import Path
 
-from rosbot_patrol.ros.ports import free_port
+from rosbot_patrol.ros.campaign.ports import free_port
 
 HERE = Path(__file__).resolve().parent
 

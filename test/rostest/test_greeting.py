@@ -14,7 +14,7 @@ from ros_processes import Process, Ros
 NODE = """
 import rospy
 from rosbot_patrol.ros import greeting
-from rosbot_patrol.ros.node import run_node
+from rosbot_patrol.ros.runtime.node import run_node
 
 greeting.PATIENCE_S = 2.0
 run_node("greeted", lambda: (print("ready", flush=True), rospy.spin()))

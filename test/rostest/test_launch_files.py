@@ -80,7 +80,7 @@ def test_parses(path: Path) -> None:
 def test_image_transports_republish_is_ours() -> None:
     """As the tutorial's launch files name it; Debian's knows no compressed transport."""
     first = roslib.packages.find_node("image_transport", "republish")[0]
-    assert "rosbot_patrol.ros.republish_node" in Path(first).read_text(encoding="utf-8")
+    assert "rosbot_patrol.ros.detector.republish_node" in Path(first).read_text(encoding="utf-8")
 
 
 def test_the_tutorials_files_are_all_there() -> None:

@@ -16,7 +16,7 @@ from ros_processes import Process, Ros
 # As a node does that logs a line: rospy asks the master whether /rosout is to name the topics.
 BUSY = """
 import rospy
-from rosbot_patrol.ros.node import run_node
+from rosbot_patrol.ros.runtime.node import run_node
 
 def body():
     rospy.on_shutdown(lambda: print("hook", flush=True))
@@ -57,7 +57,7 @@ def test_a_node_ends_on_a_signal_while_it_talks_to_the_master(ros, number):
 # rospy closes topics before it says that it is shut down; who publishes just then gets this.
 SPEAKING = """
 import rospy
-from rosbot_patrol.ros.node import run_node
+from rosbot_patrol.ros.runtime.node import run_node
 
 def body():
     rospy.signal_shutdown("enough")
@@ -75,7 +75,7 @@ def test_a_node_ends_in_peace_that_publishes_while_it_ends(ros):
 
 def test_a_node_that_ends_by_itself_needs_no_signal(ros):
     node = Process(
-        [sys.executable, "-c", "from rosbot_patrol.ros.node import run_node; run_node('brief', lambda: None)"],
+        [sys.executable, "-c", "from rosbot_patrol.ros.runtime.node import run_node; run_node('brief', lambda: None)"],
         ros.env,
         stdin=subprocess.DEVNULL,
     )
@@ -87,7 +87,7 @@ HALF_DEAD = """
 import time
 from pathlib import Path
 import rospy
-from rosbot_patrol.ros.node import Loop, Worker, run_node
+from rosbot_patrol.ros.runtime.node import Loop, Worker, run_node
 
 def fail(*_):
     raise {error}
@@ -125,7 +125,7 @@ def test_a_node_ends_in_peace_when_a_worker_meets_its_shutdown(ros):
 LOGGING = """
 import logging, sys
 import rospy
-from rosbot_patrol.ros.node import run_node
+from rosbot_patrol.ros.runtime.node import run_node
 
 def body():
     print("at work", flush=True)

@@ -32,7 +32,7 @@ def heard(ros):
 
 
 def record(ros, *arguments):
-    return Process([sys.executable, "-m", "rosbot_patrol.ros.record_node", *map(str, arguments)], ros.env)
+    return Process([sys.executable, "-m", "rosbot_patrol.ros.tools.record_node", *map(str, arguments)], ros.env)
 
 
 def test_a_bag_until_it_is_ended(ros, tmp_path: Path):
@@ -75,6 +75,6 @@ def test_what_cannot_be_written_is_said(ros, tmp_path: Path, name: str, said: st
 
 
 def test_without_a_master_it_says_so(ros, tmp_path: Path):
-    command = [sys.executable, "-m", "rosbot_patrol.ros.record_node", str(tmp_path / "night.bag")]
+    command = [sys.executable, "-m", "rosbot_patrol.ros.tools.record_node", str(tmp_path / "night.bag")]
     process = Process(command, {**ros.env, "ROS_MASTER_URI": "http://localhost:9"})
     process.says("no ROS master answers at http://localhost:9")

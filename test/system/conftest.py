@@ -10,7 +10,9 @@ import pytest
 
 @pytest.fixture(scope="session")
 def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[object]:
-    house = pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
+    house = pytest.importorskip(
+        "rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`"
+    )
     running = house.Master(tmp_path_factory.mktemp("master") / "roscore.log")
     yield running
     running.stop()

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
-from rosbot_patrol.ros.house import House, Mission
+pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`")
+from rosbot_patrol.ros.campaign.house import House, Mission
 
 pytestmark = pytest.mark.system
 

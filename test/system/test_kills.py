@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
+pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`")
 import rospy
 from nav_msgs.msg import Odometry
 from rosbot_patrol.msg import PatrolState
 
-from rosbot_patrol.ros.campaign_mail import kept_mails
-from rosbot_patrol.ros.house import House
+from rosbot_patrol.ros.campaign.house import House
+from rosbot_patrol.ros.campaign.mail_sink import kept_mails
 
 pytestmark = pytest.mark.system
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
+pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`")
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -17,7 +17,7 @@ from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.srv import Arm
 from std_srvs.srv import SetBool
 
-from rosbot_patrol.ros.house import House
+from rosbot_patrol.ros.campaign.house import House
 
 pytestmark = pytest.mark.system
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
+pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`")
 import rosgraph
 import rospy
 from command_check import ROOT, launch_arguments, launch_file
@@ -31,8 +31,8 @@ from page_list import PAGES
 from rosbot_patrol.msg import PatrolState
 
 from rosbot_patrol.patrol.rooms import load_rooms
-from rosbot_patrol.ros.house import House, end_group
-from rosbot_patrol.ros.ports import free_port
+from rosbot_patrol.ros.campaign.house import House, end_group
+from rosbot_patrol.ros.campaign.ports import free_port
 
 pytestmark = [pytest.mark.system, pytest.mark.slow]
 

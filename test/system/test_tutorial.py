@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
-from rosbot_patrol.ros.house import House
+pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`")
+from rosbot_patrol.ros.campaign.house import House
 
 pytestmark = pytest.mark.system
 

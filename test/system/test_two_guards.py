@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
+pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`")
 import rosgraph
 from rosbot_patrol.msg import PatrolState
 
 from rosbot_patrol.alerts.incident_query import Query, find_incidents
 from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.ros.house import House
-from rosbot_patrol.ros.ports import free_port
+from rosbot_patrol.ros.campaign.house import House
+from rosbot_patrol.ros.campaign.ports import free_port
 
 pytestmark = pytest.mark.system
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rosbot_patrol.ros.house", reason="the workspace is not on the path: `. scripts/env`")
+pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is not on the path: `. scripts/env`")
 pytestmark = pytest.mark.system
 
 INSIDE = Path(__file__).with_name("two_machines_inside.py")

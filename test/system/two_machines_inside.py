@@ -19,7 +19,7 @@ import rospy
 from darknet_ros_msgs.msg import ObjectCount
 from diagnostic_msgs.msg import DiagnosticArray
 
-from rosbot_patrol.ros.house import House, Master
+from rosbot_patrol.ros.campaign.house import House, Master
 
 CABLE = Path(__file__).with_name("cable.py")
 QUALITY = ["--delay", "0.01", "--loss", "0.005", "--rate", "20e6"]

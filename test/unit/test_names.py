@@ -15,7 +15,7 @@ CALLS |= {"ActionServer", "ActionClient", "wait_for_service", "wait_for_message"
 # What all guards of one master share, and what launch files remap, as tf2 and darknet_ros name it.
 SHARED = {"/clock": "one time", "/diagnostics": "names there carry the namespace", "/tf": "tf2's name; remapped"}
 # Programs that watch a guard at the root, as the tests do.
-WATCHERS = {"campaign_watch.py", "campaign_crash.py", "campaign_patrol.py"}
+WATCHERS = {"campaign/watch.py", "campaign/crash.py", "campaign/patrol.py"}
 
 
 def absolute_names(path: Path) -> list[str]:
@@ -38,9 +38,9 @@ def test_names_that_begin_at_the_root_are_found(tmp_path: Path) -> None:
     assert absolute_names(file) == ["/scan", "/gazebo/"]
 
 
-@pytest.mark.parametrize("path", sorted(ROS.rglob("*.py")), ids=lambda p: p.name)
+@pytest.mark.parametrize("path", sorted(ROS.rglob("*.py")), ids=lambda p: p.relative_to(ROS).as_posix())
 def test_no_name_begins_at_the_root(path: Path) -> None:
-    if path.name not in WATCHERS:
+    if path.relative_to(ROS).as_posix() not in WATCHERS:
         assert [name for name in absolute_names(path) if name not in SHARED] == []
 
 

@@ -1,4 +1,4 @@
-"""Scans that wait for the odometry (the order under a late tf: test/ros/test_scan_queue.py)."""
+"""Scans that wait for the odometry (the order under a late tf: test/ros/runtime/test_scan_queue.py)."""
 
 from __future__ import annotations
 

@@ -9,10 +9,10 @@ ROS = Path(__file__).parents[2] / "src" / "rosbot_patrol" / "ros"
 
 # Plain threads whose failure leaves no node half dead, and why.
 PLAIN = {
-    "node.py": "ends the node on a signal",
-    "greeting.py": "one a link; ends with it",
-    "by_hand.py": "asks the master before a tool is a node",
-    "campaign_mail.py": "a server of the standard library in a program that is no node",
+    "runtime/node.py": "ends the node on a signal",
+    "runtime/greeting.py": "one a link; ends with it",
+    "runtime/by_hand.py": "asks the master before a tool is a node",
+    "campaign/mail_sink.py": "a server of the standard library in a program that is no node",
 }
 
 
@@ -27,6 +27,6 @@ def plain_threads(path: Path) -> int:
 
 
 def test_no_node_has_a_thread_that_dies_in_silence() -> None:
-    found = {path.name for path in ROS.rglob("*.py") if plain_threads(path)}
-    assert found <= set(PLAIN), f"use Worker of ros/node.py in {sorted(found - set(PLAIN))}"
-    assert "node.py" in found
+    found = {path.relative_to(ROS).as_posix() for path in ROS.rglob("*.py") if plain_threads(path)}
+    assert found <= set(PLAIN), f"use Worker of ros/runtime/node.py in {sorted(found - set(PLAIN))}"
+    assert "runtime/node.py" in found

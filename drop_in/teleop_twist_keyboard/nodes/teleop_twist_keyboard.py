@@ -1,4 +1,4 @@
 #!/usr/bin/env python3
-from rosbot_patrol.ros.teleop_node import main
+from rosbot_patrol.ros.drive.teleop_node import main
 
 main()

@@ -1,4 +1,4 @@
-"""tf kept without ROS (against tf2 itself: test/ros/test_transform_tree_as_tf2.py)."""
+"""tf kept without ROS (against tf2 itself: test/ros/runtime/test_transform_tree_as_tf2.py)."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""The node rosserial's serial_node: motion sensors to ROS topics."""

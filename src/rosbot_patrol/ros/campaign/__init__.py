@@ -1,0 +1,1 @@
+"""Whole houses as child processes: campaigns, system tests and benchmarks drive them."""

@@ -1,0 +1,214 @@
+"""campaign: many seeded patrols of the simulated houses, each judged against what really was there.
+
+    rosrun rosbot_patrol campaign FOLDER --patrols 60
+    rosrun rosbot_patrol campaign FOLDER --patrols 100 --faults    # something breaks in every other one
+    rosrun rosbot_patrol campaign FOLDER --only 17        # one of them again
+    rosrun rosbot_patrol campaign FOLDER --crash 200      # patrols in which programs are killed
+
+Run again it goes on where it stopped. Exit status: 0, or 1 where anything was not as it should have been.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import shlex
+import shutil
+import signal
+import sys
+import time
+from pathlib import Path
+
+import rospkg
+
+from rosbot_patrol.campaign.floor import Floor
+from rosbot_patrol.campaign.houses import HOUSES, HouseFiles, load_house
+from rosbot_patrol.campaign.page import page
+from rosbot_patrol.campaign.plan import Patrol, house_of, plan_patrol
+from rosbot_patrol.campaign.progress import progress_line
+from rosbot_patrol.campaign.record import PLAN, RESULT, CampaignFolder, Result, Settings
+from rosbot_patrol.campaign.table import HEADINGS, figures, markdown_table, row, summary, text_table
+from rosbot_patrol.errors import PatrolError
+from rosbot_patrol.files import write_atomic
+from rosbot_patrol.ros.campaign.crash import CrashLife
+from rosbot_patrol.ros.campaign.crashes import CrashCampaign
+from rosbot_patrol.ros.campaign.house import HouseError
+from rosbot_patrol.ros.campaign.patrol import play
+from rosbot_patrol.ros.campaign.runner import Job, Runner, own_space, raise_loopback
+
+KEPT_FOR_GOOD = (RESULT, PLAN, "scenario.yaml", "mail")  # of a patrol that went as it should
+
+
+def package_root() -> Path:
+    """The folder with worlds and maps: the package's, wherever it is installed."""
+    return Path(rospkg.RosPack().get_path("rosbot_patrol"))
+
+
+def options(arguments: list[str]) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        prog="campaign", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", default="campaign", type=Path, help="for plans, results and the page")
+    parser.add_argument("--patrols", type=int, default=60, help="how many")
+    parser.add_argument("--seed", type=int, default=1, help="of the campaign")
+    parser.add_argument("--houses", nargs="+", default=list(HOUSES), choices=HOUSES, help="that take turns")
+    parser.add_argument("--jobs", type=int, default=max((os.cpu_count() or 2) // 2, 1), help="at once, two cores each")
+    parser.add_argument("--timeout", type=float, default=600.0, help="for a patrol [s] of real time")
+    parser.add_argument("--only", type=int, nargs="+", help="numbers of the patrols to play, again where played")
+    parser.add_argument("--wrap", default="", help="command to run each patrol under, such as 'flock FILE'")
+    parser.add_argument(
+        "--crash", type=int, metavar="KILLS", help="kill programs instead, so often; see docs/campaign.md"
+    )
+    parser.add_argument("--faults", action="store_true", help="something breaks in every other patrol")
+    parser.add_argument("--life", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # the program in its own space
+    parser.add_argument("--space", action="store_true", help=argparse.SUPPRESS)
+    return parser.parse_args(arguments)
+
+
+class Campaign:
+    """The patrols of a folder."""
+
+    def __init__(self, given: argparse.Namespace) -> None:
+        self._given = given
+        self._root = package_root()
+        self._folder = CampaignFolder(
+            given.folder.resolve(), Settings(seed=given.seed, houses=tuple(given.houses), faults=given.faults)
+        )
+        self._floors: dict[str, tuple[HouseFiles, Floor]] = {}
+        self._began = time.monotonic()
+        self._here = 0
+
+    def run(self) -> int:
+        """Play what has not been played; the exit status."""
+        numbers = self._given.only or range(self._given.patrols)
+        wanted = [n for n in numbers if self._given.only or self._folder.result(n) is None]
+        self._total = len(set(numbers) | {r.number for r in self._folder.results()})
+        prefix = own_space()
+        if not prefix:
+            print("no network spaces of one's own here (unshare is refused): one patrol at a time", flush=True)
+        runner = Runner(self._given.jobs, prefix, shlex.split(self._given.wrap), self._done)
+        self._tell()
+        try:
+            runner.run(self._job(number, bool(prefix)) for number in wanted)
+        except KeyboardInterrupt:
+            runner.stop()
+            print(f"\nstopped; run the same again to go on in {self._folder.folder}")
+            return 130
+        self._write()
+        results = self._folder.results()
+        print(f"\n{text_table(HEADINGS, map(row, results))}\n\n{summary(results)}\n\n{self._failures(results)}")
+        return 1 if any(result.failures for result in results) else 0
+
+    def _job(self, number: int, space: bool) -> Job:
+        folder = self._folder.of(number)
+        shutil.rmtree(folder, ignore_errors=True)
+        patrol = self._plan(number)
+        write_atomic(folder / PLAN, json.dumps(patrol.to_plain(), indent=1).encode())
+        command = [sys.executable, sys.argv[0], "--one", str(folder), "--timeout", str(self._given.timeout)]
+        return Job(str(number), command + ["--space"] * space, folder / "campaign.log", self._given.timeout)
+
+    def _plan(self, number: int) -> Patrol:
+        name = house_of(self._given.seed, number, self._given.houses)
+        if name not in self._floors:
+            house = load_house(name, self._root)
+            self._floors[name] = house.files, Floor(house.bodies, house.rooms)
+        return plan_patrol(self._given.seed, number, *self._floors[name], faults=self._given.faults)
+
+    def _done(self, job: Job, problem: str) -> None:
+        number = int(job.name)
+        folder = self._folder.of(number)
+        if self._folder.result(number) is None:
+            patrol = self._plan(number)
+            failed = Result(
+                number=number,
+                seed=patrol.seed,
+                kind=patrol.kind,
+                house=patrol.house,
+                room=patrol.room,
+                title=patrol.title,
+                expected=patrol.expected,
+                mishap=patrol.mishap,
+                allowed=patrol.allowed,
+                problem=problem or "left no result",
+            )
+            write_atomic(folder / RESULT, failed.to_json().encode())
+        result = self._folder.result(number)
+        assert result is not None
+        if not result.failures:
+            for path in folder.iterdir():
+                if path.name not in KEPT_FOR_GOOD:
+                    shutil.rmtree(path) if path.is_dir() else path.unlink()
+        self._here += 1
+        self._write()
+        self._tell(result)
+
+    def _tell(self, result: Result | None = None) -> None:
+        results = self._folder.results()
+        failed = sum(bool(r.failures) for r in results)
+        if result is not None:
+            how = "; ".join(result.failures) or result.verdict
+            print(f"\r\x1b[K{result.number:4d}  {result.title}: {how}")
+        elapsed = time.monotonic() - self._began
+        line = progress_line(len(results), self._total, self._here, elapsed, failed=failed)
+        print(f"\r\x1b[K{line}" if sys.stdout.isatty() else line, end="" if sys.stdout.isatty() else "\n", flush=True)
+
+    def _failures(self, results: list[Result]) -> str:
+        failed = [r for r in results if r.failures]
+        if not failed:
+            return "Everything was as it should be."
+        lines = [f"{r.number}: {'; '.join(r.failures)} ({r.title})\n    {self.command(r)}" for r in failed]
+        return "Not as they should be, each with the command that plays it again:\n" + "\n".join(lines)
+
+    def command(self, result: Result) -> str:
+        """What plays a patrol again."""
+        houses = f" --houses {' '.join(self._given.houses)}" if tuple(self._given.houses) != HOUSES else ""
+        folder, faults = f"again-{result.number}", " --faults" if self._given.faults else ""
+        return f"rosrun rosbot_patrol campaign {folder} --seed {result.seed}{houses}{faults} --only {result.number}"
+
+    def _write(self) -> None:
+        results = self._folder.results()
+        folder = self._folder.folder
+        table = markdown_table(HEADINGS, map(row, results))
+        write_atomic(folder / "results.md", f"{table}\n\n{summary(results)}\n\n{self._failures(results)}\n".encode())
+        subtitle = f"seed {self._given.seed}, houses {', '.join(self._given.houses)}, {os.cpu_count()} cores"
+        write_atomic(folder / "index.html", page(results, self.command, subtitle=subtitle).encode())
+        write_atomic(folder / "results.json", json.dumps(figures(results), indent=1).encode())
+
+
+def in_its_space(given: argparse.Namespace) -> int:
+    """The program as it was started by itself: one patrol, or one life of a crash campaign; the exit status."""
+    if given.space:
+        raise_loopback()
+    status = 0
+    try:
+        if given.one:
+            play(given.one, package_root(), given.timeout)
+        else:
+            CrashLife(given.folder, package_root(), given.seed, given.crash).run()
+    except HouseError as err:
+        print(err)
+        status = 1
+    sys.stdout.flush()
+    return status
+
+
+def main() -> None:
+    """Run the program."""
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s")
+    given = options(sys.argv[1:])
+    for number in (signal.SIGINT, signal.SIGTERM):  # in the background a shell has SIGINT ignored
+        signal.signal(number, signal.default_int_handler)
+    try:
+        if given.one or given.life:
+            os._exit(in_its_space(given))  # rospy's threads would linger
+        if given.crash is not None:
+            wrap = shlex.split(given.wrap)
+            sys.exit(CrashCampaign(given.folder, given.seed, given.crash, wrap).run())
+        sys.exit(Campaign(given).run())
+    except (PatrolError, OSError) as err:
+        print(f"campaign: {err}", file=sys.stderr)
+        sys.exit(2)  # 1 says that a patrol was not as it should be

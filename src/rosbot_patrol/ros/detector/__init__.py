@@ -1,0 +1,1 @@
+"""The node darknet_ros, and the nodes and programs around its pictures."""

@@ -1,0 +1,111 @@
+"""The action check_for_objects: pictures that somebody wants looked at, each answered with its own boxes."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+
+import actionlib
+from darknet_ros_msgs.msg import BoundingBoxes, CheckForObjectsAction, CheckForObjectsResult
+from std_msgs.msg import Header
+
+from rosbot_patrol.images.encodings import Picture
+from rosbot_patrol.ros.messages.images import picture_from_msg
+
+MOST_PENDING = 10
+
+
+class Goal:
+    """A picture to be looked at, and whom to answer."""
+
+    def __init__(self, handle: actionlib.ServerGoalHandle) -> None:
+        self._handle = handle
+        self._lock = threading.Lock()
+        self._over = False
+
+    def is_of(self, handle: actionlib.ServerGoalHandle) -> bool:
+        """Whether it came with this handle."""
+        return bool(self._handle == handle)
+
+    def picture(self) -> tuple[Picture, Header]:
+        """The picture and its header; ImageError where it cannot be read."""
+        image = self._handle.get_goal().image
+        return picture_from_msg(image), image.header
+
+    def finish(self, boxes: BoundingBoxes) -> None:
+        """Answer; nothing where it was cancelled meanwhile."""
+        result = CheckForObjectsResult(id=self._handle.get_goal().id, bounding_boxes=boxes)
+        self._end(lambda: self._handle.set_succeeded(result))
+
+    def abort(self, reason: str) -> None:
+        """Answer that it cannot be done."""
+        self._end(lambda: self._handle.set_aborted(text=reason))
+
+    def cancel(self) -> None:
+        """The client wants no answer any more: preempted."""
+        self._end(self._handle.set_canceled)
+
+    def _end(self, answer: Callable[[], None]) -> None:
+        with self._lock:
+            if self._over:
+                return
+            self._over = True
+            answer()
+            # actionlib keeps a goal in a cycle of references until Python collects those: 1 MB each with its picture
+            self._handle.get_goal().image.data = b""
+
+    @property
+    def over(self) -> bool:
+        """Whether it needs no answer any more."""
+        return self._over
+
+
+class CheckForObjects:
+    """The server; keeps goals until the detector takes them.
+
+    Args:
+        name: of the action.
+        notify: called when a goal has come.
+    """
+
+    def __init__(self, name: str, notify: Callable[[], None]) -> None:
+        self._lock = threading.Lock()
+        self._goals: deque[Goal] = deque()
+        self._current: Goal | None = None
+        self._notify = notify
+        self._server = actionlib.ActionServer(
+            name, CheckForObjectsAction, self._on_goal, self._on_cancel, auto_start=False
+        )
+        self._server.start()
+
+    @property
+    def pending(self) -> bool:
+        """Whether a goal waits."""
+        return bool(self._goals)
+
+    def take(self) -> Goal | None:
+        """The oldest goal that still wants an answer."""
+        with self._lock:
+            while self._goals:
+                goal = self._goals.popleft()
+                if not goal.over:
+                    self._current = goal
+                    return goal
+        return None
+
+    def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
+        with self._lock:
+            if len(self._goals) >= MOST_PENDING:
+                handle.set_rejected(text=f"{MOST_PENDING} pictures wait already")
+                return
+            handle.set_accepted()
+            self._goals.append(Goal(handle))
+        self._notify()
+
+    def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
+        with self._lock:
+            goals = [*self._goals, *([self._current] if self._current else [])]
+        for goal in goals:
+            if goal.is_of(handle):
+                goal.cancel()

@@ -1,0 +1,257 @@
+"""The node darknet_ros: finds objects in a camera's pictures.
+
+Matches darknet_ros 1.1.5 (leggedrobotics/darknet_ros 1027a28): parameters, topics, types, action, thresholds, what is
+sent and when.
+
+Differs:
+- Boxes, count and drawn picture carry the stamp of the picture they belong to, and `image_header` its header.
+- A picture is looked at once, and only the newest; upstream looks at the last one again and again.
+- rgb8 and bgr8 both come out right; upstream swaps the colours of bgr8.
+- The action answers with the boxes of the picture that it was sent, each goal its own.
+- Of more than 100 boxes the 100 most probable are sent; upstream sends none.
+- More encodings (`rosbot_patrol.images.encodings`); upstream takes mono8, mono16, rgb8, bgr8, rgba8 and bgra8.
+- Weights that do not fit the network, and class names that do not, end it in a sentence; upstream goes on.
+- Further: compressed input (`~image_transport`), `~network` hog, `~publish_empty`, `~max_rate`, `~threads`, the service
+  `~enable`, `~standby_after`, to stand in for another detector that has gone, `~camera_ok` (std_msgs/Bool, latched) and
+  /diagnostics, which know a camera that has stopped or is frozen.
+- There is no nodelet: Python has none.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import os
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import rospkg
+import rospy
+from darknet_ros_msgs.msg import BoundingBox, BoundingBoxes, ObjectCount
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
+
+from rosbot_patrol.detection.choice import make_detector
+from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.detection.detector import Detection, Detector
+from rosbot_patrol.errors import ImageError
+from rosbot_patrol.images.encodings import Picture
+from rosbot_patrol.ros.detector.action import CheckForObjects
+from rosbot_patrol.ros.detector.camera import Camera
+from rosbot_patrol.ros.detector.display import display_problem
+from rosbot_patrol.ros.detector.standby import Standby
+from rosbot_patrol.ros.messages.images import picture_to_msg
+from rosbot_patrol.ros.runtime import diagnostics
+from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node
+from rosbot_patrol.ros.runtime.process import share_one_heap
+
+log = logging.getLogger(__name__)
+
+IDLE_WAIT = 0.25
+CONSOLE_PERIOD = 1.0
+CONSOLE_REPEAT = 10.0
+
+
+def main() -> None:
+    """Run the node."""
+    share_one_heap()
+    run_node("darknet_ros", _body)
+
+
+def _body() -> None:
+    params = load_params(DarknetParams)
+    models = os.path.join(rospkg.RosPack().get_path("rosbot_patrol"), "models")
+    detector = make_detector(params, models)
+    DarknetNode(params, detector).run()
+
+
+def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBoxes:
+    """Detections of the picture with this header."""
+    msg = BoundingBoxes(header=Header(stamp=image_header.stamp, frame_id="detection"), image_header=image_header)
+    msg.bounding_boxes = [
+        BoundingBox(
+            probability=one.probability,
+            xmin=one.xmin,
+            ymin=one.ymin,
+            xmax=one.xmax,
+            ymax=one.ymax,
+            id=one.class_id,
+            Class=one.name,
+        )
+        for one in found
+    ]
+    return msg
+
+
+class DarknetNode:
+    """Wires one detector to its topics; `step` looks at one picture.
+
+    Args:
+        params: its parameters.
+        detector: ready to run.
+    """
+
+    def __init__(self, params: DarknetParams, detector: Detector) -> None:
+        self._params = params
+        self._detector = detector
+        self._enabled = params.enabled
+        self._wake = threading.Condition()
+        self._health = diagnostics.Health()
+        self._console = _Console() if params.image_view.enable_console_output else None
+        self._window = self._open_window()
+        self._advertise()
+        self._standby = Standby(_private(params.publishers.object_detector.topic), params.standby_after, self._health)
+        self._action = CheckForObjects(rospy.resolve_name(_private(params.actions.camera_reading.topic)), self._notify)
+        self._camera = Camera(
+            _private(params.subscribers.camera_reading.topic),
+            transport=params.image_transport,
+            timeout=params.camera_timeout,
+            frozen_timeout=params.frozen_timeout,
+            health=self._health,
+            notify=self._notify,
+        )
+        rospy.Service("~enable", SetBool, self._on_enable)
+
+    def run(self) -> None:
+        """Look at pictures until shutdown; the window needs the main thread."""
+        worker = Worker(self._work, name="detection")
+        worker.start()
+        if self._window is not None:
+            self._window.run()
+        while worker.is_alive() and not rospy.is_shutdown():
+            worker.join(0.2)
+
+    def step(self) -> bool:
+        """Answer one goal or look at the newest picture; whether there was anything to do."""
+        goal = self._action.take()
+        if goal is not None:
+            self._answer(goal)
+            return True
+        message = self._camera.take()  # also while switched off: what came then is not looked at later
+        if not self._standby.is_wanted() or message is None or not self._enabled:
+            return False
+        started = time.monotonic()
+        try:
+            picture = self._camera.decode(message)
+            found = self._detector.detect(picture)
+        except ImageError as err:
+            self._camera.refuse(str(err))
+            return True
+        self._camera.accept()
+        self._publish(picture, message.header, found)
+        self._report(found, time.monotonic() - started)
+        return True
+
+    def _work(self) -> None:
+        due = 0.0
+        while not rospy.is_shutdown():
+            if not self.step():
+                self._wait()
+            elif self._params.max_rate > 0.0:
+                due = max(due + 1.0 / self._params.max_rate, time.monotonic())
+                time.sleep(max(due - time.monotonic(), 0.0))
+
+    def _wait(self) -> None:
+        with self._wake:
+            if not (self._action.pending or self._camera.pending):
+                self._wake.wait(IDLE_WAIT)
+
+    def _notify(self) -> None:
+        with self._wake:
+            self._wake.notify()
+
+    def _advertise(self) -> None:
+        out = self._params.publishers
+        self._boxes = _publisher(out.bounding_boxes, BoundingBoxes)
+        self._count = _publisher(out.object_detector, ObjectCount)
+        self._drawn = _publisher(out.detection_image, Image)
+
+    def _answer(self, goal: Any) -> None:
+        """Look at the picture of an action's goal; it is published like a camera's, as upstream does."""
+        try:
+            picture, header = goal.picture()
+            found = self._detector.detect(picture)
+        except ImageError as err:
+            goal.abort(f"the goal's picture cannot be looked at: {err}")
+            return
+        boxes = self._publish(picture, header, found)
+        goal.finish(boxes)
+
+    def _publish(self, picture: Picture, header: Header, found: Sequence[Detection]) -> BoundingBoxes:
+        boxes = boxes_to_msg(found, header)
+        if found or self._params.publish_empty:
+            self._boxes.publish(boxes)
+        self._count.publish(ObjectCount(header=boxes.header, count=len(found)))
+        if self._drawn.get_num_connections() or self._window is not None:
+            drawn = importlib.import_module("rosbot_patrol.detection.draw").draw_boxes(picture, found)
+            if self._drawn.get_num_connections():
+                self._drawn.publish(picture_to_msg(drawn, Header(stamp=header.stamp, frame_id="detection_image")))
+            if self._window is not None:
+                self._window.show(drawn.pixels)
+        return boxes
+
+    def _report(self, found: Sequence[Detection], seconds: float) -> None:
+        values = {"milliseconds": f"{seconds * 1e3:.1f}", "objects": len(found), "runtime": self._detector.runtime}
+        self._health.set("", diagnostics.OK, "looks at pictures", values)
+        if self._console is not None:
+            self._console.tell(found, time.monotonic())
+
+    def _on_enable(self, request: SetBoolRequest) -> SetBoolResponse:
+        self._enabled = bool(request.data)
+        message = "looks at pictures" if self._enabled else "switched off"
+        self._health.set("", diagnostics.OK, message)
+        log.info("the detector %s", message if self._enabled else "is switched off")
+        self._notify()
+        return SetBoolResponse(success=True, message=message)
+
+    def _open_window(self) -> Any:
+        if not self._params.image_view.enable_opencv:
+            return None
+        problem = display_problem()
+        if problem:
+            log.info("no window with the boxes: %s; see the topic detection_image", problem)
+            return None
+        window = importlib.import_module("rosbot_patrol.ros.detector.window")  # brings OpenCV, 98 MB
+        return window.Window(rospy.get_name().strip("/"))
+
+
+class _Console:
+    """Prints rate and objects when what is seen changes, and now and then."""
+
+    def __init__(self) -> None:
+        self._counted = 0
+        self._since: float | None = None
+        self._told: tuple[str, ...] | None = None
+
+    def tell(self, found: Sequence[Detection], now: float) -> None:
+        """Called for each picture."""
+        if self._since is None:
+            self._since = now
+        self._counted += 1
+        seen = tuple(dict.fromkeys(one.name for one in found))
+        waited = now - self._since
+        if waited < CONSOLE_PERIOD or (seen == self._told and waited < CONSOLE_REPEAT):
+            return
+        objects = ", ".join(_by_class(found)) or "nothing"
+        print(f"{self._counted / waited:.1f} pictures a second; seen: {objects}", flush=True)
+        self._counted, self._since, self._told = 0, now, seen
+
+
+def _by_class(found: Sequence[Detection]) -> list[str]:
+    """Of each class the best probability, and how many there are."""
+    best: dict[str, list[float]] = {}
+    for one in found:
+        best.setdefault(one.name, []).append(one.probability)
+    return [f"{name} {max(p):.0%}" + (f" and {len(p) - 1} more" if len(p) > 1 else "") for name, p in best.items()]
+
+
+def _private(name: str) -> str:
+    """A name as upstream resolves it: below the node's own, unless it starts with a slash."""
+    return name if name.startswith(("/", "~")) else "~" + name
+
+
+def _publisher(topic: Any, kind: type) -> rospy.Publisher:
+    return rospy.Publisher(_private(topic.topic), kind, queue_size=topic.queue_size, latch=topic.latch)

@@ -1,0 +1,1 @@
+"""The nodes slam_gmapping and explore."""

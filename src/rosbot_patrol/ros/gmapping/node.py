@@ -1,0 +1,188 @@
+"""slam_gmapping: a map of the surroundings and the robot's place on it, from odometry and a lidar.
+
+Matches slam_gmapping of ROS Noetic (gmapping 1.4): topic `scan` and tf in; `map` and `map_metadata` (latched),
+`~entropy` and tf map -> odom out, that stamped now + tf_delay every transform_publish_period; service `dynamic_map`;
+parameters in `GmappingParams`. Written from Grisetti, Stachniss, Burgard 2007 and upstream's documentation.
+
+Differs: a map's cell lies where its origin says, where upstream's lies half a cell off. The search for the best fit is
+refined by Gauss-Newton across the walls, the proposal is the Gaussian of match and odometry, and the odometry errs by
+the way between updates, not by the number of scans. Beams that graze a wall do not wear it away within a scan. A scan
+of another number of beams is taken as it is, upstream drops it. A beam that met nothing (inf) frees the floor where
+`maxRange` is range_max or more. The entropy is that of the weights and comes with each update. A saved map may be gone
+on with (`map_file`, `initial_pose_x`, `_y`, `_a`). A clock that goes back or an odometry that jumps is a restart, not
+a motion. The parameters llsample* and lasample* are accepted without effect.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+
+import rospy
+import tf2_ros
+from nav_msgs.msg import MapMetaData
+from nav_msgs.srv import GetMapResponse
+from rospy.numpy_msg import numpy_msg
+from sensor_msgs.msg import LaserScan as LaserScanMsg
+from std_msgs.msg import Float64
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.gmapping.slam import Outcome
+from rosbot_patrol.gmapping.start import started
+from rosbot_patrol.ros.messages.convert import grid_to_msg, scan_from_msg, transform_to_msg
+from rosbot_patrol.ros.messages.fast_arrays import GetMapFast, GridMsg
+from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.ros.runtime.node import Loop, load_params, run_node
+from rosbot_patrol.ros.runtime.scan_queue import PlacedScan, ScanQueue
+from rosbot_patrol.ros.runtime.scan_watch import ScanWatch
+from rosbot_patrol.ros.runtime.transforms import Transforms
+from rosbot_patrol.scan import LaserScan
+
+log = logging.getLogger(__name__)
+
+WAITING = 50  # scans: more than a fast lidar sends before one that tf cannot place is given up and told of
+
+
+class GmappingNode:
+    """The edge of a Slam.
+
+    Args:
+        params: of slam_gmapping.
+
+    Raises:
+        MapError: the extent or the saved map makes no sense.
+    """
+
+    def __init__(self, params: GmappingParams) -> None:
+        self._params = params
+        self._map_frame = params.map_frame.lstrip("/")
+        self._odom = params.odom_frame.lstrip("/")
+        self._slam = started(params)
+        self._transforms = Transforms()
+        self._scans = ScanQueue(self._transforms, self._odom, params.base_frame.lstrip("/"), WAITING)
+        self._watch = ScanWatch(self._transforms, "nothing is mapped")
+        self._heard = 0
+        self._map_stamp = -math.inf  # of the scan that the map was last made after
+        self._map: GridMsg | None = None
+        self._correction = Pose2D()  # map_from_odom
+        self._sent_stamp = -math.inf  # of the transform last told
+        self._note = ""  # what was wrong with the last update
+        self._lock = threading.Lock()  # of the map's message
+        self._health = Health()
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        self._grid = rospy.Publisher("map", GridMsg, queue_size=1, latch=True)
+        self._metadata = rospy.Publisher("map_metadata", MapMetaData, queue_size=1, latch=True)
+        self._entropy = rospy.Publisher("~entropy", Float64, queue_size=1, latch=True)
+        self._service = rospy.Service("dynamic_map", GetMapFast, self._get_map)
+        self._subscriber = rospy.Subscriber(
+            "scan", numpy_msg(LaserScanMsg), self._scan, queue_size=5, buff_size=1 << 20
+        )
+
+    def run(self) -> None:
+        """Work until shutdown."""
+        info, p = self._slam.maps.info, self._params
+        log.info("Mapping %d X %d cells @ %.3f m with %d particles", info.width, info.height, p.delta, p.particles)
+        Loop(1.0, self._tell_health, name="health").start()
+        if self._params.transform_publish_period > 0.0:
+            Loop(1.0 / self._params.transform_publish_period, self._send_transform, name="transform").start()
+        while not rospy.is_shutdown():
+            placed = self._scans.take()
+            if placed is not None:
+                self._step(placed)
+
+    # Inputs
+
+    def _scan(self, message: LaserScanMsg) -> None:
+        self._watch.hear()
+        self._heard += 1
+        if (self._heard - 1) % self._params.throttle_scans:
+            return
+        scan = scan_from_msg(message)
+        if self._watch.is_usable(scan):
+            self._scans.put(scan)
+
+    def _get_map(self, _request: object) -> GetMapResponse:
+        with self._lock:
+            if self._map is None:
+                raise rospy.ServiceException("there is no map yet: no scan has been taken in")
+            return GetMapFast._response_class(map=self._map)
+
+    # Step and outputs
+
+    def _step(self, placed: PlacedScan) -> None:
+        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
+        if self._slam.map_from_odom is not None:
+            self._correction = self._slam.map_from_odom
+        self._note = self._describe(outcome, placed.scan)
+        if not outcome.updated:
+            return
+        self._entropy.publish(Float64(data=self._slam.entropy))
+        since = placed.scan.stamp - self._map_stamp
+        if self._map is None or since > self._params.map_update_interval or since < 0.0:
+            self._map_stamp = placed.scan.stamp
+            self._publish_map(placed.scan.stamp)
+
+    def _describe(self, outcome: Outcome, scan: LaserScan) -> str:
+        """What is wrong with an update, in a sentence; warned of now and then."""
+        text = ""
+        if outcome.is_blind:
+            text = f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
+        elif outcome.failed:
+            count = self._params.particles
+            text = f"scan matching failed for {outcome.failed} of {count} particles: they follow the odometry"
+        elif not outcome.updated:
+            return self._note
+        if text:
+            rospy.logwarn_throttle(10.0, text)
+        return text
+
+    def _publish_map(self, stamp: float) -> None:
+        plain = grid_to_msg(self._slam.grid(), self._map_frame, stamp, load_time=stamp)
+        message = GridMsg()
+        message.header, message.info, message.data = plain.header, plain.info, plain.data
+        with self._lock:
+            self._map = message
+        self._grid.publish(message)
+        self._metadata.publish(message.info)
+
+    def _send_transform(self, current: float) -> None:
+        delay = self._params.tf_delay
+        stamp = current + (delay if delay >= 0.0 else self._params.transform_publish_period)
+        if stamp == self._sent_stamp:  # the clock stood, and tf warns of what it has heard
+            return
+        self._sent_stamp = stamp
+        self._broadcaster.sendTransform(transform_to_msg(self._correction, self._map_frame, self._odom, stamp))
+
+    def _tell_health(self, current: float) -> None:
+        silence = self._watch.tend(current)
+        level, text = (WARN, silence) if silence else self._state()
+        maps = self._slam.maps
+        values = {
+            "updates": len(self._slam.stamps),
+            "scans dropped": self._scans.dropped,
+            "tiles": maps.tiles_used,
+            "map [MB]": f"{maps.megabytes:.1f}",
+        }
+        self._health.set("", level, text, values)
+
+    def _state(self) -> tuple[int, str]:
+        if self._scans.problem:
+            rospy.logwarn_throttle(10.0, f"scans are dropped: {self._scans.problem}")
+            return ERROR, f"scans are dropped: {self._scans.problem}"
+        if self._slam.map_from_odom is None:
+            return WARN, "waiting for the first scan"
+        if self._note:
+            return WARN, self._note
+        return OK, "mapping"
+
+
+def body() -> None:
+    """Load, build, run."""
+    GmappingNode(load_params(GmappingParams)).run()
+
+
+def main() -> None:
+    """The program."""
+    run_node("slam_gmapping", body)

@@ -1,0 +1,1 @@
+"""The nodes map_server and map_saver."""

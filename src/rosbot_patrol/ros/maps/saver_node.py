@@ -1,0 +1,101 @@
+"""map_saver: waits for one map on `map`, writes it to disk, and ends.
+
+Matches map_saver of ROS Noetic's navigation 1.17: `map_saver [--occ 65] [--free 25] [-f map]`, `map:=TOPIC`; the
+pgm and the yaml are the same byte for byte.
+
+Differs: with `-f FOLDER/NAME` the yaml names the picture `NAME.pgm`, as map_server looks for it beside the yaml
+(upstream writes `FOLDER/NAME.pgm`, which then is not found). While no map comes it says so every 10 s. A file is
+written whole or not at all. An unwritable file is an error (exit 1), upstream reports success. Typed by hand, it ends
+after 5 s without a ROS master.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+import threading
+from typing import NoReturn
+
+import rospy
+from nav_msgs.msg import OccupancyGrid
+
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.maps.map_io import write_map
+from rosbot_patrol.ros.messages.convert import grid_from_msg
+from rosbot_patrol.ros.messages.fast_arrays import GridMsg
+from rosbot_patrol.ros.runtime.latest import Latest
+from rosbot_patrol.ros.runtime.node import run_node
+
+log = logging.getLogger(__name__)
+
+REMIND_S = 10.0
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise ParamError("arguments", f"{message}; expected map_saver [--occ 65] [--free 25] [-f map]")
+
+
+def arguments_of(words: list[str]) -> argparse.Namespace:
+    """The command line (remappings taken off): occ, free, f; raises ParamError."""
+    parser = _Parser(prog="map_saver", description="Save one map to disk.", allow_abbrev=False)
+    parser.add_argument("--occ", type=int, default=65, help="from here on a cell is a wall, 1 to 100")
+    parser.add_argument("--free", type=int, default=25, help="up to here a cell is free, 0 to 100")
+    parser.add_argument("-f", default="map", metavar="NAME", help="writes NAME.pgm and NAME.yaml")
+    found = parser.parse_args(words)
+    if not 1 <= found.occ <= 100:
+        raise ParamError("--occ", f"is {found.occ}, expected 1 to 100")
+    if not 0 <= found.free <= 100:
+        raise ParamError("--free", f"is {found.free}, expected 0 to 100")
+    if found.occ <= found.free:
+        raise ParamError("--free", f"is {found.free}, expected less than --occ {found.occ}")
+    return found
+
+
+def wait_for_map() -> Grid | None:
+    """The first map that comes, None at shutdown; raises MapError where it makes no sense."""
+    inbox: Latest[OccupancyGrid] = Latest()
+    arrived = threading.Event()
+
+    def store(message: OccupancyGrid) -> None:
+        inbox.set(message, 0.0)
+        arrived.set()
+
+    topic = rospy.resolve_name("map")
+    subscriber = rospy.Subscriber("map", GridMsg, store, queue_size=1)
+    log.info("Waiting for the map on %s", topic)
+    waited = 0.0
+    while not arrived.wait(0.2):
+        waited += 0.2
+        if rospy.is_shutdown():
+            return None
+        if waited >= REMIND_S:
+            waited = 0.0
+            log.warning("still waiting for the map: nothing has been published on %s", topic)
+    subscriber.unregister()
+    message = inbox.get()
+    assert message is not None
+    return grid_from_msg(message, topic)
+
+
+def body() -> None:
+    """Wait, write, end."""
+    wanted = arguments_of(rospy.myargv(sys.argv)[1:])
+    grid = wait_for_map()
+    if grid is None:
+        return
+    info = grid.info
+    log.info("Received a %d X %d map @ %.3f m/pix", info.width, info.height, info.resolution)
+    pgm, text = write_map(wanted.f, grid, occupied=wanted.occ, free=wanted.free)
+    log.info("Writing map occupancy data to %s", pgm)
+    log.info("Writing map occupancy data to %s", text)
+    log.info("Done")
+
+
+def main() -> None:
+    """The program."""
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        arguments_of(["--help"])
+    run_node("map_saver", body, by_hand=True, anonymous=False)

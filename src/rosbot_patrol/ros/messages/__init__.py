@@ -1,0 +1,1 @@
+"""ROS messages to records and arrays, and back."""

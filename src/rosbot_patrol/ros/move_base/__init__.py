@@ -1,0 +1,1 @@
+"""The node move_base with its costmaps."""

@@ -1,0 +1,140 @@
+"""The action server of move_base and its simple goal topic: they set or clear the goal, nothing else."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+
+import actionlib
+import rospy
+from geometry_msgs.msg import PoseStamped
+from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
+
+from rosbot_patrol.errors import TransformError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.navigation.interfaces import BAD_QUATERNION, Outcome
+from rosbot_patrol.ros.messages.convert import pose2d_from_pose, pose_to_msg
+from rosbot_patrol.ros.runtime.transforms import Transforms
+
+log = logging.getLogger(__name__)
+
+
+class GoalRefusedError(Exception):
+    """A goal that cannot be worked on; its text is the action's result text."""
+
+
+def read_pose(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
+    """A pose of make_plan in a frame: as upstream, whatever its orientation.
+
+    Raises:
+        GoalRefusedError: something of it is not finite, or its frame is not known.
+    """
+    try:
+        pose = pose2d_from_pose(msg.pose, "the orientation of a pose for make_plan")
+    except ValueError as err:
+        raise GoalRefusedError(str(err)) from err
+    return _in_frame(pose, msg.header.frame_id.lstrip("/"), frame, transforms)
+
+
+def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
+    """A goal message in a frame.
+
+    Raises:
+        GoalRefusedError: its quaternion is none (upstream's text), its position is none, or its frame is not known.
+    """
+    q, p = msg.pose.orientation, msg.pose.position
+    length = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
+    if not math.isfinite(length) or length < 1e-6:
+        raise GoalRefusedError(BAD_QUATERNION)
+    tilt = 1.0 - 2.0 * (q.x * q.x + q.y * q.y) / length  # upstream wants the z axis up
+    if abs(tilt - 1.0) > 1e-3:
+        raise GoalRefusedError(BAD_QUATERNION)
+    if not (math.isfinite(p.x) and math.isfinite(p.y)):
+        raise GoalRefusedError(f"Aborting on goal because it was sent with an invalid position ({p.x}, {p.y})")
+    yaw = math.atan2(2.0 * (q.w * q.z + q.x * q.y) / length, 1.0 - 2.0 * (q.y * q.y + q.z * q.z) / length)
+    return _in_frame(Pose2D(p.x, p.y, yaw), msg.header.frame_id.lstrip("/"), frame, transforms)
+
+
+def _in_frame(pose: Pose2D, source: str, frame: str, transforms: Transforms) -> Pose2D:
+    if source == frame:
+        return pose
+    try:
+        return transforms.lookup(frame, source) @ pose
+    except TransformError as err:
+        log.error("a goal in frame '%s' cannot be used: %s", source, err)
+        text = "The goal pose passed to this planner must be in the {} frame. It is instead in the {} frame."
+        raise GoalRefusedError(text.format(frame, source)) from err
+
+
+class GoalServer:
+    """Goals come in by the action `move_base` and by `move_base_simple/goal`.
+
+    Args:
+        frame: that goals are wanted in.
+        transforms: the node's tf listener.
+        notify: called, on another thread, when a goal has come or was cancelled.
+    """
+
+    def __init__(self, frame: str, transforms: Transforms, notify: Callable[[], None]) -> None:
+        self._frame = frame
+        self._transforms = transforms
+        self._pub_goal = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=1)
+        self._pub_current = rospy.Publisher("~current_goal", PoseStamped, queue_size=1)
+        self._server = actionlib.SimpleActionServer("move_base", MoveBaseAction, auto_start=False)
+        self._server.register_goal_callback(notify)
+        self._server.register_preempt_callback(notify)
+        rospy.Subscriber("move_base_simple/goal", PoseStamped, self._on_simple, queue_size=1)
+
+    def start(self) -> None:
+        """Take goals."""
+        self._server.start()
+
+    def _on_simple(self, msg: PoseStamped) -> None:
+        goal = MoveBaseActionGoal()
+        goal.header.stamp = rospy.Time.now()
+        goal.goal.target_pose = msg
+        self._pub_goal.publish(goal)
+
+    @property
+    def is_active(self) -> bool:
+        """Whether a goal is worked on."""
+        return bool(self._server.is_active())
+
+    @property
+    def is_cancelled(self) -> bool:
+        """Whether the goal that is worked on was cancelled, with no other to follow."""
+        return bool(self._server.is_preempt_requested()) and not self._server.is_new_goal_available()
+
+    def take(self, now: float) -> Pose2D | None:
+        """A new goal in the global frame, once; None where there is none or it was refused (and told so)."""
+        if not self._server.is_new_goal_available():
+            return None
+        goal = self._server.accept_new_goal()
+        if goal is None:
+            return None
+        try:
+            pose = read_goal(goal.target_pose, self._frame, self._transforms)
+        except GoalRefusedError as err:
+            log.error("%s", err)
+            self._server.set_aborted(MoveBaseResult(), str(err))
+            return None
+        self._pub_current.publish(pose_to_msg(pose, self._frame, now))
+        return pose
+
+    def finish(self, outcome: Outcome) -> None:
+        """Tell the client how it ended."""
+        if not self._server.is_active():
+            return
+        end = self._server.set_succeeded if outcome.succeeded else self._server.set_aborted
+        end(MoveBaseResult(), outcome.text)
+
+    def preempt(self) -> None:
+        """Tell the client that its cancelling was done."""
+        if self._server.is_active():
+            self._server.set_preempted()
+
+    def feedback(self, pose: Pose2D, now: float) -> None:
+        """Tell the client where the robot is."""
+        if self._server.is_active():
+            self._server.publish_feedback(MoveBaseFeedback(base_position=pose_to_msg(pose, self._frame, now)))

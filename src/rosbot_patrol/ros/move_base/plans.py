@@ -1,0 +1,86 @@
+"""Planning on a thread of its own, so that the control cycle never waits for it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+from rosbot_patrol.errors import PatrolError, PlanningError, TransformError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.navigation.interfaces import PlanResult
+from rosbot_patrol.planning.interfaces import Array, GlobalPlanner
+from rosbot_patrol.ros.move_base.costmap import CostmapNode
+from rosbot_patrol.ros.runtime.node import Worker, now
+
+log = logging.getLogger(__name__)
+
+
+class PoseUnknownError(PlanningError):
+    """There is no start to plan from."""
+
+
+class ThreadedPlans:
+    """A PlanSource that plans on a worker thread over a copy of the global costmap."""
+
+    def __init__(self, planner: GlobalPlanner, costmap: CostmapNode) -> None:
+        self._planner = planner
+        self._costmap = costmap
+        self._lock = threading.Lock()
+        self._planner_lock = threading.Lock()
+        self._wake = threading.Condition(self._lock)
+        self._goal: Pose2D | None = None
+        self._ticket = 0
+        self._result: PlanResult | None = None
+        self._busy = False
+        Worker(self._run, name="planner").start()
+
+    def request(self, goal: Pose2D) -> None:
+        """Begin to plan; the result of an earlier request is forgotten."""
+        with self._wake:
+            self._goal, self._result, self._busy = goal, None, True
+            self._ticket += 1
+            self._wake.notify()
+
+    def poll(self) -> PlanResult | None:
+        """The result, once."""
+        with self._lock:
+            result, self._result = self._result, None
+            return result
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a request is worked on."""
+        return self._busy
+
+    def drop(self) -> None:
+        """Forget what is worked on."""
+        with self._lock:
+            self._ticket += 1
+            self._goal, self._result, self._busy = None, None, False
+
+    def plan(self, start: Pose2D, goal: Pose2D, tolerance: float | None = None) -> Array:
+        """A plan now, for services; raises PlanningError."""
+        with self._planner_lock:
+            return self._planner.plan(self._costmap.copy(), start, goal, tolerance=tolerance)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                while self._goal is None:
+                    self._wake.wait()
+                goal, ticket, self._goal = self._goal, self._ticket, None
+            result = self._attempt(goal)
+            with self._lock:
+                if ticket == self._ticket:
+                    self._result, self._busy = result, False
+
+    def _attempt(self, goal: Pose2D) -> PlanResult:
+        try:
+            return PlanResult(poses=self.plan(self._costmap.robot_pose(now()), goal))
+        except PlanningError as err:
+            return PlanResult(error=err)
+        except TransformError as err:
+            return PlanResult(error=PoseUnknownError(str(err)))
+        except (PatrolError, ValueError, IndexError) as err:
+            log.error("the global planner failed", exc_info=True)
+            return PlanResult(error=PlanningError(f"the global planner failed: {err}"))

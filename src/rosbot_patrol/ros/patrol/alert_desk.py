@@ -1,0 +1,334 @@
+"""The alert desk: a thread writes notices to disk, the post delivers them, and neither ever stops the patrol."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+import rospy
+
+from rosbot_patrol.alerts.damaged import replacement
+from rosbot_patrol.alerts.held import HeldNotices
+from rosbot_patrol.alerts.incident import Event, Incident
+from rosbot_patrol.alerts.incident_database import FOLDER
+from rosbot_patrol.alerts.incident_files import NewFile
+from rosbot_patrol.alerts.incident_store import recall_incident
+from rosbot_patrol.alerts.mail import one_line, token
+from rosbot_patrol.alerts.notice import Notice as PostNotice
+from rosbot_patrol.alerts.picture import LabelledBox, to_jpeg
+from rosbot_patrol.alerts.postman import Delivery
+from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
+from rosbot_patrol.errors import AlertError
+from rosbot_patrol.msg import Alert
+from rosbot_patrol.patrol.chronicle import Entry, person_room
+from rosbot_patrol.patrol.commands import Commands, Ignored, Notice, Release, Word
+from rosbot_patrol.patrol.ignored_log import IgnoredLog
+from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
+from rosbot_patrol.ros.patrol.pictures import PictureRing
+from rosbot_patrol.ros.post.outbox_owner import OwnerPost
+from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, Health
+from rosbot_patrol.ros.runtime.node import Worker
+
+log = logging.getLogger(__name__)
+
+DISK_RETRY = 5.0  # [s] between attempts to write where the disk does not take it
+RECORD_WAIT = 2.0  # [s] that the patrol's memory waits for the records
+
+
+class AlertDesk:
+    """Takes notices, keeps them, delivers them.
+
+    Args:
+        post: keeps notices and delivers them.
+        pictures: the camera's last pictures.
+        keeper: of the records.
+        health: where to say how it goes.
+    """
+
+    def __init__(
+        self,
+        post: OwnerPost,
+        pictures: PictureRing,
+        keeper: IncidentKeeper,
+        health: Health,
+    ) -> None:
+        self._post, self._pictures, self._keeper, self._health = post, pictures, keeper, health
+        self._held = HeldNotices(keeper.state_dir / "held")
+        self._ignored = IgnoredLog(keeper.state_dir / "ignored.jsonl")
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._unwritten: list[Callable[[], None]] = []
+        self._listing = threading.Lock()
+        self._retry_at = 0.0
+        self._memory: Callable[[], None] | None = None
+        self._memory_due = 0.0
+        self._to_record = threading.Event()
+        self._told: dict[str, Incident] = {}
+        self._telling = threading.Lock()
+        self._publisher = rospy.Publisher("patrol/alerts", Alert, queue_size=10)
+
+    def start(self) -> None:
+        """Begin to work."""
+        self._post.on_delivery(self._delivered)
+        self._post.start()
+        Worker(partial(_repeat, self._record_next, self._to_record), name="record").start()
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether every notice and memory taken is on disk."""
+        return not self._jobs and self._memory is None
+
+    def is_held(self, incident: str) -> bool:
+        """Whether the notice of this incident waits for the entry delay."""
+        try:
+            return self._held.has(token(incident))
+        except OSError as err:
+            log.error("the notice about %s cannot be looked for: %s", incident, err)
+            return False
+
+    def told(self, incident: str) -> PostNotice | None:
+        """The notice of an incident from before the program's start, None where there is none."""
+        try:
+            return self._held.get(token(incident)) or self._post.find(token(incident))
+        except (OSError, ValueError) as err:
+            log.error("the notice about %s cannot be read: %s", incident, err)
+            return None
+
+    def write_later(self, write: Callable[[], None]) -> None:
+        """Try again and again what the disk did not take: `write` raises OSError until it does; returns at once."""
+        with self._listing:
+            if write not in self._unwritten:
+                self._unwritten.append(write)
+        self._to_record.set()
+
+    def recall(self, incident: str, notice: PostNotice) -> None:
+        """Complete the record of a mission whose notice is older than what the patrol remembers."""
+        event = Event(wall=notice.wall, kind="seen", text="somebody was seen, and the program was killed right after")
+        self._keeper.put([Entry(incident=incident, changes={"confirmed": notice.wall}, events=(event,))])
+        if notice.picture is not None:
+            caption = "sent with the notice"
+            file = NewFile(name="seen.jpg", role="detection", data=notice.picture, stamp=notice.wall, caption=caption)
+            self._keeper.put_picture(incident, file)
+
+    def take(self, notice: Notice, ros_time: float) -> None:
+        """Take an intruder's notice; returns at once."""
+        mission, seen, pose = notice.mission, notice.seen, notice.pose
+        incident = Incident(
+            id=mission.id,
+            wall=time.time(),
+            ros_time=ros_time,
+            room_id=mission.room.id,
+            room_name=mission.room.name,
+            origin=mission.origin.value,
+            phase=notice.phase.value,
+            object_class=seen.label,
+            probability=seen.probability,
+            pictures=seen.pictures,
+            verdict=mission.verdict.value if mission.verdict else "",
+            reason=mission.reason,
+            pose=(pose.x, pose.y, pose.yaw) if pose else None,
+            person=mission.place,
+            **person_room(mission),
+        )
+        self._jobs.append(lambda: self._record(incident, notice))
+        self._keeper.see(incident.id, seen.stamp)
+        self._to_record.set()
+
+    def follow(self, commands: Commands) -> None:
+        """Take what else a step has for the owner: notices that waited, words, calls that start nothing."""
+        jobs = [partial(self._release, release) for release in commands.releases]
+        jobs += [partial(self._tell, word, time.time()) for word in commands.words]
+        jobs += [partial(self._note_ignored, commands.ignored)] * bool(commands.ignored)
+        if jobs:
+            self._jobs.extend(jobs)
+            self._to_record.set()
+
+    def remember(self, save: Callable[[], None]) -> None:
+        """Save the patrol's memory once every notice taken so far is on disk; returns at once.
+
+        A mission is never remembered as one that gave its notice before the notice is there, nor, where the records'
+        disk takes them, as one that is over before its record says so.
+        """
+        if self._memory is None:
+            self._memory_due = time.monotonic() + RECORD_WAIT
+        self._memory = save
+        self._to_record.set()
+
+    # -- the threads
+
+    def _record_next(self) -> float:
+        """Write one thing; returns how long to wait for the next [s]."""
+        if self._jobs:
+            job = self._jobs[0]
+            try:
+                job()
+            except Exception:  # the other jobs first
+                self._jobs.rotate(-1)
+                raise
+            self._jobs.popleft()
+            return 0.0
+        self._write_again()
+        self._keeper.give_way(self._post.is_disk_full)
+        save = self._memory
+        if save is None:
+            return DISK_RETRY if self._unwritten or not self._post.is_written else 60.0
+        if self._unwritten or not self._post.is_written:
+            return 1.0
+        if not self._keeper.is_written and time.monotonic() < self._memory_due:
+            return 0.02
+        return 0.0 if self._remember(save) else DISK_RETRY
+
+    def _write_again(self) -> None:
+        if time.monotonic() < self._retry_at:
+            return
+        with self._listing:
+            waiting = list(self._unwritten)
+        for write in waiting:
+            with suppress(OSError):  # which was said when it came
+                write()
+                with self._listing:
+                    self._unwritten.remove(write)
+        self._retry_at = time.monotonic() + DISK_RETRY
+
+    def _remember(self, save: Callable[[], None]) -> bool:
+        try:
+            save()
+        except OSError as err:
+            log.error("the patrol's state cannot be kept: %s; trying on", err)
+            self._health.set("memory", ERROR, f"the patrol's state cannot be kept: {err}")
+            return False
+        self._health.set("memory", OK, "the patrol's state is kept")
+        if self._memory is save:
+            self._memory = None
+        return True
+
+    def _delivered(self, delivery: Delivery) -> None:
+        for notice_id in delivery.ids if delivery.delivered else ():
+            with self._telling:  # first that it is on disk, then that it was delivered
+                incident = self._told.get(notice_id) or recall_incident(self._keeper.state_dir, notice_id)
+                if incident is not None:
+                    self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
+
+    def _record(self, incident: Incident, notice: Notice) -> None:
+        """Bring a notice to the disk, or, where that takes nothing, to the post's memory, from which it is sent."""
+        if self._post.has(incident.id) or self.is_held(incident.id):  # the program was killed after it was written
+            return
+        picture, note = self._picture(notice)
+        place = str(self._held.folder) if notice.is_held else self._post.place
+        with self._telling:
+            self._told[incident.id] = incident
+            is_on_disk = (self._hold if notice.is_held else self._post.put)(
+                incident_notice(incident, picture, picture_note=note)
+            )
+            self._publish(incident, transport="", location=place, text=incident.sentence)
+        where = "is on disk" if is_on_disk else "is in memory only, as the disk does not take it"
+        waits = " and waits for the entry delay" if notice.is_held else ""
+        log.warning("ALERT: %s; the notice %s%s", incident.sentence, where, waits)
+        if picture is not None:
+            caption = "sent with the notice"
+            file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=notice.seen.stamp, caption=caption)
+            self._keeper.put_picture(incident.id, file)
+
+    def _hold(self, notice: PostNotice) -> bool:
+        """Keep a notice for the entry delay; whether it is on the disk."""
+        try:
+            self._held.put(notice)
+        except OSError as err:
+            log.error("the notice %s cannot be written to %s: %s; trying on", notice.id, self._held.folder, err)
+            self.write_later(self._held.save)
+            return False
+        return True
+
+    def _release(self, release: Release) -> None:
+        """Send a notice that waited, or drop it."""
+        notice_id = token(release.mission)
+        try:
+            notice = self._held.get(notice_id)
+        except (OSError, ValueError) as err:
+            log.error("the notice about %s that waited cannot be used: %s", release.mission, err)
+            notice = replacement(self._keeper.state_dir, notice_id, time.time())
+        if notice is not None and not release.is_dropped:
+            self._post.put(notice)
+        try:
+            self._held.remove(notice_id)
+        except OSError as err:
+            log.error("the notice about %s that waited cannot be removed: %s; trying on", release.mission, err)
+            self.write_later(partial(self._held.remove, notice_id))
+        text = f"the notice is {'dropped' if release.is_dropped else 'sent'}: {release.why}"
+        log.warning("%s (%s)", text, release.mission)
+        event = Event(wall=time.time(), kind="notice", text=text)
+        self._keeper.put([Entry(incident=release.mission, events=(event,))])
+
+    def _tell(self, word: Word, wall: float) -> None:
+        """Tell the owner something that is no intruder."""
+        self._post.put(
+            PostNotice(
+                id=token(f"{word.kind}-{wall:.3f}"),
+                wall=wall,
+                kind="fault",
+                subject=f"rosbot patrol: {word.kind}{' again well' if word.is_over else ''}",
+                text=f"{word.text[:1].upper()}{word.text[1:]}.",
+            )
+        )
+
+    def _note_ignored(self, calls: tuple[Ignored, ...]) -> None:
+        try:
+            self._ignored.add(calls)
+        except OSError as err:
+            log.error("calls that start no mission cannot be written down: %s", err)
+
+    def _picture(self, notice: Notice) -> tuple[bytes | None, str]:
+        if not self._pictures.is_wanted:
+            return None, "none, no camera topic is set"
+        raw = self._pictures.wait_for(notice.seen.stamp, 0.5)
+        boxes = [
+            LabelledBox(
+                text=f"{one_line(b.label)} {b.probability:.2f}", xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax
+            )
+            for b in notice.seen.boxes
+        ]
+        note = "attached, the one that the boxes were found in"
+        if raw is None:
+            raw, boxes = self._pictures.find(notice.seen.stamp, tolerance=2.0), []
+            if raw is None:
+                return None, "none came from the camera"
+            note = f"attached, taken {abs(raw.stamp - notice.seen.stamp):.1f} s from the detection"
+        try:
+            return to_jpeg(raw, boxes), note
+        except AlertError as err:
+            log.error("%s", err)
+            return None, f"none: {err}"
+
+    def tell_verdict(self, incident: Incident) -> None:
+        """Publish the verdict of a mission whose record is on the disk."""
+        place = str(self._keeper.state_dir / FOLDER / incident.id)
+        self._publish(incident, transport="", location=place, text=incident.sentence, kind=Alert.VERDICT)
+        if incident.verdict in self._post.notify_verdicts:
+            self._post.keep(verdict_notice(incident))
+
+    def _publish(self, incident: Incident, *, transport: str, location: str, text: str, kind: str = "") -> None:
+        """Tell the topic; without a transport the notice is not delivered yet."""
+        message = Alert(id=incident.id, delivered=bool(transport), transport=transport, location=location, text=text)
+        message.header.stamp = rospy.Time.now()
+        message.room_id, message.room_name = incident.room_id, incident.room_name
+        message.object_class, message.probability = incident.object_class, incident.probability
+        message.kind = kind or (Alert.DELIVERED if transport else Alert.SEEN)
+        message.verdict = incident.verdict
+        message.share_seen = -1.0 if incident.share_seen is None else incident.share_seen
+        self._publisher.publish(message)
+
+
+def _repeat(work: Callable[[], float], wake: threading.Event) -> None:
+    while not rospy.is_shutdown():
+        try:
+            pause = work()
+        except Exception:  # the desk has to outlive whatever one mail does to it
+            log.error("the alert desk stumbled", exc_info=True)
+            pause = DISK_RETRY
+        if pause > 0.0:
+            wake.wait(min(pause, 60.0))
+            wake.clear()

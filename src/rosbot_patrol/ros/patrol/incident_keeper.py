@@ -1,0 +1,367 @@
+"""Keeps the record of every mission, on a thread of its own: the patrol hands over what happens and never waits.
+
+Entries are written in order. What the disk does not take is tried again, and said in the log and on /diagnostics; a
+full disk loses its oldest clear incidents first; a damaged database is set aside and a new one begun.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import rospy
+
+from rosbot_patrol.alerts.album import Album, Sighting
+from rosbot_patrol.alerts.evidence import EvidenceParams
+from rosbot_patrol.alerts.incident import Event, Incident
+from rosbot_patrol.alerts.incident_files import REPORT, NewFile
+from rosbot_patrol.alerts.incident_query import Query, find_incidents
+from rosbot_patrol.alerts.incident_repair import close_abandoned, repair
+from rosbot_patrol.alerts.incident_report import write_report
+from rosbot_patrol.alerts.incident_salvage import open_store
+from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.alerts.map_picture import MapView, Marks, crop_map, draw_map, view_of_marks
+from rosbot_patrol.alerts.retention import RetentionParams, keep_reserve, make_room, prune
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.errors import MapError, StoreError
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.chronicle import Entry
+from rosbot_patrol.ros.messages import convert
+from rosbot_patrol.ros.messages.fast_arrays import GridMsg
+from rosbot_patrol.ros.patrol.pictures import PictureRing
+from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
+from rosbot_patrol.ros.runtime.node import Worker
+
+log = logging.getLogger(__name__)
+
+DISK_RETRY = 5.0  # [s] between attempts where the disk does not take something
+_BUSY, _IDLE = 0.5, 5.0  # [s] between two looks at the pictures, in a mission and without one
+_TIDY = 600.0  # [s] between two looks at age and size
+_MOST = 5000  # entries in memory while the disk takes nothing; 2 kB each at most
+_RECENT = 5  # records that are looked at for a missing report
+_SAME_AGAIN = 60.0  # [s] until the same complaint is logged again
+_PATIENCE = 3.0  # [s] more than a clip should take
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordParams:
+    """Which incidents get a report of their own on the disk."""
+
+    report_verdicts: list[str] = param(
+        ["confirmed", "unverified"],
+        choices=("confirmed", "clear", "unreachable", "unverified"),
+        doc="incidents of these verdicts get a report.html at once; `incidents report` makes one of any",
+    )
+
+
+@dataclass(kw_only=True)
+class _Closing:
+    """A mission that is over: its record waits for the last pictures, until `deadline` (monotonic) at most."""
+
+    wall: float
+    deadline: float
+    files: list[NewFile] | None = None
+
+
+class IncidentKeeper:
+    """Writes entries and pictures into the incidents' store.
+
+    Args:
+        state_dir: of database and folders.
+        pictures: the camera's last ones.
+        health: where to say how it goes.
+        evidence, retention, records: parameters.
+        on_verdict: is called on the keeper's thread when a mission is over and its verdict on the disk.
+    """
+
+    def __init__(
+        self,
+        state_dir: Path,
+        pictures: PictureRing,
+        health: Health,
+        *,
+        evidence: EvidenceParams | None = None,
+        retention: RetentionParams | None = None,
+        records: RecordParams | None = None,
+        on_verdict: Callable[[Incident], None] = lambda _: None,
+    ) -> None:
+        self.state_dir = state_dir
+        self._pictures, self._health, self._on_verdict = pictures, health, on_verdict
+        self._evidence = evidence or EvidenceParams()
+        self._retention, self._records = retention or RetentionParams(), records or RecordParams()
+        self._album = Album(self._evidence)
+        self._store: IncidentStore | None = None
+        self._running: Collection[str] | None = None
+        self._entries: deque[Entry | tuple[str, NewFile]] = deque()
+        self._seen: deque[tuple[str, float]] = deque()
+        self._closing: dict[str, _Closing] = {}
+        self._looking = ""
+        self._is_ending = self._gives_way = False
+        self._lost = 0
+        self._complaint = ("", 0.0)
+        self._tidy_at = 0.0
+        self._map: MapView | None = None
+        self._wake = threading.Event()
+
+    def start(self, running: Collection[str] = ()) -> None:
+        """Begin to work.
+
+        Args:
+            running: ids of missions that go on from before the program's start; other open records are closed.
+        """
+        self._running = tuple(running)
+        rospy.Subscriber("map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 23)
+        Worker(self._run, name="incidents").start()
+
+    # -- what the patrol hands over; returns at once
+
+    @property
+    def is_written(self) -> bool:
+        """Whether all entries are on the disk (pictures may still come, until `finish`)."""
+        return not self._entries and not (self._is_ending and self._closing)
+
+    @property
+    def needs_pictures(self) -> bool:
+        """Whether pictures are wanted although no mission runs."""
+        return self._evidence.evidence_always or bool(self._closing) or self._album.is_waiting
+
+    def finish(self) -> None:
+        """The program ends: complete what is over without waiting for more pictures."""
+        self._is_ending = True
+        self._wake.set()
+
+    def give_way(self, wanted: bool) -> None:
+        """Leave what room the disk has to a notice that did not find its own: no pictures and reports meanwhile."""
+        if wanted != self._gives_way:
+            self._gives_way = wanted
+            self._wake.set()
+
+    def put(self, entries: Sequence[Entry]) -> None:
+        """Take entries."""
+        if not entries:
+            return
+        self._entries.extend(entries)
+        self._wake.set()
+
+    def put_picture(self, incident_id: str, file: NewFile) -> None:
+        """Take a picture for a record."""
+        self._entries.append((incident_id, file))
+        self._wake.set()
+
+    def see(self, incident_id: str, stamp: float) -> None:
+        """Somebody was confirmed in the picture of this stamp [s]."""
+        self._seen.append((incident_id, stamp))
+        self._wake.set()
+
+    def note(self, sighting: Sighting) -> None:
+        """What the detector saw in a picture."""
+        self._album.note(sighting)
+
+    def look(self, incident_id: str) -> None:
+        """The robot looks around for this mission, or ("") for none."""
+        self._looking = incident_id
+
+    # -- the thread
+
+    def _run(self) -> None:
+        while not rospy.is_shutdown():
+            self._wake.wait(self.step())
+            self._wake.clear()
+
+    def step(self) -> float:
+        """Write what there is, whatever the disk says; returns how long to wait for the next step [s]."""
+        while len(self._entries) > _MOST:  # on this thread: another would take away what is being written
+            self._entries.popleft()
+            self._lost += 1
+        try:
+            return self._work()
+        except StoreError as err:
+            return self._trouble(err)
+        except Exception:  # records have to outlive whatever one of them does
+            log.error("the keeping of incidents stumbled, and goes on", exc_info=True)
+            self._forget_store()
+            return DISK_RETRY
+
+    def _work(self) -> float:
+        """Write what there is; returns how long to wait for more [s]. Raises StoreError."""
+        store = self._store or self._open()
+        while self._entries:
+            self._write(store, self._entries[0])
+            self._entries.popleft()
+        if self._gives_way and not self._is_ending:
+            self._tidy(store)
+            return _IDLE
+        self._collect(store)
+        for incident_id in [i for i, closing in self._closing.items() if self._is_due(i, closing)]:
+            self._close(store, incident_id, self._closing[incident_id])
+            del self._closing[incident_id]
+        self._tidy(store)
+        store.settle()
+        return _BUSY if self._looking or self._closing or self._album.is_waiting else _IDLE
+
+    def _open(self) -> IncidentStore:
+        wall = time.time()
+        store, said = open_store(self.state_dir, wall=wall)
+        is_first, running = self._running is not None, self._running or ()
+        said += repair(store, wall=wall)
+        if is_first:
+            said += close_abandoned(store, running, wall=wall)
+            self._running = None
+        for sentence in said:
+            log.warning("incidents: %s", sentence)
+        self._store = store
+        keep_reserve(self.state_dir)
+        self._catch_up(store)
+        self._tell_well()
+        return store
+
+    def _catch_up(self, store: IncidentStore) -> None:
+        """Write the reports that the end of the program came before."""
+        for row in find_incidents(store.connection, store.path, Query(limit=_RECENT)):
+            is_wanted = row.closed is not None and row.verdict in self._records.report_verdicts
+            if is_wanted and not store.folder.path(row.id, REPORT).exists():
+                incident = store.get(row.id)
+                if incident is not None:
+                    write_report(store, incident)
+
+    def _write(self, store: IncidentStore, entry: Entry | tuple[str, NewFile]) -> None:
+        if isinstance(entry, tuple):
+            kept = store.get(entry[0])
+            if kept is not None and kept.closed is None:
+                store.add_files(entry[0], [entry[1]])
+            return
+        if entry.begin is not None:
+            store.begin(entry.begin)
+            self._album.begin(entry.incident)
+        kept = store.get(entry.incident)
+        if kept is None:
+            log.error("an entry for the incident %s came, which has no record", entry.incident)
+        elif kept.closed is not None:
+            _amend(store, kept, entry)
+        else:
+            self._write_open(store, kept, entry)
+
+    def _write_open(self, store: IncidentStore, kept: Incident, entry: Entry) -> None:
+        changes = dict(entry.changes)
+        if entry.times:
+            changes["times"] = kept.times + entry.times
+        if entry.path:
+            changes["path"] = kept.path + entry.path
+        events = entry.events
+        if self._lost:
+            text = f"{count_of(self._lost, 'entry was', 'entries were')} lost while the disk took nothing"
+            events = (Event(wall=time.time(), kind="fault", text=text), *events)
+        store.record(entry.incident, add=events, **changes)
+        self._lost = 0
+        if entry.closed is not None:
+            deadline = time.monotonic() + self._evidence.evidence_after + _PATIENCE
+            self._closing[entry.incident] = _Closing(wall=entry.closed, deadline=deadline)
+            self._on_verdict(replace(kept, **changes))
+
+    # -- pictures
+
+    def _collect(self, store: IncidentStore) -> None:
+        while self._seen:
+            self._album.sight(*self._seen.popleft())
+        if not self._album.is_waiting and not self._looking:
+            return
+        ring = self._pictures.snapshot()
+        for incident_id in store.open_ids():
+            files = self._album.take(incident_id, ring)
+            if incident_id == self._looking:
+                files += self._album.look(incident_id, ring)
+            if files:
+                store.add_files(incident_id, files)
+        for problem in self._album.problems:
+            log.error("%s", problem)
+        self._album.problems.clear()
+
+    def _is_due(self, incident_id: str, closing: _Closing) -> bool:
+        if self._is_ending or time.monotonic() > closing.deadline:
+            return True
+        return self._album.is_over(incident_id, self._pictures.snapshot())
+
+    def _close(self, store: IncidentStore, incident_id: str, closing: _Closing) -> None:
+        kept = store.get(incident_id)
+        if kept is None or kept.closed is not None:
+            return
+        if closing.files is None:
+            closing.files = [*self._album.finish(incident_id), *self._draw(kept)]
+        store.add_files(incident_id, closing.files)
+        incident = store.close(incident_id, wall=closing.wall)
+        if incident.verdict in self._records.report_verdicts:
+            write_report(store, incident)
+        log.info("incident %s is on record: %s", incident.id, incident.verdict)
+        self._tidy_at = 0.0
+
+    def _draw(self, incident: Incident) -> list[NewFile]:
+        marks = Marks(path=incident.path, robot=incident.pose, person=incident.person)
+        if not incident.path and incident.pose is None:
+            return []
+        view = self._map or view_of_marks(marks)
+        caption = "The robot's way (blue)"
+        caption += ", where it stood when somebody was seen (arrow)" if incident.pose else ""
+        caption += ", the person (red)" if incident.person else ""
+        return [NewFile(name="map.png", role="map", data=draw_map(view, marks), caption=caption)]
+
+    def _on_map(self, message: GridMsg) -> None:  # type: ignore[valid-type]
+        try:
+            self._map = crop_map(convert.grid_from_msg(message, rospy.resolve_name("map")))
+        except MapError as err:
+            log.error("the map cannot be drawn: %s", err)
+
+    # -- the disk
+
+    def _tidy(self, store: IncidentStore) -> None:
+        if time.monotonic() < self._tidy_at:
+            return
+        done = prune(store, self._retention, wall=time.time())
+        if done.ids:
+            log.warning("incidents: %s", done.sentence)
+        self._tidy_at = 0.0 if not done.is_done else time.monotonic() + _TIDY
+        self._tell_well(done.sentence if done.ids else "")
+
+    def _tell_well(self, more: str = "") -> None:
+        self._health.set("incidents", WARN if "disk" in more else OK, more or "incidents are kept")
+
+    def _trouble(self, err: StoreError) -> float:
+        self._complain(err)
+        if err.is_full and self._store is not None:
+            try:
+                done = make_room(self._store, wall=time.time())
+            except StoreError as worse:
+                log.error("no room could be made for incidents: %s", worse)
+            else:
+                log.warning("incidents: %s", done.sentence)
+                what = f"the disk is full: {count_of(len(done.ids), 'old incident was', 'old incidents were')} removed"
+                self._health.set("incidents", WARN if done.ids else ERROR, what)
+                return 0.1 if done.ids else DISK_RETRY
+        self._health.set("incidents", ERROR, f"incidents cannot be written: {err}")
+        self._forget_store()
+        return DISK_RETRY
+
+    def _complain(self, err: StoreError) -> None:
+        """Log what is wrong, the same again once a minute only."""
+        text, at = self._complaint
+        if str(err) == text and time.monotonic() - at < _SAME_AGAIN:
+            return
+        self._complaint = (str(err), time.monotonic())
+        log.error("incidents cannot be written: %s; trying on every %.0f s", err, DISK_RETRY)
+
+    def _forget_store(self) -> None:
+        if self._store is not None:
+            self._store.close_database()
+        self._store = None
+
+
+def _amend(store: IncidentStore, kept: Incident, entry: Entry) -> None:
+    """The mission went on after its record was closed, as after a crash: what is new is added to the chain."""
+    known = f"{kept.verdict}: {kept.reason}"
+    for event in entry.events:
+        if event.kind == "seen" or (event.kind == "verdict" and event.text != known):
+            store.amend(kept.id, wall=event.wall, text=event.text, data=event.data)

@@ -1,0 +1,86 @@
+"""move_base's action as the patrol sees it: one client for ever, and whether the server lives."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+
+from rosbot_patrol.patrol.inputs import Goal, GoalLink, GoalState
+from rosbot_patrol.ros.messages import convert
+
+_ACTIVE = {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}
+_WORDS = {
+    GoalStatus.PREEMPTED: "the goal was given up for another",
+    GoalStatus.RECALLED: "the goal was called back",
+    GoalStatus.REJECTED: "the goal was rejected",
+    GoalStatus.LOST: "the goal was lost",
+}
+
+
+class MoveBase:
+    """Sends goals to the action server `move_base` and tells how they stand.
+
+    Args:
+        frame: of the goals.
+        silence: the server counts as down when its status was not heard for so long [s], wall time.
+    """
+
+    def __init__(self, frame: str = "map", silence: float = 5.0) -> None:
+        self._frame = frame
+        self._silence = silence
+        self._client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
+        self._lock = threading.Lock()
+        self._heard = float("-inf")
+        self._tag = ""
+        rospy.Subscriber("move_base/status", GoalStatusArray, self._on_status, queue_size=1)
+
+    def _on_status(self, _: GoalStatusArray) -> None:
+        self._heard = time.monotonic()
+
+    @property
+    def is_up(self) -> bool:
+        """The server speaks, and hears us."""
+        client = self._client.action_client
+        connected = all(
+            end.get_num_connections() > 0
+            for end in (client.pub_goal, client.pub_cancel, client.result_sub, client.status_sub)
+        )
+        return connected and time.monotonic() - self._heard < self._silence
+
+    def link(self) -> GoalLink:
+        """How server and goal stand."""
+        with self._lock:
+            if not self._tag:
+                return GoalLink(is_up=self.is_up)
+            state = self._client.get_state()
+            text = self._client.get_goal_status_text() or _WORDS.get(state, "")
+            return GoalLink(is_up=self.is_up, tag=self._tag, state=_state(state), text=text)
+
+    def send(self, goal: Goal) -> None:
+        """Send a goal; the one before is no longer followed."""
+        message = MoveBaseGoal()
+        message.target_pose = convert.pose_to_msg(goal.pose, self._frame, rospy.get_time())
+        with self._lock:
+            self._client.send_goal(message)
+            self._tag = goal.tag
+
+    def cancel(self) -> None:
+        """Give up the goal, if there is one."""
+        with self._lock:
+            if self._tag:
+                self._client.cancel_goal()
+
+    def cancel_all(self) -> None:
+        """Give up every goal that the server has, whoever sent it."""
+        self._client.cancel_all_goals()
+
+
+def _state(status: int) -> GoalState:
+    if status in _ACTIVE:
+        return GoalState.ACTIVE
+    return GoalState.SUCCEEDED if status == GoalStatus.SUCCEEDED else GoalState.FAILED

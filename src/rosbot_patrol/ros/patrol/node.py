@@ -1,0 +1,344 @@
+"""patrol_robot: drives to the room whose motion sensor calls, looks around, mails what it finds, comes home.
+
+Matches `patrol_robot` and `patrol_robot_simulation` of the tutorial: topics /motion_trigger,
+/darknet_ros/bounding_boxes, /cmd_vel, action move_base, parameters ~path_to_params, ~email_to, ~email_from.
+
+Differs: see rosbot_patrol.patrol.manager, .patrol.rooms, .patrol.spin and .alerts.mail; beyond the original it
+publishes /patrol/state, /patrol/alerts and /patrol/arming, takes the action /patrol and the services /patrol/cancel,
+home, all, arm and emergency_stop, makes scheduled rounds, keeps its outbox, queue and incidents in ~state_dir, and
+stops the robot and gives up its goal when it is ended. Only one action client, one tf listener and one publisher are
+made.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import math
+import signal
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import rospy
+
+from rosbot_patrol.alerts.album import Sighting
+from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.evidence import EvidenceParams
+from rosbot_patrol.alerts.mail import one_line
+from rosbot_patrol.alerts.notice import Notice as PostNotice
+from rosbot_patrol.alerts.picture import LabelledBox
+from rosbot_patrol.alerts.retention import RetentionParams
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.arming import Arming, ArmingRules, load_rules, read_memory
+from rosbot_patrol.patrol.chronicle import Chronicle
+from rosbot_patrol.patrol.commands import Commands, Word
+from rosbot_patrol.patrol.emergency import EmergencyStop
+from rosbot_patrol.patrol.eyes import Eyes
+from rosbot_patrol.patrol.inputs import Box, Inputs
+from rosbot_patrol.patrol.journal import Journal
+from rosbot_patrol.patrol.judge import Judge
+from rosbot_patrol.patrol.known_objects import load_known
+from rosbot_patrol.patrol.manager import PatrolManager
+from rosbot_patrol.patrol.mission import Phase
+from rosbot_patrol.patrol.request import Origin, Request
+from rosbot_patrol.patrol.rooms import Rooms, load_rooms
+from rosbot_patrol.patrol.schedule import Schedule, load_schedule
+from rosbot_patrol.patrol.store import PatrolStore
+from rosbot_patrol.ros.patrol.action import PatrolActions
+from rosbot_patrol.ros.patrol.alert_desk import AlertDesk
+from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper, RecordParams
+from rosbot_patrol.ros.patrol.inputs import InputParams, PatrolInputs
+from rosbot_patrol.ros.patrol.missed_calls import MissedCalls
+from rosbot_patrol.ros.patrol.move_base import MoveBase
+from rosbot_patrol.ros.patrol.orders import ArmingDesk, Orders, StopSwitch
+from rosbot_patrol.ros.patrol.outputs import PeopleMarkers, Pulse, StatePublisher, Wheels
+from rosbot_patrol.ros.patrol.pictures import PictureRing
+from rosbot_patrol.ros.patrol.sensor_watch_alive import Neighbour
+from rosbot_patrol.ros.patrol.settings import (
+    NO_ROUNDS,
+    NodeParams,
+    load_flat,
+    load_manager_params,
+    load_or_say,
+)
+from rosbot_patrol.ros.patrol.sight import PatrolEyes
+from rosbot_patrol.ros.post.outbox_owner import OwnerPost, refuse_passwords
+from rosbot_patrol.ros.runtime.diagnostics import Health
+from rosbot_patrol.ros.runtime.node import Loop, now, run_node
+from rosbot_patrol.ros.runtime.private_files import keep_private
+from rosbot_patrol.ros.runtime.state_folder import claim_folder, state_folder
+from rosbot_patrol.ros.runtime.transforms import Transforms
+from rosbot_patrol.sensors.sensor_file import load_sensors
+
+log = logging.getLogger(__name__)
+
+HELD_MOST = 600.0  # [s] no entry delay is longer; when one is over arming says
+
+
+class PatrolNode:
+    """Inputs, one thread that steps the manager, outputs."""
+
+    def __init__(self) -> None:
+        tree = rospy.get_param("~", {}) or {}
+        refuse_passwords(tree)
+        self.params = load_flat(NodeParams, tree)
+        mail = load_flat(MailParams, tree)
+        rooms = load_rooms(Path(self.params.path_to_params).expanduser())
+        names = {room.id: room.name for room in rooms}
+        self.sensors = load_sensors(self.params.sensors, names, rooms_source=rooms.source)
+        folder = state_folder(self.params.state_dir, rospy.get_namespace())
+        keep_private(folder)
+        claim_folder(folder, rospy.get_name() + "/state_dir")
+        self.health = Health()
+        evidence = load_flat(EvidenceParams, tree)
+        self.pictures = PictureRing(self.params.image_topic, evidence)
+        self.chronicle = Chronicle()
+        self.keeper = IncidentKeeper(
+            folder,
+            self.pictures,
+            self.health,
+            evidence=evidence,
+            retention=load_flat(RetentionParams, tree),
+            records=load_flat(RecordParams, tree),
+            on_verdict=lambda incident: self.desk.tell_verdict(incident),
+        )
+        self.desk = AlertDesk(OwnerPost(mail, folder, self.health), self.pictures, self.keeper, self.health)
+        self.store = PatrolStore(folder / "patrol.json", str(rospy.get_param("/run_id", "")), str(rooms.source))
+        self.rules = load_or_say(load_rules, self.params.arming, rooms, ArmingRules(), self.health)
+        rounds, zone = load_or_say(load_schedule, self.params.schedule, rooms, NO_ROUNDS, self.health)
+        self.schedule = Schedule(rounds, zone, self.store.schedule)
+        params = load_manager_params(self.params, tree, rospy.get_name() + "/")
+        views = Eyes(self.params)
+        self.manager = PatrolManager(
+            rooms,
+            params,
+            memory=self.store.memory,
+            needs_camera=self.pictures.is_wanted,
+            views=views,
+            viewpoints=views.instead,
+            judge=Judge(self.params.judge, load_known(self.params.known_objects)),
+        )
+        how_many, how_often = count_of(len(rooms), "room"), count_of(len(rounds), "round")
+        log.info("%s in %s, %s in the schedule", how_many, rooms.source, how_often)
+        self._make_ends(load_flat(InputParams, tree), rooms, folder)
+
+    def _make_ends(self, inputs: InputParams, rooms: Rooms, folder: Path) -> None:
+        self._stepping = threading.Lock()
+        self._loop = Loop(self.params.rate, self._step, name="patrol")
+        journal = Journal(folder / "calls.jsonl", self.store.taken)
+        self._lost_calls = journal.damage
+        transforms = Transforms()
+        eyes = PatrolEyes(
+            self.params.eyes,
+            rooms,
+            self.params.alarm_classes,
+            transforms,
+            frames=inputs,
+            health=self.health,
+        )
+        self.inputs = PatrolInputs(
+            inputs, rooms, self.sensors, self.store, journal, eyes=eyes, transforms=transforms, wake=self._loop.hurry
+        )
+        self.inputs.on_boxes = self._note_sighting
+        self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of)
+        self.neighbour = Neighbour(self.params.sensor_watch_after, self.params.sensor_watch_notice_after, self.health)
+        self.markers = PeopleMarkers(inputs.map_frame)
+        self._shown = ""
+        self._is_over = False
+        self._older: dict[str, PostNotice] = {}  # by incident: from before the start, and of which the memory knows not
+        self._is_signalled = False
+        self._round_at = -math.inf
+        self._schedule_changed = False
+        self.move_base = MoveBase(inputs.map_frame)
+        self._wheels, self._state, self._pulse = Wheels(), StatePublisher(self.health), Pulse()
+        stop = EmergencyStop(folder / "stop.json")
+        self._stop_switch = StopSwitch(stop, self.move_base, self._wheels.publisher, self.desk.write_later)
+        kept = folder / "arming.json"
+        memory = Arming(self.rules, read_memory(kept))
+        self._arming = ArmingDesk(memory, kept, self._tell_owner, self.desk.write_later)
+        self._orders = Orders(self.manager, rooms, self._stepping)
+        self._actions = PatrolActions(self.manager, rooms)
+
+    def run(self) -> None:
+        """Patrol until shutdown."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._note_signal(number)
+        rospy.on_shutdown(self._stop)
+        mission = [self.manager.mission.id] if self.manager.mission is not None else []
+        running = [*mission, *(request.id for request in self.manager.queue)]
+        self.keeper.start(running)
+        for mission_id in running:
+            self._recall_notice(mission_id)
+        self.desk.start()
+        if self._lost_calls:
+            log.error("%s", self._lost_calls)
+            self.desk.follow(Commands(words=(Word(kind="calls lost", text=self._lost_calls),)))
+        self.inputs.start()
+        self.missed.start()
+        self.neighbour.start()
+        self._actions.start()
+        self._loop.start()
+        rospy.spin()
+
+    def _recall_notice(self, mission_id: str) -> None:
+        """The program may have been killed after a notice was written and before the rest knew of it."""
+        notice = self.desk.told(mission_id)
+        if notice is None:
+            return
+        why = dict(notice.facts).get("Why", "somebody was seen")
+        until = notice.wall + HELD_MOST if self.desk.is_held(mission_id) else None
+        if self.manager.note_told(mission_id, why, held_until=until):
+            self._older[mission_id] = notice
+
+    # -- step
+
+    def _step(self, time_now: float) -> None:
+        with self._stepping:
+            if not self._is_over:
+                self.missed.step()
+                self._actions.begin()
+                self._stop_switch.step()
+                inputs = self._inputs(time_now)
+                commands = self.manager.step(time_now, inputs)
+                self._publish(time_now, inputs, commands)
+                self._actions.follow(commands.ended, commands.report)
+                self._pulse.step()
+
+    def _inputs(self, time_now: float) -> Inputs:
+        guarded = self._arming.step(self.manager.calls())
+        is_busy = self.manager.mission is not None
+        known = self.inputs.take(time_now, guarded, self._stop_switch.why, is_busy=is_busy)
+        return dataclasses.replace(
+            known,
+            frames=tuple(dataclasses.replace(f, is_same=self.pictures.is_same(f.stamp)) for f in known.frames),
+            requests=known.requests + self._rounds(time_now, known),
+            link=self.move_base.link(),
+            camera_at=self.pictures.seen_at,
+            camera_changed_at=self.pictures.changed_at,
+        )
+
+    def _rounds(self, time_now: float, known: Inputs) -> tuple[Request, ...]:
+        """Rooms of the rounds that are due; looked for once a second."""
+        if 0.0 <= time.monotonic() - self._round_at < 1.0:
+            return ()
+        self._round_at = time.monotonic()
+        due = self.schedule.step(time_now, known.wall, known.guarded.mode)
+        self._schedule_changed |= self.schedule.changed
+        return tuple(
+            Request(room_id=room, origin=Origin.SCHEDULE, note=f"round '{entry.name}'", wall=known.wall)
+            for entry in due
+            for room in entry.rooms
+        )
+
+    def _tell_owner(self, word: Word) -> None:
+        self.desk.follow(Commands(words=(word,)))
+
+    def _note_sighting(self, stamp: float, boxes: Sequence[Box]) -> None:
+        alarms = [box for box in boxes if box.label in self.params.alarm_classes]
+        if alarms and self.manager.mission is not None:
+            drawn = [
+                LabelledBox(
+                    text=f"{one_line(b.label)} {b.probability:.2f}", xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax
+                )
+                for b in alarms
+            ]
+            self.keeper.note(Sighting(stamp=stamp, probability=max(b.probability for b in alarms), boxes=drawn))
+
+    # -- publish
+
+    def _publish(self, time_now: float, inputs: Inputs, commands: Commands) -> None:
+        if commands.cancel:
+            self.move_base.cancel()
+        if commands.goal is not None:
+            self.move_base.send(commands.goal)
+        self._wheels.turn(commands.speed)
+        if commands.report is not None:
+            self._state.publish(time_now, commands.report, self.manager.mission)
+        for notice in commands.notices:
+            self.desk.take(notice, time_now)
+        commands.words += self.neighbour.step()
+        self.desk.follow(commands)
+        self._record(time_now, commands, inputs.pose)
+        self._show_people(time_now, commands)
+        if self.manager.mission is not None or self.keeper.needs_pictures:
+            self.pictures.start()
+        elif self.desk.is_recorded:
+            self.pictures.stop()
+        self.inputs.note_served(self.manager.served())
+        changed = commands.changed or self._schedule_changed
+        self._schedule_changed = False
+        self._save(self.inputs.has_latched() or changed)
+
+    def _record(self, time_now: float, commands: Commands, pose: Pose2D | None = None) -> None:
+        mission = self.manager.mission
+        entries = self.chronicle.step(
+            now=time_now,
+            wall=time.time(),
+            mission=mission,
+            commands=commands,
+            pose=pose,
+            heard=self.inputs.take_heard(),
+        )
+        self.keeper.put(entries)
+        if mission is not None and mission.id in self._older:
+            self.desk.recall(mission.id, self._older.pop(mission.id))
+        self.keeper.look(mission.id if mission is not None and mission.phase is Phase.LOOKING else "")
+
+    def _show_people(self, time_now: float, commands: Commands) -> None:
+        mission = self.manager.mission
+        if mission is not None and mission.id != self._shown:
+            self._shown = mission.id
+            self.markers.clear()
+        if commands.people:
+            self.markers.show(commands.people, time_now, mission.room.title if mission else "")
+
+    def _save(self, changed: bool) -> None:
+        if not changed:
+            return
+        memory, served = self.manager.snapshot(), self.manager.served()
+        taken, schedule = self.inputs.taken, self.schedule.snapshot()
+
+        def save() -> None:
+            self.store.save(memory, taken=taken, schedule=schedule)
+            self.inputs.note_saved(served, taken)
+
+        self.desk.remember(save)
+
+    def _note_signal(self, number: int) -> None:
+        rospys = signal.getsignal(number)
+
+        def note(received: int, frame: Any) -> None:
+            self._is_signalled = True
+            if callable(rospys):
+                rospys(received, frame)
+
+        signal.signal(number, note)
+
+    def _stop(self) -> None:
+        """Leave the robot at rest: goal given up, wheels still.
+
+        A signal (Ctrl-C, the end of the launch) gives up missions, too; after anything else (`rosnode kill`) the
+        respawned node goes on with them.
+        """
+        with self._stepping:
+            self._is_over = True
+            if self._is_signalled:
+                self._record(now(), self.manager.abandon("the patrol was ended"))
+                self.missed.end()
+            self.move_base.cancel()
+            self._wheels.stop()
+            self._save(changed=True)
+        self.keeper.finish()
+        deadline = time.monotonic() + 2.0
+        while not (self.desk.is_recorded and self.keeper.is_written) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        time.sleep(0.1)  # let the two messages leave
+
+
+def main() -> None:
+    """Run the node."""
+    run_node("patrol_robot", lambda: PatrolNode().run())

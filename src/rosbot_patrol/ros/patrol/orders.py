@@ -1,0 +1,230 @@
+"""What people order: services to cancel, come home, look at all rooms, arm, and the emergency stop."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import rospy
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
+
+from rosbot_patrol.msg import Arming as ArmingMsg
+from rosbot_patrol.patrol.arming import Arming, write_memory
+from rosbot_patrol.patrol.commands import Word
+from rosbot_patrol.patrol.emergency import SERVICE, TOPIC, EmergencyStop
+from rosbot_patrol.patrol.inputs import Guarded
+from rosbot_patrol.patrol.manager import PatrolManager
+from rosbot_patrol.patrol.modes import DISARMED
+from rosbot_patrol.patrol.request import Origin, Request
+from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.patrol.schedule import all_rooms
+from rosbot_patrol.ros.messages import convert
+from rosbot_patrol.ros.patrol.move_base import MoveBase
+from rosbot_patrol.ros.runtime.callers import CallerService, caller_of
+from rosbot_patrol.srv import Arm, ArmRequest, ArmResponse
+
+log = logging.getLogger(__name__)
+
+STOP_REPEAT = 0.5  # [s] between two words on /e_stop while it is held, against a button that says it is not
+NOTED = "; it does not outlive a restart, as it cannot be kept: "
+
+
+class StopSwitch:
+    """The emergency stop towards ROS: the service, the topic, the wheels and everybody's goals.
+
+    Args:
+        stop: whether it is held.
+        move_base: whose goals are given up.
+        cmd_vel: where zero velocity goes at once.
+        write_later: takes what the disk did not, and tries it until it does.
+    """
+
+    def __init__(
+        self,
+        stop: EmergencyStop,
+        move_base: MoveBase,
+        cmd_vel: rospy.Publisher,
+        write_later: Callable[[Callable[[], None]], None],
+    ) -> None:
+        self._stop, self._move_base, self._cmd_vel = stop, move_base, cmd_vel
+        self._write_later = write_later
+        self._lock = threading.Lock()
+        self._told = float("-inf")
+        self._topic = rospy.Publisher("e_stop", Bool, queue_size=5, latch=True)
+        rospy.Subscriber("e_stop", Bool, self._on_topic, queue_size=10, tcp_nodelay=True)
+        rospy.Service("patrol/emergency_stop", SetBool, self._on_service)
+
+    @property
+    def why(self) -> str:
+        """Why the robot has to stand still, "" where it has not."""
+        return self._stop.why
+
+    def step(self) -> None:
+        """Repeat the word while the stop is held, and everybody's goals stay given up."""
+        if self._stop.is_held and time.monotonic() - self._told > STOP_REPEAT:
+            self._hold()
+
+    def _hold(self) -> None:
+        self._told = time.monotonic()
+        self._topic.publish(Bool(data=True))
+        self._cmd_vel.publish(Twist())
+        self._move_base.cancel_all()
+
+    def _on_service(self, request: SetBoolRequest) -> SetBoolResponse:
+        was = self._stop.is_held
+        problem = self._press(bool(request.data), SERVICE)
+        if request.data:
+            text = "the robot stands still until the stop is released"
+        else:
+            text = "released" if was else "the emergency stop was not pressed"
+        return SetBoolResponse(success=True, message=text + (NOTED + problem if problem else ""))
+
+    def _on_topic(self, message: Bool) -> None:
+        header = getattr(message, "_connection_header", None) or {}
+        if header.get("callerid") == rospy.get_name():
+            return
+        self._press(bool(message.data), TOPIC)
+        if self._stop.is_held and not message.data:  # another holds it: the base's lock has to hear that last
+            self._topic.publish(Bool(data=True))
+
+    def _press(self, pressed: bool, source: str) -> str:
+        """Press or release; what was wrong with keeping it."""
+        with self._lock:
+            changed = self._stop.press(pressed, source)
+            if self._stop.is_held and changed:
+                log.warning("%s: the robot stands still", self._stop.why)
+                self._hold()
+            elif changed:
+                log.warning("the emergency stop is released")
+                self._topic.publish(Bool(data=False))
+            try:
+                self._stop.save()
+            except OSError as err:
+                log.error("the emergency stop cannot be kept: %s; trying on", err)
+                self._write_later(self._save)
+                return str(err)
+        return ""
+
+    def _save(self) -> None:
+        with self._lock:
+            self._stop.save()
+
+
+class ArmingDesk:
+    """The mode towards ROS: service `/patrol/arm`, latched topic `/patrol/arming`.
+
+    Args:
+        arming: the mode.
+        path: where it is kept.
+        tell: takes a word for the owner, from any thread; returns at once.
+        write_later: takes what the disk did not, and tries it until it does.
+    """
+
+    def __init__(
+        self,
+        arming: Arming,
+        path: Path,
+        tell: Callable[[Word], None],
+        write_later: Callable[[Callable[[], None]], None],
+    ) -> None:
+        self._arming, self._path, self._tell, self._write_later = arming, path, tell, write_later
+        self._lock = threading.Lock()  # of the mode; the step wants it, so nobody holds it over the disk
+        self._keeping = threading.Lock()  # of the file: one change after the other
+        self._told: Guarded | None = None
+        log.log(logging.WARNING if arming.mode == DISARMED else logging.INFO, "the mode is %s", arming.mode)
+        self._publisher = rospy.Publisher("patrol/arming", ArmingMsg, queue_size=5, latch=True)
+        CallerService("patrol/arm", Arm, self._on_service)
+
+    def step(self, calls: dict[str, int]) -> Guarded:
+        """What is guarded; `calls` are the rooms of missions, by id, that sensors called for."""
+        with self._lock:
+            wall = time.time()
+            self._arming.follow(calls, wall)
+            guarded = self._arming.step(wall)
+            if guarded != self._told:
+                self._told = guarded
+                self._publish(guarded, wall)
+        return guarded
+
+    def _on_service(self, request: ArmRequest) -> ArmResponse:
+        """Change the mode at once; it is on disk before the answer."""
+        caller, wall = caller_of(request), time.time()
+        with self._keeping:
+            with self._lock:
+                before = self._arming.snapshot()
+                accepted, text = self._arming.arm(request.mode, wall)
+                memory = self._arming.snapshot()
+            (log.warning if accepted else log.error)("arming: %s; ordered by %s (service /patrol/arm)", text, caller)
+            if accepted and memory != before:
+                self._tell(changed_word(self._arming.mode, text, caller, wall))
+            problem = self._keep(memory) if accepted else ""
+        return ArmResponse(accepted=accepted, message=text + (NOTED + problem if problem else ""))
+
+    def _keep(self, memory: Mapping[str, Any]) -> str:
+        """Bring the mode to the disk; what was wrong with that."""
+        try:
+            write_memory(self._path, memory)
+        except OSError as err:
+            log.error("the mode cannot be kept: %s; trying on", err)
+            self._write_later(self._save)
+            return str(err)
+        return ""
+
+    def _save(self) -> None:
+        with self._keeping:
+            with self._lock:
+                memory = self._arming.snapshot()
+            write_memory(self._path, memory)
+
+    def _publish(self, guarded: Guarded, wall: float) -> None:
+        message = ArmingMsg(mode=guarded.mode, all_rooms=guarded.rooms is None, quiet=guarded.is_quiet)
+        message.header.stamp = convert.time_to_msg(rospy.get_time())
+        message.rooms = bytes(sorted(guarded.rooms or ()))
+        message.exit_delay = self._arming.exit_left(wall)
+        message.entry_delay = max(guarded.holds_until - wall, 0.0) if guarded.holds_until else 0.0
+        message.why = guarded.why or f"the mode {guarded.mode} holds"
+        self._publisher.publish(message)
+
+
+def changed_word(mode: str, text: str, caller: str, wall: float) -> Word:
+    """What the owner is told of another mode: what, who, from where, when."""
+    when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(wall))
+    kind = "disarmed" if mode == DISARMED else f"armed ({mode})"
+    return Word(kind=kind, text=f"{text}. Ordered by {caller}, by the service /patrol/arm, {when}")
+
+
+class Orders:
+    """Services that change what the patrol does, between two steps.
+
+    Args:
+        manager: of the missions.
+        rooms: of the points file.
+        stepping: held while the manager steps.
+    """
+
+    def __init__(self, manager: PatrolManager, rooms: Rooms, stepping: threading.Lock) -> None:
+        self._manager, self._rooms, self._stepping = manager, rooms, stepping
+        rospy.Service("patrol/cancel", Trigger, self._cancel)
+        rospy.Service("patrol/home", Trigger, self._home)
+        rospy.Service("patrol/all", Trigger, self._all)
+
+    def _cancel(self, _: TriggerRequest) -> TriggerResponse:
+        with self._stepping:
+            return TriggerResponse(success=True, message=self._manager.cancel())
+
+    def _home(self, _: TriggerRequest) -> TriggerResponse:
+        with self._stepping:
+            return TriggerResponse(success=True, message=self._manager.go_home())
+
+    def _all(self, _: TriggerRequest) -> TriggerResponse:
+        rooms = all_rooms(self._rooms)
+        with self._stepping:
+            self._manager.ask([Request(room_id=room, origin=Origin.ALL, wall=time.time()) for room in rooms])
+        text = f"the robot looks at the rooms {', '.join(map(str, rooms))}, those that sensors call for first"
+        return TriggerResponse(success=True, message=text)

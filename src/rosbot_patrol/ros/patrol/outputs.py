@@ -1,0 +1,158 @@
+"""What the patrol says and commands on topics: that it lives, its state, and the wheels while it turns.
+
+Those whom a mission met, for rviz on /patrol/people (latched): a figure, and above it who and where.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Iterable
+
+import rospy
+from geometry_msgs.msg import Point, Twist
+from std_msgs.msg import ColorRGBA, Empty
+from visualization_msgs.msg import Marker, MarkerArray
+
+from rosbot_patrol.geometry import STOP, Twist2D
+from rosbot_patrol.msg import PatrolState
+from rosbot_patrol.patrol.commands import Report
+from rosbot_patrol.patrol.mission import Mission, Phase
+from rosbot_patrol.patrol.people import Person
+from rosbot_patrol.ros.messages import convert
+from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
+
+log = logging.getLogger(__name__)
+
+
+class Wheels:
+    """/cmd_vel while the patrol turns; another's, else."""
+
+    def __init__(self) -> None:
+        self.publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        self._turning = False
+
+    def turn(self, speed: float | None) -> None:
+        """Turn [rad/s]; None: no longer, and stand still at the end of a turn."""
+        if speed is None:
+            self.stop()
+            return
+        self._turning = True
+        self.publisher.publish(convert.twist_to_msg(Twist2D(wz=speed)))
+
+    def stop(self) -> None:
+        """Stand still, where it turns."""
+        if self._turning:
+            self.publisher.publish(convert.twist_to_msg(STOP))
+        self._turning = False
+
+
+class Pulse:
+    """/patrol/alive: the patrol's own step runs; about once a second of the wall, whatever simulated time does."""
+
+    def __init__(self) -> None:
+        self._at = -math.inf
+        self._publisher = rospy.Publisher("patrol/alive", Empty, queue_size=2)
+
+    def step(self) -> None:
+        """Call it in each step."""
+        if 0.0 <= time.monotonic() - self._at < 1.0:
+            return
+        self._at = time.monotonic()
+        self._publisher.publish(Empty())
+
+
+class StatePublisher:
+    """/patrol/state, the log and /diagnostics.
+
+    Args:
+        health: of the node.
+    """
+
+    def __init__(self, health: Health) -> None:
+        self._health = health
+        self._report: Report | None = None
+        self._publisher = rospy.Publisher("patrol/state", PatrolState, queue_size=10, latch=True)
+
+    def publish(self, time_now: float, report: Report, mission: Mission | None) -> None:
+        """Tell a state that is new.
+
+        Args:
+            time_now: ROS time [s].
+            report: the state.
+            mission: that runs.
+        """
+        if self._report is None or (report.phase, report.why) != (self._report.phase, self._report.why):
+            log.info("%s: %s", report.phase.value, report.why)
+        self._report = report
+        message = PatrolState(
+            state=report.phase.value,
+            mission=report.mission,
+            room_id=report.room_id,
+            room_name=report.room_name,
+            origin=report.origin,
+            why=report.why,
+            queue=bytes(report.queue),
+            verdict=report.verdict,
+            last_verdict=report.last_verdict,
+            share_seen=-1.0,
+            mode=report.mode,
+        )
+        if mission is not None:
+            message.share_seen = -1.0 if mission.share_seen is None else mission.share_seen
+            message.phases, message.seconds = list(mission.times), list(mission.times.values())
+        message.header.stamp = convert.time_to_msg(time_now)
+        self._publisher.publish(message)
+        level = OK if report.phase is not Phase.STARTING else WARN
+        self._health.set("", level, f"{report.phase.value}: {report.why}")
+
+
+PEOPLE_TOPIC = "patrol/people"
+_RED, _DARK = ColorRGBA(0.9, 0.1, 0.1, 0.9), ColorRGBA(0.4, 0.0, 0.0, 1.0)
+
+
+class PeopleMarkers:
+    """Publishes them.
+
+    Args:
+        frame: of their places.
+    """
+
+    def __init__(self, frame: str) -> None:
+        self._frame = frame
+        self._publisher = rospy.Publisher(PEOPLE_TOPIC, MarkerArray, queue_size=2, latch=True)
+
+    def clear(self) -> None:
+        """A new mission has met nobody."""
+        self._publisher.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
+
+    def show(self, people: Iterable[Person], stamp: float, room: str) -> None:
+        """Those met so far, as far as their places are known.
+
+        Args:
+            people: each with its place.
+            stamp: of now [s].
+            room: where the mission leads, for people to read.
+        """
+        markers = [marker for person in people for marker in self._markers(person, stamp, room)]
+        self._publisher.publish(MarkerArray(markers=markers))
+
+    def _markers(self, person: Person, stamp: float, room: str) -> list[Marker]:
+        if person.x is None or person.y is None:
+            return []
+        body = self._marker("people", person, Marker.CYLINDER, 0.85, stamp)
+        body.scale.x = body.scale.y = max(0.4, min(2.0 * person.error, 2.0))
+        body.scale.z = 1.7
+        body.color = _RED
+        text = self._marker("people names", person, Marker.TEXT_VIEW_FACING, 2.0, stamp)
+        text.scale.z, text.color = 0.3, _DARK
+        text.text = f"{person.label or 'somebody'} {person.number}, {person.room or room}"
+        return [body, text]
+
+    def _marker(self, name: str, person: Person, kind: int, height: float, stamp: float) -> Marker:
+        marker = Marker(ns=name, id=person.number, type=kind)
+        marker.header.frame_id, marker.header.stamp = self._frame, rospy.Time.from_sec(stamp)
+        marker.pose.position = Point(person.x, person.y, height)
+        marker.pose.orientation.w = 1.0
+        return marker

@@ -1,0 +1,56 @@
+"""sensor_watch tells of a patrol that hangs; here the patrol tells of a sensor_watch that does."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+import rospy
+
+from rosbot_patrol.msg import SensorStates
+from rosbot_patrol.patrol.absence import Absence
+from rosbot_patrol.patrol.commands import Word
+from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
+
+log = logging.getLogger(__name__)
+
+PART = "sensor_watch"
+
+
+class Neighbour:
+    """Listens to /sensors/states, which comes every 5 s of the wall at least.
+
+    Args:
+        silent_after: so long without it sensor_watch has gone, or hangs [s].
+        told_after: that lasting so long the owner is told [s].
+        health: of the patrol.
+    """
+
+    def __init__(self, silent_after: float, told_after: float, health: Health) -> None:
+        self._absence = Absence(silent_after, told_after)
+        self._health = health
+        self._is_gone: bool | None = None
+
+    def start(self) -> None:
+        """Begin to listen."""
+        rospy.Subscriber("sensors/states", SensorStates, self._on_states, queue_size=2)
+
+    def _on_states(self, _: SensorStates) -> None:
+        self._absence.heard(time.monotonic())
+
+    def step(self) -> tuple[Word, ...]:
+        """Say on /diagnostics how it is; what the owner is told."""
+        now = time.monotonic()
+        silence = self._absence.silence(now)
+        if self._absence.was_heard and (silence > 0.0) != self._is_gone:
+            self._tell(silence)
+        return self._absence.step(now)
+
+    def _tell(self, silence: float) -> None:
+        if silence > 0.0:
+            log.warning("sensor_watch has gone, or hangs: nothing was heard of it for %.0f s", silence)
+            self._health.set(PART, WARN, "it has gone, or hangs: nobody tells of motion sensors that fail")
+        else:
+            log.log(logging.DEBUG if self._is_gone is None else logging.INFO, "sensor_watch is heard")
+            self._health.set(PART, OK, "it is heard")
+        self._is_gone = silence > 0.0

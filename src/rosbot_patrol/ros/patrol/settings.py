@@ -1,0 +1,67 @@
+"""The parameters of patrol_robot, and its files that may be wrong without ending the guard."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from datetime import tzinfo
+from typing import Any, TypeVar
+
+from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.evidence import EvidenceParams
+from rosbot_patrol.alerts.retention import RetentionParams
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import declared
+from rosbot_patrol.patrol.battery import BatteryParams
+from rosbot_patrol.patrol.drive import DriveParams
+from rosbot_patrol.patrol.look import LookParams
+from rosbot_patrol.patrol.node_params import InputParams, NodeParams, manager_params
+from rosbot_patrol.patrol.queueing import PriorityParams
+from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.patrol.schedule import Round
+from rosbot_patrol.patrol.settings import ManagerParams
+from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
+from rosbot_patrol.ros.runtime.diagnostics import WARN, Health
+from rosbot_patrol.ros.runtime.node import load_params
+
+log = logging.getLogger(__name__)
+
+P = TypeVar("P")
+
+NO_ROUNDS: tuple[tuple[Round, ...], tzinfo | None] = ((), None)
+
+
+RECORDS = (EvidenceParams, RetentionParams, RecordParams)
+FLAT = (
+    NodeParams,
+    InputParams,
+    MailParams,
+    DriveParams,
+    LookParams,
+    SpinParams,
+    PriorityParams,
+    BatteryParams,
+    *RECORDS,
+)
+
+
+def load_flat(cls: type[P], tree: dict[str, Any]) -> P:
+    """One of the groups that share the node's flat namespace; only NodeParams' warns of unknown names."""
+    others = {name for other in FLAT if other is not cls for name, *_ in declared(other)}
+    return load_params(cls, tree=tree, ignore=others | (set(tree) if cls is not NodeParams else set()))
+
+
+def load_manager_params(node: NodeParams, tree: dict[str, Any], prefix: str) -> ManagerParams:
+    """Everything that the manager is told. Raises ParamError."""
+    return manager_params(node, lambda cls: load_flat(cls, tree), prefix)
+
+
+def load_or_say(load: Callable[[str, Rooms], P], path: str, rooms: Rooms, without: P, health: Health) -> P:
+    """What a file says; a guard whose file of modes or rounds is wrong stands guard without it, and says so."""
+    try:
+        return load(path, rooms)
+    except ParamError as err:
+        log.error("%s; the patrol goes on without this file", err)
+        health.set(path, WARN, f"{err}; the patrol goes on without this file")
+        return without

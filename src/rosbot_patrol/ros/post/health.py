@@ -1,0 +1,110 @@
+"""How the post does, on /diagnostics and on the disk: each channel, who delivers, what nobody delivers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.postman import ChannelStatus, Postman
+from rosbot_patrol.alerts.settings_file import differences, state_of
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
+
+OVERDUE = 120.0  # [s] after which a notice that nobody delivers is a fault
+COMPARE = 30.0  # [s] between two looks at what the other programs were told
+STATUS = 60.0  # [s] between two writings of a status that has not changed
+
+
+class PostHealth:
+    """Tells how the post does.
+
+    Args:
+        who: this program; mail: what it was told.
+        postman: that delivers, or waits for its turn.
+        health: where to say it.
+    """
+
+    def __init__(self, who: str, mail: MailParams, postman: Postman, health: Health) -> None:
+        self._who, self._mail, self._postman, self._health = who, mail, postman, health
+        self._parts: set[str] = set()
+        self._spare_parts: set[str] = set()
+        self._differ = ""
+        self._compared = self._written = float("-inf")
+        self._status: list[object] = []
+        self.trouble = ""  # why the outbox takes nothing, "" where it does
+
+    def report(self) -> None:
+        """Say how it is now. Raises OSError."""
+        if time.monotonic() - self._compared >= COMPARE:
+            self._compared = time.monotonic()
+            self._differ = "; ".join(differences(self._postman.outbox.folder, self._who, self._mail))
+        if self._postman.is_delivering:
+            self._report_channels()
+        else:
+            self._report_from_afar()
+
+    def say_trouble(self, what: str) -> None:
+        """The outbox takes nothing: say so until `trouble` is "" again."""
+        self.trouble = what
+        self._set("outbox", ERROR, what)
+
+    def report_spare(self, statuses: Sequence[ChannelStatus]) -> None:
+        """Say how the channels do with what they have to take from memory."""
+        found = {f"{status.name} (from memory)": status for status in statuses}
+        for part in self._spare_parts - set(found):
+            self._health.drop(part)
+        self._spare_parts = set(found)
+        for part, status in found.items():
+            level, text = judge(status)
+            self._health.set(part, level, text, {"waiting": status.waiting, "refused": status.refused})
+
+    def _report_channels(self) -> None:
+        statuses = self._postman.statuses()
+        for status in statuses:
+            level, text = judge(status)
+            self._set(status.name, level, text, {"waiting": status.waiting, "refused": status.refused})
+        self._outbox_is(f"{self._who} delivers")
+        state: list[object] = [(s.name, s.waiting, s.since, s.refused, s.error, s.refusal) for s in statuses]
+        if state != self._status or time.monotonic() - self._written >= STATUS:
+            self._postman.write_status()
+            self._status, self._written = state, time.monotonic()
+
+    def _report_from_afar(self) -> None:
+        outbox, holder = self._postman.outbox, self._postman.lock.holder()
+        for part in self._parts - {"outbox"}:  # that were this program's to say
+            self._health.drop(part)
+        self._parts &= {"outbox"}
+        late = [entry for entry in outbox.waiting() if time.time() - entry.wall > OVERDUE]
+        told = state_of(outbox.folder) or {} if late else {}
+        if late and time.time() - float(told.get("wall", 0.0)) > OVERDUE:
+            waits = count_of(len(late), "notice waits", "notices wait")
+            text = f"{waits}, and {holder}, which has to deliver them, does nothing"
+            self._set("outbox", ERROR, text)
+        else:
+            self._outbox_is(f"{holder} delivers")
+
+    def _outbox_is(self, text: str) -> None:
+        if self.trouble:
+            self._set("outbox", ERROR, self.trouble)
+        else:
+            self._set("outbox", WARN if self._differ else OK, self._differ or text)
+
+    def _set(self, part: str, level: int, text: str, values: dict[str, Any] | None = None) -> None:
+        self._parts.add(part)
+        self._health.set(part, level, text, values)
+
+
+def judge(status: ChannelStatus) -> tuple[int, str]:
+    """Level and sentence about a channel for /diagnostics."""
+    if not status.waiting and status.refusal:
+        return WARN, f"the last notice was refused for good: {status.refusal}"
+    if not status.waiting:
+        return OK, f"notices go to {status.describe}"
+    since = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(status.since))
+    waits = count_of(status.waiting, "notice waits", "notices wait")
+    if not status.error:
+        return OK, f"{waits} for {status.describe}, since {since}"
+    refused = f", {status.refused} of them refused for good" if status.refused else ""
+    return WARN, f"{waits} since {since}{refused}: {status.error}"

@@ -1,0 +1,196 @@
+"""notify: tries the ways to the owner, and shows what waits for them; needs no ROS master.
+
+rosrun rosbot_patrol notify --test [--channel NAME] [--config FILE]     a real test notice through each channel
+rosrun rosbot_patrol notify --list                                      what waits, and why
+rosrun rosbot_patrol notify --flush                                     try all that waits now
+
+It uses the channels that the robot's nodes were last started with (they leave that in the outbox), or those of a file.
+Exit status: 0 all well, 1 something was not taken or waits still, 2 it cannot be tried.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import socket
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rosgraph.names import get_ros_namespace
+
+from rosbot_patrol.alerts.channel import Channel
+from rosbot_patrol.alerts.channels import MailParams, Surroundings, load_channels, make_channels
+from rosbot_patrol.alerts.outbox import Outbox
+from rosbot_patrol.alerts.postman import Postman
+from rosbot_patrol.alerts.settings_file import read_settings, state_of
+from rosbot_patrol.alerts.trial import trial_notice, try_channel
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import unknown_name
+from rosbot_patrol.ros.runtime.node import ros_home
+from rosbot_patrol.ros.runtime.private_files import use_private_umask
+from rosbot_patrol.ros.runtime.state_folder import state_folder
+
+FLUSH_WAIT = 90.0  # [s] for the node that delivers
+
+
+def main() -> None:
+    """Run the program."""
+    use_private_umask()
+    arguments = [a for a in sys.argv[1:] if not a.startswith("__") and ":=" not in a]
+    logging.getLogger("rosbot_patrol.alerts.postman").disabled = True  # what it says is printed
+    try:
+        sys.exit(run(arguments))
+    except (ParamError, OSError) as err:
+        print(f"notify: {err}", file=sys.stderr)
+        sys.exit(2)
+
+
+def run(arguments: list[str]) -> int:
+    """Do what is asked; returns the exit status. Raises ParamError, OSError."""
+    options = _parse(arguments)
+    folder = state_folder(options.state_dir, get_ros_namespace()) / "outbox"
+    around = Surroundings(home=ros_home(), environ=os.environ, host=socket.gethostname())
+    if options.list:
+        return show(folder)
+    channels = _channels(options, folder, around)
+    return flush(folder, channels) if options.flush else try_all(channels)
+
+
+def try_all(channels: list[Channel]) -> int:
+    """Send a test notice through each channel."""
+    notice = trial_notice(time.time(), socket.gethostname())
+    good = True
+    for channel in channels:
+        print(f"{channel.name}: {channel.transport.describe()} ...", flush=True)
+        trial = try_channel(channel, notice)
+        good = good and trial.is_taken
+        result = "taken" if trial.is_taken else "NOT taken"
+        print(f"{channel.name}: {result} after {trial.seconds:.1f} s: {trial.text}")
+        if trial.advice:
+            print(f"{channel.name}: {trial.advice}")
+    return 0 if good else 1
+
+
+def show(folder: Path) -> int:
+    """List what waits."""
+    if not folder.is_dir():
+        print(f"There is no outbox at {folder}: no node has used it yet (--state-dir names another place).")
+        return 0
+    waiting = Outbox(folder).waiting()
+    told = state_of(folder) or {}
+    print(f"{_count(len(waiting))} in {folder}. Last delivered for by {told.get('who', 'nobody')}.")
+    for channel in _told_channels(told):
+        print(f"  {_channel_line(channel, time.time() - float(told.get('wall', 0.0)))}")
+    for entry in waiting:
+        print(f"{_when(entry.wall)}  {entry.kind:9} {entry.id}  {Outbox(folder).read(entry).subject[:60]}")
+    return 0
+
+
+def flush(folder: Path, channels: list[Channel]) -> int:
+    """Have everything tried now, by the node that delivers, or else here."""
+    if not folder.is_dir():
+        return show(folder)
+    fast = [replace(channel, pace=replace(channel.pace, interval=0.0)) for channel in channels]
+    legacy = (folder, folder.parent / "sensor_outbox")
+    postman = Postman(Outbox(folder), fast, who="notify --flush", legacy=legacy)
+    if postman.take_over():
+        with postman.lock.beating():
+            left = _flush_here(postman)
+    else:
+        print(f"{postman.lock.holder()} delivers and is asked to try all.")
+        left = _flush_there(folder)
+    print(f"{_count(left)} still." if left else "Nothing waits.")
+    return 1 if left else 0
+
+
+def _flush_here(postman: Postman) -> int:
+    print("No node delivers at the moment: this program does.")
+    try:
+        postman.nudge(all_=True)
+        for name in postman.channels:
+            while (done := postman.deliver(name)) is not None:
+                print(f"{name}: {done.text}")
+        postman.refresh()
+        postman.write_status()
+        return len(postman.outbox.waiting())
+    finally:
+        postman.hand_over()
+
+
+def _flush_there(folder: Path) -> int:
+    began, outbox = time.time(), Outbox(folder)
+    if not outbox.waiting():
+        return 0  # the node rewrites its status once a minute only
+    (folder / "flush").touch()
+    while time.time() - began < FLUSH_WAIT:
+        told = state_of(folder) or {}
+        has_tried = not (folder / "flush").exists() and float(str(told.get("wall", 0.0))) > began + 1.0
+        if has_tried and not outbox.waiting():
+            return 0
+        if has_tried and all(c.get("error") or not c.get("waiting") for c in _told_channels(told)):
+            break
+        time.sleep(0.2)
+    for channel in _told_channels(state_of(folder) or {}):
+        print(f"  {_channel_line(channel, 0.0)}")
+    return len(outbox.waiting())
+
+
+def _channels(options: argparse.Namespace, folder: Path, around: Surroundings) -> list[Channel]:
+    if options.config:
+        channels = load_channels(Path(options.config).expanduser(), around)
+    else:
+        known = read_settings(folder) if folder.is_dir() else []
+        source = f"as {known[0].who} was started" if known else "by default: no node has left its settings here"
+        print(f"Channels {source}.")
+        channels = make_channels(known[0].mail if known else MailParams(), around)
+    if options.channel:
+        names = sorted({name for channel in channels for name in channel.names})
+        if options.channel not in names:
+            raise ParamError("--channel", unknown_name(options.channel, names))
+        channels = [channel for channel in channels if options.channel in channel.names]
+    return channels
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="notify", description="Tries the ways to the owner; shows what waits.")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--test", action="store_true", help="send a test notice through each channel")
+    what.add_argument("--list", action="store_true", help="what waits, and why")
+    what.add_argument("--flush", action="store_true", help="try all that waits now")
+    parser.add_argument("--channel", default="", help="this one only; with NAME:ADDRESS one of its recipients")
+    parser.add_argument("--config", default="", help="channels of this file instead of those of the robot's nodes")
+    parser.add_argument("--state-dir", default="", help="the nodes' state_dir; rosbot_patrol in ROS's home")
+    return parser.parse_args(arguments)
+
+
+def _told_channels(told: Mapping[str, Any]) -> list[dict[str, Any]]:
+    channels = told.get("channels")
+    return [c for c in channels if isinstance(c, dict)] if isinstance(channels, list) else []
+
+
+def _channel_line(channel: Mapping[str, Any], age: float) -> str:
+    line = f"{channel.get('name')}: {channel.get('describe')}"
+    if not channel.get("waiting"):
+        refusal = channel.get("refusal")
+        return f"{line}: refused the last notice for good: {refusal}" if refusal else f"{line}: took all"
+    waits = count_of(int(channel["waiting"]), "waits", "wait")
+    line += f": {waits} since {_when(channel.get('since') or 0.0)}"
+    if channel.get("error"):
+        line += f", because {channel['error']}"
+    if channel.get("next_try") is not None:
+        line += f"; next try in {max(channel['next_try'] - age, 0.0):.0f} s"
+    return line
+
+
+def _count(number: int) -> str:
+    return count_of(number, "notice waits", "notices wait", none="No")
+
+
+def _when(wall: float) -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall))

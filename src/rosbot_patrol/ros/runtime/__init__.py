@@ -1,0 +1,1 @@
+"""What every node shares: start and end, inputs, logs, diagnostics, transforms, files."""

@@ -1,0 +1,190 @@
+"""What all nodes share: starting, failing at start in one sentence, and a loop on wall or ROS time."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import rospy
+from rospy.core import is_shutdown_requested
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import PatrolError
+from rosbot_patrol.ros.runtime import greeting, logs
+from rosbot_patrol.ros.runtime.by_hand import require_master
+from rosbot_patrol.ros.runtime.process import Priority, take
+
+T = TypeVar("T")
+
+log = logging.getLogger(__name__)
+
+
+def run_node(
+    name: str,
+    body: Callable[[], None],
+    *,
+    priority: Priority = Priority.ORDINARY,
+    by_hand: bool = False,
+    **init_options: Any,
+) -> None:
+    """Start a node and run `body`; a PatrolError or a bad file is logged in one sentence and the program exits 1.
+
+    Args:
+        name: name of the node where the launch file gives none.
+        body: builds and runs it; returns on shutdown.
+        priority: among the processes of the machine, as far as the system permits it.
+        by_hand: people type this program: without a ROS master it ends, unless roslaunch started it.
+        init_options: further arguments of `rospy.init_node`.
+    """
+    if by_hand:
+        require_master(name)
+    refused = take(priority)  # before there are other threads: they take after this one
+    greeting.install()
+    rospy.init_node(name, **init_options)
+    logs.install()
+    if refused:
+        log.info("%s", refused)
+    threading.excepthook = _end_with_worker
+    ending = _Ending()
+    try:
+        body()
+        ending.finish()
+    except (PatrolError, OSError) as err:
+        rospy.logfatal("%s: %s", rospy.get_name(), err)
+        time.sleep(0.3)  # /rosout is sent by another thread
+        rospy.signal_shutdown(str(err))
+        sys.stdout.flush()
+        os._exit(1)
+    except rospy.ROSException:  # sleeping or publishing while the node ends; topics close before is_shutdown says so
+        if not is_shutdown_requested():
+            raise
+        ending.finish()
+
+
+class _Ending:
+    """Ends the node on a thread of its own when a signal comes.
+
+    rospy does so within the signal handler, on the main thread: where that waits for the master just then, rospy's
+    lock around the master is held, and the node never ends. The main thread must not block without looking at
+    `rospy.is_shutdown`.
+    """
+
+    def __init__(self) -> None:
+        self._read, self._write = os.pipe()
+        self._rospys: dict[int, Any] = {}
+        self._has_come = False
+        self._done = threading.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            self._rospys[number] = signal.signal(number, self._note)
+        threading.Thread(target=self._work, name="ending", daemon=True).start()
+
+    def finish(self) -> None:
+        """Let a shutdown that is under way tell the master."""
+        if self._has_come:
+            self._done.wait(5.0)
+
+    def _note(self, number: int, _frame: object) -> None:
+        self._has_come = True
+        os.write(self._write, bytes([number]))  # takes no lock
+
+    def _work(self) -> None:
+        while True:
+            number = os.read(self._read, 1)[0]
+            handler = self._rospys[number]
+            if callable(handler):
+                handler(number, None)
+            else:
+                rospy.signal_shutdown(f"signal {number}")
+            self._done.set()
+
+
+def load_params(cls: type[T], *, ignore: Iterable[str] = (), tree: dict[str, Any] | None = None) -> T:
+    """The node's private parameters through their declaration (one round trip to the master)."""
+    if tree is None:
+        tree = rospy.get_param("~", {}) or {}
+    return params.load(cls, tree, name=rospy.get_name() + "/", ignore=ignore)
+
+
+def ros_home() -> Path:
+    """Where ROS keeps a user's files."""
+    return Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
+
+
+def sender_of(message: object) -> str:
+    """Name of the node that published a message, "" where it did not come by a topic."""
+    header = getattr(message, "_connection_header", None) or {}
+    return str(header.get("callerid", ""))
+
+
+def now() -> float:
+    """ROS time [s]."""
+    return float(rospy.get_time())
+
+
+class Worker(threading.Thread):
+    """A thread that a node cannot do without: whatever exception leaves it is logged and ends the node.
+
+    So that no node looks alive with half of it dead; the launch file's respawn brings it back whole. `run_node` sees
+    to it.
+    """
+
+    def __init__(self, target: Callable[[], None] | None = None, *, name: str) -> None:
+        super().__init__(target=target, name=name, daemon=True)
+
+
+def _end_with_worker(args: threading.ExceptHookArgs) -> None:
+    if args.exc_type is not SystemExit and isinstance(args.thread, Worker):
+        if rospy.is_shutdown() and issubclass(args.exc_type, rospy.ROSException):
+            return
+        what = (args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback)
+        log.critical("%s: '%s' failed, the node ends", rospy.get_name(), args.thread.name, exc_info=what)
+        time.sleep(0.3)  # /rosout is sent by another thread
+        os._exit(1)
+    threading.__excepthook__(args)
+
+
+class Loop(Worker):
+    """Calls `step(now)` at a rate of ROS time on its own thread, without hanging when simulated time stops.
+
+    A step that takes too long is followed by the next at once; the loop does not catch up.
+    """
+
+    def __init__(self, rate: float, step: Callable[[float], None], *, name: str = "loop") -> None:
+        super().__init__(name=name)
+        self._period = 1.0 / rate
+        self._step = step
+        self._hurried = False
+
+    def set_rate(self, rate: float) -> None:
+        """Another rate from the next step on."""
+        self._period = 1.0 / rate
+
+    def hurry(self) -> None:
+        """Have a step at once, besides those that are due; from any thread."""
+        self._hurried = True
+
+    def run(self) -> None:
+        """Run until shutdown."""
+        due = now()
+        while not rospy.is_shutdown():
+            current = now()
+            if current + self._period + 1.0 < due:  # time went back
+                due = current
+            if current >= due:
+                due = max(due + self._period, current)
+            elif not self._hurried:
+                self._wait(due - current)
+                continue
+            self._hurried = False
+            self._step(current)
+
+    def _wait(self, seconds: float) -> None:
+        # Under simulated time the clock may run faster or slower than the wall: look often, never block for good.
+        time.sleep(min(max(seconds / 3.0, 0.001), 0.01))

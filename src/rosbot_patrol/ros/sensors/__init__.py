@@ -1,0 +1,1 @@
+"""The node sensor_watch and the program sensors."""

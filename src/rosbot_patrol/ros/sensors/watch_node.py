@@ -1,0 +1,235 @@
+"""sensor_watch: knows which motion sensor is well, and tells who asks, and the owner, when one is not.
+
+Listens to /motion_trigger, whoever publishes there, to the bridges' /sensors/links and to the patrol's /patrol/alive: a
+patrol that is dead or hangs answers nobody, and cannot say so itself. The patrol's /patrol/arming says which rooms are
+guarded; until it is heard, and where the patrol has gone, all are. Publishes /sensors/states
+(latched), /sensors/events and /diagnostics, and tells the owner through the outbox in ~state_dir, which it shares with
+the patrol but needs no other node to deliver.
+
+All durations are of the wall: sensors send their heartbeats in real time, whatever /clock does.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rospy
+from std_msgs.msg import Empty
+
+from rosbot_patrol.alerts.channels import MailParams
+from rosbot_patrol.alerts.notice import Notice as PostNotice
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.files import write_atomic
+from rosbot_patrol.msg import Arming as ArmingMsg
+from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
+from rosbot_patrol.params import declared, param
+from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.ros.bridge.links import links_from_msg
+from rosbot_patrol.ros.post.outbox_owner import RETRY, OwnerPost, refuse_passwords
+from rosbot_patrol.ros.runtime.diagnostics import Health
+from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node, sender_of
+from rosbot_patrol.ros.runtime.private_files import keep_private
+from rosbot_patrol.ros.runtime.state_folder import state_folder
+from rosbot_patrol.ros.sensors.reports import Reports, event_to_msg, look_to_msg, states_to_msg
+from rosbot_patrol.sensors.looks import Looks
+from rosbot_patrol.sensors.notices import Notice, Notices
+from rosbot_patrol.sensors.problems import SERIOUS, Kind
+from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
+from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
+from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
+from rosbot_patrol.simulation.sensor_places import read_sensors
+
+log = logging.getLogger(__name__)
+
+STEP = 0.25  # [s] of the wall
+REPORT_EVERY = 4  # steps
+STATES_EVERY = 20  # steps, where nothing changes
+MAX_WAITING = 20_000  # messages between two steps; more than a flood can need
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorWatchParams:
+    """The node's own parameters; those of mail, times and looks come beside them."""
+
+    path_to_params: str = param(doc="points file, which names the rooms")
+    sensors: str = param(
+        "", doc="file of the sensors; empty or none: each room's sensor has the room's number as its id"
+    )
+    motion_sensors: str = param("", doc="the simulator's file, to hold `sensors` against; empty: none")
+    state_dir: str = param(
+        "", doc="folder of notices that wait, as the patrol's; empty: rosbot_patrol(-NAMESPACE) in ROS's home"
+    )
+
+
+GROUPS = (SensorWatchParams, WatchTimes, NoticeTimes, LookTimes, MailParams)
+
+
+def load_group(cls: type, tree: Mapping[str, Any]) -> Any:
+    """One of the groups that share the node's flat namespace; only the first warns of unknown names."""
+    others = {name for other in GROUPS if other is not cls for name, *_ in declared(other)}
+    return load_params(cls, tree=dict(tree), ignore=others | (set(tree) if cls is not GROUPS[0] else set()))
+
+
+def load_list(params: SensorWatchParams) -> SensorList:
+    """The sensors, checked against rooms and simulator; raises ParamError."""
+    rooms = load_rooms(Path(params.path_to_params).expanduser())
+    sensors = load_sensors(params.sensors, {room.id: room.name for room in rooms}, rooms_source=rooms.source)
+    if sensors.has_file and params.motion_sensors:
+        sensors.check_places([(p.id, p.room) for p in read_sensors(params.motion_sensors)], params.motion_sensors)
+    return sensors
+
+
+class SensorWatch:
+    """Inputs, one thread that steps the supervisor, outputs."""
+
+    def __init__(self) -> None:
+        tree = rospy.get_param("~", {}) or {}
+        refuse_passwords(tree)
+        params = load_group(SensorWatchParams, tree)
+        sensors = load_list(params)
+        folder = state_folder(params.state_dir, rospy.get_namespace())
+        keep_private(folder)
+        self._memory = folder / "sensors.json"
+        self._health = Health("motion sensors")
+        self._post = OwnerPost(load_group(MailParams, tree), folder, self._health)
+        self._watch = Supervisor(sensors, load_group(WatchTimes, tree), time.monotonic())
+        self._guarded: frozenset[int] | None = None  # rooms, None for all
+        self._notices = Notices(
+            load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory), is_guarded=self._is_guarded
+        )
+        self._looks = Looks(load_group(LookTimes, tree))
+        self._reports = Reports(self._health)
+        self._unwritten = False
+        self._retry_at = 0.0
+        named = f"{count_of(len(sensors), 'sensor')} of {sensors.source}"
+        where = named if sensors.has_file else "whatever sensor is heard"
+        log.info("watching %s", where)
+
+    def run(self) -> None:
+        """Watch until shutdown."""
+        self._triggers: deque[tuple[int, bool, str, float]] = deque(maxlen=MAX_WAITING)
+        self._links: deque[tuple[SensorLinks, float, float]] = deque(maxlen=1000)
+        self._patrol: deque[tuple[str, float]] = deque(maxlen=10)
+        self._states = rospy.Publisher("sensors/states", SensorStates, queue_size=5, latch=True)
+        self._events = rospy.Publisher("sensors/events", SensorEvent, queue_size=100)
+        self._simulated = bool(rospy.get_param("/use_sim_time", False))
+        rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=1000)
+        rospy.Subscriber("patrol/alive", Empty, self._on_patrol, queue_size=10)
+        rospy.Subscriber("patrol/arming", ArmingMsg, self._on_arming, queue_size=10)
+        rospy.Subscriber("sensors/links", SensorLinks, self._on_links, queue_size=100)
+        self._post.start()
+        Worker(self._work, name="watch").start()
+        rospy.spin()
+
+    # -- callbacks store
+
+    def _on_trigger(self, message: EspTrigger) -> None:
+        self._triggers.append((message.id, message.move, sender_of(message), time.monotonic()))
+
+    def _on_patrol(self, message: Empty) -> None:
+        self._patrol.append((sender_of(message), time.monotonic()))
+
+    def _on_arming(self, message: ArmingMsg) -> None:
+        self._guarded = None if message.all_rooms else frozenset(message.rooms)
+
+    def _on_links(self, message: SensorLinks) -> None:
+        # in simulated time both stamps are of one clock
+        offset = 0.0 if self._simulated else message.header.stamp.to_sec() - rospy.get_time()
+        self._links.append((message, offset, time.monotonic()))
+
+    # -- step
+
+    def _is_guarded(self, room: int | None) -> bool:
+        """Whether motion in a room means anything; what is not known counts as guarded."""
+        guarded = self._guarded
+        is_patrol_gone = any(key.kind is Kind.PATROL_GONE for key in self._watch.problems())
+        return guarded is None or room is None or room in guarded or is_patrol_gone
+
+    def _work(self) -> None:
+        count = 0
+        while not rospy.is_shutdown():
+            try:
+                self._step(count)
+            except rospy.ROSException:
+                if rospy.is_shutdown():
+                    return
+                raise
+            count += 1
+            time.sleep(STEP)
+
+    def _step(self, count: int) -> None:
+        self._take()
+        events = self._watch.tick(time.monotonic())
+        for event in events:
+            is_bad = event.active and event.problem.key.kind in SERIOUS
+            log.log(logging.WARNING if is_bad else logging.INFO, "%s", event.text)
+            self._events.publish(event_to_msg(event, self._watch))
+        if count % REPORT_EVERY and not events:
+            return
+        statuses = self._watch.statuses()
+        self._reports.update(statuses, self._watch)
+        if events or not count % STATES_EVERY:
+            self._states.publish(states_to_msg(statuses, self._watch))
+        self._tell_owner(statuses)
+        for look in self._looks.update(self._watch, statuses, time.monotonic()):
+            log.warning("%s: the robot is asked to look at room %d", look.text, look.room)
+            self._events.publish(look_to_msg(look, self._watch))
+
+    def _take(self) -> None:
+        while self._triggers:
+            sensor_id, move, sender, at = self._triggers.popleft()
+            self._watch.heard(sensor_id, sender, at, move=move)
+        while self._patrol:
+            self._watch.patrol_heard(*self._patrol.popleft())
+        while self._links:
+            message, offset, at = self._links.popleft()
+            self._watch.linked(message.bridge, links_from_msg(message), at, clock_offset=offset)
+
+    def _tell_owner(self, statuses: list[SensorStatus]) -> None:
+        now = time.monotonic()
+        notice = self._notices.update(self._watch, statuses, now, time.time())
+        if notice is not None:
+            log.warning("notice to the owner: %s", notice.subject)
+            self._post.put(to_post(notice))
+            self._unwritten, self._retry_at = True, now
+        if self._unwritten and now >= self._retry_at and self._post.is_written:
+            self._remember(now)
+
+    def _remember(self, now: float) -> None:
+        """Keep what was told, once the notices are on the disk themselves."""
+        try:
+            write_atomic(self._memory, json.dumps(self._notices.snapshot(), indent=1).encode())
+        except OSError as err:
+            log.error("what was told cannot be kept in %s: %s; trying on", self._memory, err)
+            self._retry_at = now + RETRY
+        else:
+            self._unwritten = False
+
+
+def to_post(notice: Notice) -> PostNotice:
+    """The notice as the outbox takes it."""
+    return PostNotice(id=notice.id, wall=time.time(), kind="sensor", subject=notice.subject, text=notice.text)
+
+
+def read_memory(path: Path) -> Mapping[str, Any] | None:
+    """What was told before the program ended; None where there is nothing that makes sense."""
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as err:
+        log.warning("%s cannot be used (%s), starting afresh", path, err)
+        return None
+    return tree if isinstance(tree, dict) else None
+
+
+def main() -> None:
+    """Run the node."""
+    run_node("sensor_watch", lambda: SensorWatch().run())

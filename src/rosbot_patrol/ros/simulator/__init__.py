@@ -1,0 +1,1 @@
+"""The node simulator, and what is asked of it while it runs."""

@@ -1,0 +1,193 @@
+"""docs/parameters.md, made from the declarations: `scripts/parameter_tables`."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import typing
+from pathlib import Path
+
+from rosbot_patrol.alerts.channels import SPECS, MailParams
+from rosbot_patrol.alerts.evidence import EvidenceParams
+from rosbot_patrol.alerts.retention import RetentionParams
+from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.control.teleop import TeleopParams
+from rosbot_patrol.costmap.params import (
+    CostmapParams,
+    InflationParams,
+    KeepoutParams,
+    ObstacleParams,
+    StaticParams,
+    VoxelParams,
+)
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
+from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.images.compressed import CompressedParams
+from rosbot_patrol.images.compressed_depth import CompressedDepthParams
+from rosbot_patrol.navigation.params import MoveBaseParams
+from rosbot_patrol.params import declared, table
+from rosbot_patrol.patrol.battery import BatteryParams
+from rosbot_patrol.patrol.drive import DriveParams
+from rosbot_patrol.patrol.look import LookParams
+from rosbot_patrol.patrol.queueing import PriorityParams
+from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.planning.dwa_params import DWAPlannerParams
+from rosbot_patrol.planning.global_planner import GlobalPlannerParams
+from rosbot_patrol.planning.navfn import NavfnParams
+from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
+from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
+from rosbot_patrol.ros.detector.republish_node import RepublishParams
+from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
+from rosbot_patrol.ros.gmapping.explore_node import ExploreParams
+from rosbot_patrol.ros.maps.server_node import MapServerParams
+from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
+from rosbot_patrol.ros.patrol.inputs import InputParams
+from rosbot_patrol.ros.patrol.settings import NodeParams
+from rosbot_patrol.ros.sensors.watch_node import SensorWatchParams
+from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
+from rosbot_patrol.ros.simulator.node import SimulatorParams
+from rosbot_patrol.ros.tools.narrator_node import NarratorParams
+from rosbot_patrol.rosserial.settings import SerialNodeParams
+from rosbot_patrol.sensors.sensor_file import SensorSpec
+from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
+from rosbot_patrol.simulation import scenario
+from rosbot_patrol.simulation.faults import KINDS, Doorway, Fault
+
+# Title, namespace below the node's own, declaration.
+SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
+    (
+        "patrol_robot",
+        [
+            ("", NodeParams),
+            ("", InputParams),
+            ("", MailParams),
+            ("", DriveParams),
+            ("", LookParams),
+            ("", SpinParams),
+            ("", PriorityParams),
+            ("", BatteryParams),
+            ("", EvidenceParams),
+            ("", RetentionParams),
+            ("", RecordParams),
+        ],
+    ),
+    (
+        "move_base",
+        [
+            ("", MoveBaseParams),
+            ("NavfnROS/", NavfnParams),
+            ("GlobalPlanner/", GlobalPlannerParams),
+            ("TrajectoryPlannerROS/", TrajectoryPlannerParams),
+            ("DWAPlannerROS/", DWAPlannerParams),
+            ("conservative_reset/, aggressive_reset/", ClearCostmapParams),
+            ("rotate_recovery/", RotateParams),
+            ("<name of a MoveSlowAndClear>/", MoveSlowParams),
+            ("global_costmap/, local_costmap/", CostmapParams),
+            ("<costmap>/static_layer/", StaticParams),
+            ("<costmap>/obstacle_layer/", ObstacleParams),
+            ("<costmap>/obstacle_layer/<source>/", SourceParams),
+            ("<costmap>/obstacle_layer/<one of depth_sources>/", DepthSourceParams),
+            ("<costmap>/inflation_layer/", InflationParams),
+            ("<costmap>/<name of a VoxelLayer>/", VoxelParams),
+            ("<costmap>/<name of a KeepoutLayer>/", KeepoutParams),
+            ("<costmap>/<name of a RangeSensorLayer>/", RangeSensorParams),
+        ],
+    ),
+    ("amcl", [("", AmclParams)]),
+    ("slam_gmapping", [("", GmappingParams)]),
+    ("explore", [("", ExploreParams)]),
+    ("map_server", [("", MapServerParams)]),
+    ("darknet_ros", [("", DarknetParams)]),
+    (
+        "republish",
+        [
+            ("", RepublishParams),
+            ("/<out>/compressed/", CompressedParams),
+            ("/<out>/compressedDepth/", CompressedDepthParams),
+        ],
+    ),
+    ("serial_node.py", [("", SerialNodeParams)]),
+    (
+        "sensor_watch",
+        [("", SensorWatchParams), ("", WatchTimes), ("", NoticeTimes), ("", LookTimes), ("", MailParams)],
+    ),
+    ("twist_mux", [("", TwistMuxParams)]),
+    ("teleop_twist_keyboard.py", [("", TeleopParams)]),
+    ("simulator", [("", SimulatorParams)]),
+    ("narrator", [("", NarratorParams)]),
+    ("demo_intruder", [("", DemoParams)]),
+]
+
+# The same for the keys of a scenario's file.
+SCENARIO: list[tuple[str, type]] = [
+    ("", scenario.Setting),
+    ("robot", scenario.Start),
+    ("actors[]", scenario.ActorEntry),
+    ("walks[]", scenario.WalkEntry),
+    ("doors[]", scenario.DoorEntry),
+    ("door_moves[]", scenario.DoorMove),
+    ("doorways/<name>", Doorway),
+    ("triggers[]", scenario.Trigger),
+    ("expect", scenario.Expect),
+    ("faults[]", Fault),
+]
+
+
+def _groups(prefix: str, cls: type) -> list[tuple[str, type]]:
+    """A declaration and the ones nested in it, with their namespaces."""
+    found = [(prefix, cls)]
+    hints = typing.get_type_hints(cls)
+    for field, (name, *_) in zip(dataclasses.fields(cls), declared(cls), strict=True):
+        if dataclasses.is_dataclass(hints[field.name]):
+            found += _groups(f"{prefix}{name}/", hints[field.name])
+    return found
+
+
+def document() -> str:
+    """The whole page."""
+    lines = [
+        "# Parameters",
+        "",
+        "Made from the declarations in the code by `scripts/parameter_tables`; names and defaults of the drop-ins are",
+        "upstream's.",
+    ]
+    for node, sections in SECTIONS:
+        lines += ["", f"## {node}"]
+        for prefix, cls in sections:
+            for namespace, group in _groups(prefix, cls):
+                rows = table(group)
+                if rows.count("\n") > 1:
+                    place = namespace if namespace.startswith("/") else f"~{namespace}"
+                    lines += ["", *([f"`{place}`", ""] if namespace else []), rows]
+    lines += ["", "## file of the sensors", "", "`sensors[]`", "", table(SensorSpec)]
+    lines += ["", "## file of the channels"]
+    for kind, spec in sorted(SPECS.items()):
+        lines += ["", f"`channels/NAME/` with `type: {kind}`", "", table(spec)]
+    lines += ["", "## scenario file"]
+    for place, cls in SCENARIO:
+        lines += ["", *([f"`{place}`", ""] if place else []), table(cls)]
+    common = table(Fault).splitlines()[2:]
+    for kind, cls in KINDS.items():
+        own = [row for row in table(cls).splitlines() if row not in common]
+        lines += ["", f"`kind: {kind}`: {cls.__doc__}"]
+        lines += ["", *own] if len(own) > 2 else []
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Write the page, or with --check compare it; exit status 1 where it is out of date."""
+    target, text = Path(sys.argv[1]), document()
+    if "--check" in sys.argv[2:]:
+        current = target.read_text(encoding="utf-8") if target.exists() else ""
+        if current != text:
+            sys.stderr.write(f"{target} is out of date: run scripts/parameter_tables\n")
+            return 1
+        return 0
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
