@@ -22,11 +22,11 @@ from rosbot_patrol.alerts.map_picture import crop_map
 from rosbot_patrol.alerts.picture import LabelledBox, RawPicture
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map
-from rosbot_patrol.patrol.chronicle import Chronicle
-from rosbot_patrol.patrol.commands import Commands, Notice, Report
-from rosbot_patrol.patrol.mission import Mission, Phase, Verdict
-from rosbot_patrol.patrol.rooms import Room
-from rosbot_patrol.patrol.watch import Confirmation
+from rosbot_patrol.patrol.house.rooms import Room
+from rosbot_patrol.patrol.intruder.sightings import Confirmation
+from rosbot_patrol.patrol.mission.commands import Commands, Notice, Report
+from rosbot_patrol.patrol.mission.record import Mission, Phase, Verdict
+from rosbot_patrol.patrol.story.mission_log import Chronicle
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -20,7 +20,7 @@ from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.distance_kernels import bounded_distances
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.maps.occupancy import FREE
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams

@@ -26,14 +26,14 @@ import numpy as np
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map
-from rosbot_patrol.patrol.coverage import Coverage, sight_of_scan, sight_on_map
-from rosbot_patrol.patrol.floor import Floor, floor_of
-from rosbot_patrol.patrol.inputs import Box, Eye
-from rosbot_patrol.patrol.person_place import Depth, Lens, View, measure
-from rosbot_patrol.patrol.room_regions import part_rooms
-from rosbot_patrol.patrol.rooms import load_rooms
-from rosbot_patrol.patrol.viewpoints import ViewpointPlanner
-from rosbot_patrol.patrol.witness import Witness
+from rosbot_patrol.patrol.house.floor import Floor, floor_of
+from rosbot_patrol.patrol.house.regions import part_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
+from rosbot_patrol.patrol.intruder.lidar_motion import Witness
+from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
+from rosbot_patrol.patrol.mission.inputs import Box, Eye
+from rosbot_patrol.patrol.search.coverage import Coverage, sight_of_scan, sight_on_map
+from rosbot_patrol.patrol.search.viewpoints import ViewpointPlanner
 from rosbot_patrol.scan import LaserScan
 
 ROOT = Path(__file__).resolve().parents[1]

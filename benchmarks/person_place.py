@@ -27,11 +27,11 @@ from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.maps.map_io import read_map
-from rosbot_patrol.patrol.floor import floor_of
-from rosbot_patrol.patrol.inputs import Box, Measured
-from rosbot_patrol.patrol.judge import Judge
-from rosbot_patrol.patrol.person_place import Depth, Lens, View, measure
-from rosbot_patrol.patrol.witness import off_the_map
+from rosbot_patrol.patrol.house.floor import floor_of
+from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
+from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
+from rosbot_patrol.patrol.mission.inputs import Box, Measured
 from rosbot_patrol.simulation.matrices import from_pose2d
 from rosbot_patrol.simulation.world import load_world
 

@@ -87,7 +87,7 @@ def main() -> int:
     parser.add_argument("--empty", action="store_true", help="only without a person")
     options = parser.parse_args()
     try:
-        from rosbot_patrol.patrol.rooms import load_rooms
+        from rosbot_patrol.patrol.house.rooms import load_rooms
         from rosbot_patrol.ros.campaign.house import House, Master
         from rosbot_patrol.ros.simulator.demo_intruder_node import read_walk
     except ImportError as err:

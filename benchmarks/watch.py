@@ -32,8 +32,8 @@ from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import load
-from rosbot_patrol.patrol.inputs import Box, Frame
-from rosbot_patrol.patrol.watch import Watch, WatchParams
+from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
+from rosbot_patrol.patrol.mission.inputs import Box, Frame
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.robot import load_robot

@@ -9,9 +9,9 @@ import pytest
 import yaml
 from page_list import PAGES, ROOT
 
-from rosbot_patrol.patrol.known_objects import load_known
-from rosbot_patrol.patrol.rooms import Rooms, load_rooms
-from rosbot_patrol.patrol.schedule import load_schedule
+from rosbot_patrol.patrol.guard.schedule import load_schedule
+from rosbot_patrol.patrol.house.known_objects import load_known
+from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.replay.case import read_case
 from rosbot_patrol.sensors.sensor_file import load_sensors
 from rosbot_patrol.simulation.scenario import read_scenario

@@ -175,7 +175,7 @@ def test_sensor_watch_starts_and_tells_without_a_disk(house, phone):
 
 
 def test_calls_that_were_emptied_are_told(house, phone):
-    from rosbot_patrol.patrol.journal import Journal
+    from rosbot_patrol.patrol.calls.journal import Journal
 
     state = house.folder / "state"
     journal = Journal(state / "calls.jsonl", 0)

@@ -11,7 +11,7 @@ from ros_processes import wait_for
 
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import write_map
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from page_commands import Command, commands_of
 from page_list import PAGES
 from rosbot_patrol.msg import PatrolState
 
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.campaign.house import House, end_group
 from rosbot_patrol.ros.campaign.ports import free_port
 

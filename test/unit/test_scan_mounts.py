@@ -18,11 +18,11 @@ from rosbot_patrol.costmap.obstacle import height_problem, observe_level
 from rosbot_patrol.costmap.params import SourceParams, read_costmap
 from rosbot_patrol.geometry import Pose2D, Transform, Twist2D
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.patrol.coverage import sight_of_scan
-from rosbot_patrol.patrol.floor import floor_of
-from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
-from rosbot_patrol.patrol.rooms import Room, Rooms
-from rosbot_patrol.patrol.witness import Witness
+from rosbot_patrol.patrol.house.floor import floor_of
+from rosbot_patrol.patrol.house.rooms import Room, Rooms
+from rosbot_patrol.patrol.intruder.lidar_motion import Witness
+from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
+from rosbot_patrol.patrol.search.coverage import sight_of_scan
 from rosbot_patrol.replay.patrol_sight import PatrolSight
 from rosbot_patrol.replay.scan_feed import ScanFeed
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.raster import flood
-from rosbot_patrol.patrol.floor import floor_of
-from rosbot_patrol.patrol.room_regions import NOBODYS, part_rooms
-from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.patrol.house.floor import floor_of
+from rosbot_patrol.patrol.house.regions import NOBODYS, part_rooms
+from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.simulation.floor_plan import floor_plan
 from rosbot_patrol.simulation.scene import Body
 from rosbot_patrol.simulation.sight import Sight

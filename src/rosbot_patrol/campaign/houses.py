@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.patrol.rooms import Rooms, load_rooms
+from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.simulation.scene import Body
 from rosbot_patrol.simulation.world import load_world
 

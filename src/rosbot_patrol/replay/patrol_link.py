@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rosbot_patrol.patrol.inputs import Goal, GoalLink, GoalState
+from rosbot_patrol.goal import Goal, GoalLink, GoalState
 from rosbot_patrol.replay.patrol_records import GoalRecord, OutcomeRecord
 
 SILENCE = 5.0  # the server counts as down when its status was not heard for so long [s]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rosbot_patrol.patrol.commands import Commands
-from rosbot_patrol.patrol.mission import Mission
+from rosbot_patrol.patrol.mission.commands import Commands
+from rosbot_patrol.patrol.mission.record import Mission
 from rosbot_patrol.replay.results import STAMP, Result, Rows
 from rosbot_patrol.replay.runner import Field
 

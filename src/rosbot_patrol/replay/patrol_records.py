@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from rosbot_patrol.patrol.battery import battery_of
-from rosbot_patrol.patrol.inputs import Battery, Box
-from rosbot_patrol.patrol.person_place import Lens
+from rosbot_patrol.patrol.guard.battery import battery_of
+from rosbot_patrol.patrol.intruder.measure import Lens
+from rosbot_patrol.patrol.mission.inputs import Battery, Box
 from rosbot_patrol.replay import raw_ros1
 from rosbot_patrol.replay.definitions import STAMP
 from rosbot_patrol.replay.records import ANY, Kind, Refused, stamp_of

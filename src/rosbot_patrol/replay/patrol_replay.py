@@ -19,15 +19,14 @@ from typing import Any
 import numpy as np
 
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.patrol.eyes import Eyes
-from rosbot_patrol.patrol.inputs import Battery, Frame, Guarded, Inputs
-from rosbot_patrol.patrol.judge import Judge
-from rosbot_patrol.patrol.manager import PatrolManager
-from rosbot_patrol.patrol.node_params import InputParams, NodeParams
-from rosbot_patrol.patrol.request import Origin, Request
-from rosbot_patrol.patrol.robot_place import RobotPlace
-from rosbot_patrol.patrol.rooms import Rooms
-from rosbot_patrol.patrol.settings import ManagerParams
+from rosbot_patrol.patrol.calls.queue import Origin, Request
+from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.mission.inputs import Battery, Frame, Guarded, Inputs
+from rosbot_patrol.patrol.mission.manager import PatrolManager
+from rosbot_patrol.patrol.mission.params import InputParams, ManagerParams, NodeParams
+from rosbot_patrol.patrol.mission.robot_place import RobotPlace
+from rosbot_patrol.patrol.search.room_search import Eyes
 from rosbot_patrol.replay import patrol_records as heard
 from rosbot_patrol.replay.patrol_link import BagLink
 from rosbot_patrol.replay.patrol_log import PatrolLog

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from rosbot_patrol.errors import LaserTilted, MapError, TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.patrol.floor import floor_of
-from rosbot_patrol.patrol.inputs import Eye, Frame, ScanView
-from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
-from rosbot_patrol.patrol.person_place import Lens, View, measure
-from rosbot_patrol.patrol.robot_place import RobotPlace
-from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
-from rosbot_patrol.patrol.rooms import Rooms
-from rosbot_patrol.patrol.witness import off_the_map
+from rosbot_patrol.patrol.house.floor import floor_of
+from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
+from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
+from rosbot_patrol.patrol.intruder.measure import Lens, View, measure
+from rosbot_patrol.patrol.mission.inputs import Eye, Frame, ScanView
+from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
+from rosbot_patrol.patrol.mission.robot_place import RobotPlace
 from rosbot_patrol.replay.patrol_records import LensRecord
 from rosbot_patrol.replay.transform_tree import TransformTree
 from rosbot_patrol.scan import LaserScan, level_scan, scan_points

@@ -15,10 +15,10 @@ from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.maps.map_io import read_map
-from rosbot_patrol.patrol.judge import Judge
-from rosbot_patrol.patrol.known_objects import load_known
-from rosbot_patrol.patrol.node_params import InputParams, NodeParams, manager_params
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.known_objects import load_known
+from rosbot_patrol.patrol.house.rooms import load_rooms
+from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.mission.params import InputParams, NodeParams, manager_params
 from rosbot_patrol.replay import (
     amcl_replay,
     detector_replay,

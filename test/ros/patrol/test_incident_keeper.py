@@ -13,7 +13,7 @@ from rosbot_patrol.alerts.incident_store import IncidentStore
 from rosbot_patrol.alerts.incident_verify import verify
 from rosbot_patrol.alerts.picture import RawPicture
 from rosbot_patrol.alerts.retention import RetentionParams
-from rosbot_patrol.patrol.chronicle import Entry
+from rosbot_patrol.patrol.story.mission_log import Entry
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN
 

@@ -11,8 +11,8 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 import rospy
 from nav_msgs.msg import OccupancyGrid
 
-from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
+from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
 from rosbot_patrol.ros.patrol import sight as patrol_eyes
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN
 from rosbot_patrol.ros.runtime.node import Worker

@@ -11,8 +11,8 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, Transform
-from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
-from rosbot_patrol.patrol.rooms import Room, Rooms
+from rosbot_patrol.patrol.house.rooms import Room, Rooms
+from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
 from rosbot_patrol.ros.messages.convert import scan_from_msg, scan_to_msg
 from rosbot_patrol.ros.patrol import sight as patrol_eyes
 from rosbot_patrol.ros.patrol.sight import PatrolEyes

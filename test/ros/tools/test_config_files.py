@@ -19,10 +19,10 @@ from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
-from rosbot_patrol.patrol.arming import load_rules
-from rosbot_patrol.patrol.rooms import load_rooms
-from rosbot_patrol.patrol.schedule import load_schedule
-from rosbot_patrol.patrol.watch import WatchParams
+from rosbot_patrol.patrol.guard.arming import load_rules
+from rosbot_patrol.patrol.guard.schedule import load_schedule
+from rosbot_patrol.patrol.house.rooms import load_rooms
+from rosbot_patrol.patrol.intruder.sightings import WatchParams
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams

@@ -10,7 +10,7 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 
 from std_msgs.msg import String
 
-from rosbot_patrol.patrol.narration import AlertTelling, Narrator, Telling
+from rosbot_patrol.patrol.story.mission_story import AlertTelling, Narrator, Telling
 from rosbot_patrol.ros.tools import narrated_scenario as scenario_watch
 from rosbot_patrol.ros.tools.narrated_scenario import ScenarioWatch
 from rosbot_patrol.simulation.scenario import PLAYED

@@ -4,8 +4,8 @@ import json
 
 from rosbot_patrol.alerts.held import HeldNotices
 from rosbot_patrol.alerts.notice import Notice
-from rosbot_patrol.patrol.commands import Ignored
-from rosbot_patrol.patrol.ignored_log import MOST, IgnoredLog
+from rosbot_patrol.patrol.calls.ignored_log import MOST, IgnoredLog
+from rosbot_patrol.patrol.mission.commands import Ignored
 
 
 def test_a_notice_waits_and_is_gone_when_removed(tmp_path):

@@ -9,14 +9,15 @@ from collections.abc import Callable
 from floors import drawn_floor, points, scan_over
 
 from rosbot_patrol.geometry import Pose2D, wrap_angle
-from rosbot_patrol.patrol.coverage import sight_on_map
-from rosbot_patrol.patrol.eyes import Eyes, SightParams
-from rosbot_patrol.patrol.inputs import Box, Eye, Frame, GoalLink, GoalState, Inputs, Measured, ScanView
-from rosbot_patrol.patrol.judge import Judge
-from rosbot_patrol.patrol.manager import ManagerParams, PatrolManager
-from rosbot_patrol.patrol.mission import Phase
-from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
-from rosbot_patrol.patrol.rooms import Rooms
+from rosbot_patrol.goal import GoalLink, GoalState
+from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
+from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.mission.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
+from rosbot_patrol.patrol.mission.manager import ManagerParams, PatrolManager
+from rosbot_patrol.patrol.mission.record import Phase
+from rosbot_patrol.patrol.search.coverage import sight_on_map
+from rosbot_patrol.patrol.search.room_search import Eyes, SightParams
 
 WIDTH = 1.047
 HOUSE = (

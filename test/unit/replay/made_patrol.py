@@ -15,10 +15,10 @@ from rosbags.typesys import get_types_from_msg
 
 from rosbot_patrol import params
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.eyes import Eyes
-from rosbot_patrol.patrol.inputs import GoalState
-from rosbot_patrol.patrol.manager import PatrolManager
-from rosbot_patrol.patrol.node_params import NodeParams
+from rosbot_patrol.goal import GoalState
+from rosbot_patrol.patrol.mission.manager import PatrolManager
+from rosbot_patrol.patrol.mission.params import NodeParams
+from rosbot_patrol.patrol.search.room_search import Eyes
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "test" / "unit" / "patrol"))

@@ -15,7 +15,7 @@ from made_patrol import POINTS, RecordedWorld, looking
 
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.watch import Watch
+from rosbot_patrol.patrol.intruder.sightings import Watch
 from rosbot_patrol.replay import patrol_replay
 from rosbot_patrol.replay.bag import Bag
 from rosbot_patrol.replay.comparison import compare

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.inputs import Box, Frame
-from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
-from rosbot_patrol.patrol.person_place import Lens
-from rosbot_patrol.patrol.rooms import Room, Rooms
+from rosbot_patrol.patrol.house.rooms import Room, Rooms
+from rosbot_patrol.patrol.intruder.measure import Lens
+from rosbot_patrol.patrol.mission.inputs import Box, Frame
+from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
 from rosbot_patrol.replay.patrol_records import LensRecord
 from rosbot_patrol.replay.patrol_sight import HELD, PatrolSight
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
 from rosbot_patrol.simulation.sensor_places import read_sensors
 

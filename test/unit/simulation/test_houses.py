@@ -15,7 +15,7 @@ from rosbot_patrol.maps.distance_kernels import bounded_distances
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
 from rosbot_patrol.maps.raster import flood
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.floor_plan import floor_plan
 from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace, bearing_in_cone

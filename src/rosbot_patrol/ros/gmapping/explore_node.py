@@ -17,12 +17,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError, TransformError
+from rosbot_patrol.exploration.explorer import Explorer, ExplorerParams
+from rosbot_patrol.exploration.frontiers import Frontier
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.map_io import write_map
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.explorer import Explorer, ExplorerParams
-from rosbot_patrol.patrol.frontiers import Frontier
 from rosbot_patrol.ros.messages.convert import grid_from_msg
 from rosbot_patrol.ros.messages.fast_arrays import GridMsg
 from rosbot_patrol.ros.patrol.move_base import MoveBase

@@ -25,9 +25,9 @@ from rosbot_patrol.alerts.postman import Delivery
 from rosbot_patrol.alerts.wording import incident_notice, verdict_notice
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
-from rosbot_patrol.patrol.chronicle import Entry, person_room
-from rosbot_patrol.patrol.commands import Commands, Ignored, Notice, Release, Word
-from rosbot_patrol.patrol.ignored_log import IgnoredLog
+from rosbot_patrol.patrol.calls.ignored_log import IgnoredLog
+from rosbot_patrol.patrol.mission.commands import Commands, Ignored, Notice, Release, Word
+from rosbot_patrol.patrol.story.mission_log import Entry, person_room
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.patrol.pictures import PictureRing
 from rosbot_patrol.ros.post.outbox_owner import OwnerPost

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image
 
 from rosbot_patrol.errors import ImageError
-from rosbot_patrol.patrol.person_place import Depth, Lens
+from rosbot_patrol.patrol.intruder.measure import Depth, Lens
 from rosbot_patrol.ros.messages.images import picture_from_msg
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 

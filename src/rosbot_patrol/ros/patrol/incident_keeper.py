@@ -30,7 +30,7 @@ from rosbot_patrol.alerts.retention import RetentionParams, keep_reserve, make_r
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError, StoreError
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.chronicle import Entry
+from rosbot_patrol.patrol.story.mission_log import Entry
 from rosbot_patrol.ros.messages import convert
 from rosbot_patrol.ros.messages.fast_arrays import GridMsg
 from rosbot_patrol.ros.patrol.pictures import PictureRing

@@ -10,9 +10,9 @@ from pathlib import Path
 import rospy
 
 from rosbot_patrol.msg import SensorStates
-from rosbot_patrol.patrol.repeats import Repeats
-from rosbot_patrol.patrol.request import Request
-from rosbot_patrol.patrol.vigil import Vigil
+from rosbot_patrol.patrol.calls.liveness import Vigil
+from rosbot_patrol.patrol.calls.queue import Request
+from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.ros.runtime.node import now
 
 log = logging.getLogger(__name__)

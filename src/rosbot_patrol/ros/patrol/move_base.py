@@ -10,7 +10,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 
-from rosbot_patrol.patrol.inputs import Goal, GoalLink, GoalState
+from rosbot_patrol.goal import Goal, GoalLink, GoalState
 from rosbot_patrol.ros.messages import convert
 
 _ACTIVE = {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}

@@ -3,7 +3,7 @@
 Matches `patrol_robot` and `patrol_robot_simulation` of the tutorial: topics /motion_trigger,
 /darknet_ros/bounding_boxes, /cmd_vel, action move_base, parameters ~path_to_params, ~email_to, ~email_from.
 
-Differs: see rosbot_patrol.patrol.manager, .patrol.rooms, .patrol.spin and .alerts.mail; beyond the original it
+Differs: see rosbot_patrol.patrol.mission.manager, .patrol.rooms, .patrol.spin and .alerts.mail; beyond the original it
 publishes /patrol/state, /patrol/alerts and /patrol/arming, takes the action /patrol and the services /patrol/cancel,
 home, all, arm and emergency_stop, makes scheduled rounds, keeps its outbox, queue and incidents in ~state_dir, and
 stops the robot and gives up its goal when it is ended. Only one action client, one tf listener and one publisher are
@@ -33,21 +33,21 @@ from rosbot_patrol.alerts.picture import LabelledBox
 from rosbot_patrol.alerts.retention import RetentionParams
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.arming import Arming, ArmingRules, load_rules, read_memory
-from rosbot_patrol.patrol.chronicle import Chronicle
-from rosbot_patrol.patrol.commands import Commands, Word
-from rosbot_patrol.patrol.emergency import EmergencyStop
-from rosbot_patrol.patrol.eyes import Eyes
-from rosbot_patrol.patrol.inputs import Box, Inputs
-from rosbot_patrol.patrol.journal import Journal
-from rosbot_patrol.patrol.judge import Judge
-from rosbot_patrol.patrol.known_objects import load_known
-from rosbot_patrol.patrol.manager import PatrolManager
-from rosbot_patrol.patrol.mission import Phase
-from rosbot_patrol.patrol.request import Origin, Request
-from rosbot_patrol.patrol.rooms import Rooms, load_rooms
-from rosbot_patrol.patrol.schedule import Schedule, load_schedule
-from rosbot_patrol.patrol.store import PatrolStore
+from rosbot_patrol.patrol.calls.journal import Journal
+from rosbot_patrol.patrol.calls.queue import Origin, Request
+from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules, load_rules, read_memory
+from rosbot_patrol.patrol.guard.emergency import EmergencyStop
+from rosbot_patrol.patrol.guard.schedule import Schedule, load_schedule
+from rosbot_patrol.patrol.house.known_objects import load_known
+from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
+from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.mission.commands import Commands, Word
+from rosbot_patrol.patrol.mission.inputs import Box, Inputs
+from rosbot_patrol.patrol.mission.manager import PatrolManager
+from rosbot_patrol.patrol.mission.record import Phase
+from rosbot_patrol.patrol.mission.resume import PatrolStore
+from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.story.mission_log import Chronicle
 from rosbot_patrol.ros.patrol.action import PatrolActions
 from rosbot_patrol.ros.patrol.alert_desk import AlertDesk
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper, RecordParams

@@ -8,8 +8,8 @@ import time
 import rospy
 
 from rosbot_patrol.msg import SensorStates
-from rosbot_patrol.patrol.absence import Absence
-from rosbot_patrol.patrol.commands import Word
+from rosbot_patrol.patrol.guard.absence import Absence
+from rosbot_patrol.patrol.mission.commands import Word
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 
 log = logging.getLogger(__name__)

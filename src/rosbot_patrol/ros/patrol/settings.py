@@ -12,15 +12,14 @@ from rosbot_patrol.alerts.evidence import EvidenceParams
 from rosbot_patrol.alerts.retention import RetentionParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import declared
-from rosbot_patrol.patrol.battery import BatteryParams
-from rosbot_patrol.patrol.drive import DriveParams
-from rosbot_patrol.patrol.look import LookParams
-from rosbot_patrol.patrol.node_params import InputParams, NodeParams, manager_params
-from rosbot_patrol.patrol.queueing import PriorityParams
-from rosbot_patrol.patrol.rooms import Rooms
-from rosbot_patrol.patrol.schedule import Round
-from rosbot_patrol.patrol.settings import ManagerParams
-from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.calls.queue import PriorityParams
+from rosbot_patrol.patrol.guard.battery import BatteryParams
+from rosbot_patrol.patrol.guard.schedule import Round
+from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.mission.drive import DriveParams
+from rosbot_patrol.patrol.mission.look import LookParams
+from rosbot_patrol.patrol.mission.params import InputParams, ManagerParams, NodeParams, manager_params
+from rosbot_patrol.patrol.mission.turn import SpinParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
 from rosbot_patrol.ros.runtime.diagnostics import WARN, Health
 from rosbot_patrol.ros.runtime.node import load_params

@@ -22,14 +22,14 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.errors import LaserTilted, MapError, TransformError
 from rosbot_patrol.geometry import Pose2D, transform_points, wrap_angles
-from rosbot_patrol.patrol.floor import floor_of
-from rosbot_patrol.patrol.inputs import Box, Eye, Frame, ScanView
-from rosbot_patrol.patrol.node_params import EyesTopics, InputParams
-from rosbot_patrol.patrol.person_place import View, measure
-from rosbot_patrol.patrol.robot_place import RobotPlace
-from rosbot_patrol.patrol.room_regions import RoomRegions, part_rooms
-from rosbot_patrol.patrol.rooms import Rooms
-from rosbot_patrol.patrol.witness import off_the_map
+from rosbot_patrol.patrol.house.floor import floor_of
+from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
+from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
+from rosbot_patrol.patrol.intruder.measure import View, measure
+from rosbot_patrol.patrol.mission.inputs import Box, Eye, Frame, ScanView
+from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
+from rosbot_patrol.patrol.mission.robot_place import RobotPlace
 from rosbot_patrol.ros.messages import convert
 from rosbot_patrol.ros.messages.fast_arrays import GridMsg
 from rosbot_patrol.ros.patrol.depth_ring import DepthRing, Lenses

@@ -30,7 +30,7 @@ from rosbot_patrol.alerts.receipts import Receipt
 from rosbot_patrol.alerts.secrets_on_disk import refuse_secrets
 from rosbot_patrol.alerts.settings_file import Settings, write_settings
 from rosbot_patrol.alerts.spare_post import SparePost
-from rosbot_patrol.patrol.repeats import Repeats
+from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.ros.post.health import PostHealth
 from rosbot_patrol.ros.runtime.diagnostics import Health
 from rosbot_patrol.ros.runtime.node import Worker, ros_home

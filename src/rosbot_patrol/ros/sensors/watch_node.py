@@ -30,7 +30,7 @@ from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import Arming as ArmingMsg
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.bridge.links import links_from_msg
 from rosbot_patrol.ros.post.outbox_owner import RETRY, OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import Health

@@ -14,7 +14,7 @@ from pathlib import Path
 from PIL import Image, ImageDraw
 
 from rosbot_patrol.errors import PatrolError
-from rosbot_patrol.patrol.rooms import load_rooms
+from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.simulator.packages import model_folders, package_finder
 from rosbot_patrol.simulation.renderer import make_renderer
 from rosbot_patrol.simulation.sensor_places import read_sensors

@@ -16,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from rosbot_patrol.msg import EspTrigger, PatrolState, SensorEvent, SensorStates
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.rooms import Room, Rooms, load_rooms
+from rosbot_patrol.patrol.house.rooms import Room, Rooms, load_rooms
 from rosbot_patrol.ros.runtime.node import load_params, run_node
 from rosbot_patrol.simulation.motion_sensors import SensorPlace
 from rosbot_patrol.simulation.sensor_places import read_sensors

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import rospy
 from std_msgs.msg import String
 
-from rosbot_patrol.patrol.narration import Narrator
+from rosbot_patrol.patrol.story.mission_story import Narrator
 from rosbot_patrol.ros.runtime.node import now
 from rosbot_patrol.simulation.scenario import PLAYED, Expect, Outcome, disappointments, read_scenario
 

@@ -20,7 +20,7 @@ import rospy
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import Alert, EspTrigger, PatrolState
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.narration import AlertTelling, Narrator, Telling
+from rosbot_patrol.patrol.story.mission_story import AlertTelling, Narrator, Telling
 from rosbot_patrol.ros.runtime.by_hand import is_launched, require_publisher
 from rosbot_patrol.ros.runtime.node import load_params, run_node
 from rosbot_patrol.ros.tools.narrated_scenario import ScenarioWatch

@@ -27,11 +27,11 @@ from rosbot_patrol.images.compressed import CompressedParams
 from rosbot_patrol.images.compressed_depth import CompressedDepthParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import declared, table
-from rosbot_patrol.patrol.battery import BatteryParams
-from rosbot_patrol.patrol.drive import DriveParams
-from rosbot_patrol.patrol.look import LookParams
-from rosbot_patrol.patrol.queueing import PriorityParams
-from rosbot_patrol.patrol.spin import SpinParams
+from rosbot_patrol.patrol.calls.queue import PriorityParams
+from rosbot_patrol.patrol.guard.battery import BatteryParams
+from rosbot_patrol.patrol.mission.drive import DriveParams
+from rosbot_patrol.patrol.mission.look import LookParams
+from rosbot_patrol.patrol.mission.turn import SpinParams
 from rosbot_patrol.planning.dwa_params import DWAPlannerParams
 from rosbot_patrol.planning.global_planner import GlobalPlannerParams
 from rosbot_patrol.planning.navfn import NavfnParams

@@ -1,0 +1,173 @@
+"""Drives the robot to the borders of its map until there are none, and then home: a map without a hand on the keys."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.exploration.frontiers import Borders, Frontier, FrontierParams
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.goal import Goal, GoalLink, GoalState
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.params import param
+
+log = logging.getLogger(__name__)
+
+_SAME = 0.6  # so near to each other two borders are one [m]
+_NEARER = 0.15  # that is progress [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplorerParams:
+    """When to go on to another border."""
+
+    frontiers: FrontierParams = FrontierParams()
+    progress_timeout: float = param(30.0, unit="s", lo=1.0, doc="a goal that comes no nearer for so long is given up")
+    look_again: float = param(2.0, unit="s", lo=0.1, doc="between two looks at the map while driving")
+    map_patience: float = param(15.0, unit="s", lo=0.5, doc="longest wait for the map that shows what was seen")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """What to do now.
+
+    Attributes:
+        goal: to drive to, None: nothing new.
+        is_done: it is over.
+        text: what it is about.
+        frontiers: of the newest look at the map, None where it did not look.
+    """
+
+    goal: Goal | None = None
+    is_done: bool = False
+    text: str = ""
+    frontiers: tuple[Frontier, ...] | None = None
+
+
+class Explorer:
+    """Explores once.
+
+    Args:
+        params: when to go on.
+
+    Attributes:
+        left_out: borders that could not be reached, or that stayed when the robot stood there, in map [m].
+        area: floor that the map showed last [m2].
+    """
+
+    def __init__(self, params: ExplorerParams | None = None) -> None:
+        self.params = params or ExplorerParams()
+        self.left_out: list[tuple[float, float]] = []
+        self.area = 0.0
+        self._home: Pose2D | None = None
+        self._target: Frontier | None = None
+        self._goal: Goal | None = None
+        self._tags = itertools.count(1)
+        self._best, self._since, self._looked = math.inf, 0.0, -math.inf
+        self._arrived: tuple[float, int] | None = None  # when, and the number of the map then
+        self._goes_home = self._is_over = False
+
+    def step(self, now: float, grid: Grid | None, maps: int, pose: Pose2D | None, link: GoalLink) -> Step:
+        """Go on.
+
+        Args:
+            now: [s].
+            grid: the newest map.
+            maps: how many there were so far.
+            pose: of the robot in map.
+            link: what move_base says.
+        """
+        if self._is_over:
+            return Step(is_done=True, text="explored")
+        if grid is None or pose is None or not link.is_up:
+            missing = [("a map", grid is None), ("the robot's pose", pose is None), ("move_base", not link.is_up)]
+            return Step(text=f"waiting for {' and '.join(name for name, is_missing in missing if is_missing)}")
+        self._home = self._home or pose
+        state = link.state if self._goal is not None and link.tag == self._goal.tag else GoalState.ACTIVE
+        if self._goal is None:
+            return self._next(now, grid, pose)
+        if self._goes_home:
+            return self._home_step(now, pose, state)
+        assert self._target is not None
+        if state is GoalState.SUCCEEDED:
+            return self._look(now, grid, maps, pose)
+        if state is GoalState.FAILED or self._stalls(now, pose):
+            stalled = f"no progress for {self.params.progress_timeout:.0f} s"
+            reason = link.text or "move_base gave up" if state is GoalState.FAILED else stalled
+            log.warning("no way to the border at (%.1f, %.1f): %s", self._target.x, self._target.y, reason)
+            return self._leave_out(now, grid, pose)
+        if now - self._looked < self.params.look_again:
+            return Step(text=self._about)
+        self._looked = now
+        found = Borders(grid, pose, self.params.frontiers).frontiers()
+        if not any(_is_at(f, self._target) for f in found):  # it was seen on the way
+            return self._next(now, grid, pose)
+        return Step(text=self._about, frontiers=tuple(found))
+
+    @property
+    def _about(self) -> str:
+        t = self._target
+        return "" if t is None else f"driving to a border of {t.length:.1f} m at ({t.x:.1f}, {t.y:.1f})"
+
+    def _look(self, now: float, grid: Grid, maps: int, pose: Pose2D) -> Step:
+        """The robot stands at a border; the next map but one shows what it saw from there."""
+        if self._arrived is None:
+            self._arrived = now, maps
+        if maps < self._arrived[1] + 2 and now - self._arrived[0] < self.params.map_patience:
+            return Step(text="waiting for the map")
+        assert self._target is not None
+        if any(_is_at(f, self._target) for f in Borders(grid, pose, self.params.frontiers).frontiers()):
+            log.info("the border at (%.1f, %.1f) stays unknown from nearby", self._target.x, self._target.y)
+            return self._leave_out(now, grid, pose)
+        return self._next(now, grid, pose)
+
+    def _leave_out(self, now: float, grid: Grid, pose: Pose2D) -> Step:
+        assert self._target is not None
+        self.left_out.append((self._target.x, self._target.y))
+        return self._next(now, grid, pose)
+
+    def _next(self, now: float, grid: Grid, pose: Pose2D) -> Step:
+        borders = Borders(grid, pose, self.params.frontiers)
+        self.area, found = borders.area, borders.frontiers()
+        open_ = [f for f in found if not any(math.dist((f.x, f.y), place) < _SAME for place in self.left_out)]
+        self._looked = now
+        if not open_:
+            return self._drive_home(now, tuple(found))
+        self._target = open_[0]
+        self._send(now, self._target.goal)
+        log.info("%.0f m2 of floor known, %s; %s", self.area, count_of(len(open_), "border"), self._about)
+        return Step(goal=self._goal, text=self._about, frontiers=tuple(found))
+
+    def _drive_home(self, now: float, found: tuple[Frontier, ...]) -> Step:
+        assert self._home is not None
+        left = count_of(len(self.left_out), "border was", "borders were")
+        log.info("no border is left: %.0f m2 of floor known, %s left out", self.area, left)
+        self._goes_home, self._target = True, None
+        self._send(now, self._home)
+        return Step(goal=self._goal, text="explored, driving home", frontiers=found)
+
+    def _home_step(self, now: float, pose: Pose2D, state: GoalState) -> Step:
+        if state is GoalState.FAILED or self._stalls(now, pose):
+            log.warning("the way home failed: the robot stands at (%.1f, %.1f)", pose.x, pose.y)
+        elif state is not GoalState.SUCCEEDED:
+            return Step(text="explored, driving home")
+        self._is_over = True
+        return Step(is_done=True, text="explored")
+
+    def _send(self, now: float, pose: Pose2D) -> None:
+        self._goal = Goal(tag=f"explore-{next(self._tags)}", pose=pose)
+        self._best, self._since, self._arrived = math.inf, now, None
+
+    def _stalls(self, now: float, pose: Pose2D) -> bool:
+        assert self._goal is not None
+        gap = math.dist(pose[:2], self._goal.pose[:2])
+        if gap < self._best - _NEARER:
+            self._best, self._since = gap, now
+        return now - self._since > self.params.progress_timeout
+
+
+def _is_at(frontier: Frontier, other: Frontier) -> bool:
+    return math.dist((frontier.x, frontier.y), (other.x, other.y)) < max(_SAME, 0.5 * other.length)

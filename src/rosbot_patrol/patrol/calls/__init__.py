@@ -1,0 +1,1 @@
+"""Calls of the motion sensors: filtered, queued, written down."""

@@ -1,0 +1,1 @@
+"""Whether the guard is on duty: arming, schedule, emergency stop, battery, neighbours."""

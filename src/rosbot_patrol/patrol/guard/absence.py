@@ -1,0 +1,53 @@
+"""Whether a neighbour of the patrol has fallen silent, and when the owner is told: the sensors' watch."""
+
+from __future__ import annotations
+
+import math
+
+from rosbot_patrol.patrol.mission.commands import Word
+
+KIND = "the sensors' watch"
+
+
+class Absence:
+    """One neighbour. Times are of any monotonic clock [s].
+
+    Args:
+        silent_after: so long without a word it counts as gone [s].
+        told_after: so long it has to be gone before the owner is told, and to be back before that is told [s].
+    """
+
+    def __init__(self, silent_after: float, told_after: float) -> None:
+        self._silent_after, self._told_after = silent_after, told_after
+        self._heard = -math.inf
+        self._since = math.inf  # when what is not told yet was first seen
+        self._is_told = False
+
+    def heard(self, now: float) -> None:
+        """It has said something."""
+        self._heard = now
+
+    @property
+    def was_heard(self) -> bool:
+        """Whether it ever said something; one that is not there from the start is not missed."""
+        return self._heard > -math.inf
+
+    def silence(self, now: float) -> float:
+        """How long it has been gone [s], 0 where it is there, or never was."""
+        quiet = now - self._heard
+        return quiet if self.was_heard and quiet > self._silent_after else 0.0
+
+    def step(self, now: float) -> tuple[Word, ...]:
+        """What the owner is told now; call it often: what this program slept through is not held against it."""
+        is_gone = self.silence(now) > 0.0
+        if is_gone == self._is_told:
+            self._since = math.inf
+            return ()
+        self._since = min(self._since, now)
+        if now - self._since < self._told_after:
+            return ()
+        self._is_told = is_gone
+        text = "the program sensor_watch has gone, or hangs: nobody tells of motion sensors that fail. See its log"
+        if not is_gone:
+            text = "the program sensor_watch is heard again: it tells of motion sensors that fail"
+        return (Word(kind=KIND, text=text, is_over=not is_gone),)

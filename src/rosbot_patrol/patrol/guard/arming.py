@@ -1,0 +1,212 @@
+"""What is guarded: the modes armed_away, armed_home, night and disarmed, with delays to leave and to come in.
+
+- Arming runs through the exit delay first: a sensor that calls meanwhile starts no mission.
+- A call from an entry room begins the entry delay. The mission starts at once, and all it sees is kept; but notices
+  wait until the delay is over, and are dropped (and stay on record) where the owner disarms before.
+- Disarming ends at once what sensors and rounds called for.
+- A mode is kept over restarts. A fresh install is armed_away, without delays, so that the first patrol mails.
+- A clock that is set cannot make a delay longer than it is.
+- `armed` means armed_away.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import tzinfo
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol import params
+from rosbot_patrol.files import write_atomic
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.guard.modes import DISARMED, MODES, parse_mode, unknown_mode
+from rosbot_patrol.patrol.guard.wall_times import Window, parse_window, parse_zone
+from rosbot_patrol.patrol.house.rooms import Rooms, choose_rooms
+from rosbot_patrol.patrol.mission.inputs import Guarded
+from rosbot_patrol.yaml_files import read_mapping
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeSpec:
+    """What a mode guards: a group of each of armed_away, armed_home and night in the file."""
+
+    rooms: Any = param("all", doc="all, or a list of rooms by number or name, whose sensors count")
+    exit_delay: float = param(30.0, unit="s", lo=0.0, hi=600.0, doc="time to leave after arming")
+    entry_delay: float = param(0.0, unit="s", lo=0.0, hi=600.0, doc="so long notices wait after an entry room called")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmingFile:
+    """The keys of config/arming.yaml."""
+
+    first_mode: str = param("armed_away", choices=MODES, doc="mode of a fresh install")
+    entry_rooms: list[Any] = param([], doc="rooms, by number or name, through which people come in")
+    quiet_hours: list[Any] = param([], doc="windows {from, to, days} in which no round starts")
+    time_zone: str = param("", doc="of the quiet hours, such as Europe/Warsaw; empty: this machine's")
+    armed_away: ModeSpec = ModeSpec()
+    armed_home: ModeSpec = ModeSpec()
+    night: ModeSpec = ModeSpec()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mode:
+    """A mode as it holds in a house: rooms (None for all) and delays [s]."""
+
+    rooms: frozenset[int] | None = None
+    exit_delay: float = 0.0
+    entry_delay: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmingRules:
+    """The file, held against the rooms of the house."""
+
+    first_mode: str = "armed_away"
+    modes: Mapping[str, Mode] = field(default_factory=lambda: {name: Mode() for name in MODES})
+    entry_rooms: frozenset[int] = frozenset()
+    quiet_hours: tuple[Window, ...] = ()
+    zone: tzinfo | None = None
+
+
+def load_rules(path: str, rooms: Rooms) -> ArmingRules:
+    """Read config/arming.yaml; "" gives the rules without delays.
+
+    Raises:
+        ParamError: it cannot be read or is wrong; names the file and the key.
+    """
+    if not path:
+        return ArmingRules()
+    prefix = f"{path}: "
+    file = params.load_strict(ArmingFile, read_mapping(Path(path), keys="armed_away"), name=prefix)
+    modes = {DISARMED: Mode(rooms=frozenset())}
+    for name in MODES[:3]:
+        spec: ModeSpec = getattr(file, name)
+        chosen = choose_rooms(spec.rooms, rooms, f"{prefix}{name}/rooms")
+        kept = None if chosen is None else frozenset(chosen)
+        modes[name] = Mode(rooms=kept, exit_delay=spec.exit_delay, entry_delay=spec.entry_delay)
+    return ArmingRules(
+        first_mode=file.first_mode,
+        modes=modes,
+        entry_rooms=frozenset(choose_rooms(file.entry_rooms, rooms, f"{prefix}entry_rooms") or ()),
+        quiet_hours=tuple(parse_window(w, f"{prefix}quiet_hours[{i}]") for i, w in enumerate(file.quiet_hours)),
+        zone=parse_zone(file.time_zone, f"{prefix}time_zone"),
+    )
+
+
+class Arming:
+    """The mode and its delays.
+
+    Args:
+        rules: of the file.
+        memory: what `snapshot` gave before the program ended.
+
+    Attributes:
+        mode: one of MODES.
+    """
+
+    def __init__(self, rules: ArmingRules, memory: Mapping[str, Any] | None = None) -> None:
+        self._rules = rules
+        self.mode = rules.first_mode
+        self._exit_until: float | None = None
+        self._entry_until: float | None = None
+        self._seen: set[str] = set()
+        if memory:
+            self._recall(memory)
+
+    def snapshot(self) -> dict[str, Any]:
+        """What has to outlive the program, for JSON."""
+        return {"mode": self.mode, "exit_until": self._exit_until, "entry_until": self._entry_until}
+
+    def _recall(self, memory: Mapping[str, Any]) -> None:
+        if memory.get("mode") not in MODES:
+            log.error("the mode that was kept, %r, is none: the mode is %s", memory.get("mode"), self.mode)
+            return
+        self.mode = str(memory["mode"])
+        for name in ("exit_until", "entry_until"):
+            until = memory.get(name)
+            setattr(self, f"_{name}", float(until) if isinstance(until, (int, float)) else None)
+
+    def arm(self, name: str, wall: float) -> tuple[bool, str]:
+        """Change the mode.
+
+        Args:
+            name: of the mode, as people type it.
+            wall: seconds since 1970.
+
+        Returns:
+            Whether it was taken, and one sentence.
+        """
+        mode = parse_mode(name)
+        if mode is None:
+            return False, f"the mode {unknown_mode(name)}; the mode stays {self.mode}"
+        was, self.mode = self.mode, mode
+        self._entry_until = None
+        delay = self._rules.modes[mode].exit_delay if mode != DISARMED else 0.0
+        if was == mode and self._exit_until is None:
+            return True, f"the mode is {mode} already"
+        self._exit_until = wall + delay if delay else None
+        after = f"; it guards in {delay:.0f} s" if delay else ""
+        return True, f"the mode is {mode} now, it was {was}{after}"
+
+    def follow(self, missions: Mapping[str, int], wall: float) -> None:
+        """Begin the entry delay where a mission, by id, answers a call from an entry room that is new."""
+        delay = self._rules.modes[self.mode].entry_delay
+        for mission, room_id in missions.items():
+            if mission not in self._seen and room_id in self._rules.entry_rooms and delay and not self._entry_until:
+                self._entry_until = wall + delay
+                log.info("the entry delay runs for %.0f s: notices wait", delay)
+        self._seen = set(missions)
+
+    def step(self, wall: float) -> Guarded:
+        """What is guarded now, at `wall` seconds since 1970."""
+        mode = self._rules.modes[self.mode]
+        self._exit_until = _still(self._exit_until, wall, mode.exit_delay)
+        self._entry_until = _still(self._entry_until, wall, mode.entry_delay)
+        is_leaving = self._exit_until is not None
+        return Guarded(
+            mode=self.mode,
+            rooms=frozenset() if is_leaving or self.mode == DISARMED else mode.rooms,
+            why=self._why(wall),
+            is_quiet=any(window.contains(wall, self._rules.zone) for window in self._rules.quiet_hours),
+            holds_until=self._entry_until,
+        )
+
+    def exit_left(self, wall: float) -> float:
+        """Seconds of the exit delay that are left."""
+        return max(self._exit_until - wall, 0.0) if self._exit_until is not None else 0.0
+
+    def _why(self, wall: float) -> str:
+        if self.mode == DISARMED:
+            return "the house is disarmed"
+        if self._exit_until is not None:
+            return f"the exit delay of {self.mode} runs"
+        return ""
+
+
+def _still(until: float | None, wall: float, delay: float) -> float | None:
+    """The end of a delay while it runs; a clock that went back does not make it longer."""
+    return until if until is not None and 0.0 < until - wall <= delay else None
+
+
+def read_memory(path: Path) -> Mapping[str, Any]:
+    """What was kept of the mode; empty, and said, where it cannot be used."""
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(tree, dict):
+            raise ValueError("expected a group of values")
+        return tree
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as err:
+        log.error("%s cannot be used (%s): the mode is that of a fresh install", path, err)
+        return {}
+
+
+def write_memory(path: Path, memory: Mapping[str, Any]) -> None:
+    """Keep what `snapshot` gave. Raises OSError."""
+    write_atomic(path, json.dumps(memory, indent=1).encode())

@@ -1,0 +1,114 @@
+"""Whether the battery is low: two thresholds, so that a robot at rest whose battery recovers a little stays at home."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.mission.inputs import Battery
+
+log = logging.getLogger(__name__)
+
+_OTHER = 0.8  # below this part of battery_low_voltage it is another battery: cells are cut off before
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatteryParams:
+    """When to go home to charge."""
+
+    battery_low: float = param(0.2, lo=0.0, hi=1.0, doc="share of the charge below which the robot goes home")
+    battery_ok: float = param(0.4, lo=0.0, hi=1.0, doc="share of the charge from which on it patrols again")
+    battery_low_voltage: float = param(
+        10.8, unit="V", lo=0.0, doc="the same by voltage, for a battery without a share (ROSbot: 3 cells); 0: not used"
+    )
+    battery_ok_voltage: float = param(11.4, unit="V", lo=0.0, doc="voltage from which on it patrols again")
+    battery_voltage_first: bool = param(
+        False, doc="judge by voltage even if there is a share (TurtleBot3: its share is volts / 11.1)"
+    )
+    battery_timeout: float = param(
+        60.0, unit="s", lo=1.0, doc="a battery silent for longer is not known, and not low for that"
+    )
+
+
+def check_battery(params: BatteryParams, prefix: str = "") -> None:
+    """Raise ParamError where the thresholds contradict each other."""
+    if params.battery_ok <= params.battery_low:
+        raise ParamError(
+            f"{prefix}battery_ok", f"is {params.battery_ok:g}, expected more than battery_low {params.battery_low:g}"
+        )
+    low, ok = params.battery_low_voltage, params.battery_ok_voltage
+    if low and ok <= low:
+        raise ParamError(f"{prefix}battery_ok_voltage", f"is {ok:g}, expected more than battery_low_voltage {low:g}")
+
+
+def battery_of(share: float, voltage: float, *, is_present: bool, is_charging: bool = False) -> Battery:
+    """A battery from the fields of sensor_msgs/BatteryState.
+
+    Args:
+        share: field `percentage`. Drivers that do not measure it leave NaN, or C++'s 0 with `present` false.
+        voltage: [V]; NaN and 0 are unknown.
+        is_present: field `present`; drivers that leave it false may still tell a share.
+        is_charging: whether it hangs at the charger.
+    """
+    is_known = 0.0 <= share <= 1.0 and (share > 0.0 or is_present)
+    return Battery(
+        share=float(share) if is_known else None,
+        voltage=float(voltage) if math.isfinite(voltage) and voltage > 0.0 else None,
+        is_charging=is_charging,
+    )
+
+
+class BatteryWatch:
+    """Remembers whether the battery is low."""
+
+    def __init__(self, params: BatteryParams) -> None:
+        self._params = params
+        self._is_other_told = False
+        self.is_low = False
+        self.text = ""
+
+    def step(self, now: float, battery: Battery | None) -> bool:
+        """Look at the battery; whether `is_low` has changed.
+
+        Args:
+            now: steady time [s], as `battery.at`.
+            battery: what it last said.
+        """
+        was_low = self.is_low
+        if battery is None or now - battery.at > self._params.battery_timeout:
+            self.is_low = False
+            self.text = "the battery was low and is silent now" if was_low else ""
+        else:
+            self._judge(battery)
+        return self.is_low != was_low
+
+    def _judge(self, battery: Battery) -> None:
+        p = self._params
+        has_voltage = battery.voltage is not None and p.battery_low_voltage > 0.0
+        if battery.share is not None and not (has_voltage and p.battery_voltage_first):
+            self.text = f"{battery.share:.0%}"
+            self._compare(battery.share, p.battery_low, p.battery_ok)
+        elif battery.voltage is not None and has_voltage:
+            self._judge_voltage(battery.voltage)
+        else:
+            self.is_low, self.text = False, ""
+
+    def _judge_voltage(self, voltage: float) -> None:
+        p = self._params
+        self.text = f"{voltage:.1f} V"
+        if voltage >= _OTHER * p.battery_low_voltage:
+            self._compare(voltage, p.battery_low_voltage, p.battery_ok_voltage)
+        elif not self._is_other_told:
+            self._is_other_told = True
+            log.warning(
+                "the battery says %.1f V, and battery_low_voltage is %.1f V: not judged, as this must be another "
+                "battery; set battery_low_voltage and battery_ok_voltage for it, or 0 for none",
+                voltage,
+                p.battery_low_voltage,
+            )
+
+    def _compare(self, value: float, low: float, ok: float) -> None:
+        self.is_low = value < (ok if self.is_low else low)

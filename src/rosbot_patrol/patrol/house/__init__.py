@@ -1,0 +1,1 @@
+"""The house that is guarded: rooms, floor, known objects."""

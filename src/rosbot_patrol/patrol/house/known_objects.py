@@ -1,0 +1,61 @@
+"""The file of things in the house that look like somebody: a statue, a coat stand, a poster without depth.
+
+    objects:
+      - {name: statue in the hall, x: 2.1, y: 0.4, radius: 0.5, label: person}
+
+`label` may be left out: then no class of object alarms there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol import params
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.patrol.intruder.exclusions import Known
+from rosbot_patrol.yaml_files import read_mapping
+
+
+def _not_finite(value: float) -> str | None:
+    return None if math.isfinite(value) else f"is {value}, expected a finite number"
+
+
+def _bad_name(value: str) -> str | None:
+    return None if value.strip() and value.isprintable() else f"is {value!r}, expected one line of text"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Entry:
+    name: str = params.param(doc="for people", check=_bad_name)
+    x: float = params.param(unit="m", check=_not_finite)
+    y: float = params.param(unit="m", check=_not_finite)
+    radius: float = params.param(0.5, unit="m", lo=0.05, hi=5.0, doc="nothing within alarms")
+    label: str = params.param("", doc="class of object; empty: all of them")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _File:
+    objects: list[Any] = params.param(doc="one for each thing")
+
+
+def load_known(path: str | Path) -> tuple[Known, ...]:
+    """Read the file; nothing where the path is empty.
+
+    Raises:
+        ParamError: it cannot be read or is wrong; names the file and the key.
+    """
+    if not str(path):
+        return ()
+    path = Path(path).expanduser()
+    file = params.load(_File, read_mapping(path, keys="objects"), name=f"{path}: ")
+    return tuple(_known(entry, f"{path}: objects/{i}/") for i, entry in enumerate(file.objects))
+
+
+def _known(tree: Any, name: str) -> Known:
+    if not isinstance(tree, dict):
+        raise ParamError(name, f"is {tree!r}, expected name, x, y, and maybe radius and label")
+    entry = params.load(_Entry, tree, name=name)
+    return Known(x=entry.x, y=entry.y, radius=entry.radius, name=entry.name.strip(), label=entry.label)

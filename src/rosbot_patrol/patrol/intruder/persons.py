@@ -1,0 +1,99 @@
+"""Who was met on a mission: the same person once, another one as another.
+
+Somebody who is seen again near where they were last seen, or as far off as they can have walked, is the same. Somebody
+whose place is not known is the one that was seen last.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.mission.inputs import Measured
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeopleParams:
+    """When two sightings are of one person."""
+
+    same_person: float = param(1.0, unit="m", lo=0.1, doc="so near to where one was seen it is the same person")
+    walking_speed: float = param(1.0, unit="m/s", lo=0.0, doc="farther by this for each second that has passed")
+    walked_most: float = param(5.0, unit="m", lo=0.0, doc="but no farther: beyond it is somebody else")
+
+
+@dataclass(kw_only=True)
+class Person:
+    """One who was met.
+
+    Attributes:
+        number: from 1 on.
+        x: last place in map [m]; y: likewise; error: of it [m]; at: when [s].
+        sightings: how often confirmed; label: class of object; room: where, for people.
+    """
+
+    number: int
+    x: float | None
+    y: float | None
+    error: float
+    at: float
+    sightings: int = 0
+    label: str = ""
+    room: str = ""
+
+
+class People:
+    """Those met on one mission."""
+
+    def __init__(self, params: PeopleParams | None = None) -> None:
+        self.params = params or PeopleParams()
+        self.met: list[Person] = []
+
+    def recall(self, places: Iterable[tuple[float, float] | None], now: float) -> None:
+        """Those met before the program ended, as if they had been seen now."""
+        for place in places:
+            x, y = place or (None, None)
+            self.met.append(Person(number=len(self.met) + 1, x=x, y=y, error=0.3, at=now))
+
+    @property
+    def places(self) -> list[tuple[float, float] | None]:
+        """Where each was last."""
+        return [None if p.x is None or p.y is None else (p.x, p.y) for p in self.met]
+
+    def note(self, now: float, measured: Measured | None) -> tuple[Person, bool]:
+        """Somebody was confirmed; who it is, and whether for the first time."""
+        person = self._who(now, measured)
+        is_new = person is None
+        if person is None:
+            person = Person(number=len(self.met) + 1, x=None, y=None, error=math.inf, at=now)
+            self.met.append(person)
+        if measured is not None and (measured.error <= 2.0 * person.error or now - person.at > 1.0):
+            person.x, person.y, person.error = measured.x, measured.y, measured.error
+        person.at = now
+        person.sightings += 1
+        return person, is_new
+
+    def _who(self, now: float, measured: Measured | None) -> Person | None:
+        if not self.met:
+            return None
+        latest = max(self.met, key=lambda person: person.at)
+        if measured is None:
+            return latest
+        may_be = [person for person in self.met if self._gap(now, person, measured) <= 0.0]
+        return min(may_be, key=lambda person: _apart(person, measured), default=None)
+
+    def _gap(self, now: float, person: Person, measured: Measured) -> float:
+        """How much farther apart than one can have walked [m], 0 or less where it may be the same."""
+        p = self.params
+        if person.x is None or person.y is None:
+            return 0.0
+        walked = min(p.walking_speed * (now - person.at), p.walked_most)
+        return _apart(person, measured) - p.same_person - walked - min(measured.error, 1.0) - min(person.error, 1.0)
+
+
+def _apart(person: Person, measured: Measured) -> float:
+    """How far a place is from where a person was last [m], inf where that is not known."""
+    if person.x is None or person.y is None:
+        return math.inf
+    return math.hypot(measured.x - person.x, measured.y - person.y)

@@ -1,0 +1,60 @@
+"""What moves, is shown whole to the camera, and is taken for nobody: a pet, or a vacuum cleaner.
+
+A detector that is right about pets says nothing of them, so that nobody tells whose legs those were that stood right
+before the camera. Here the lidar tells: a thing that it follows, and that some pictures showed from so far off that a
+person would be seen whole, without a box of a person there, is none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Sequence
+
+from rosbot_patrol.geometry import angle_difference
+from rosbot_patrol.patrol.intruder.close_ups import Sighting
+from rosbot_patrol.patrol.intruder.lidar_motion import Thing
+from rosbot_patrol.patrol.intruder.second_looks import shows_whole
+from rosbot_patrol.patrol.mission.inputs import Box, Eye
+from rosbot_patrol.patrol.search.coverage import Sight
+
+_PICTURES = 8  # in a row, of the same thing
+_LATE = 0.5  # a thing that the lidar has not seen for so long is not where it was [s]
+_BESIDE = 0.15  # a box that begins so far beside a thing is of another [rad]
+_KEPT = 20
+
+
+class Harmless:
+    """Those of one mission."""
+
+    def __init__(self) -> None:
+        self._sightings: deque[Sighting] = deque(maxlen=_KEPT)
+
+    @property
+    def sightings(self) -> Sequence[Sighting]:
+        """Where something was that is no person."""
+        return tuple(self._sightings)
+
+    def look(self, now: float, eye: Eye, sight: Sight, boxes: Iterable[Box], things: Iterable[Thing]) -> None:
+        """Take in a picture.
+
+        Args:
+            now: [s].
+            eye: the camera when it was taken.
+            sight: how far one could look from there.
+            boxes: all that the detector found in it.
+            things: that the lidar follows.
+        """
+        people = [box for box in boxes if box.label == "person"]
+        for thing in things:
+            if not thing.has_moved or now - thing.at > _LATE or not shows_whole(eye, sight, thing.x, thing.y):
+                continue
+            thing.shown = 0 if any(_is_of(box, eye, thing) for box in people) else thing.shown + 1
+            if thing.shown >= _PICTURES:
+                self._sightings.append(Sighting(thing.x, thing.y, now))
+
+
+def _is_of(box: Box, eye: Eye, thing: Thing) -> bool:
+    bearing = math.atan2(thing.y - eye.pose.y, thing.x - eye.pose.x)
+    ahead = angle_difference(bearing, eye.pose.yaw)
+    return eye.bearing(box.xmax) - _BESIDE <= ahead <= eye.bearing(box.xmin) + _BESIDE

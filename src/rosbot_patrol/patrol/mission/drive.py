@@ -1,0 +1,118 @@
+"""Bring the robot to a pose by an action server that may be down, die, refuse or never end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rosbot_patrol.geometry import Pose2D, distance
+from rosbot_patrol.goal import Goal, GoalLink, GoalState
+from rosbot_patrol.params import param
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveParams:
+    """How long and how often to try to get somewhere."""
+
+    goal_timeout: float = param(
+        0.0, unit="s", lo=0.0, doc="longest drive; 0: 60 s and 40 s for each metre as the crow flies"
+    )
+    goal_attempts: int = param(2, lo=1, hi=20, doc="how often a goal is tried")
+    other_viewpoints: int = param(
+        3, lo=0, hi=20, doc="other free points of the room to try where its own cannot be reached, each once"
+    )
+    retry_delay: float = param(2.0, unit="s", lo=0.0, doc="pause before a goal is tried again")
+    server_wait: float = param(60.0, unit="s", lo=0.0, doc="how long to wait for move_base in one drive, in all")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveStep:
+    """What to do now.
+
+    Attributes:
+        goal: to be sent.
+        cancel: the goal that runs is to be given up.
+        waiting: for the action server.
+        reached: the pose is reached.
+        problem: why it will not be, "" while it may; is_down: as there is no action server.
+    """
+
+    goal: Goal | None = None
+    cancel: bool = False
+    waiting: bool = False
+    reached: bool = False
+    problem: str = ""
+    is_down: bool = False
+
+
+class Drive:
+    """One drive to one pose.
+
+    Args:
+        name: of the drive, unlike any other's: the stem of its goals' tags.
+        pose: in map.
+        params: bounds.
+    """
+
+    def __init__(self, name: str, pose: Pose2D, params: DriveParams) -> None:
+        self.params = params
+        self._name = name
+        self._pose = pose
+        self._sent = 0
+        self._failed = 0
+        self._tag = ""
+        self._last: float | None = None
+        self._waited = 0.0
+        self._driven = 0.0
+        self._retry_at: float | None = None
+        self._timeout: float | None = params.goal_timeout or None
+
+    def step(self, now: float, link: GoalLink, pose: Pose2D | None) -> DriveStep:
+        """Look at the goal's state, and decide."""
+        passed = 0.0 if self._last is None else now - self._last
+        self._last = now
+        if not link.is_up:
+            return self._wait(passed)
+        if self._retry_at is not None:
+            if now < self._retry_at:
+                return DriveStep()
+            self._retry_at = None
+        if not self._tag:
+            return self._send(pose)
+        if link.tag == self._tag and link.state is GoalState.SUCCEEDED:
+            return DriveStep(reached=True)
+        if link.tag == self._tag and link.state is GoalState.FAILED:
+            return self._again(now, link.text)
+        self._driven += passed
+        if self._timeout is not None and self._driven > self._timeout:
+            return DriveStep(cancel=True, problem=f"not there after {self._timeout:.0f} s")
+        return DriveStep()
+
+    def pause(self) -> None:
+        """The goal is given up by whoever calls this; the next step sends it again, and the pause does not count."""
+        self._tag = ""
+        self._retry_at = None
+        self._last = None
+
+    def _wait(self, passed: float) -> DriveStep:
+        self._tag = ""  # a server that comes back has forgotten the goal
+        self._retry_at = None
+        self._waited += passed
+        if self._waited > self.params.server_wait:
+            return DriveStep(is_down=True, problem=f"move_base did not answer for {self.params.server_wait:.0f} s")
+        return DriveStep(waiting=True)
+
+    def _send(self, pose: Pose2D | None) -> DriveStep:
+        if self._timeout is None:
+            self._timeout = 60.0 + 40.0 * (distance(pose, self._pose) if pose else 20.0)
+        self._sent += 1
+        self._tag = f"{self._name}/{self._sent}"
+        return DriveStep(goal=Goal(tag=self._tag, pose=self._pose))
+
+    def _again(self, now: float, text: str) -> DriveStep:
+        self._failed += 1
+        self._tag = ""
+        if self._failed >= self.params.goal_attempts:
+            tried = "" if self._failed == 1 else f", tried {self._failed} times"
+            return DriveStep(problem=f"move_base gave up{tried}: {(text or 'no reason given').rstrip('.')}")
+        self._retry_at = now + self.params.retry_delay
+        return DriveStep()

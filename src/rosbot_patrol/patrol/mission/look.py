@@ -1,0 +1,183 @@
+"""The look around in a room: one full turn before a live detector, and whether it may be relied on.
+
+The turn is measured in odom. Wheels slip, so that a full turn there may be several degrees off; where the pose in the
+map (amcl) says so, within reason, the rest is turned on top.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.geometry import Pose2D, angle_difference
+from rosbot_patrol.goal import Goal
+from rosbot_patrol.params import param
+from rosbot_patrol.patrol.mission.inputs import Inputs
+from rosbot_patrol.patrol.mission.turn import Spin, SpinParams
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookParams:
+    """What a look around needs to count."""
+
+    detector_timeout: float = param(3.0, unit="s", lo=0.1, doc="a detector silent for longer has not watched")
+    camera_timeout: float = param(3.0, unit="s", lo=0.1, doc="a camera silent for longer has not watched")
+    detector_wait: float = param(10.0, unit="s", lo=0.0, doc="wait this long for detector and camera before turning")
+    linger: float = param(1.0, unit="s", lo=0.0, hi=30.0, doc="wait after the turn for the detector's last pictures")
+    correction_min: float = param(
+        0.04, unit="rad", lo=0.01, doc="a turn is corrected where the map says it is off by this"
+    )
+    correction_max: float = param(
+        0.4, unit="rad", lo=0.0, hi=3.0, doc="off by more the pose in the map is not believed"
+    )
+    hold: float = param(2.0, unit="s", lo=0.0, hi=30.0, doc="stand still this long while something may be an intruder")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookStep:
+    """What to do now.
+
+    Attributes:
+        speed: turning speed [rad/s], None where the wheels are another's.
+        goal: to be driven to; cancel: give it up.
+        progress: a viewpoint is done, which has to outlive the program.
+        done: the look is over.
+        problem: why it does not count as a look at the whole room, "" where it does.
+        is_stuck: that is because the robot could not turn so far; what it saw, it saw.
+        why: what it does, for people.
+    """
+
+    speed: float | None = 0.0
+    goal: Goal | None = None
+    cancel: bool = False
+    progress: bool = False
+    done: bool = False
+    problem: str = ""
+    is_stuck: bool = False
+    why: str = ""
+
+
+class Look:
+    """One look around.
+
+    Args:
+        needs_camera: whether pictures come to this program, too, so that a silent camera can be told.
+        turn: to the left [rad]; 0 is a look ahead.
+    """
+
+    def __init__(
+        self, params: LookParams, spin: SpinParams, *, needs_camera: bool = True, turn: float = math.tau
+    ) -> None:
+        self.params = params
+        self.spin = Spin(turn, clockwise=False, params=spin)
+        self._needs_camera = needs_camera
+        self._began: float | None = None
+        self._turning = False
+        self._turning_since = math.inf
+        self._correction: Spin | None = None
+        self._spin_params = spin
+        self._map_yaw: float | None = None
+        self._map_turned = 0.0
+        self._turned_at: float | None = None
+        self._problem = self._stuck = ""
+        self._held_since: float | None = None
+        self._held_out_until = -math.inf
+
+    def step(self, now: float, inputs: Inputs, *, candidate: bool, held: bool = False) -> LookStep:
+        """Wait for the eyes, turn, linger.
+
+        Args:
+            now: time [s].
+            inputs: of this step.
+            candidate: something is in view that may become an intruder.
+            held: another has the wheels for now: measure what it turns, and wait.
+        """
+        if self._began is None:
+            self._began = now
+        if self._turned_at is not None:
+            self._turned_at = now if held else self._turned_at
+            return self._linger(now, inputs)
+        if not self._turning:
+            blind = self._blind(now, inputs)
+            if blind and now - self._began < self.params.detector_wait:
+                return LookStep(why=f"waiting before the turn: {blind}")
+            self._turning, self._turning_since = True, now
+        self._note_blindness(now, inputs)
+        self._measure_in_map(inputs.pose)
+        spin = self._correction or self.spin
+        step = spin.step(now, inputs.yaw, inputs.clearance, hold=held or self._hold(now, candidate))
+        if step.done and spin is self.spin and not step.problem and self._is_off():
+            self._correction = Spin(abs(self._left()), clockwise=self._left() < 0.0, params=self._spin_params)
+        elif step.done:
+            if spin is self.spin:  # a correction that fails takes nothing from the turn
+                self._stuck = step.problem
+            self._turned_at = now
+        return LookStep(speed=step.speed, why=f"turning to look around, {self._progress()}")
+
+    @property
+    def turned_deg(self) -> float:
+        """How far it has turned [deg]: by the map where that is believed, else by odom."""
+        by_map = abs(self._left()) <= self.params.correction_max
+        return math.degrees(self._map_turned) if by_map else self.spin.turned_deg
+
+    def _measure_in_map(self, pose: Pose2D | None) -> None:
+        if pose is None:
+            return
+        if self._map_yaw is not None:
+            self._map_turned += angle_difference(pose.yaw, self._map_yaw)
+        self._map_yaw = pose.yaw
+
+    def _left(self) -> float:
+        return self.spin.target - self._map_turned
+
+    def _is_off(self) -> bool:
+        return self.params.correction_min < abs(self._left()) <= self.params.correction_max
+
+    def _progress(self) -> str:
+        whole = math.degrees(self.spin.target)
+        return f"{max(self.spin.turned_deg, 0.0) // 30 * 30:.0f} of {whole:.0f} degrees"
+
+    def _linger(self, now: float, inputs: Inputs) -> LookStep:
+        assert self._turned_at is not None
+        self._note_blindness(now, inputs)
+        waited = now - self._turned_at
+        done = waited >= self.params.linger
+        problem = self._problem or self._stuck
+        is_stuck = bool(self._stuck) and not self._problem
+        return LookStep(done=done, problem=problem, is_stuck=is_stuck, why="waiting for the detector's last pictures")
+
+    def _note_blindness(self, now: float, inputs: Inputs) -> None:
+        if not self._problem:
+            self._problem = self._blind(now, inputs)
+
+    def _blind(self, now: float, inputs: Inputs) -> str:
+        silent = _silent(now, inputs.detector_at, self.params.detector_timeout)
+        if silent:
+            return f"the detector {silent}"
+        timeout = self.params.camera_timeout
+        if self._needs_camera and inputs.camera_at == -math.inf:
+            return "the camera has not shown anything"
+        if self._needs_camera and now - inputs.camera_at > timeout:
+            return f"the camera has shown nothing for more than {timeout:g} s"
+        same = max(inputs.camera_changed_at, self._turning_since)
+        if self._needs_camera and now - same > timeout:
+            return f"the camera showed the same picture for more than {timeout:g} s of turning"
+        return ""
+
+    def _hold(self, now: float, candidate: bool) -> bool:
+        if not candidate or now < self._held_out_until:
+            self._held_since = None
+            return False
+        if self._held_since is None:
+            self._held_since = now
+        if now - self._held_since > self.params.hold:
+            self._held_out_until = now + 1.5  # it had its chance: turn on past it
+            self._held_since = None
+            return False
+        return True
+
+
+def _silent(now: float, last: float, timeout: float) -> str:
+    if last == -math.inf:
+        return "has not been heard"
+    return f"was silent for more than {timeout:g} s" if now - last > timeout else ""

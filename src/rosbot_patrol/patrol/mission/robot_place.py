@@ -1,0 +1,71 @@
+"""Where the robot is now, from the newest transforms, none of which may be too old.
+
+Odometry comes often; the map's part (amcl's map -> odom) comes with each scan, and a slow amcl may take its time. The
+newest of both are put together, each with an age limit of its own: a localisation that has died gives no pose.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from rosbot_patrol.errors import TransformError
+from rosbot_patrol.geometry import Pose2D, compose
+from rosbot_patrol.patrol.mission.params import InputParams
+
+
+class Frames(Protocol):
+    """Planar transforms."""
+
+    def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
+        """The newest `target_from_source` and its stamp [s], 0 where nothing moves; raises TransformError."""
+
+
+class RobotPlace:
+    """Heading in odom and pose in the map.
+
+    Args:
+        frames: transforms.
+        params: names of the frames, and how old their transforms may be.
+
+    Attributes:
+        problem: why `pose` gave none last, "" where it gave one.
+    """
+
+    def __init__(self, frames: Frames, params: InputParams) -> None:
+        self._frames, self._params = frames, params
+        self.problem = ""
+
+    def yaw(self, now: float) -> float | None:
+        """Heading of the robot in odom [rad], None where it is not known now [s]."""
+        try:
+            return self._in_odom(now).yaw
+        except TransformError:
+            return None
+
+    def pose(self, now: float) -> Pose2D | None:
+        """The robot in the map, None where it is not known now [s]."""
+        try:
+            found = compose(self.map_from_odom(now), self._in_odom(now))
+        except TransformError as err:
+            self.problem = str(err)
+            return None
+        self.problem = ""
+        return found
+
+    def map_from_odom(self, now: float) -> Pose2D:
+        """The map's part of a pose of a time [s]; raises TransformError where it is too old for that."""
+        p = self._params
+        pose, stamp = self._frames.lookup_stamped(p.map_frame, p.odom_frame)
+        age = now - stamp  # amcl's stamps lie ahead by its transform_tolerance; a transform that never moves has 0
+        if stamp and age > p.map_timeout:
+            raise TransformError(
+                p.map_frame, p.odom_frame, f"the newest is {age:.1f} s old: does the localisation (amcl) still run?"
+            )
+        return pose
+
+    def _in_odom(self, now: float) -> Pose2D:
+        p = self._params
+        pose, stamp = self._frames.lookup_stamped(p.odom_frame, p.base_frame)
+        if abs(now - stamp) > p.pose_timeout:
+            raise TransformError(p.odom_frame, p.base_frame, f"the newest is {now - stamp:.1f} s old")
+        return pose

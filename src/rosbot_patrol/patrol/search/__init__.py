@@ -1,0 +1,1 @@
+"""Where in a room to look from, and how much of it has been seen."""

@@ -1,0 +1,1 @@
+"""What the patrol says about itself: status, narration, the log of a mission."""

@@ -1,0 +1,161 @@
+"""One plain sentence for each step of a patrol, for whoever watches `scripts/patrol`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from rosbot_patrol.patrol.mission.record import Phase, Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Telling:
+    """What the topics say: one /patrol/state."""
+
+    phase: str
+    why: str
+    mission: str = ""
+    room_id: int = 0
+    room_name: str = ""
+    last_verdict: str = ""
+
+    @property
+    def room(self) -> str:
+        """Number and name."""
+        return f"room {self.room_id} ({self.room_name})" if self.room_name else f"room {self.room_id}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlertTelling:
+    """What the topics say: one /patrol/alerts."""
+
+    id: str
+    room: str
+    object_class: str
+    probability: float
+    delivered: bool
+    transport: str
+    location: str
+
+
+@dataclass(kw_only=True)
+class MissionSummary:
+    """One mission as it was seen from outside; times in seconds of the narrator's clock."""
+
+    id: str
+    room_id: int
+    room_name: str
+    verdict: str = ""
+    why: str = ""
+    times: dict[str, float] = field(default_factory=dict)
+    seen: list[str] = field(default_factory=list)
+    mails: list[str] = field(default_factory=list)
+
+
+class Narrator:
+    """Turns what topics say into sentences, and keeps the summary."""
+
+    def __init__(self) -> None:
+        self.missions: list[MissionSummary] = []
+        self.on_guard_at: float | None = None
+        self.ended = 0
+        self.is_home = True
+        self._last: Telling | None = None
+        self._called: set[int] = set()
+
+    def trigger(self, room_id: int) -> list[str]:
+        """A motion sensor saw something; said once until a mission has answered it."""
+        if room_id in self._called:
+            return []
+        self._called.add(room_id)
+        return [f"Motion sensor {room_id} calls."]
+
+    def state(self, now: float, told: Telling) -> list[str]:
+        """The patrol's state was published."""
+        last, self._last = self._last, told
+        mission = self._mission(told)
+        if mission and told.phase not in mission.times:
+            mission.times[told.phase] = now
+        if last is not None and (last.phase, last.mission) == (told.phase, told.mission):
+            return self._news(last, told)
+        if told.phase == Phase.IDLE.value:
+            return self._idle(now, last, told)
+        if told.phase == Phase.STARTING.value:
+            return [f"Not yet on guard: {told.why}."]
+        return [self._step(told)]
+
+    def alert(self, told: AlertTelling) -> list[str]:
+        """An intruder was seen, or the mail about one has left."""
+        mission = next((m for m in self.missions if m.id == told.id), None)
+        if not told.delivered:
+            if mission:
+                mission.seen.append(told.object_class)
+            return [
+                f"INTRUDER: a {told.object_class} seen on the mission to {told.room},"
+                f" probability {told.probability:.2f}. The notice is on disk."
+            ]
+        if mission:
+            mission.mails.append(told.location)
+        if told.transport == "maildir":
+            return [f"The mail lies in {told.location}"]
+        return [f"The mail was sent to {told.location} by {told.transport}."]
+
+    def is_told(self, mission: MissionSummary) -> bool:
+        """Whether nothing more is to come of a mission that ended."""
+        return mission.verdict != Verdict.CONFIRMED.value or bool(mission.mails)
+
+    def summary(self) -> dict[str, Any]:
+        """All missions, for JSON."""
+        return {"on_guard_s": self.on_guard_at, "missions": [vars(mission) for mission in self.missions]}
+
+    def _mission(self, told: Telling) -> MissionSummary | None:
+        if not told.mission:
+            return None
+        found = next((m for m in self.missions if m.id == told.mission), None)
+        if found is None:
+            found = MissionSummary(id=told.mission, room_id=told.room_id, room_name=told.room_name)
+            self.missions.append(found)
+        return found
+
+    def _idle(self, now: float, last: Telling | None, told: Telling) -> list[str]:
+        if last is None or not last.mission:
+            if self.on_guard_at is not None:
+                return []
+            self.on_guard_at = now
+            extra = told.why.removeprefix("on guard").strip("; ")
+            return [f"On guard{f' ({extra})' if extra else ''}."]
+        mission = next(m for m in self.missions if m.id == last.mission)
+        mission.verdict, mission.why = told.last_verdict, told.why
+        mission.times["end"] = now
+        self.ended += 1
+        self._called.discard(mission.room_id)
+        self.is_home = "not at home" not in told.why
+        place = "Home again" if self.is_home else "Not home"
+        return [f"{place}. Verdict for {last.room}: {told.last_verdict}.", f"On guard ({_details(told.why)})."]
+
+    @staticmethod
+    def _news(last: Telling, told: Telling) -> list[str]:
+        if told.phase == Phase.STARTING.value and told.why != last.why:
+            return [f"Not yet on guard: {told.why}."]
+        if "waiting" in told.why and "waiting" not in last.why and "last pictures" not in told.why:
+            return [f"{told.why[:1].upper()}{told.why[1:]}."]
+        if "keeping the camera" in told.why and "keeping the camera" not in last.why:
+            return ["Somebody is in view: the camera is kept on them."]
+        if "driving to a further viewpoint" in told.why and "driving to a further viewpoint" not in last.why:
+            return [f"On to a further viewpoint in {told.room}."]
+        if "turning" in told.why and "turning" not in last.why:
+            once = "Turning once" if "of 360" in told.why else "Turning"
+            return [f"{once} to look around in {told.room}."]
+        return []
+
+    @staticmethod
+    def _step(told: Telling) -> str:
+        if told.phase == Phase.DRIVING.value:
+            return f"Driving to {told.room}."
+        if told.phase == Phase.LOOKING.value:
+            return f"Arrived in {told.room}."
+        return f"Driving home. {_details(told.why).removeprefix('driving home, ').capitalize()}."
+
+
+def _details(why: str) -> str:
+    return why.removeprefix("on guard, ").rstrip(".")

@@ -1,0 +1,101 @@
+"""What the patrol says of itself, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.patrol.calls.queue import MissionQueue
+from rosbot_patrol.patrol.house.rooms import Room
+from rosbot_patrol.patrol.intruder.sightings import Confirmation
+from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
+from rosbot_patrol.patrol.mission.commands import Report
+from rosbot_patrol.patrol.mission.record import Mission, Phase
+
+_WHERE = {Phase.DRIVING: "on the way to", Phase.LOOKING: "in"}
+
+
+def verdict(mission: Mission) -> str:
+    """The verdict so far and its reason."""
+    return f"{mission.verdict.value}: {mission.reason}" if mission.verdict else "without a verdict"
+
+
+def sighting(mission: Mission, seen: Confirmation, room: Room | None = None, *, is_outside: bool = False) -> str:
+    """That somebody was seen: first where they are, then where the robot was sent.
+
+    Args:
+        mission: that runs.
+        seen: what the detector saw.
+        room: in which the person is, None where that is not known.
+        is_outside: the person's place is known and lies in no room.
+    """
+    sure = f"probability {seen.probability:.2f} over {count_of(seen.pictures, 'picture')}"
+    place = ""
+    if seen.measured is not None:
+        about = "about " if seen.measured.error > 0.5 else ""
+        place = f", {about}at ({seen.measured.x:.1f}, {seen.measured.y:.1f})"
+    if room is not None and room.id != mission.room.id:
+        return f"{seen.label} seen in {room.title}{place}, {_robot(mission)}, {sure}"
+    if is_outside:
+        return f"{seen.label} seen in no room of the map{place}, {_robot(mission)}, {sure}"
+    where = _WHERE.get(mission.phase, "on the way back from")
+    return f"{seen.label} seen {where} {mission.room.title}{place}, {sure}"
+
+
+def _robot(mission: Mission) -> str:
+    """Where the robot was when it saw somebody elsewhere."""
+    where = "from" if mission.phase is Phase.LOOKING else _WHERE.get(mission.phase, "on the way back from")
+    return f"{where} {mission.room.title}"
+
+
+def clear(mission: Mission, turned_deg: float, refusals: Mapping[str, int]) -> str:
+    """That nobody was seen, and how thorough the look was."""
+    parts = [f"nobody seen in {mission.room.title}", f"turned {turned_deg:.0f} degrees"]
+    if mission.share_seen is not None:
+        parts.append(f"{mission.share_seen:.0%} of its floor seen")
+    if refusals:
+        parts.append(f"something like a person was no person: {max(refusals, key=lambda why: refusals[why])}")
+    return ", ".join(parts)
+
+
+def suspects(found: Iterable[Suspect]) -> tuple[str, ...]:
+    """What looked like somebody, for the record: where, how surely, from which sides."""
+    texts = []
+    for suspect in found:
+        sides = [
+            f"{count_of(len(side.scores), 'picture')} at {side.score:.2f} from ({side.eye.x:.1f}, {side.eye.y:.1f})"
+            for side in suspect.sides
+        ]
+        about = f"{suspect.label} at ({suspect.x:.2f}, {suspect.y:.2f})"
+        texts.append(f"{about}{', told' * suspect.is_told}: {'; '.join(sides)}")
+    return tuple(texts)
+
+
+def phase_text(mission: Mission) -> str:
+    """Where on its way a mission is."""
+    return f"{_WHERE.get(mission.phase, 'on the way back from')} {mission.room.title}"
+
+
+def rooms_open(mission: Mission | None, queue: MissionQueue) -> str:
+    """Rooms that have no verdict yet, "" where there are none."""
+    ids = ([mission.room.id] if mission else []) + list(queue.rooms)
+    return f"room{'s' * (len(ids) > 1)} {', '.join(map(str, ids))}" if ids else ""
+
+
+def report(
+    phase: Phase, why: str, mission: Mission | None, queue: MissionQueue, last_verdict: str, mode: str
+) -> Report:
+    """The state for people."""
+    about = Report(phase=phase, why=why, queue=queue.rooms, last_verdict=last_verdict, mode=mode)
+    if mission is None:
+        return about
+    return Report(
+        **{
+            **vars(about),
+            "mission": mission.id,
+            "room_id": mission.room.id,
+            "room_name": mission.room.name,
+            "origin": mission.origin.value,
+            "verdict": mission.verdict.value if mission.verdict else "",
+        }
+    )

@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from floors import TWO_ROOMS, drawn_floor, drawn_map
+
+from rosbot_patrol.errors import MapError
+from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.patrol.house.floor import _clearance, floor_of
+
+
+def test_floor_lies_where_the_map_has_it() -> None:
+    floor = drawn_floor(*TWO_ROOMS)
+    assert floor.info.resolution == pytest.approx(0.1)
+    assert floor.is_free(0.55, 0.55)
+    assert not floor.is_free(0.45, 0.55)
+    assert not floor.is_free(-5.0, 0.5)
+    assert floor.free.sum() * floor.cell_area == pytest.approx(114 * 0.25, rel=1e-6)
+
+
+def test_floor_of_unknown_cells_is_none() -> None:
+    floor = drawn_floor("..  ", "..  ")
+    assert floor.is_free(0.9, 0.5)
+    assert not floor.is_free(1.2, 0.5)
+
+
+def test_a_floor_at_the_edge_of_its_map_is_whole() -> None:
+    floor = drawn_floor("..", "..")
+    assert floor.free.sum() * floor.cell_area == pytest.approx(1.0)
+
+
+def test_clearance_is_exact() -> None:
+    rng = np.random.default_rng(1)
+    free = rng.random((30, 40)) > 0.03
+    free[[0, -1]] = free[:, [0, -1]] = False
+    found = _clearance(free, 9.0)
+    solid = np.argwhere(~free)
+    for y, x in np.ndindex(free.shape):
+        nearest = np.hypot(*(solid - [y, x]).T).min() if free[y, x] else 0.0
+        assert found[y, x] == pytest.approx(min(nearest, 9.0))
+
+
+def test_nearest_cell_of_a_mask() -> None:
+    floor = drawn_floor(*TWO_ROOMS)
+    ix, iy = floor.nearest(floor.free, 0.0, 0.8) or (0, 0)
+    assert floor.info.centre_of(ix, iy) == pytest.approx((0.55, 0.75), abs=0.11)
+    assert floor.nearest(floor.free, -3.0, 0.8, within=1.0) is None
+    assert floor.nearest(np.zeros(floor.info.shape, bool), 1.0, 1.0) is None
+
+
+def test_points_mark_what_is_near() -> None:
+    floor = drawn_floor(*TWO_ROOMS)
+    near = floor.mark_near(np.array([[2.05, 2.05], [99.0, 0.0]]), 0.3)
+    iy, ix = np.nonzero(near)
+    xs, ys = floor.centres(ix, iy)
+    assert np.hypot(xs - 2.05, ys - 2.05).max() <= 0.3 + 1e-9
+    assert near.sum() == 29
+
+
+def test_a_map_without_floor_is_refused_in_a_sentence() -> None:
+    with pytest.raises(MapError, match="no free cell"):
+        floor_of(drawn_map("##", "##"))
+
+
+def test_a_turned_map_is_refused() -> None:
+    grid = drawn_map("..")
+    info = GridInfo(resolution=0.05, width=grid.info.width, height=grid.info.height, yaw=math.pi / 4)
+    with pytest.raises(MapError, match="turned"):
+        floor_of(Grid(info, grid.cells))
