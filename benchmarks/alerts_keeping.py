@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.alerts.album import Sighting
-from rosbot_patrol.alerts.evidence import EvidenceParams, EvidenceRing
-from rosbot_patrol.alerts.incident import Event
-from rosbot_patrol.alerts.map_picture import crop_map
-from rosbot_patrol.alerts.picture import LabelledBox, RawPicture
+from rosbot_patrol.alerts.pictures.album import Sighting
+from rosbot_patrol.alerts.pictures.jpeg import LabelledBox, RawPicture
+from rosbot_patrol.alerts.pictures.map import crop_map
+from rosbot_patrol.alerts.pictures.ring import EvidenceParams, EvidenceRing
+from rosbot_patrol.alerts.records.incident import Event
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.patrol.house.rooms import Room

@@ -13,12 +13,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from rosbot_patrol.alerts.incident import Event, Incident, StoredFile
-from rosbot_patrol.alerts.incident_database import transaction
-from rosbot_patrol.alerts.incident_query import Query, find_incidents
-from rosbot_patrol.alerts.incident_rows import close_incident, insert_incident
-from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.alerts.incident_verify import verify
+from rosbot_patrol.alerts.records.database import close_incident, insert_incident, transaction
+from rosbot_patrol.alerts.records.incident import Event, Incident, StoredFile
+from rosbot_patrol.alerts.records.query import Query, find_incidents
+from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.records.verify import verify
 
 COUNT = 100_000
 ROOMS = ("Küche", "hall", "square room behind the door", "west alcove", "台所", "corridor", "library", "bathroom")

@@ -175,8 +175,8 @@ class House:
         return [n for i, n in enumerate(names) if i == 0 or names[i - 1] != n]
 
     def incident(self, incident_id):
-        from rosbot_patrol.alerts.incident_store import IncidentStore
-        from rosbot_patrol.alerts.incident_verify import verify
+        from rosbot_patrol.alerts.records.store import IncidentStore
+        from rosbot_patrol.alerts.records.verify import verify
 
         with IncidentStore(self.folder / "state", read_only=True) as store:
             done = verify(store)

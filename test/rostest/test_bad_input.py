@@ -32,9 +32,9 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import Process, free_port, wait_for
 
-from rosbot_patrol.alerts.incident import Incident
-from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.wording import incident_notice
+from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.post.texts import incident_notice
+from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.detection.darknet_cfg import read_cfg
 from rosbot_patrol.detection.darknet_weights import format_weights
 from rosbot_patrol.detection.random_weights import random_weights

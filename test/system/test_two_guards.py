@@ -13,8 +13,8 @@ pytest.importorskip("rosbot_patrol.ros.campaign.house", reason="the workspace is
 import rosgraph
 from rosbot_patrol.msg import PatrolState
 
-from rosbot_patrol.alerts.incident_query import Query, find_incidents
-from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.alerts.records.query import Query, find_incidents
+from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.ros.campaign.house import House
 from rosbot_patrol.ros.campaign.ports import free_port
 

@@ -6,13 +6,13 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.alerts.evidence import EvidenceParams, EvidenceRing
-from rosbot_patrol.alerts.incident import Event, Incident
-from rosbot_patrol.alerts.incident_files import NewFile
-from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.alerts.incident_verify import verify
-from rosbot_patrol.alerts.picture import RawPicture
-from rosbot_patrol.alerts.retention import RetentionParams
+from rosbot_patrol.alerts.pictures.jpeg import RawPicture
+from rosbot_patrol.alerts.pictures.ring import EvidenceParams, EvidenceRing
+from rosbot_patrol.alerts.records.files import NewFile
+from rosbot_patrol.alerts.records.incident import Event, Incident
+from rosbot_patrol.alerts.records.retention import RetentionParams
+from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.records.verify import verify
 from rosbot_patrol.patrol.story.mission_log import Entry
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN

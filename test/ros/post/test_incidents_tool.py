@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.alerts.incident import NO_ROOM, Event, Incident
-from rosbot_patrol.alerts.incident_files import NewFile
-from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.alerts.records.files import NewFile
+from rosbot_patrol.alerts.records.incident import NO_ROOM, Event, Incident
+from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.ros.post.incidents import _command_first, _parser, main
 
 

@@ -3,20 +3,15 @@
 import json
 import mailbox
 import socket
-import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit" / "alerts"))
-
 from smtp_server import SmtpServer
 
-from rosbot_patrol.alerts.channels import MailParams
-from rosbot_patrol.alerts.file_lock import FileLock
-from rosbot_patrol.alerts.notice import Notice
-from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.settings_file import Settings, write_settings
+from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.post.file_lock import FileLock
+from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.post.settings_file import Settings, write_settings
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.ros.post import notify as notify_tool
 

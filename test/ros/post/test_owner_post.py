@@ -3,19 +3,16 @@
 import errno
 import fcntl
 import shutil
-import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "unit" / "alerts"))
 
 from post import Box, channel, notice
 
-from rosbot_patrol.alerts.channels import MailParams
-from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.postman import Clocks
+from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.post.dispatcher import Clocks
+from rosbot_patrol.alerts.post.outbox import Outbox
 from rosbot_patrol.ros.post import outbox_owner as owner_mail
 from rosbot_patrol.ros.post.outbox_owner import OwnerPost
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK

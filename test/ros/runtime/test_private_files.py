@@ -10,12 +10,12 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.alerts.incident import Incident
-from rosbot_patrol.alerts.incident_files import NewFile
-from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.alerts.notice import Notice
-from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.postman import Postman
+from rosbot_patrol.alerts.post.dispatcher import Postman
+from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.records.files import NewFile
+from rosbot_patrol.alerts.records.incident import Incident
+from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.ros.runtime.private_files import keep_private
 
 

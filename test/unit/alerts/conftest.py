@@ -1,14 +1,11 @@
 import os
-import sys
 import tempfile
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from rosbot_patrol.alerts.incident import Incident
-from rosbot_patrol.alerts.mail import make_envelope
+from rosbot_patrol.alerts.channels.mail import make_envelope
+from rosbot_patrol.alerts.records.incident import Incident
 
 
 @pytest.fixture

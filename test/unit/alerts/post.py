@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from rosbot_patrol.alerts.channel import Channel, DeliveryError
-from rosbot_patrol.alerts.lane import Pace
-from rosbot_patrol.alerts.notice import Notice
-from rosbot_patrol.alerts.outbox import Outbox
-from rosbot_patrol.alerts.postman import Clocks, Postman
+from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
+from rosbot_patrol.alerts.post.channel_queue import Pace
+from rosbot_patrol.alerts.post.dispatcher import Clocks, Postman
+from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.post.outbox import Outbox
 
 
 class Time:

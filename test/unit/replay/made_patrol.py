@@ -21,7 +21,6 @@ from rosbot_patrol.patrol.mission.params import NodeParams
 from rosbot_patrol.patrol.search.room_search import Eyes
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "test" / "unit" / "patrol"))
 
 from patrol_world import ROOMS, World  # noqa: E402
 from patrol_world import looking as looking  # noqa: E402

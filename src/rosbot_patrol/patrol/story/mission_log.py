@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from rosbot_patrol.alerts.incident import NO_ROOM, Event, Incident
+from rosbot_patrol.alerts.records.incident import NO_ROOM, Event, Incident
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.mission.commands import Commands, Notice

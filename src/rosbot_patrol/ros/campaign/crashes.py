@@ -9,11 +9,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from rosbot_patrol.alerts.incident import Incident
-from rosbot_patrol.alerts.incident_database import NAME
-from rosbot_patrol.alerts.incident_json import load_incident
-from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.alerts.incident_verify import verify
+from rosbot_patrol.alerts.records.database import NAME
+from rosbot_patrol.alerts.records.incident import Incident
+from rosbot_patrol.alerts.records.incident_json import load_incident
+from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.records.verify import verify
 from rosbot_patrol.campaign.crash_ledger import Books, Journal, KeptRecord, balance, everything_killed, next_patrol
 from rosbot_patrol.campaign.crash_plan import plan_crashes
 from rosbot_patrol.campaign.plan import CONFIRMED

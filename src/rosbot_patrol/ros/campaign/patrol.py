@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rosbot_patrol.alerts.incident import Incident
-from rosbot_patrol.alerts.incident_database import NAME
-from rosbot_patrol.alerts.incident_store import IncidentStore
+from rosbot_patrol.alerts.records.database import NAME
+from rosbot_patrol.alerts.records.incident import Incident
+from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.campaign.crash_ledger import KeptMail
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses import load_house

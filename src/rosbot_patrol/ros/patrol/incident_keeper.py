@@ -16,17 +16,17 @@ from pathlib import Path
 
 import rospy
 
-from rosbot_patrol.alerts.album import Album, Sighting
-from rosbot_patrol.alerts.evidence import EvidenceParams
-from rosbot_patrol.alerts.incident import Event, Incident
-from rosbot_patrol.alerts.incident_files import REPORT, NewFile
-from rosbot_patrol.alerts.incident_query import Query, find_incidents
-from rosbot_patrol.alerts.incident_repair import close_abandoned, repair
-from rosbot_patrol.alerts.incident_report import write_report
-from rosbot_patrol.alerts.incident_salvage import open_store
-from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.alerts.map_picture import MapView, Marks, crop_map, draw_map, view_of_marks
-from rosbot_patrol.alerts.retention import RetentionParams, keep_reserve, make_room, prune
+from rosbot_patrol.alerts.pictures.album import Album, Sighting
+from rosbot_patrol.alerts.pictures.map import MapView, Marks, crop_map, draw_map, view_of_marks
+from rosbot_patrol.alerts.pictures.ring import EvidenceParams
+from rosbot_patrol.alerts.records.files import REPORT, NewFile
+from rosbot_patrol.alerts.records.incident import Event, Incident
+from rosbot_patrol.alerts.records.query import Query, find_incidents
+from rosbot_patrol.alerts.records.repair import close_abandoned, repair
+from rosbot_patrol.alerts.records.retention import RetentionParams, keep_reserve, make_room, prune
+from rosbot_patrol.alerts.records.salvage import open_store
+from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.report.page import write_report
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError, StoreError
 from rosbot_patrol.params import param

@@ -17,7 +17,7 @@ from darknet_ros_msgs.msg import BoundingBoxes, ObjectCount
 from sensor_msgs.msg import BatteryState
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
-from rosbot_patrol.alerts.incident import Event
+from rosbot_patrol.alerts.records.incident import Event
 from rosbot_patrol.errors import LaserTilted, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.msg import EspTrigger, SensorEvent

@@ -13,8 +13,8 @@ from collections import deque
 import rospy
 from sensor_msgs.msg import Image
 
-from rosbot_patrol.alerts.evidence import EvidenceParams, EvidenceRing
-from rosbot_patrol.alerts.picture import Picture, RawPicture
+from rosbot_patrol.alerts.pictures.jpeg import Picture, RawPicture
+from rosbot_patrol.alerts.pictures.ring import EvidenceParams, EvidenceRing
 from rosbot_patrol.ros.runtime.node import now
 
 _SAMPLED = 211  # one byte of so many is looked at: 4,367 of a picture of 640 x 480

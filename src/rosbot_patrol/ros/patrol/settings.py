@@ -7,9 +7,9 @@ from collections.abc import Callable
 from datetime import tzinfo
 from typing import Any, TypeVar
 
-from rosbot_patrol.alerts.channels import MailParams
-from rosbot_patrol.alerts.evidence import EvidenceParams
-from rosbot_patrol.alerts.retention import RetentionParams
+from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.pictures.ring import EvidenceParams
+from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import declared
 from rosbot_patrol.patrol.calls.queue import PriorityParams

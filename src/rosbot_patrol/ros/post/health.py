@@ -6,9 +6,9 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from rosbot_patrol.alerts.channels import MailParams
-from rosbot_patrol.alerts.postman import ChannelStatus, Postman
-from rosbot_patrol.alerts.settings_file import differences, state_of
+from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.post.dispatcher import ChannelStatus, Postman
+from rosbot_patrol.alerts.post.settings_file import differences, state_of
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 

@@ -21,14 +21,14 @@ from pathlib import Path
 
 from rosgraph.names import get_ros_namespace
 
-from rosbot_patrol.alerts.incident import NO_ROOM, VERDICTS, Incident, Place, clock_text, incident_to_plain
-from rosbot_patrol.alerts.incident_database import errors_of
-from rosbot_patrol.alerts.incident_files import REPORT
-from rosbot_patrol.alerts.incident_query import Found, Query, find_incidents
-from rosbot_patrol.alerts.incident_report import make_report
-from rosbot_patrol.alerts.incident_store import IncidentStore
-from rosbot_patrol.alerts.incident_verify import verify
-from rosbot_patrol.alerts.retention import RetentionParams, prune
+from rosbot_patrol.alerts.records.database import errors_of
+from rosbot_patrol.alerts.records.files import REPORT
+from rosbot_patrol.alerts.records.incident import NO_ROOM, VERDICTS, Incident, Place, clock_text, incident_to_plain
+from rosbot_patrol.alerts.records.query import Found, Query, find_incidents
+from rosbot_patrol.alerts.records.retention import RetentionParams, prune
+from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.records.verify import verify
+from rosbot_patrol.alerts.report.page import make_report
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import write_atomic

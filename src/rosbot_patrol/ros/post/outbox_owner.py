@@ -19,17 +19,17 @@ from typing import Any
 
 import rospy
 
-from rosbot_patrol.alerts.channels import MailParams, Surroundings, make_channels
-from rosbot_patrol.alerts.damaged import replacement
-from rosbot_patrol.alerts.disk_watch import DiskWatch
-from rosbot_patrol.alerts.network_state import network_mark
-from rosbot_patrol.alerts.notice import Notice
-from rosbot_patrol.alerts.outbox import DISK_FULL, Outbox
-from rosbot_patrol.alerts.postman import Delivery, Postman
-from rosbot_patrol.alerts.receipts import Receipt
-from rosbot_patrol.alerts.secrets_on_disk import refuse_secrets
-from rosbot_patrol.alerts.settings_file import Settings, write_settings
-from rosbot_patrol.alerts.spare_post import SparePost
+from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.channels.network_state import network_mark
+from rosbot_patrol.alerts.channels.secrets_on_disk import refuse_secrets
+from rosbot_patrol.alerts.post.damaged import replacement
+from rosbot_patrol.alerts.post.disk_watch import DiskWatch
+from rosbot_patrol.alerts.post.dispatcher import Delivery, Postman
+from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.post.outbox import DISK_FULL, Outbox
+from rosbot_patrol.alerts.post.receipts import Receipt
+from rosbot_patrol.alerts.post.settings_file import Settings, write_settings
+from rosbot_patrol.alerts.post.spare_post import SparePost
 from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.ros.post.health import PostHealth
 from rosbot_patrol.ros.runtime.diagnostics import Health

@@ -23,8 +23,8 @@ from typing import Any
 import rospy
 from std_msgs.msg import Empty
 
-from rosbot_patrol.alerts.channels import MailParams
-from rosbot_patrol.alerts.notice import Notice as PostNotice
+from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.post.notice import Notice as PostNotice
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.msg import Arming as ArmingMsg

@@ -7,9 +7,9 @@ import sys
 import typing
 from pathlib import Path
 
-from rosbot_patrol.alerts.channels import SPECS, MailParams
-from rosbot_patrol.alerts.evidence import EvidenceParams
-from rosbot_patrol.alerts.retention import RetentionParams
+from rosbot_patrol.alerts.channels.config import SPECS, MailParams
+from rosbot_patrol.alerts.pictures.ring import EvidenceParams
+from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.control.teleop import TeleopParams
 from rosbot_patrol.costmap.params import (

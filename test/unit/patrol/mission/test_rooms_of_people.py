@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 from patrol_world import PERSON, ROOMS, World, phase
 
-from rosbot_patrol.alerts.incident import NO_ROOM, Incident
+from rosbot_patrol.alerts.records.incident import NO_ROOM, Incident
 from rosbot_patrol.patrol.house.regions import NOBODYS
 from rosbot_patrol.patrol.mission.inputs import Measured
 from rosbot_patrol.patrol.mission.manager import PatrolManager

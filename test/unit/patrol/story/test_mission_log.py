@@ -2,7 +2,7 @@ import dataclasses
 
 import pytest
 
-from rosbot_patrol.alerts.incident import Event
+from rosbot_patrol.alerts.records.incident import Event
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.sightings import Confirmation

@@ -1,0 +1,85 @@
+"""What a channel is: a name, a way out, and what it is asked to take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from rosbot_patrol.alerts.post.channel_queue import Pace
+from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.post.outbox import Waiting
+from rosbot_patrol.errors import AlertError
+
+
+class DeliveryError(AlertError):
+    """A transport did not take a notice.
+
+    Args:
+        problem: what happened, and where.
+        permanent: it is this notice's fault: others may pass.
+        answered: the other side was there and did not want it now: it may be this notice's fault after all.
+        delay: that the other side asked for [s].
+        of_recipient: with `permanent`: it is the recipient's fault, whatever the notice is.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        permanent: bool = False,
+        answered: bool = False,
+        delay: float | None = None,
+        of_recipient: bool = False,
+    ) -> None:
+        super().__init__(problem)
+        self.permanent, self.answered, self.delay = permanent, answered, delay
+        self.of_recipient = of_recipient
+
+
+class Transport(Protocol):
+    """Takes notices."""
+
+    name: str
+
+    def describe(self) -> str:
+        """Where they go, for people."""
+
+    def send(self, notice: Notice) -> str:
+        """Deliver; returns the place (a file, the addresses, an answer). Never hangs. Raises DeliveryError."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One way to the owner.
+
+    Attributes:
+        name: for people, and in the receipts.
+        transport: how notices leave.
+        kinds: of notices that it takes; empty: all.
+        pace: how fast.
+        recipient: address that it carries to, where its channel in the configuration may have several.
+        group: what it is called in the configuration, where that gives several recipients, each a channel; else empty.
+    """
+
+    name: str
+    transport: Transport
+    kinds: tuple[str, ...] = ()
+    pace: Pace = field(default_factory=Pace)
+    recipient: str = ""
+    group: str = ""
+
+    @property
+    def names(self) -> frozenset[str]:
+        """What it is called now, and with other recipients beside it: NAME and NAME:ADDRESS."""
+        base = self.group or self.name
+        return frozenset((self.name, base, f"{base}:{self.recipient}" if self.recipient else base))
+
+    def takes(self, entry: Waiting) -> bool:
+        """Whether a notice is for this channel."""
+        if entry.channels:
+            return not self.names.isdisjoint(entry.channels)
+        return not self.kinds or entry.kind in self.kinds
+
+    def is_beside(self, other: Channel) -> bool:
+        """Whether both carry to recipients of one channel of the configuration."""
+        return self.name != other.name and bool(self.group) and self.group == other.group

@@ -1,0 +1,346 @@
+"""The channels: the tutorial's own from the parameters, more from a file.
+
+channels:
+phone:
+type: webhook
+url: https://hass.example.org/api/webhook/patrol
+secret_file: ~/.config/rosbot_patrol/webhook_secret
+kinds: [incident, fault]
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+from urllib.parse import urlsplit
+
+from rosbot_patrol.alerts.channels.channel import Channel, Transport
+from rosbot_patrol.alerts.channels.mail import Envelope, make_envelope
+from rosbot_patrol.alerts.channels.maildir import MaildirTransport
+from rosbot_patrol.alerts.channels.network_words import is_loopback
+from rosbot_patrol.alerts.channels.secrets_on_disk import read_secret, refuse_secrets, warn_where_open
+from rosbot_patrol.alerts.channels.sendmail import SENDMAILS, SendmailTransport, find_sendmail
+from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
+from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport, check_url
+from rosbot_patrol.alerts.post.channel_queue import Pace
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.params import load_strict, param, unknown_name
+from rosbot_patrol.yaml_files import read_mapping
+
+DEFAULT = "mail"
+PASSWORD_VARIABLE = "ROSBOT_PATROL_SMTP_PASSWORD"
+KINDS = ("incident", "verdict", "sensor", "fault", "test")
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,39}")
+_SECURITY = ("auto", "none", "starttls", "tls")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surroundings:
+    """What channels need of the machine: ROS's home, the environment, the host's name."""
+
+    home: Path
+    environ: Mapping[str, str]
+    host: str = "localhost"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MailParams:
+    """Whom to tell, and how."""
+
+    email_to: str = param("", doc="recipients, with commas between (the tutorial's name)")
+    email_from: str = param("", doc="sender (the tutorial's name)")
+    transport: str = param(
+        "auto",
+        choices=("auto", "sendmail", "smtp", "maildir"),
+        doc="auto: sendmail where email_to is a real address and a sendmail program is there, else maildir",
+    )
+    maildir: str = param("", doc="Maildir for mails on this disk; empty: rosbot_patrol/mail in ROS's home")
+    sendmail: str = param("", doc="path of the sendmail program; empty: where it usually is")
+    mail_interval: float = param(10.0, unit="s", lo=0.0, doc="least time between two mails; delays, never drops")
+    mail_timeout: float = param(
+        30.0, unit="s", lo=0.5, hi=600.0, doc="longest wait for an answer of a mail server or program"
+    )
+    mail_retry: float = param(5.0, unit="s", lo=0.1, hi=900.0, doc="wait after a failed delivery; doubles up to 900 s")
+    smtp_host: str = param("localhost", doc="mail server")
+    smtp_port: int = param(25, lo=1, hi=65535, doc="its port")
+    smtp_security: str = param("auto", choices=_SECURITY, doc="auto: starttls where it is offered")
+    smtp_user: str = param("", doc="login; empty: none")
+    smtp_password_file: str = param(
+        "", doc="file with the password, readable by its owner only; else the environment's " + PASSWORD_VARIABLE
+    )
+    smtp_ca_file: str = param("", doc="certificates to trust, where the mail server's is none of the system's")
+    smtp_allow_plaintext: bool = param(False, doc="send the login without TLS (smtp_security: none) to another machine")
+    channels: str = param("", doc="file of further channels (docs/alerts.md); empty: none")
+    notify_verdicts: list[str] = param(
+        [],
+        choices=("clear", "unreachable", "unverified"),
+        doc="missions that end so are told, too; that somebody was seen is told in any case (patrol_robot)",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelSpec:
+    """What every channel of the file has."""
+
+    type: str = param(choices=("sendmail", "smtp", "maildir", "webhook"), doc="how notices leave")
+    kinds: list[str] = param([], choices=KINDS, doc="of notices that it takes; empty: all")
+    interval: float = param(10.0, unit="s", lo=0.0, doc="least time between two messages; delays, never drops")
+    retry: float = param(5.0, unit="s", lo=0.1, hi=900.0, doc="wait after a failed delivery; doubles up to 900 s")
+    timeout: float = param(30.0, unit="s", lo=0.5, hi=600.0, doc="longest wait for an answer")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaildirSpec(ChannelSpec):
+    """A Maildir on this disk."""
+
+    folder: str = param("", doc="of the Maildir; empty: rosbot_patrol/mail in ROS's home")
+    to: str = param("", doc="recipients in the mails' headers")
+    sender: str = param("", name="from", doc="sender in the mails' headers")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SendmailSpec(ChannelSpec):
+    """A sendmail program."""
+
+    to: str = param(doc="recipients, with commas between")
+    sender: str = param("", name="from", doc="sender")
+    program: str = param("", doc="its path; empty: where it usually is")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmtpSpec(ChannelSpec):
+    """A mail server."""
+
+    to: str = param(doc="recipients, with commas between")
+    sender: str = param("", name="from", doc="sender")
+    host: str = param("localhost", doc="mail server")
+    port: int = param(25, lo=1, hi=65535, doc="its port")
+    security: str = param("auto", choices=_SECURITY, doc="auto: starttls where it is offered")
+    user: str = param("", doc="login; empty: none")
+    password_file: str = param("", doc="file with the password, of mode 600")
+    password_env: str = param("", doc="variable of the environment with the password")
+    ca_file: str = param("", doc="certificates to trust, where the server's is none of the system's")
+    allow_plaintext: bool = param(False, doc="send the login without TLS (security: none) to another machine")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WebhookSpec(ChannelSpec):
+    """A web address that takes JSON."""
+
+    url: str = param(doc="http or https; path and query are kept secret", check=check_url)
+    picture: bool = param(True, doc="send the picture, in base64")
+    secret_file: str = param("", doc="file with the secret of the signature, of mode 600")
+    secret_env: str = param("", doc="variable of the environment with that secret")
+    token_file: str = param("", doc="file with a bearer token, of mode 600")
+    token_env: str = param("", doc="variable of the environment with that token")
+    ca_file: str = param("", doc="certificates to trust, where the server's is none of the system's")
+    allow_plaintext: bool = param(False, doc="send the token over plain http to another machine")
+
+
+SPECS: Mapping[str, type[ChannelSpec]] = {
+    "maildir": MaildirSpec,
+    "sendmail": SendmailSpec,
+    "smtp": SmtpSpec,
+    "webhook": WebhookSpec,
+}
+
+
+def make_channels(params: MailParams, around: Surroundings, *, prefix: str = "~") -> list[Channel]:
+    """The default channel of the parameters, and those of the file; one that the file calls `mail` takes its place.
+
+    Args:
+        params: checked.
+        around: the machine.
+        prefix: of the parameters' names in messages.
+
+    Raises:
+        ParamError: names the parameter, or file and key.
+    """
+    more = load_channels(Path(params.channels).expanduser(), around) if params.channels else []
+    channels = [] if any(DEFAULT in c.names for c in more) else _default_channels(params, around, prefix)
+    channels += more
+    if not any(not channel.kinds or "incident" in channel.kinds for channel in channels):
+        raise ParamError(params.channels, "no channel takes the kind 'incident': nobody would be told of an intruder")
+    return channels
+
+
+def load_channels(path: Path, around: Surroundings) -> list[Channel]:
+    """The channels of a file; raises ParamError."""
+    tree = read_mapping(path, keys="channels", is_secret=True)  # the addresses of webhooks are secrets
+    for key in tree:
+        if key != "channels":
+            raise ParamError(f"{path}: {key}", unknown_name(str(key), ["channels"]))
+    channels = tree.get("channels")
+    if not isinstance(channels, dict) or not channels:
+        raise ParamError(f"{path}: channels", "expected one group of keys for each channel")
+    made = [_channels(str(name), given, f"{path}: channels/", around) for name, given in channels.items()]
+    found = [channel for several in made for channel in several]
+    if any(channel.transport.name == WebhookTransport.name for channel in found):
+        warn_where_open(path, "the address of a webhook")
+    return found
+
+
+def _channels(name: str, given: Any, prefix: str, around: Surroundings) -> list[Channel]:
+    if not _NAME.fullmatch(name):
+        raise ParamError(prefix + name, "expected a name of letters, digits, - and _")
+    prefix = f"{prefix}{name}/"
+    if not isinstance(given, dict):
+        raise ParamError(prefix, f"expected a group of keys, got {_shown(given)}")
+    refuse_secrets(given, name=prefix, place="in this file")
+    kind = given.get("type")
+    if not isinstance(kind, str) or kind not in SPECS:
+        expected = f"expected one of {', '.join(SPECS)}"
+        problem = f"is missing, {expected}" if kind is None else f"is {_shown(kind)}, {expected}"
+        raise ParamError(f"{prefix}type", problem)
+    if not isinstance(given.get("url", ""), str):
+        raise ParamError(f"{prefix}url", f"expected a text, got {_shown(given['url'])}")
+    spec = load_strict(SPECS[kind], given, name=prefix)
+    return _one_each(name, _Maker(prefix, around).make(spec, name), spec)
+
+
+def _shown(value: Any) -> str:
+    """A value of the file as it may be shown: what could hold a web address by its type only."""
+    is_short = isinstance(value, (str, int, float, type(None))) and "/" not in str(value)
+    return repr(value)[:40] if is_short else f"something else ({type(value).__name__})"
+
+
+def _one_each(name: str, transports: Mapping[str, Transport], spec: ChannelSpec) -> list[Channel]:
+    """A channel for each recipient, so that each has a queue, a back-off and receipts of its own."""
+    pace, kinds = Pace(interval=spec.interval, first_delay=spec.retry), tuple(spec.kinds)
+    if len(transports) == 1:
+        return [Channel(name=name, transport=t, kinds=kinds, pace=pace, recipient=to) for to, t in transports.items()]
+    return [
+        Channel(name=f"{name}:{to}", transport=t, kinds=kinds, pace=pace, recipient=to, group=name)
+        for to, t in transports.items()
+    ]
+
+
+def _default_channels(params: MailParams, around: Surroundings, prefix: str) -> list[Channel]:
+    names = {
+        "to": "email_to", "from": "email_from", "program": "sendmail", "security": "smtp_security",
+        "user": "smtp_user", "password_file": "smtp_password_file", "allow_plaintext": "smtp_allow_plaintext",
+    }  # fmt: skip
+    maker = _Maker(prefix, around, names)
+    envelope = maker.envelope(params.email_to, params.email_from)
+    kind = params.transport
+    if kind == "auto":
+        kind = "sendmail" if envelope.is_real and find_sendmail(params.sendmail) else "maildir"
+    common: dict[str, Any] = {"type": kind, "timeout": params.mail_timeout}
+    common |= {"interval": params.mail_interval, "retry": params.mail_retry}
+    common |= {"to": params.email_to, "sender": params.email_from}
+    specs: dict[str, ChannelSpec] = {
+        "maildir": MaildirSpec(**common, folder=params.maildir),
+        "sendmail": SendmailSpec(**common, program=params.sendmail),
+        "smtp": SmtpSpec(
+            **common,
+            host=params.smtp_host,
+            port=params.smtp_port,
+            security=params.smtp_security,
+            user=params.smtp_user,
+            password_file=params.smtp_password_file,
+            password_env=PASSWORD_VARIABLE,
+            ca_file=params.smtp_ca_file,
+            allow_plaintext=params.smtp_allow_plaintext,
+        ),
+    }
+    return _one_each(DEFAULT, maker.make(specs[kind], DEFAULT), specs[kind])
+
+
+class _Maker:
+    """Makes transports, and knows what their keys are called where they were given."""
+
+    _same: ClassVar[Mapping[str, str]] = {}
+
+    def __init__(self, prefix: str, around: Surroundings, names: Mapping[str, str] | None = None) -> None:
+        self._prefix, self._around, self._names = prefix, around, names or self._same
+
+    def make(self, spec: ChannelSpec, name: str) -> dict[str, Transport]:
+        """The transports of a channel by recipient, "" where it has none of its own; raises ParamError."""
+        if isinstance(spec, MaildirSpec):
+            folder = Path(spec.folder).expanduser() if spec.folder else self._around.home / "rosbot_patrol" / "mail"
+            return {"": MaildirTransport(folder, self.envelope(spec.to, spec.sender))}
+        if isinstance(spec, SendmailSpec):
+            return self._sendmail(spec)
+        if isinstance(spec, SmtpSpec):
+            return self._smtp(spec)
+        if isinstance(spec, WebhookSpec):
+            return {"": self._webhook(spec, name)}
+        raise TypeError(type(spec))
+
+    def envelope(self, to: str, sender: str) -> Envelope:
+        """Sender and recipients; raises ParamError."""
+        return make_envelope(to, sender, names=(self._name("to"), self._name("from")), host=self._around.host)
+
+    def _name(self, key: str) -> str:
+        return self._prefix + self._names.get(key, key)
+
+    def _real_envelope(self, to: str, sender: str, kind: str) -> Envelope:
+        envelope = self.envelope(to, sender)
+        if not envelope.is_real:
+            raise ParamError(self._name("to"), f"expected a real address for {kind}, got {to!r}")
+        return envelope
+
+    def _sendmail(self, spec: SendmailSpec) -> dict[str, Transport]:
+        envelope = self._real_envelope(spec.to, spec.sender, "sendmail")
+        program = find_sendmail(spec.program)
+        if program is None:
+            raise ParamError(self._name("program"), f"no program at {spec.program or ' or '.join(SENDMAILS)}")
+        return {copy.recipient: SendmailTransport(program, copy, spec.timeout) for copy in envelope.copies()}
+
+    def _smtp(self, spec: SmtpSpec) -> dict[str, Transport]:
+        envelope = self._real_envelope(spec.to, spec.sender, "smtp")
+        if spec.user and spec.security not in ("starttls", "tls"):
+            self._check_plain_login(spec)
+        server = SmtpServer(
+            host=spec.host,
+            port=spec.port,
+            security=spec.security,
+            user=spec.user,
+            password=self._secret("password", spec.password_file, spec.password_env) if spec.user else "",
+            timeout=spec.timeout,
+            ca_file=self._ca_file(spec.ca_file),
+        )
+        return {copy.recipient: SmtpTransport(server, copy) for copy in envelope.copies()}
+
+    def _check_plain_login(self, spec: SmtpSpec) -> None:
+        allow = self._names.get("allow_plaintext", "allow_plaintext")
+        if spec.security == "none" and (spec.allow_plaintext or is_loopback(spec.host)):
+            return
+        problem = f"expected starttls or tls where {self._names.get('user', 'user')} is given"
+        if spec.security == "none":
+            problem += f": without, everybody on the way reads the login; {allow}: true sends it all the same"
+        raise ParamError(self._name("security"), problem)
+
+    def _webhook(self, spec: WebhookSpec, name: str) -> Transport:
+        secret = spec.secret_file or spec.secret_env
+        token = spec.token_file or spec.token_env
+        parts = urlsplit(spec.url)
+        if token and parts.scheme == "http" and not (spec.allow_plaintext or is_loopback(parts.hostname or "")):
+            raise ParamError(
+                self._name("url"),
+                f"expected https://{parts.netloc}/... where a token is given: over http everybody on the way reads it;"
+                " allow_plaintext: true sends it all the same",
+            )
+        address = WebAddress(
+            url=spec.url,
+            name=name,
+            secret=self._secret("secret", spec.secret_file, spec.secret_env) if secret else "",
+            token=self._secret("token", spec.token_file, spec.token_env) if token else "",
+            with_picture=spec.picture,
+            timeout=spec.timeout,
+            ca_file=self._ca_file(spec.ca_file),
+        )
+        return WebhookTransport(address)
+
+    def _secret(self, what: str, file: str, variable: str) -> str:
+        return read_secret(self._name(f"{what}_file"), file, variable, self._around.environ)
+
+    def _ca_file(self, given: str) -> str:
+        path = os.path.expanduser(given)
+        if path and not os.access(path, os.R_OK):
+            raise ParamError(self._name("ca_file"), f"{path} cannot be read")
+        return path

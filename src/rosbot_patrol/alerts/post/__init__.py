@@ -1,0 +1,1 @@
+"""Notices to the owner: texts, outbox, dispatch, receipts."""

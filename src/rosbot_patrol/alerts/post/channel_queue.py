@@ -1,0 +1,227 @@
+"""One channel's queue: what leaves when. Order is kept, nothing is dropped.
+
+- A channel that is down is tried ever more seldom, with jitter, up to a quarter of an hour; all wait for the oldest.
+- A notice that the channel refuses for good lets the others pass and is tried again rarely. So does one that it did not
+  want "now" again and again, once it is seen to take the next one.
+- Between two messages lies `interval`. What is not urgent gathers meanwhile and leaves as one digest. An urgent notice
+  (an intruder) is never merged, and waits for no interval but that of the urgent one before it: what stands in front of
+  it leaves at once.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from rosbot_patrol.alerts.post.outbox import Waiting
+
+DIGEST_FROM = 3  # so many that are not urgent become one message
+DIGEST_MOST = 500
+DOUBTFUL = 6  # so many times not wanted, though the other side was there
+RARELY = (900.0, 21600.0)  # first and longest pause for a notice that was refused [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pace:
+    """How fast a channel goes.
+
+    Attributes:
+        interval: least time between two messages [s].
+        first_delay: after the first failure [s]; doubles with each to at most max_delay.
+        jitter: part of a delay that is left to chance, so that robots do not come all at once.
+    """
+
+    interval: float = 10.0
+    first_delay: float = 5.0
+    max_delay: float = 900.0
+    jitter: float = 0.2
+
+
+@dataclass
+class _Refusal:
+    times: int = 0
+    due: float = 0.0
+    error: str = ""
+    is_final: bool = False  # the other side said so; else it is our guess
+
+
+class Lane:
+    """What one channel has still to take.
+
+    Args:
+        pace: how fast.
+        rng: for the jitter.
+        last: when it took the last message before the program began [s].
+    """
+
+    def __init__(self, pace: Pace, rng: random.Random, *, last: float = float("-inf")) -> None:
+        self._pace, self._rng = pace, rng
+        self._queue: list[Waiting] = []
+        self._refused: dict[str, _Refusal] = {}
+        self._alone: set[str] = set()
+        self._unwanted: dict[str, int] = {}
+        self._last = self._last_urgent = last
+        self._failures = 0
+        self._blocked_until = self._last_try = float("-inf")
+        self._asked_until = float("-inf")  # by the other side, which wants to hear nothing before
+        self.down_since: float | None = None
+        self.error = ""
+
+    def __len__(self) -> int:
+        return len(self._queue)
+
+    @property
+    def oldest(self) -> Waiting | None:
+        """The first that waits."""
+        return self._queue[0] if self._queue else None
+
+    @property
+    def refused(self) -> list[tuple[Waiting, str]]:
+        """Those that the channel refused for good, and what it said."""
+        return [(entry, self._refused[entry.id].error) for entry in self._queue if entry.id in self._refused]
+
+    @property
+    def refused_for_good(self) -> list[tuple[Waiting, str]]:
+        """Of `refused` those that the other side called final; the others it did not want "now" too often."""
+        return [(entry, error) for entry, error in self.refused if self._refused[entry.id].is_final]
+
+    def offer(self, waiting: Iterable[Waiting]) -> None:
+        """Say what the channel has to take now, oldest first."""
+        self._queue = list(waiting)
+        ids = {entry.id for entry in self._queue}
+        self._refused = {name: state for name, state in self._refused.items() if name in ids}
+        self._alone &= ids
+        self._unwanted = {name: times for name, times in self._unwanted.items() if name in ids}
+
+    def due(self, now: float) -> list[Waiting]:
+        """What to send now as one message: nothing, one notice, or several for a digest."""
+        if now < self._blocked_until:
+            return []
+        open_ = [e for e in self._queue if e.id not in self._refused or self._refused[e.id].due <= now]
+        if not open_:
+            return []
+        if len(open_) > 1 and self._is_doubtful(open_[0]) and self._failures % 2:
+            return open_[1:2]  # does it take any?
+        may_urgent = now >= self._last_urgent + self._pace.interval
+        if open_[0].is_urgent:
+            return open_[:1] if may_urgent else []
+        hurry = may_urgent and any(entry.is_urgent for entry in open_)
+        if now < self._last + self._pace.interval and not hurry:
+            return []
+        return self._together(open_)
+
+    def wait(self, now: float) -> float | None:
+        """How long until `due` may give something [s], None where nothing waits."""
+        if not self._queue:
+            return None
+        refused = self._refused
+        first = min(refused[e.id].due if e.id in refused else float("-inf") for e in self._queue)
+        urgent = any(entry.is_urgent and entry.id not in refused for entry in self._queue)
+        gate = (self._last_urgent if urgent else self._last) + self._pace.interval
+        return max(max(first, self._blocked_until, gate) - now, 0.0)
+
+    def delivered(self, batch: Sequence[Waiting], now: float) -> None:
+        """A message was taken."""
+        for entry in self._queue:
+            if entry.id == batch[0].id:
+                break
+            if self._is_doubtful(entry):  # it took a younger one: once more, and then rarely
+                self._refused.setdefault(entry.id, _Refusal(due=now, error=self.error))
+        ids = {entry.id for entry in batch}
+        self._queue = [entry for entry in self._queue if entry.id not in ids]
+        for name in ids:
+            self._refused.pop(name, None)
+        self._last = now
+        if any(entry.is_urgent for entry in batch):
+            self._last_urgent = now
+        self._is_up()
+
+    def failed(
+        self,
+        batch: Sequence[Waiting],
+        now: float,
+        error: str,
+        *,
+        permanent: bool = False,
+        answered: bool = False,
+        delay: float | None = None,
+        of_recipient: bool = False,
+    ) -> float:
+        """A message was not taken; returns how long it is put off [s].
+
+        Args:
+            batch: that was tried.
+            now: time [s].
+            error: why.
+            permanent: the fault is this message's, the others may pass.
+            answered: the other side was there and did not want it now.
+            delay: that the other side asked for [s].
+            of_recipient: with `permanent`: the fault is the recipient's. So a digest is not taken apart, and the next
+                message waits for `interval`: servers lock out who asks for unknown users again and again.
+        """
+        self._last_try = now
+        self.error = error
+        is_final = permanent
+        if answered:
+            for entry in batch:
+                self._unwanted[entry.id] = self._unwanted.get(entry.id, 0) + 1
+            permanent = permanent or any(entry.id in self._refused for entry in batch)
+        if permanent:
+            self._is_up(error)
+            if of_recipient:
+                self._blocked_until = now + self._pace.interval
+                return max(self._refuse([entry], now, error, is_final=is_final) for entry in batch)
+            return self._refuse(batch, now, error, is_final=is_final)
+        self._failures += 1
+        if self.down_since is None:
+            self.down_since = now
+        put_off = self._jittered(self._pace.first_delay * 2.0 ** min(self._failures - 1, 30))
+        if delay is not None:
+            put_off = max(put_off, min(delay, self._pace.max_delay))
+            self._asked_until = now + min(delay, self._pace.max_delay)
+        self._blocked_until = now + put_off
+        return put_off
+
+    def nudge(self, now: float, *, all_: bool = False) -> None:
+        """Something speaks for trying again at once: a new notice, a network that came back.
+
+        Args:
+            now: time [s].
+            all_: what was refused, too, and without a pause since the last try, even one that the other side asked for.
+        """
+        soonest = now if all_ else max(now, self._last_try + self._pace.first_delay, self._asked_until)
+        self._blocked_until = min(self._blocked_until, soonest)
+        if all_:
+            for state in self._refused.values():
+                state.due = now
+
+    def _together(self, open_: Sequence[Waiting]) -> list[Waiting]:
+        run: list[Waiting] = []
+        for entry in open_:
+            if entry.is_urgent or entry.id in self._alone:
+                break
+            run.append(entry)
+        return run[:DIGEST_MOST] if len(run) >= DIGEST_FROM else list(open_[:1])
+
+    def _is_doubtful(self, entry: Waiting) -> bool:
+        return self._unwanted.get(entry.id, 0) >= DOUBTFUL and entry.id not in self._refused
+
+    def _refuse(self, batch: Sequence[Waiting], now: float, error: str, *, is_final: bool) -> float:
+        if len(batch) > 1:  # one of them is to blame: each by itself, then
+            self._alone |= {entry.id for entry in batch}
+            return 0.0
+        state = self._refused.setdefault(batch[0].id, _Refusal())
+        state.times += 1
+        state.error, state.is_final = error, is_final
+        put_off = min(RARELY[0] * 2.0 ** min(state.times - 1, 20), RARELY[1])
+        state.due = now + put_off
+        return put_off
+
+    def _is_up(self, error: str = "") -> None:
+        self._failures, self._blocked_until, self._asked_until = 0, float("-inf"), float("-inf")
+        self.down_since, self.error = None, error
+
+    def _jittered(self, delay: float) -> float:
+        shift = 1.0 + self._pace.jitter * (2.0 * self._rng.random() - 1.0)
+        return min(delay * shift, self._pace.max_delay)

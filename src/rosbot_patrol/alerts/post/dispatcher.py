@@ -1,0 +1,463 @@
+"""Brings what waits in the outbox to its channels. Of all processes that could, one does at a time.
+
+Whoever holds the outbox's lock delivers for everybody; the system takes the lock back however that process ends, and
+the next that asks has it. One that hangs loses it to the next when it has given no sign of life for a while; if it goes
+on, it sees that before it sends anything more. A notice is crossed out for a channel once that took it: after a crash
+or a hang between the two it goes to that channel again, with the same id (as Message-ID, file name or idempotency key).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import random
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
+from rosbot_patrol.alerts.channels.mail import token
+from rosbot_patrol.alerts.post.channel_queue import Lane
+from rosbot_patrol.alerts.post.digest import merge
+from rosbot_patrol.alerts.post.file_lock import STALE, FileLock, NoLock
+from rosbot_patrol.alerts.post.memory_outbox import MemoryOutbox
+from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.post.outbox import Outbox, Waiting
+from rosbot_patrol.alerts.post.receipts import Receipt, Receipts
+from rosbot_patrol.alerts.post.upgrade import adopt_mails
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.files import write_atomic
+
+log = logging.getLogger(__name__)
+
+STATUS = "status.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delivery:
+    """What became of a message: taken at `where`, or put off; `text` says so."""
+
+    channel: str
+    transport: str
+    ids: tuple[str, ...]
+    delivered: bool
+    permanent: bool = False
+    where: str = ""
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChannelStatus:
+    """How a channel does.
+
+    Attributes:
+        name: of the channel; describe: where it goes.
+        waiting: how many it has still to take; since: when the oldest of them happened, seconds since 1970.
+        refused: how many of them it refused for good.
+        down_for: so long it has not taken what it should [s]; None: it does.
+        error: what it said last, "" where all is well.
+        refusal: why it refused for good what it was asked for last, "" where it took that.
+        next_try: in so long [s], None where nothing waits.
+    """
+
+    name: str
+    describe: str
+    waiting: int
+    since: float | None
+    refused: int
+    down_for: float | None
+    error: str
+    next_try: float | None
+    refusal: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clocks:
+    """The times of day and of the machine [s]; tests give their own."""
+
+    now: Callable[[], float] = time.monotonic
+    wall: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_REALTIME)
+
+
+class Postman:
+    """Owns the channels, and, where it holds the lock, the deliveries.
+
+    Args:
+        outbox: notices on disk; those in memory are this process's alone.
+        channels: ways out.
+        who: this process, for people.
+        clocks: time.
+        seed: for the jitter.
+        legacy: folders of mails that the version before left.
+        down_after: a channel that is down for so long is told on the others [s].
+        stale_after: who gave no sign of life for so long delivers no more [s].
+    """
+
+    def __init__(
+        self,
+        outbox: Outbox | MemoryOutbox,
+        channels: Sequence[Channel],
+        *,
+        who: str = "",
+        clocks: Clocks | None = None,
+        seed: int | None = None,
+        legacy: Sequence[Path] = (),
+        down_after: float = 1800.0,
+        stale_after: float = STALE,
+    ) -> None:
+        self.outbox = outbox
+        self.channels = {channel.name: channel for channel in channels}
+        self._clocks = clocks or Clocks()
+        self.receipts = Receipts(None)
+        self.lock: FileLock | NoLock = NoLock()
+        if isinstance(outbox, Outbox):
+            self.receipts = Receipts(outbox.folder / "taken.jsonl")
+            self.lock = FileLock(outbox.folder / "lock", who, stale_after=stale_after, clock=self._clocks.now)
+        self._rng = random.Random(seed)
+        self._legacy, self._down_after, self._stale_after = legacy, down_after, stale_after
+        self._lanes: dict[str, Lane] = {}
+        self._unwritten: list[Receipt] = []
+        self._waiting: list[Waiting] = []
+        self._guard = threading.RLock()
+
+    @property
+    def is_delivering(self) -> bool:
+        """Whether this process is the one that delivers."""
+        return self.lock.is_held and bool(self._lanes)
+
+    @property
+    def has_trouble(self) -> bool:
+        """Whether a channel does not take what it should."""
+        with self._guard:
+            return any(lane.down_since is not None for lane in self._lanes.values())
+
+    def take_over(self) -> bool:
+        """Become the one that delivers, where nobody is, or who is hangs; else say that this one lives.
+
+        Call it again and again. Raises OSError.
+        """
+        with self._guard:
+            self._mind_the_lock()
+            if self.is_delivering:
+                self.lock.beat()
+                return True
+            self.outbox.make()
+            if not self.lock.take():
+                return False
+            if self.lock.seized_from:
+                who, silent = self.lock.seized_from, self._stale_after
+                log.error("%s, which delivered the notices, gave no sign of life for %.0f s: taking over", who, silent)
+            self._adopt()
+            self._read_receipts()
+            now, wall = self._clocks.now(), self._clocks.wall()
+            for name, channel in self.channels.items():
+                ago = max(wall - self.receipts.last.get(name, float("-inf")), 0.0)
+                self._lanes[name] = Lane(channel.pace, self._rng, last=now - ago)
+            self.refresh()
+            self.receipts.compact(entry.id for entry in self._waiting)
+            return True
+
+    def hand_over(self) -> None:
+        """Stop delivering; another process may."""
+        with self._guard:
+            self._lanes.clear()
+            self.lock.release()
+
+    def refresh(self) -> None:
+        """Look at what waits on disk; only where this process delivers. Raises OSError."""
+        with self._guard:
+            before = {entry.name for entry in self._waiting}
+            self._waiting = self.outbox.waiting()
+            self._read_receipts()  # after the look at the folder: another program writes receipts before the notice
+            for name, lane in self._lanes.items():
+                self._offer(name)
+                if any(entry.name not in before for entry in self._waiting):
+                    lane.nudge(self._clocks.now())
+            self._write_receipts()  # the lanes first: they need no disk that takes anything
+            self._settle_refusals()
+            self._finish()
+            self.outbox.tidy()
+
+    def learn(self, receipt: Receipt) -> None:
+        """Notices went to a channel past this object: it sends them there no more."""
+        with self._guard:
+            self.receipts.note(receipt)
+            if lane := self._lanes.get(receipt.channel):
+                lane.offer(e for e in self._waiting if self._is_open(e, receipt.channel))
+
+    def deliver(self, name: str) -> Delivery | None:
+        """Send what is due on a channel, None where nothing is; waits for the transport. Raises OSError."""
+        with self._guard:
+            self._mind_the_lock()
+            lane = self._lanes.get(name)
+            batch = lane.due(self._clocks.now()) if lane else []
+            if not lane or not batch:
+                return None
+            notice = self._compose(batch)
+        if notice is None:
+            self.refresh()
+            return None
+        channel = self.channels[name]
+        ids = tuple(entry.id for entry in batch)
+        try:
+            where = _send(channel, notice)
+        except DeliveryError as err:
+            with self._guard:
+                put_off = lane.failed(
+                    batch,
+                    self._clocks.now(),
+                    str(err),
+                    permanent=err.permanent,
+                    answered=err.answered,
+                    delay=err.delay,
+                    of_recipient=err.of_recipient,
+                )
+                rest = self._what_next(name, ids, put_off, err)
+            text = f"{_told(batch)} not taken by '{name}'{rest}: {err}"
+            log.error("%s", text)
+            return Delivery(
+                channel=name,
+                transport=channel.transport.name,
+                ids=ids,
+                delivered=False,
+                permanent=err.permanent,
+                text=text,
+            )
+        with self._guard:
+            self._cross_out(channel, lane, batch, where)
+        text = f"{_told(batch)} delivered by {channel.transport.name}: {where}"
+        log.info("%s", text)
+        return Delivery(channel=name, transport=channel.transport.name, ids=ids, delivered=True, where=where, text=text)
+
+    def pause(self, name: str, most: float = 60.0) -> float:
+        """How long until `deliver` may have something to do [s]."""
+        with self._guard:
+            lane = self._lanes.get(name)
+            wait = lane.wait(self._clocks.now()) if lane else None
+        return most if wait is None else min(wait + 0.01, most)
+
+    def nudge(self, *, all_: bool = False) -> None:
+        """Try again at once: the network came back; `all_`: somebody asks for it, refused ones too."""
+        with self._guard:
+            for lane in self._lanes.values():
+                lane.nudge(self._clocks.now(), all_=all_)
+
+    def statuses(self) -> list[ChannelStatus]:
+        """How the channels do; only where this process delivers."""
+        with self._guard:
+            return [self._status(name, lane) for name, lane in self._lanes.items()]
+
+    def tell_faults(self) -> None:
+        """Tell of a channel that is down for long, or refuses a notice for good, on the others. Raises OSError."""
+        with self._guard:
+            for name, lane in self._lanes.items():
+                others = self._others(name)
+                if not others:
+                    continue
+                if lane.oldest is not None and self._is_down(name):
+                    self._tell_down(name, lane, lane.oldest, others)
+                for entry, error in lane.refused:
+                    self._tell_refused(name, entry, error, others)
+
+    def write_status(self) -> None:
+        """Leave for others how the channels do. Raises OSError."""
+        tree = {
+            "wall": self._clocks.wall(),
+            "who": self.lock.holder(),
+            "channels": [asdict(s) for s in self.statuses()],
+        }
+        write_atomic(self.outbox.folder / STATUS, json.dumps(tree, indent=1).encode())
+
+    # -- inside
+
+    def _mind_the_lock(self) -> None:
+        """Deliver no more where another has taken over, as this process hung, or where the lock's file was removed."""
+        if not self.lock.is_lost:
+            return
+        if holder := self.lock.holder():
+            log.error("this program hung: %s delivers now", holder)
+        else:
+            log.error("%s was removed, by which others know who delivers: making it anew", self.lock.path)
+        self.hand_over()
+
+    def _read_receipts(self) -> None:
+        try:
+            self.receipts.read_new()
+        except OSError as err:  # rather twice than never
+            log.error("%s cannot be read: %s; what was taken before may be sent again", self.receipts.path, err)
+
+    def _adopt(self) -> None:
+        if not isinstance(self.outbox, Outbox):
+            return
+        try:
+            adopt_mails(self.outbox, self._legacy)
+        except OSError as err:
+            log.error("the mails that the version before left waiting cannot be taken over now: %s", err)
+
+    def _is_open(self, entry: Waiting, name: str) -> bool:
+        channel = self.channels[name]
+        return channel.takes(entry) and channel.names.isdisjoint(self.receipts.done(entry.id))
+
+    def _offer(self, name: str) -> None:
+        self._lanes[name].offer(e for e in self._waiting if self._is_open(e, name))
+
+    def _what_next(self, name: str, ids: tuple[str, ...], put_off: float, err: DeliveryError) -> str:
+        try:
+            self._settle_refusals()
+            self._finish()
+        except OSError as problem:
+            log.error("that '%s' refused %s cannot be written down: %s; trying on", name, ", ".join(ids), problem)
+        if all(name in self.receipts.refused.get(notice_id, ()) for notice_id in ids):
+            return " for good, and not tried there again"
+        rest = " for good; it stays in" if err.permanent else "; it waits in"
+        return f"{rest} {self.outbox.folder}, next try in {put_off:.0f} s"
+
+    def _settle_refusals(self) -> None:
+        """Ask no recipient again for what it refused for good while another of the same channel took it."""
+        if self._unwritten:  # the disk takes nothing: first what is known already
+            return
+        for name, lane in self._lanes.items():
+            channel = self.channels[name]
+            beside = {other.name for other in self.channels.values() if other.is_beside(channel)}
+            for entry, error in lane.refused_for_good:
+                if beside.isdisjoint(self.receipts.taken.get(entry.id, ())):
+                    continue
+                if others := self._others(name):
+                    self._tell_refused(name, entry, error, others)
+                log.error("notice %s is given up for '%s', others of '%s' have it", entry.id, name, channel.group)
+                self._unwritten.append(self._receipt(channel, [entry], refused=error))
+            self._write_receipts()
+            self._offer(name)
+
+    def _others(self, name: str) -> tuple[str, ...]:
+        """Channels that can tell of a fault: those that take something at the moment."""
+        return tuple(
+            other
+            for other in self._lanes
+            if other != name and not self._is_down(other) and not self._is_refusing_recipient(other)
+        )
+
+    def _is_refusing_recipient(self, name: str) -> bool:
+        refuses = name in self.receipts.refusals or bool(self._lanes[name].refused_for_good)
+        return bool(self.channels[name].group) and refuses
+
+    def _finish(self) -> None:
+        """Cross out for good what every channel took that is asked."""
+        for entry in list(self._waiting):
+            if not any(self._is_open(entry, name) for name in self.channels):
+                if not self.receipts.done(entry.id):
+                    log.warning("notice %s is of kind '%s', which no channel takes", entry.id, entry.kind)
+                self.outbox.finish(entry)
+                self._waiting.remove(entry)
+
+    def _compose(self, batch: list[Waiting]) -> Notice | None:
+        try:
+            notices = [self.outbox.read(entry) for entry in batch]
+        except (OSError, ValueError) as err:
+            log.error("%s: a notice cannot be read: %s", self.outbox.folder, err)
+            self.outbox.doubt(batch)
+            return None
+        return notices[0] if len(notices) == 1 else merge(notices)
+
+    def _cross_out(self, channel: Channel, lane: Lane, batch: list[Waiting], where: str) -> None:
+        receipt = self._receipt(channel, batch, where=where)
+        lane.delivered(batch, self._clocks.now())
+        self.receipts.note(receipt)
+        self._unwritten.append(receipt)
+        try:
+            self._write_receipts()
+            self._settle_refusals()
+            self._finish()
+        except OSError as err:
+            log.error("the delivery of %s cannot be written down: %s; trying on", ", ".join(receipt.ids), err)
+
+    def _receipt(self, channel: Channel, batch: Sequence[Waiting], *, where: str = "", refused: str = "") -> Receipt:
+        return Receipt(
+            channel=channel.name,
+            transport=channel.transport.name,
+            ids=tuple(entry.id for entry in batch),
+            wall=self._clocks.wall(),
+            where=where,
+            refused=refused,
+        )
+
+    def _write_receipts(self) -> None:
+        while self._unwritten:
+            self.receipts.add(self._unwritten[0])
+            self._unwritten.pop(0)
+
+    def _status(self, name: str, lane: Lane) -> ChannelStatus:
+        now, oldest = self._clocks.now(), lane.oldest
+        return ChannelStatus(
+            name=name,
+            describe=self.channels[name].transport.describe(),
+            waiting=len(lane),
+            since=oldest.wall if oldest else None,
+            refused=len(lane.refused),
+            down_for=None if lane.down_since is None else now - lane.down_since,
+            error=lane.error or (lane.refused[0][1] if lane.refused else ""),
+            next_try=lane.wait(now),
+            refusal=self.receipts.refusals.get(name, ""),
+        )
+
+    def _is_down(self, name: str) -> bool:
+        since = self._lanes[name].down_since
+        return since is not None and self._clocks.now() - since >= self._down_after
+
+    def _tell_down(self, name: str, lane: Lane, oldest: Waiting, others: tuple[str, ...]) -> None:
+        when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(oldest.wall))
+        text = (
+            f"The channel '{name}' ({self.channels[name].transport.describe()}) takes nothing: {lane.error}\n\n"
+            f"{count_of(len(lane), 'notice waits', 'notices wait')} for it, the oldest of {when}. "
+            f"{'It is' if len(lane) == 1 else 'They are'} kept and tried on."
+        )
+        self._tell(f"{oldest.id[:90]}-down-{_mark(name)}", f"the channel '{name}' is down", text, others)
+
+    def _tell_refused(self, name: str, entry: Waiting, error: str, others: tuple[str, ...]) -> None:
+        if name in self.receipts.refusals:  # told with the first, and it has taken nothing since
+            return
+        channel = self.channels[name]
+        rest = "It is kept and tried again now and then; the others pass."
+        if channel.group:
+            rest += " What it refused for good is not sent to it again once another recipient has it."
+        text = (
+            f"The channel '{name}' ({channel.transport.describe()}) refused the notice {entry.id}"
+            f" ({entry.kind}): {error}\n\n{rest}"
+        )
+        self._tell(f"{entry.id[:90]}-refused-{_mark(name)}", f"the channel '{name}' refused a notice", text, others)
+
+    def _tell(self, notice_id: str, subject: str, text: str, others: tuple[str, ...]) -> None:
+        notice = Notice(
+            id=notice_id,
+            wall=self._clocks.wall(),
+            kind="fault",
+            subject=f"rosbot patrol: {subject}",
+            text=text,
+            channels=others,
+        )
+        if self.outbox.put(notice):
+            log.error("told on %s: %s", ", ".join(others), subject)
+
+
+def _send(channel: Channel, notice: Notice) -> str:
+    try:
+        return channel.transport.send(notice)
+    except DeliveryError:
+        raise
+    except Exception as err:  # whatever one notice does to a channel, the others have to pass
+        log.error("channel '%s' stumbled over notice %s", channel.name, notice.id, exc_info=True)
+        raise DeliveryError(f"the channel stumbled over it: {err!r}", permanent=True) from err
+
+
+def _mark(name: str) -> str:
+    """A channel's name as a part of a notice's id."""
+    if len(name) <= 40 and token(name) == name:
+        return name
+    return f"{token(name)[:31]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def _told(batch: Sequence[Waiting]) -> str:
+    return f"notice {batch[0].id}" if len(batch) == 1 else f"a digest of {len(batch)} notices"

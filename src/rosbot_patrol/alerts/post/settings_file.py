@@ -1,0 +1,86 @@
+"""What each program that uses an outbox was told about channels, left beside the notices: no passwords are in it.
+
+`rosrun rosbot_patrol notify` reads it, so that it tries the very channels that the robot uses; and the programs compare
+theirs, as one of them delivers for all.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.mail import token
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.files import write_atomic
+from rosbot_patrol.params import load
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """One program's.
+
+    Attributes:
+        who: its name.
+        pid: its process.
+        wall: when it started, seconds since 1970.
+        mail: what it was told.
+    """
+
+    who: str
+    pid: int
+    wall: float
+    mail: MailParams
+
+    @property
+    def is_running(self) -> bool:
+        """Whether its process is there."""
+        return Path(f"/proc/{self.pid}").exists()
+
+
+def write_settings(folder: Path, settings: Settings) -> None:
+    """Leave them in the outbox. Raises OSError."""
+    tree = {"who": settings.who, "pid": settings.pid, "wall": settings.wall, "mail": asdict(settings.mail)}
+    write_atomic(folder / f"settings-{token(settings.who)}.json", json.dumps(tree, indent=1).encode())
+
+
+def read_settings(folder: Path) -> list[Settings]:
+    """Those of all programs, the youngest first; what makes no sense is left out and said."""
+    found = []
+    for path in folder.glob("settings-*.json"):
+        try:
+            tree = json.loads(path.read_bytes())
+            mail = load(MailParams, tree["mail"], name=f"{path}: mail/")
+            found.append(Settings(who=str(tree["who"]), pid=int(tree["pid"]), wall=float(tree["wall"]), mail=mail))
+        except (OSError, ValueError, KeyError, TypeError, ParamError) as err:
+            log.warning("%s cannot be used: %s", path, err)
+    return sorted(found, key=lambda settings: -settings.wall)
+
+
+def differences(folder: Path, who: str, mail: MailParams) -> list[str]:
+    """A sentence for each program that runs and was told something else."""
+    sentences = []
+    for other in read_settings(folder):
+        if other.who == who or other.pid == os.getpid() or not other.is_running:
+            continue
+        mine, theirs = asdict(mail), asdict(other.mail)
+        names = [name for name in mine if mine[name] != theirs[name] and name != "notify_verdicts"]
+        if names:
+            sentences.append(f"{other.who} has other values than {who} for {', '.join(names)}: one delivers for both")
+    return sentences
+
+
+def state_of(folder: Path) -> Mapping[str, Any] | None:
+    """What the program that delivers last wrote about its channels; None where there is nothing."""
+    try:
+        tree = json.loads((folder / "status.json").read_bytes())
+    except (OSError, ValueError):
+        return None
+    return tree if isinstance(tree, dict) else None

@@ -1,0 +1,1 @@
+"""Incident records on disk: written, chained, found, repaired, kept for a time."""

@@ -1,0 +1,182 @@
+"""Which incidents go when they are old, too many, or the disk is full: clear ones first, confirmed ones last.
+
+A record that goes leaves its digest in the chain. A clock that jumps far ahead makes nothing vanish: the newest of each
+kind always stay, whatever their age.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from rosbot_patrol.alerts.records.database import errors_of
+from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.errors import StoreError
+from rosbot_patrol.params import param
+
+MB = 1_000_000
+DAY = 86_400.0
+ALWAYS_KEPT = 100  # the newest of each verdict stay, however old
+AT_ONCE = 200  # removals in one go, so that other work has its turn
+_ORDER = (("clear",), ("unreachable", "unverified", ""), ("confirmed",))
+_RESERVE = "incidents.reserve"
+_RESERVE_BYTES = 2 * MB  # what the database needs to write down that something goes
+
+
+@dataclass(frozen=True, kw_only=True)
+class RetentionParams:
+    """How long incidents are kept, and how much of the disk they may take."""
+
+    keep_clear_days: float = param(30.0, unit="d", lo=0.0, doc="incidents whose verdict is clear go when older")
+    keep_days: float = param(365.0, unit="d", lo=0.0, doc="all other incidents go when older")
+    keep_mb: float = param(2000.0, unit="MB", lo=10.0, doc="room for incidents and their pictures; the oldest go")
+    keep_free_mb: float = param(
+        200.0, unit="MB", lo=0.0, doc="room that stays free on the disk: the oldest incidents but confirmed ones go"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pruned:
+    """What went: ids in order, their bytes, why; `is_done`: nothing more has to go."""
+
+    ids: tuple[str, ...] = ()
+    bytes: int = 0
+    why: str = ""
+    is_done: bool = True
+
+    @property
+    def sentence(self) -> str:
+        """For people."""
+        count = len(self.ids)
+        return f"{count_of(count, 'old incident')} ({self.bytes / MB:.1f} MB) removed: {self.why}"
+
+
+def prune(store: IncidentStore, params: RetentionParams, *, wall: float) -> Pruned:
+    """Remove what is too old or too much, at most AT_ONCE.
+
+    Args:
+        store: of the incidents.
+        params: what may stay.
+        wall: now, seconds since 1970.
+
+    Raises:
+        StoreError: the disk does not take it.
+    """
+    found = _remove(store, _expired(store, params, wall), AT_ONCE, wall, "they are older than they are kept")
+    if found.ids:
+        return found
+    over = used_bytes(store) - params.keep_mb * MB
+    if over > 0.0:
+        return _remove(store, _oldest(store, _ORDER), AT_ONCE, wall, f"all take more than {params.keep_mb:g} MB", over)
+    lacking = params.keep_free_mb * MB - free_bytes(store.state_dir)
+    if lacking > 0.0:
+        why = f"less than {params.keep_free_mb:g} MB were free on the disk"
+        return _remove(store, _oldest(store, _ORDER[:2]), AT_ONCE, wall, why, lacking)
+    return Pruned()
+
+
+def make_room(store: IncidentStore, *, wall: float, wanted: float = 10.0 * MB) -> Pruned:
+    """Remove the oldest incidents but confirmed ones, because the disk takes nothing more. Raises StoreError."""
+    release_reserve(store.state_dir)
+    why = "the disk is full"
+    try:
+        return _remove(store, _oldest(store, _ORDER[:2]), 20, wall, why, wanted)
+    finally:
+        with suppress(StoreError):  # the disk is full, which is why we are here
+            keep_reserve(store.state_dir)
+
+
+def keep_reserve(state_dir: Path) -> None:
+    """Hold some room on the disk that `make_room` can use. Raises StoreError."""
+    path = state_dir / _RESERVE
+    with errors_of(path):
+        if path.exists() and path.stat().st_size == _RESERVE_BYTES:
+            return
+        try:
+            with path.open("wb") as file:
+                os.posix_fallocate(file.fileno(), 0, _RESERVE_BYTES)
+        except OSError:
+            path.unlink(missing_ok=True)
+            raise
+
+
+def release_reserve(state_dir: Path) -> None:
+    """Let go of the room that is held. Raises StoreError."""
+    path = state_dir / _RESERVE
+    with errors_of(path):
+        path.unlink(missing_ok=True)
+
+
+def used_bytes(store: IncidentStore) -> int:
+    """What all incidents take on the disk. Raises StoreError."""
+    with errors_of(store.path):
+        files = store.connection.execute("SELECT total(bytes) FROM incidents").fetchone()[0]
+        pages = store.connection.execute("PRAGMA page_count").fetchone()[0]
+        free = store.connection.execute("PRAGMA freelist_count").fetchone()[0]
+        return int(files) + (pages - free) * int(store.connection.execute("PRAGMA page_size").fetchone()[0])
+
+
+def free_bytes(folder: Path) -> int:
+    """What the disk has left. Raises StoreError."""
+    with errors_of(folder):
+        return shutil.disk_usage(folder).free
+
+
+def _remove(
+    store: IncidentStore, victims: Iterator[tuple[str, int]], most: int, wall: float, why: str, wanted: float = 0.0
+) -> Pruned:
+    ids: list[str] = []
+    freed = 0
+    for incident_id, size in victims:
+        if len(ids) == most or (wanted and freed >= wanted):
+            break
+        store.remove(incident_id, wall=wall, why=why)
+        ids.append(incident_id)
+        freed += size
+    if ids:
+        store.settle()
+    is_done = len(ids) < most
+    return Pruned(ids=tuple(ids), bytes=freed, why=why, is_done=is_done)
+
+
+def _expired(store: IncidentStore, params: RetentionParams, wall: float) -> Iterator[tuple[str, int]]:
+    for group in _ORDER:
+        for verdict in group:
+            days = params.keep_clear_days if verdict == "clear" else params.keep_days
+            yield from _closed(store, verdict, before=wall - days * DAY, spare=ALWAYS_KEPT)
+
+
+def _oldest(store: IncidentStore, order: tuple[tuple[str, ...], ...]) -> Iterator[tuple[str, int]]:
+    for group in order:
+        while True:
+            heads = [row for verdict in group for row in _closed_rows(store, verdict, float("inf"), 0, 1)]
+            if not heads:
+                break
+            _, incident_id, size = min(heads)
+            yield incident_id, size
+
+
+def _closed(store: IncidentStore, verdict: str, before: float, spare: int) -> Iterator[tuple[str, int]]:
+    for _, incident_id, size in _closed_rows(store, verdict, before, spare, AT_ONCE):
+        yield incident_id, size
+
+
+def _closed_rows(
+    store: IncidentStore, verdict: str, before: float, spare: int, most: int
+) -> list[tuple[float, str, int]]:
+    """(wall, id, bytes) of the oldest closed ones that began before a time, without the `spare` newest."""
+    with errors_of(store.path):
+        count = store.connection.execute(
+            "SELECT count(*) FROM incidents WHERE verdict=? AND closed IS NOT NULL", (verdict,)
+        ).fetchone()[0]
+        rows = store.connection.execute(
+            "SELECT wall, id, bytes FROM incidents WHERE verdict=? AND closed IS NOT NULL AND wall < ?"
+            " ORDER BY wall LIMIT ?",
+            (verdict, before, max(min(most, count - spare), 0)),
+        )
+        return [(row["wall"], row["id"], row["bytes"]) for row in rows]
