@@ -24,9 +24,9 @@ from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams
-from rosbot_patrol.simulation.floor_plan import floor_plan
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.scene.floor_plan import floor_plan
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).resolve().parents[1]
 HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}

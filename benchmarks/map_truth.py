@@ -21,8 +21,8 @@ from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.distance_kernels import bounded_distances
 from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
-from rosbot_patrol.simulation.floor_plan import floor_plan
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.scene.floor_plan import floor_plan
+from rosbot_patrol.simulation.sdf.world import load_world
 
 HEIGHT = 0.158  # of the lidar's plane [m]
 FINE = 0.01  # cells of the plan that the error is measured on [m]

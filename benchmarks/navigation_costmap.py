@@ -40,9 +40,9 @@ from rosbot_patrol.costmap.params import read_costmap  # noqa: E402
 from rosbot_patrol.geometry import Pose2D  # noqa: E402
 from rosbot_patrol.maps.map_io import read_map  # noqa: E402
 from rosbot_patrol.planning.registry import make_global_planner  # noqa: E402
-from rosbot_patrol.simulation.lidar import LidarParams, measure_scan  # noqa: E402
-from rosbot_patrol.simulation.slices import slice_bodies  # noqa: E402
-from rosbot_patrol.simulation.world import load_world  # noqa: E402
+from rosbot_patrol.simulation.scene.slices import slice_bodies  # noqa: E402
+from rosbot_patrol.simulation.sdf.world import load_world  # noqa: E402
+from rosbot_patrol.simulation.sensors.lidar import LidarParams, measure_scan  # noqa: E402
 
 AIMS = {"inflation_full_ms": 60.0, "inflation_shift_ms": 20.0}
 ROUND = (0, 1, 2, 3, 4, 5, 6, 7, 0)  # rooms in the order of the patrol

@@ -39,10 +39,10 @@ from rosbot_patrol.maps.map_io import read_map  # noqa: E402
 from rosbot_patrol.planning.registry import make_global_planner  # noqa: E402
 from rosbot_patrol.replay.closed_loop import ClosedLoop, Drive, read_profile  # noqa: E402
 from rosbot_patrol.simulation.engine import Engine, EngineParams  # noqa: E402
-from rosbot_patrol.simulation.renderer import make_renderer  # noqa: E402
-from rosbot_patrol.simulation.robot import load_robot  # noqa: E402
-from rosbot_patrol.simulation.slices import Slice, slice_bodies  # noqa: E402
-from rosbot_patrol.simulation.world import load_world  # noqa: E402
+from rosbot_patrol.simulation.render.egl import make_renderer  # noqa: E402
+from rosbot_patrol.simulation.robot.description import load_robot  # noqa: E402
+from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies  # noqa: E402
+from rosbot_patrol.simulation.sdf.world import load_world  # noqa: E402
 
 HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}
 FULL_SPEED = 0.36  # [m/s]

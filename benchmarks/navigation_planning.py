@@ -46,8 +46,8 @@ from rosbot_patrol.geometry import Pose2D  # noqa: E402
 from rosbot_patrol.grid import Grid, GridInfo  # noqa: E402
 from rosbot_patrol.maps.map_io import read_map  # noqa: E402
 from rosbot_patrol.planning.registry import GLOBAL_PLANNERS, make_global_planner  # noqa: E402
-from rosbot_patrol.simulation.floor_plan import floor_plan  # noqa: E402
-from rosbot_patrol.simulation.world import load_world  # noqa: E402
+from rosbot_patrol.simulation.scene.floor_plan import floor_plan  # noqa: E402
+from rosbot_patrol.simulation.sdf.world import load_world  # noqa: E402
 
 AIMS = {"plan_room7_ms": 100.0, "plan_corner_ms": 350.0, "plan_house_map_ms": 25.0, "plan_excess_percent": 1.0}
 ROOMS = {0: (0.0, 0.0), 2: (-3.489, 0.306), 7: (14.75, 11.48)}

@@ -32,8 +32,8 @@ from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
 from rosbot_patrol.patrol.mission.inputs import Box, Measured
-from rosbot_patrol.simulation.matrices import from_pose2d
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.scene.matrices import from_pose2d
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).resolve().parent.parent
 HOUSES = {"house": "rosbot", "flat": "flat", "office": "office"}

@@ -90,9 +90,9 @@ def make_engine(world: Path, *, with_actor: bool = True) -> Any:
     """An engine with the robot in it."""
     from rosbot_patrol.geometry import Pose2D
     from rosbot_patrol.simulation.engine import Engine, EngineParams
-    from rosbot_patrol.simulation.renderer import make_renderer
-    from rosbot_patrol.simulation.robot import load_robot
-    from rosbot_patrol.simulation.world import load_world
+    from rosbot_patrol.simulation.render.egl import make_renderer
+    from rosbot_patrol.simulation.robot.description import load_robot
+    from rosbot_patrol.simulation.sdf.world import load_world
 
     engine = Engine(load_world(world), EngineParams(seed=1), make_renderer=make_renderer)
     engine.spawn_robot(load_robot(URDF))
@@ -165,11 +165,11 @@ def picture_times(quick: bool) -> list[float]:
 
 def shares(pictures: bool) -> dict[str, float]:
     """Wall milliseconds that each part takes of a simulated second."""
-    from rosbot_patrol.simulation.camera import Camera
-    from rosbot_patrol.simulation.drive import Drive
     from rosbot_patrol.simulation.engine import Engine
-    from rosbot_patrol.simulation.physics import Physics
-    from rosbot_patrol.simulation.renderer import EglRenderer
+    from rosbot_patrol.simulation.physics.world import Physics
+    from rosbot_patrol.simulation.render.egl import EglRenderer
+    from rosbot_patrol.simulation.robot.drive import Drive
+    from rosbot_patrol.simulation.sensors.camera import Camera
 
     watch = Watch()
     watch.watch("physics", Physics, "step")

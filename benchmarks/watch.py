@@ -35,9 +35,9 @@ from rosbot_patrol.params import load
 from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
 from rosbot_patrol.patrol.mission.inputs import Box, Frame
 from rosbot_patrol.simulation.engine import Engine, EngineParams
-from rosbot_patrol.simulation.renderer import make_renderer
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.world import World, load_world
+from rosbot_patrol.simulation.render.egl import make_renderer
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.sdf.world import World, load_world
 
 ROOT = Path(__file__).resolve().parent.parent
 CLASSES = ("person", "fire hydrant")

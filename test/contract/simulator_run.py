@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from rosbot_patrol.geometry import Pose2D, Twist2D
-from rosbot_patrol.simulation.camera import CameraParams
-from rosbot_patrol.simulation.doors import plain_door
+from rosbot_patrol.simulation.actors.doors import plain_door
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams
-from rosbot_patrol.simulation.renderer import make_renderer
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.sensor_places import read_sensors
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.render.egl import make_renderer
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.sdf.world import load_world
+from rosbot_patrol.simulation.sensors.camera import CameraParams
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 ROOT = Path(__file__).resolve().parents[2]
 Data = dict[str, np.ndarray]

@@ -10,11 +10,11 @@ import pytest
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.simulation.actors import LOOKS, hydrant_body, person_body, person_pose_parts
-from rosbot_patrol.simulation.matrices import from_pose2d
-from rosbot_patrol.simulation.renderer import make_renderer
-from rosbot_patrol.simulation.scene import Body, Intrinsics, Material, SceneRenderer, Shape, Visual
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.actors.people import LOOKS, hydrant_body, person_body, person_pose_parts
+from rosbot_patrol.simulation.render.egl import make_renderer
+from rosbot_patrol.simulation.scene.matrices import from_pose2d
+from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Material, SceneRenderer, Shape, Visual
+from rosbot_patrol.simulation.sdf.world import load_world
 
 # A robot's camera at the origin that looks along x: optical z is forward, x right, y down.
 CAMERA = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])

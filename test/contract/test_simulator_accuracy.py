@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
-from rosbot_patrol.simulation.camera import Camera, CameraParams
-from rosbot_patrol.simulation.drive import DriveParams
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams
-from rosbot_patrol.simulation.imu import ImuParams
-from rosbot_patrol.simulation.lidar import LidarParams
-from rosbot_patrol.simulation.matrices import from_xyz_rpy
-from rosbot_patrol.simulation.odometry import OdometryParams
-from rosbot_patrol.simulation.renderer import make_renderer
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.scene import Body, Collision, SceneRenderer, Shape, Visual
-from rosbot_patrol.simulation.world import World
+from rosbot_patrol.simulation.render.egl import make_renderer
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.robot.drive import DriveParams
+from rosbot_patrol.simulation.robot.imu import ImuParams
+from rosbot_patrol.simulation.robot.odometry import OdometryParams
+from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
+from rosbot_patrol.simulation.scene.scene import Body, Collision, SceneRenderer, Shape, Visual
+from rosbot_patrol.simulation.sdf.world import World
+from rosbot_patrol.simulation.sensors.camera import Camera, CameraParams
+from rosbot_patrol.simulation.sensors.lidar import LidarParams
 
 URDF = Path(__file__).parents[2] / "urdf" / "rosbot.urdf"
 FORWARD = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]])  # a camera that looks along x

@@ -14,7 +14,7 @@ from rosbot_patrol.patrol.house.known_objects import load_known
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.replay.case import read_case
 from rosbot_patrol.sensors.sensor_file import load_sensors
-from rosbot_patrol.simulation.scenario import read_scenario
+from rosbot_patrol.simulation.scenario.file import read_scenario
 
 FRAGMENTS = {"docs/costmaps.md": 2}  # parts of a costmap's parameters, with `...` for the rest
 

@@ -19,7 +19,7 @@ ROOM = 1
 ROOM_POINT = (2.819, -0.175)
 INTRUDER_AT = (4.7, 0.2)
 GOAL_TOLERANCE = 0.15  # [m] the planner's 0.10, and what localisation may be off
-# A look and a posture that training never rendered (test/unit/simulation/test_actors.py holds the sets apart).
+# A look and a posture that training never rendered (test/unit/simulation/actors/test_actors.py holds the sets apart).
 UNSEEN = {"look": "intruder_test_balaclava", "posture": "creeping"}
 
 

@@ -28,9 +28,9 @@ from rosbot_patrol.replay.scan_feed import ScanFeed
 from rosbot_patrol.replay.transform_tree import Edge, TransformTree
 from rosbot_patrol.scan import LevelScan, level_scan
 from rosbot_patrol.simulation.engine import Engine, EngineParams
-from rosbot_patrol.simulation.matrices import from_xyz_rpy
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).resolve().parents[2]
 # A room without symmetry: 5 x 3 m, with a niche at its left.

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.simulation.sensor_places import read_sensors
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 from rosbot_patrol.yaml_files import read_mapping
 
 

@@ -19,11 +19,11 @@ from rosbot_patrol.maps.raster import flood
 from rosbot_patrol.patrol.house.floor import floor_of
 from rosbot_patrol.patrol.house.regions import NOBODYS, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.simulation.floor_plan import floor_plan
-from rosbot_patrol.simulation.scene import Body
-from rosbot_patrol.simulation.sight import Sight
-from rosbot_patrol.simulation.slices import slice_bodies
-from rosbot_patrol.simulation.ways import EYE_LEVEL, Ways
+from rosbot_patrol.simulation.scene.floor_plan import floor_plan
+from rosbot_patrol.simulation.scene.scene import Body
+from rosbot_patrol.simulation.scene.sight import Sight
+from rosbot_patrol.simulation.scene.slices import slice_bodies
+from rosbot_patrol.simulation.scene.ways import EYE_LEVEL, Ways
 
 Mask = NDArray[np.bool_]
 

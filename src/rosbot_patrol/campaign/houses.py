@@ -7,8 +7,8 @@ from pathlib import Path
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
-from rosbot_patrol.simulation.scene import Body
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.scene.scene import Body
+from rosbot_patrol.simulation.sdf.world import load_world
 
 HOUSES = ("house", "flat", "office")
 

@@ -13,7 +13,7 @@ from rosbot_patrol.costmap.range_layer import RangeReading
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.simulation.engine import Engine
-from rosbot_patrol.simulation.matrices import from_pose2d, to_pose2d
+from rosbot_patrol.simulation.scene.matrices import from_pose2d, to_pose2d
 
 log = logging.getLogger(__name__)
 

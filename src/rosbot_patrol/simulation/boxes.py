@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.simulation.matrices import from_pose2d
-from rosbot_patrol.simulation.scene import Body, Collision, Material, Shape, Visual
+from rosbot_patrol.simulation.scene.matrices import from_pose2d
+from rosbot_patrol.simulation.scene.scene import Body, Collision, Material, Shape, Visual
 
 _CARDBOARD = Material(rgba=(0.62, 0.47, 0.31, 1.0))
 

@@ -17,30 +17,30 @@ from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, compose
 from rosbot_patrol.params import param
 from rosbot_patrol.scan import LaserScan, LevelScan, level_scan
-from rosbot_patrol.simulation.battery import Battery, BatteryParams
+from rosbot_patrol.simulation.actors.doors import SPEED, Door, DoorPlace
+from rosbot_patrol.simulation.actors.walkers import Walker
 from rosbot_patrol.simulation.boxes import box_body
-from rosbot_patrol.simulation.camera import Camera, CameraParams, Picture, poses_before
-from rosbot_patrol.simulation.doors import SPEED, Door, DoorPlace
-from rosbot_patrol.simulation.drive import DriveParams
-from rosbot_patrol.simulation.equipment import Equipment
-from rosbot_patrol.simulation.fault_board import FaultBoard
-from rosbot_patrol.simulation.faults import Doorway
-from rosbot_patrol.simulation.imu import ImuParams, ImuReading
-from rosbot_patrol.simulation.lidar import LidarParams, measure_scan
-from rosbot_patrol.simulation.matrices import from_pose2d
-from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace
 from rosbot_patrol.simulation.noise import noise_of
-from rosbot_patrol.simulation.odometry import OdometryParams
-from rosbot_patrol.simulation.physics import Physics, Touch
+from rosbot_patrol.simulation.physics.world import Physics, Touch
 from rosbot_patrol.simulation.population import Population
-from rosbot_patrol.simulation.range_sensors import RangeParams, measure_range
-from rosbot_patrol.simulation.robot import FrameParams, RobotDescription
-from rosbot_patrol.simulation.scene import Body, SceneRenderer
-from rosbot_patrol.simulation.sensor_net import SensorNet
-from rosbot_patrol.simulation.slices import Slice
-from rosbot_patrol.simulation.walkers import Walker
-from rosbot_patrol.simulation.ways import Ways
-from rosbot_patrol.simulation.world import World
+from rosbot_patrol.simulation.robot.battery import Battery, BatteryParams
+from rosbot_patrol.simulation.robot.description import FrameParams, RobotDescription
+from rosbot_patrol.simulation.robot.drive import DriveParams
+from rosbot_patrol.simulation.robot.equipment import Equipment
+from rosbot_patrol.simulation.robot.imu import ImuParams, ImuReading
+from rosbot_patrol.simulation.robot.odometry import OdometryParams
+from rosbot_patrol.simulation.scenario.fault_board import FaultBoard
+from rosbot_patrol.simulation.scenario.faults import Doorway
+from rosbot_patrol.simulation.scene.matrices import from_pose2d
+from rosbot_patrol.simulation.scene.scene import Body, SceneRenderer
+from rosbot_patrol.simulation.scene.slices import Slice
+from rosbot_patrol.simulation.scene.ways import Ways
+from rosbot_patrol.simulation.sdf.world import World
+from rosbot_patrol.simulation.sensors.camera import Camera, CameraParams, Picture, poses_before
+from rosbot_patrol.simulation.sensors.lidar import LidarParams, measure_scan
+from rosbot_patrol.simulation.sensors.motion_sensors import MotionSensorParams, SensorPlace
+from rosbot_patrol.simulation.sensors.range_sensors import RangeParams, measure_range
+from rosbot_patrol.simulation.sensors.sensor_net import SensorNet
 
 STEP = 0.005  # [s]
 HOME = Pose2D()

@@ -8,13 +8,13 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.simulation.doors import SPEED, Door, DoorPlace
+from rosbot_patrol.simulation.actors.doors import SPEED, Door, DoorPlace
+from rosbot_patrol.simulation.actors.walkers import Walker
 from rosbot_patrol.simulation.noise import noise_of
-from rosbot_patrol.simulation.physics import Physics
-from rosbot_patrol.simulation.slices import Slice
-from rosbot_patrol.simulation.walkers import Walker
-from rosbot_patrol.simulation.ways import LEVELS, Ways, together
-from rosbot_patrol.simulation.world import ActorPlace
+from rosbot_patrol.simulation.physics.world import Physics
+from rosbot_patrol.simulation.scene.slices import Slice
+from rosbot_patrol.simulation.scene.ways import LEVELS, Ways, together
+from rosbot_patrol.simulation.sdf.world import ActorPlace
 
 log = logging.getLogger(__name__)
 

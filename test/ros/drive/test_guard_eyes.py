@@ -22,7 +22,7 @@ from rosbot_patrol.ros.messages.convert import scan_to_msg
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN
 from rosbot_patrol.ros.simulator import messages
 from rosbot_patrol.scan import LaserScan as Scan
-from rosbot_patrol.simulation.range_sensors import RangeParams
+from rosbot_patrol.simulation.sensors.range_sensors import RangeParams
 
 BACKWARDS, UPSIDE_DOWN, PITCHED_OVER = (0.0, 0.0, 1.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
 ON_ITS_SIDE = (0.5**0.5, 0.0, 0.0, 0.5**0.5)

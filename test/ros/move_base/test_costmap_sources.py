@@ -18,8 +18,8 @@ from rosbot_patrol.ros.messages.convert import scan_to_msg
 from rosbot_patrol.ros.move_base import sources as costmap_sources
 from rosbot_patrol.ros.simulator import messages
 from rosbot_patrol.scan import LaserScan
-from rosbot_patrol.simulation.camera import CameraParams
-from rosbot_patrol.simulation.range_sensors import RangeParams
+from rosbot_patrol.simulation.sensors.camera import CameraParams
+from rosbot_patrol.simulation.sensors.range_sensors import RangeParams
 
 CAMERA = CameraParams().intrinsics
 EYE = 0.18  # of the camera above base_link [m]

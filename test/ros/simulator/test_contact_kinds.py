@@ -11,10 +11,10 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from rosbot_patrol.geometry import Pose2D, Twist2D
 from rosbot_patrol.ros.simulator.messages import contacts_msg
-from rosbot_patrol.simulation.doors import plain_door
+from rosbot_patrol.simulation.actors.doors import plain_door
 from rosbot_patrol.simulation.engine import STEP, Engine
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).resolve().parents[3]
 MODEL = """<model name="{name}"><pose>0.6 0 0.5 0 0 0</pose><link name="link"><collision name="c"><geometry>

@@ -18,13 +18,13 @@ from rosbot_patrol.errors import ParamError
 from rosbot_patrol.geometry import Pose2D, Twist2D
 from rosbot_patrol.ros.simulator import messages
 from rosbot_patrol.ros.simulator.node import SimulatorParams
-from rosbot_patrol.simulation.battery import Battery, BatteryParams
-from rosbot_patrol.simulation.camera import CameraParams
-from rosbot_patrol.simulation.imu import ImuParams, ImuReading
-from rosbot_patrol.simulation.physics import Touch
-from rosbot_patrol.simulation.range_sensors import RangeParams
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.sensor_places import read_sensors
+from rosbot_patrol.simulation.physics.world import Touch
+from rosbot_patrol.simulation.robot.battery import Battery, BatteryParams
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.robot.imu import ImuParams, ImuReading
+from rosbot_patrol.simulation.sensors.camera import CameraParams
+from rosbot_patrol.simulation.sensors.range_sensors import RangeParams
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 ROOT = Path(__file__).parents[3]
 

@@ -15,9 +15,9 @@ from rosbot_patrol.ros.simulator import outputs as simulator_outputs
 from rosbot_patrol.ros.simulator.outputs import STEPS_PER_TICK, Outputs, RateParams, is_due
 from rosbot_patrol.ros.simulator.pace import SharedClock
 from rosbot_patrol.simulation.engine import Engine
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.scene import Body
-from rosbot_patrol.simulation.world import World
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.scene.scene import Body
+from rosbot_patrol.simulation.sdf.world import World
 
 ROOT = Path(__file__).parents[3]
 TWO_WHEELER = ROOT / "test/unit/simulation/data/two_wheeler_description/urdf/two_wheeler.urdf"
@@ -62,7 +62,7 @@ def casts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many beams each cast had."""
     Wire.heard, Wire.sent, CountingRenderer.renders = set(), {}, 0
     monkeypatch.setattr(simulator_outputs.rospy, "Publisher", Wire)
-    from rosbot_patrol.simulation.slices import Slice
+    from rosbot_patrol.simulation.scene.slices import Slice
 
     counted: list[int] = []
     cast = Slice.cast

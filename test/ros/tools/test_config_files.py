@@ -31,8 +31,8 @@ from rosbot_patrol.ros.sensors import watch_node as sensor_watch_node
 from rosbot_patrol.ros.simulator.demo_intruder_node import read_walk
 from rosbot_patrol.ros.simulator.node import SimulatorParams
 from rosbot_patrol.ros.tools.parameter_tables import document
-from rosbot_patrol.simulation.scenario import read_scenario
-from rosbot_patrol.simulation.sensor_places import read_sensors
+from rosbot_patrol.simulation.scenario.file import read_scenario
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 ROOT = Path(__file__).parents[3]
 

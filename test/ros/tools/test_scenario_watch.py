@@ -13,7 +13,7 @@ from std_msgs.msg import String
 from rosbot_patrol.patrol.story.mission_story import AlertTelling, Narrator, Telling
 from rosbot_patrol.ros.tools import narrated_scenario as scenario_watch
 from rosbot_patrol.ros.tools.narrated_scenario import ScenarioWatch
-from rosbot_patrol.simulation.scenario import PLAYED
+from rosbot_patrol.simulation.scenario.file import PLAYED
 
 
 class House:

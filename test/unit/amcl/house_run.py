@@ -15,8 +15,8 @@ from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.scan import LaserScan
-from rosbot_patrol.simulation.floor_plan import floor_plan
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.scene.floor_plan import floor_plan
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).parents[3]
 MOUNT = Pose2D(0.02, 0.0, math.pi)

@@ -24,7 +24,7 @@ from rosbot_patrol.campaign.plan import (
     scenario_text,
 )
 from rosbot_patrol.errors import ParamError, WorldError
-from rosbot_patrol.simulation.scenario import read_scenario
+from rosbot_patrol.simulation.scenario.file import read_scenario
 
 SEED = 3
 

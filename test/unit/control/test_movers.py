@@ -12,8 +12,8 @@ from rosbot_patrol.control.movers import MoverWatch
 from rosbot_patrol.geometry import Pose2D, Twist2D, compose
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).resolve().parents[3]
 EVERY = round(0.1 / STEP)

@@ -11,8 +11,8 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.replay.closed_loop import ClosedLoop, read_profile
 from rosbot_patrol.simulation.engine import Engine, EngineParams
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).resolve().parents[3]
 HOME = Pose2D()

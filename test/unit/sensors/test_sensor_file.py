@@ -5,7 +5,7 @@ import pytest
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
-from rosbot_patrol.simulation.sensor_places import read_sensors
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 ROOT = Path(__file__).resolve().parents[3]
 ROOMS = {0: "base", 1: "kitchen", 5: "hall"}

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.simulation.engine import Engine, EngineParams
-from rosbot_patrol.simulation.motion_sensors import SensorPlace
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.scene import Body
-from rosbot_patrol.simulation.world import World
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.scene.scene import Body
+from rosbot_patrol.simulation.sdf.world import World
+from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -10,14 +10,14 @@ import pytest
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
-from rosbot_patrol.simulation.drive import DriveParams
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams
-from rosbot_patrol.simulation.matrices import from_xyz_rpy
-from rosbot_patrol.simulation.motion_sensors import SensorPlace
-from rosbot_patrol.simulation.odometry import OdometryParams
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.scene import Body, Collision, Shape
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.robot.drive import DriveParams
+from rosbot_patrol.simulation.robot.odometry import OdometryParams
+from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
+from rosbot_patrol.simulation.scene.scene import Body, Collision, Shape
+from rosbot_patrol.simulation.sdf.world import load_world
+from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
 
 ROOT = Path(__file__).parents[3]
 NO_SLIP = DriveParams(slip=0.0, scrub=0.0)

@@ -17,12 +17,12 @@ from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
 from rosbot_patrol.maps.raster import flood
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.simulation.engine import Engine
-from rosbot_patrol.simulation.floor_plan import floor_plan
-from rosbot_patrol.simulation.motion_sensors import MotionSensorParams, SensorPlace, bearing_in_cone
-from rosbot_patrol.simulation.robot import load_robot
-from rosbot_patrol.simulation.sensor_places import read_sensors
-from rosbot_patrol.simulation.slices import slice_bodies
-from rosbot_patrol.simulation.world import World, load_world
+from rosbot_patrol.simulation.robot.description import load_robot
+from rosbot_patrol.simulation.scene.floor_plan import floor_plan
+from rosbot_patrol.simulation.scene.slices import slice_bodies
+from rosbot_patrol.simulation.sdf.world import World, load_world
+from rosbot_patrol.simulation.sensors.motion_sensors import MotionSensorParams, SensorPlace, bearing_in_cone
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 ROOT = Path(__file__).parents[3]
 EYES = 1.3  # height [m]

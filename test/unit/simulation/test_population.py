@@ -12,10 +12,10 @@ import pytest
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams
-from rosbot_patrol.simulation.matrices import from_xyz_rpy
-from rosbot_patrol.simulation.scene import Body, Collision, Shape
-from rosbot_patrol.simulation.ways import Ways
-from rosbot_patrol.simulation.world import ActorPlace, World
+from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
+from rosbot_patrol.simulation.scene.scene import Body, Collision, Shape
+from rosbot_patrol.simulation.scene.ways import Ways
+from rosbot_patrol.simulation.sdf.world import ActorPlace, World
 
 ROOT = Path(__file__).parents[3]
 

@@ -18,7 +18,7 @@ from rosbot_patrol.detection.training.scenes import (
     reach,
     sees,
 )
-from rosbot_patrol.simulation.scene import Intrinsics
+from rosbot_patrol.simulation.scene.scene import Intrinsics
 
 CASES = {"pair": 0.17, "legs": 0.17, "screen": 0.19, "decoys": 0.14, "far": 0.06, "hydrants": 0.07, "edge": 0.20}
 _CAMERA = Intrinsics()

@@ -24,8 +24,8 @@ from rosbot_patrol.detection.training.dataset import Pictures
 from rosbot_patrol.detection.training.labels import COLUMNS
 from rosbot_patrol.detection.training.render import degrade, eye
 from rosbot_patrol.detection.training.report import Forward, find_all, load_forward
-from rosbot_patrol.simulation.renderer import EglRenderer
-from rosbot_patrol.simulation.world import World, load_world
+from rosbot_patrol.simulation.render.egl import EglRenderer
+from rosbot_patrol.simulation.sdf.world import World, load_world
 
 HOUSES = ("house", "office", "flat")
 KINDS = {"chance": "by chance", "edge": "of which the edge cuts a thing", "plant": "of which the edge cuts a plant"}

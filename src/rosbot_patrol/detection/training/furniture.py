@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rosbot_patrol.simulation.actor_meshes import ellipsoid, loft
-from rosbot_patrol.simulation.scene import Body, Material, Matrix, Shape, Visual
+from rosbot_patrol.simulation.actors.people_meshes import ellipsoid, loft
+from rosbot_patrol.simulation.scene.scene import Body, Material, Matrix, Shape, Visual
 
 Rng = np.random.Generator
 Colour = tuple[float, float, float]

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from rosbot_patrol.simulation.textures import SIDE, Field, Texture, smooth_noise, standard_textures
+from rosbot_patrol.simulation.scene.textures import SIDE, Field, Texture, smooth_noise, standard_textures
 
 KEEP = 0.35
 

@@ -30,11 +30,11 @@ from rosbot_patrol.detection.training.mixing import FURNITURE
 from rosbot_patrol.detection.training.patterns import draw_textures
 from rosbot_patrol.detection.training.test_set import SETS, WORLD, unseen_textures
 from rosbot_patrol.detection.training.visibility import contrast, silhouette
-from rosbot_patrol.simulation.actors import person_body, person_pose_parts
-from rosbot_patrol.simulation.renderer import EglRenderer, Light
-from rosbot_patrol.simulation.scene import Intrinsics, Matrix
-from rosbot_patrol.simulation.textures import SIDE, Texture
-from rosbot_patrol.simulation.world import World, load_world
+from rosbot_patrol.simulation.actors.people import person_body, person_pose_parts
+from rosbot_patrol.simulation.render.egl import EglRenderer, Light
+from rosbot_patrol.simulation.scene.scene import Intrinsics, Matrix
+from rosbot_patrol.simulation.scene.textures import SIDE, Texture
+from rosbot_patrol.simulation.sdf.world import World, load_world
 
 PER_SHARD = 500
 VIEWS = 5

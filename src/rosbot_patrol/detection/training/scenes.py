@@ -1,6 +1,6 @@
 """Scenes by chance: a room, or the house of a world file, with furniture and light; and where people could stand in it.
 
-Looks and postures that `simulation/looks.py` and `simulation/actors.py` reserve for tests are drawn only for test sets.
+Test sets alone draw the looks and postures that `simulation/actors` reserves for tests.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from rosbot_patrol.detection.training.furniture import (
     tube,
     wood_colour,
 )
-from rosbot_patrol.simulation.actors import POSTURES, hydrant_body, person_body, person_pose_parts
-from rosbot_patrol.simulation.looks import HEIGHTS, LOOKS, RESERVED_HEIGHTS, Look, draw_look
-from rosbot_patrol.simulation.meshes import mesh_of
-from rosbot_patrol.simulation.pets import PETS, draw_pet, pet_body, pet_pose_parts
-from rosbot_patrol.simulation.renderer import Light
-from rosbot_patrol.simulation.scene import Body, Material, Matrix, Shape, Visual
-from rosbot_patrol.simulation.world import World
+from rosbot_patrol.simulation.actors.looks import HEIGHTS, LOOKS, RESERVED_HEIGHTS, Look, draw_look
+from rosbot_patrol.simulation.actors.people import POSTURES, hydrant_body, person_body, person_pose_parts
+from rosbot_patrol.simulation.actors.pets import PETS, draw_pet, pet_body, pet_pose_parts
+from rosbot_patrol.simulation.render.egl import Light
+from rosbot_patrol.simulation.scene.scene import Body, Material, Matrix, Shape, Visual
+from rosbot_patrol.simulation.scene.shapes import mesh_of
+from rosbot_patrol.simulation.sdf.world import World
 
 Rng = np.random.Generator
 FLOORS = ("wood", "tiles", "carpet", "marble", "plaster", "checks", "")

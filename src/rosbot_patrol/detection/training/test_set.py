@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.simulation.textures import SIDE, Field, Texture, grey, smooth_noise
+from rosbot_patrol.simulation.scene.textures import SIDE, Field, Texture, grey, smooth_noise
 
 WORLD = Path("test/test_pictures/villa.world")
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 
 from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH
-from rosbot_patrol.simulation.meshes import mesh_of
-from rosbot_patrol.simulation.scene import Intrinsics, Matrix
+from rosbot_patrol.simulation.scene.scene import Intrinsics, Matrix
+from rosbot_patrol.simulation.scene.shapes import mesh_of
 
 
 def silhouette(actor, optical: Matrix, intrinsics: Intrinsics) -> tuple[int, int]:

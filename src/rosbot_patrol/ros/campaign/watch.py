@@ -17,7 +17,7 @@ from rosbot_patrol.campaign.truth import Track
 from rosbot_patrol.geometry import Pose2D, distance
 from rosbot_patrol.msg import Alert, Contacts, EspTrigger, PatrolState
 from rosbot_patrol.ros.messages.convert import pose2d_from_pose
-from rosbot_patrol.simulation.scenario import PLAYED
+from rosbot_patrol.simulation.scenario.file import PLAYED
 
 
 @dataclass

@@ -44,7 +44,7 @@ from rosbot_patrol.sensors.problems import SERIOUS, Kind
 from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
 from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
-from rosbot_patrol.simulation.sensor_places import read_sensors
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 log = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ import rospy
 
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.simulation.doors import SPEED, SWING, plain_door
+from rosbot_patrol.simulation.actors.doors import SPEED, SWING, plain_door
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.srv import (
     SetDoor,

@@ -16,10 +16,10 @@ from PIL import Image, ImageDraw
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.simulator.packages import model_folders, package_finder
-from rosbot_patrol.simulation.renderer import make_renderer
-from rosbot_patrol.simulation.sensor_places import read_sensors
-from rosbot_patrol.simulation.world import load_world
-from rosbot_patrol.simulation.world_picture import WorldPicture, draw_world
+from rosbot_patrol.simulation.render.egl import make_renderer
+from rosbot_patrol.simulation.render.from_above import WorldPicture, draw_world
+from rosbot_patrol.simulation.sdf.world import load_world
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 _FINER = 2  # drawn that many times larger, for smooth edges
 _ROOM = (20, 60, 160)

@@ -15,7 +15,7 @@ from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 from rosbot_patrol.rosserial.poor_link import PERFECT, LinkQuality
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine
-from rosbot_patrol.simulation.faults import KINDS, Fault, LinkPoor, read_fault
+from rosbot_patrol.simulation.scenario.faults import KINDS, Fault, LinkPoor, read_fault
 from rosbot_patrol.srv import (
     ClearFault,
     ClearFaultRequest,

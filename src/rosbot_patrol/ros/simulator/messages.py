@@ -13,12 +13,12 @@ from std_msgs.msg import Header
 from rosbot_patrol.geometry import Pose2D, Twist2D, quaternion_from_yaw
 from rosbot_patrol.msg import Contact, Contacts
 from rosbot_patrol.ros.messages.convert import time_to_msg, twist_to_msg
-from rosbot_patrol.simulation.battery import Battery
-from rosbot_patrol.simulation.imu import ImuParams, ImuReading
-from rosbot_patrol.simulation.physics import Touch
-from rosbot_patrol.simulation.range_sensors import RangeParams
-from rosbot_patrol.simulation.robot import RobotDescription
-from rosbot_patrol.simulation.scene import Intrinsics
+from rosbot_patrol.simulation.physics.world import Touch
+from rosbot_patrol.simulation.robot.battery import Battery
+from rosbot_patrol.simulation.robot.description import RobotDescription
+from rosbot_patrol.simulation.robot.imu import ImuParams, ImuReading
+from rosbot_patrol.simulation.scene.scene import Intrinsics
+from rosbot_patrol.simulation.sensors.range_sensors import RangeParams
 
 _UNKNOWN = 1e12
 _KINDS = {"fire_hydrant": "hydrant"}

@@ -42,12 +42,12 @@ from rosbot_patrol.rosserial.keys import read_keys
 from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT
 from rosbot_patrol.rosserial.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine, EngineParams
-from rosbot_patrol.simulation.motion_sensors import SensorPlace
-from rosbot_patrol.simulation.renderer import make_renderer
-from rosbot_patrol.simulation.robot import RobotDescription, load_robot, parse_robot
-from rosbot_patrol.simulation.scenario import Scenario, Start, read_scenario
-from rosbot_patrol.simulation.sensor_places import read_sensors
-from rosbot_patrol.simulation.world import World, load_world
+from rosbot_patrol.simulation.render.egl import make_renderer
+from rosbot_patrol.simulation.robot.description import RobotDescription, load_robot, parse_robot
+from rosbot_patrol.simulation.scenario.file import Scenario, Start, read_scenario
+from rosbot_patrol.simulation.sdf.world import World, load_world
+from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 if TYPE_CHECKING:
     from rosbot_patrol.ros.simulator.window import Window

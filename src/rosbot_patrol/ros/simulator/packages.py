@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rospkg
 
-from rosbot_patrol.simulation.urdf import FindPackage
+from rosbot_patrol.simulation.robot.urdf import FindPackage
 
 
 def model_folders(more: Iterable[str] = ()) -> list[str]:

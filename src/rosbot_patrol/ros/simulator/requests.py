@@ -16,7 +16,7 @@ from rosbot_patrol.errors import PatrolError, WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.ros.simulator.packages import package_finder
 from rosbot_patrol.simulation.engine import Engine
-from rosbot_patrol.simulation.robot import parse_robot
+from rosbot_patrol.simulation.robot.description import parse_robot
 from rosbot_patrol.srv import (
     MoveActor,
     MoveActorRequest,

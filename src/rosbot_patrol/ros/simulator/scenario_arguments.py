@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from rosbot_patrol.errors import PatrolError
-from rosbot_patrol.simulation.scenario import read_scenario
+from rosbot_patrol.simulation.scenario.file import read_scenario
 
 
 def main() -> None:

@@ -18,8 +18,8 @@ from rosbot_patrol.msg import EspTrigger, PatrolState, SensorEvent, SensorStates
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.rooms import Room, Rooms, load_rooms
 from rosbot_patrol.ros.runtime.node import load_params, run_node
-from rosbot_patrol.simulation.motion_sensors import SensorPlace
-from rosbot_patrol.simulation.sensor_places import read_sensors
+from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
+from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
 QUIET, BUSY, MOTION = ColorRGBA(0.2, 0.5, 0.9, 0.8), ColorRGBA(1.0, 0.6, 0.0, 1.0), ColorRGBA(1.0, 0.1, 0.1, 1.0)
 SILENT, BAD = ColorRGBA(0.05, 0.05, 0.05, 1.0), ColorRGBA(1.0, 0.875, 0.0, 1.0)

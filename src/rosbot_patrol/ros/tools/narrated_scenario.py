@@ -9,7 +9,7 @@ from std_msgs.msg import String
 
 from rosbot_patrol.patrol.story.mission_story import Narrator
 from rosbot_patrol.ros.runtime.node import now
-from rosbot_patrol.simulation.scenario import PLAYED, Expect, Outcome, disappointments, read_scenario
+from rosbot_patrol.simulation.scenario.file import PLAYED, Expect, Outcome, disappointments, read_scenario
 
 
 class ScenarioWatch:

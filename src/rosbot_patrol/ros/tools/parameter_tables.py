@@ -51,8 +51,8 @@ from rosbot_patrol.ros.tools.narrator_node import NarratorParams
 from rosbot_patrol.rosserial.settings import SerialNodeParams
 from rosbot_patrol.sensors.sensor_file import SensorSpec
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
-from rosbot_patrol.simulation import scenario
-from rosbot_patrol.simulation.faults import KINDS, Doorway, Fault
+from rosbot_patrol.simulation.scenario import file as scenario
+from rosbot_patrol.simulation.scenario.faults import KINDS, Doorway, Fault
 
 # Title, namespace below the node's own, declaration.
 SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.detection.training import empty_views
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.sdf.world import load_world
 
 REPO = Path(__file__).parents[4]
 CFG, WEIGHTS = REPO / "models/house.cfg", REPO / "models/house.weights"

@@ -10,10 +10,10 @@ from rosbot_patrol.detection.training.furniture import box, build, placed
 from rosbot_patrol.detection.training.labels import COLUMNS, column
 from rosbot_patrol.detection.training.mixing import FURNITURE
 from rosbot_patrol.detection.training.scenes import Actor, Scene
-from rosbot_patrol.simulation.actors import person_body, person_pose_parts
-from rosbot_patrol.simulation.looks import Look
-from rosbot_patrol.simulation.pets import draw_pet, pet_body, pet_pose_parts
-from rosbot_patrol.simulation.renderer import EglRenderer, Light
+from rosbot_patrol.simulation.actors.looks import Look
+from rosbot_patrol.simulation.actors.people import person_body, person_pose_parts
+from rosbot_patrol.simulation.actors.pets import draw_pet, pet_body, pet_pose_parts
+from rosbot_patrol.simulation.render.egl import EglRenderer, Light
 
 
 @pytest.fixture(scope="module")

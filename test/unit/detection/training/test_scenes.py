@@ -7,9 +7,9 @@ import pytest
 
 from rosbot_patrol.detection.training import scenes
 from rosbot_patrol.detection.training.furniture import MAKERS, SHAPELESS, build, placed
-from rosbot_patrol.simulation.looks import draw_look, is_reserved
-from rosbot_patrol.simulation.meshes import mesh_of
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.actors.looks import draw_look, is_reserved
+from rosbot_patrol.simulation.scene.shapes import mesh_of
+from rosbot_patrol.simulation.sdf.world import load_world
 
 HOUSE = Path(__file__).parents[4] / "worlds" / "house.world"
 

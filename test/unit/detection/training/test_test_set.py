@@ -6,9 +6,9 @@ import numpy as np
 
 from rosbot_patrol.detection.training import scenes
 from rosbot_patrol.detection.training.test_set import FRESH, SETS, TEST, WORLD, unseen_picture, unseen_textures
-from rosbot_patrol.simulation.looks import is_reserved
-from rosbot_patrol.simulation.textures import standard_textures
-from rosbot_patrol.simulation.world import load_world
+from rosbot_patrol.simulation.actors.looks import is_reserved
+from rosbot_patrol.simulation.scene.textures import standard_textures
+from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).parents[4]
 

@@ -1,0 +1,65 @@
+"""Posters: a board on a wall with the picture of a person on it.
+
+The picture is the person's own body pressed flat, so that colour and outline are a person's and depth is a board's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rosbot_patrol.simulation.actors.people import Look, person_body
+from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
+from rosbot_patrol.simulation.scene.scene import Body, Collision, Material, Matrix, Shape, Visual
+from rosbot_patrol.simulation.scene.shapes import triangles_of
+from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
+
+BOTTOM, SHARE = 0.45, 0.7  # of a poster: lower edge [m], size of the picture in sizes of the person
+_THICK, _PRESSED = 0.01, 0.01  # of the board [m]; depth of the picture in depths of the person
+_MARGIN = 0.06  # of the board round the picture [m]
+_BOARD = (0.86, 0.84, 0.78, 1.0)
+
+
+def poster_body(name: str, look: Look) -> Body:
+    """A poster that hangs on a wall in the plane x = 0 and faces along x."""
+    size = SHARE * look.height
+    wide, high = 0.5 * size + 2.0 * _MARGIN, size + 2.0 * _MARGIN
+    middle = from_xyz_rpy((0.0, 0.0, BOTTOM + high / 2.0), (0.0, 0.0, 0.0))
+    board = Shape(kind="box", size=(_THICK, wide, high))
+    visuals = [Visual(shape=board, pose=middle, material=Material(rgba=_BOARD)), *_pressed(look)]
+    solid = Collision(shape=board, pose=middle)
+    return Body(name=name, kind="object", static=False, visuals=tuple(visuals), collisions=(solid,))
+
+
+def _pressed(look: Look) -> list[Visual]:
+    """The parts of a standing person, flat before the board."""
+    scale = np.array([_PRESSED, SHARE, SHARE])
+    shift = np.array([_THICK / 2.0 + 0.005, 0.0, BOTTOM + _MARGIN])
+    parts = []
+    for visual in person_body("person", look).visuals:
+        vertices, faces = triangles_of(visual.shape)
+        placed = vertices @ visual.pose[:3, :3].T + visual.pose[:3, 3]
+        shape = Shape(kind="mesh", vertices=placed * scale + shift, faces=faces)
+        parts.append(Visual(shape=shape, material=visual.material))
+    return parts
+
+
+class PosterFigure:
+    """A poster as an actor: it neither moves nor is it warm."""
+
+    warmth = 0.0
+    warm_heights: tuple[float, ...] = ()
+    radius = 0.05
+    cycle = 1.0
+    turn_rate = 2.5
+
+    def __init__(self, name: str, look: Look) -> None:
+        self.body = poster_body(name, look)
+        self.look = look.name
+        self._still = Body(name=name, collisions=self.body.collisions)
+
+    def pose_parts(self, phase: float, speed: float) -> Matrix | None:
+        """Nothing of it moves."""
+
+    def cut(self, height: float, phase: float, speed: float) -> Slice:
+        """The board, where the plane is as high as it hangs."""
+        return slice_bodies([self._still], height)

@@ -1,0 +1,1 @@
+"""Bodies that push and fall: PyBullet."""

@@ -1,0 +1,1 @@
+"""Pictures of a world: OpenGL, a small software renderer, and from above."""

@@ -1,0 +1,389 @@
+"""The camera's picture in colour and depth, drawn by OpenGL without a display: EGL, on Mesa's software driver or a GPU.
+
+Everything that stands still is one array of triangles; a body that has moved has its own, with a matrix for each of
+its visuals. Colours are taken as the display's own (as Gazebo classic takes them): a white face in full light is 255.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.simulation.render.shaders import sources
+from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, SceneRenderer
+from rosbot_patrol.simulation.scene.shapes import mesh_of
+from rosbot_patrol.simulation.scene.textures import SIDE, Texture, standard_textures
+from rosbot_patrol.simulation.sensors import picture_kernels as kernels
+
+log = logging.getLogger(__name__)
+
+Vec3 = tuple[float, float, float]
+MAX_PARTS = 48
+
+_VERTEX = np.dtype(
+    [
+        ("position", "<f4", 3),
+        ("normal", "<f4", 3),
+        ("uv", "<f4", 2),
+        ("colour", "<f4", 3),
+        ("part_layer_label", "<f4", 3),
+    ]
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light:
+    """What lights a scene; each colour is added in, so that about 1 in all is full light.
+
+    Attributes:
+        sun_direction: towards the sun, of any length.
+        above, below: light on faces that look up and down, the rest in between.
+        lamp_place: a lamp [m]; its light falls to a half at `lamp_reach` [m].
+        sky: colour where nothing stands.
+    """
+
+    sun_direction: Vec3 = (-0.55, -0.35, 0.75)
+    sun: Vec3 = (0.36, 0.35, 0.33)
+    above: Vec3 = (0.68, 0.69, 0.72)
+    below: Vec3 = (0.44, 0.43, 0.41)
+    lamp_place: Vec3 = (0.0, 0.0, 2.4)
+    lamp: Vec3 = (0.0, 0.0, 0.0)
+    lamp_reach: float = 4.0
+    sky: Vec3 = (0.72, 0.80, 0.90)
+
+
+_Arrays = tuple[NDArray[np.void], NDArray[np.int64]]
+
+
+@dataclass
+class _Drawn:
+    """What OpenGL holds of some triangles: corners, their order, and an array for each program that has drawn them."""
+
+    corners: Any = None
+    order: Any = None
+    textured: bool = False
+    arrays: dict[Any, Any] = field(default_factory=dict)
+
+    def release(self) -> None:
+        for thing in (*self.arrays.values(), self.corners, self.order):
+            if thing is not None:
+                thing.release()
+
+
+@dataclass
+class _Item:
+    body: Body
+    pose: Matrix
+    visuals: Matrix
+    label: int
+    moving: bool
+    arrays: list[_Arrays]
+    drawn: list[_Drawn]
+
+
+class EglRenderer(SceneRenderer):
+    """Draws bodies by OpenGL; one per process and thread, used by the thread that made it.
+
+    Args:
+        light: what lights the scene; may be changed between pictures (`light` is an attribute).
+        textures: by the names that materials use; by default those of `textures.py`.
+
+    Raises:
+        WorldError: there is no EGL, or no driver that offers OpenGL 3.3.
+    """
+
+    def __init__(self, light: Light | None = None, textures: dict[str, Texture] | None = None) -> None:
+        self.light = light or Light()
+        self._context = _open_context()
+        self._items: dict[str, _Item] = {}
+        self._still: _Drawn | None = None
+        self._target: tuple[tuple[int, int], Any, Any, Any] | None = None
+        context = self._context
+        self._programs = {
+            (lamp, textured): context.program(*sources(lamp=lamp, textured=textured))
+            for lamp in (False, True)
+            for textured in (False, True)
+        }
+        self._layers: dict[str, tuple[int, float]] = {}
+        self._texture = self._upload(textures if textures is not None else standard_textures())
+        self._parts = np.tile(np.eye(4, dtype="<f4"), (MAX_PARTS, 1, 1))
+
+    @property
+    def driver(self) -> str:
+        """The name of what draws, as OpenGL says it."""
+        return str(self._context.info["GL_RENDERER"])
+
+    def add(self, body: Body, *, label: int = 0) -> None:
+        """Put a body into the scene; its name must be new.
+
+        Args:
+            body: what to draw.
+            label: 1 to 255, found again in `labels()` where the body is seen; 0 for none.
+
+        Raises:
+            WorldError: the name is taken, or a shape cannot be drawn.
+        """
+        if body.name in self._items:
+            raise WorldError(body.name, "is in the scene already")
+        poses = np.array([v.pose for v in body.visuals], float).reshape(-1, 4, 4)
+        arrays = [self._vertices(body, i, label) for i in range(len(body.visuals))]
+        self._items[body.name] = _Item(body, body.pose, poses, label, not body.static, arrays, [])
+        if body.static:
+            self._forget_still()
+
+    def remove(self, name: str) -> None:
+        """Take a body out of the scene."""
+        item = self._item(name)
+        self._release(item)
+        if not item.moving:
+            self._forget_still()
+        del self._items[name]
+
+    def clear(self) -> None:
+        """Take everything out of the scene."""
+        for name in list(self._items):
+            self.remove(name)
+
+    def move(self, name: str, world_from_body: Matrix) -> None:
+        """Put a body elsewhere."""
+        self._moving(name).pose = world_from_body
+
+    def pose_visuals(self, name: str, body_from_visuals: Matrix) -> None:
+        """Move the visuals of a body against it, shape (number of visuals, 4, 4)."""
+        item = self._moving(name)
+        if body_from_visuals.shape != item.visuals.shape:
+            raise WorldError(name, f"has visuals {item.visuals.shape}, was given poses {body_from_visuals.shape}")
+        item.visuals = body_from_visuals
+
+    def render(
+        self, world_from_optical: Matrix, intrinsics: Intrinsics
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """The picture in colour (height, width, 3) and depth [m] (height, width), inf where nothing was hit."""
+        size = (intrinsics.width, intrinsics.height)
+        buffer = self._draw(world_from_optical, intrinsics, size)
+        colour = np.empty((size[1], size[0], 3), np.uint8)
+        raw = np.empty((size[1], size[0]), np.float32)
+        buffer.read_into(colour, components=3, alignment=1)
+        buffer.read_into(raw, attachment=-1, components=1, dtype="f4")
+        return colour, _metres(raw, intrinsics)
+
+    def labels(self) -> NDArray[np.uint8]:
+        """The label of what the last picture shows in each pixel, shape (height, width)."""
+        assert self._target is not None, "labels() comes after render()"
+        return self._read(self._target[1], self._target[0])[:, :, 3]
+
+    def render_labelled(self, world_from_optical: Matrix, intrinsics: Intrinsics) -> NDArray[np.uint8]:
+        """The picture in colour and, as a fourth of them, its `labels()`, shape (height, width, 4).
+
+        It is read in one piece, without the depth: faster than `render` and `labels` in turn.
+        """
+        size = (intrinsics.width, intrinsics.height)
+        return self._read(self._draw(world_from_optical, intrinsics, size), size)
+
+    @staticmethod
+    def _read(buffer: Any, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Colour and label of each pixel, shape (height, width, 4)."""
+        return np.frombuffer(buffer.read(components=4), np.uint8).reshape(size[1], size[0], 4)
+
+    def close(self) -> None:
+        """Give the context and all its memory back."""
+        self._items.clear()
+        self._context.gc_mode = "context_gc"
+        self._context.gc()
+        self._context.release()
+
+    def _draw(self, world_from_optical: Matrix, intrinsics: Intrinsics, size: tuple[int, int]) -> Any:
+        buffer = self._buffer(size)
+        buffer.use()
+        context, lamp = self._context, any(self.light.lamp)
+        context.enable_only(context.DEPTH_TEST)
+        buffer.clear(*self.light.sky, 0.0, depth=1.0)
+        self._texture.use(0)
+        shading = {textured: self._programs[lamp, textured] for textured in (False, True)}
+        for program in shading.values():
+            _set(program, "view", np.linalg.inv(world_from_optical).T)
+            _set(program, "projection", _projection(intrinsics).T)
+            _set(program, "eye", world_from_optical[:3, 3])
+            self._set_light(program, lamp)
+        # What moves stands before what does not, as a rule: drawn first, it spares the fragments behind it. A pass for
+        # depth alone, to shade only what is seen, cost more than it saved.
+        for item in self._items.values():
+            if item.moving:
+                self._draw_item(item, shading)
+        self._draw_still(shading)
+        return buffer
+
+    def _draw_still(self, programs: dict[bool, Any]) -> None:
+        if self._still is None:
+            arrays = [placed for item in self._items.values() if not item.moving for placed in _placed(item)]
+            self._still = self._buffers(arrays) if arrays else _Drawn()
+        self._parts[0] = np.eye(4)
+        self._draw_array(self._still, programs)
+
+    def _draw_item(self, item: _Item, programs: dict[bool, Any]) -> None:
+        if not item.drawn:
+            item.drawn = [self._buffers(item.arrays[i : i + MAX_PARTS]) for i in range(0, len(item.arrays), MAX_PARTS)]
+        world = item.pose @ item.visuals
+        for i, drawn in enumerate(item.drawn):
+            some = world[i * MAX_PARTS : (i + 1) * MAX_PARTS]
+            self._parts[: len(some)] = some.transpose(0, 2, 1)
+            self._draw_array(drawn, programs)
+
+    def _draw_array(self, drawn: _Drawn, programs: dict[bool, Any]) -> None:
+        if drawn.corners is None:
+            return
+        program = programs[drawn.textured]
+        if program not in drawn.arrays:
+            drawn.arrays[program] = self._array(program, drawn)
+        program["parts"].write(self._parts)
+        drawn.arrays[program].render()
+
+    def _set_light(self, program: Any, lamp: bool) -> None:
+        light = self.light
+        towards = np.array(light.sun_direction, float)
+        _set(program, "sun_direction", towards / max(float(np.linalg.norm(towards)), 1e-9))
+        for name in ("sun", "above", "below", *(("lamp_place", "lamp") if lamp else ())):
+            _set(program, name, np.array(getattr(light, name)))
+        if lamp:
+            _set(program, "lamp_reach", np.array(1.0 / light.lamp_reach**2))
+
+    def _vertices(self, body: Body, index: int, label: int) -> _Arrays:
+        visual = body.visuals[index]
+        mesh = mesh_of(visual.shape)
+        layer, metres = self._layer(visual.material.texture)
+        vertices = np.zeros(len(mesh.positions), _VERTEX)
+        vertices["position"], vertices["normal"] = mesh.positions, mesh.normals
+        vertices["uv"] = mesh.uv / metres if metres > 0 else mesh.uv / mesh.span + 0.5
+        vertices["colour"] = visual.material.rgba[:3]
+        vertices["part_layer_label"] = (index % MAX_PARTS, layer, label / 255.0)
+        return vertices, mesh.faces
+
+    def _buffers(self, parts: list[_Arrays]) -> _Drawn:
+        starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+        vertices = np.concatenate([vertices for vertices, _ in parts])
+        faces = np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=False)])
+        return _Drawn(
+            corners=self._context.buffer(vertices.tobytes()),
+            order=self._context.buffer(np.ascontiguousarray(faces, "<i4").tobytes()),
+            textured=bool(vertices["part_layer_label"][:, 1].any()),
+        )
+
+    def _array(self, program: Any, drawn: _Drawn) -> Any:
+        """Corners as one program takes them: what it does not use is skipped."""
+        names = [name for name in _VERTEX.names or () if name in program]
+        layout = " ".join(
+            f"{_VERTEX[name].shape[0]}f" if name in names else f"{_VERTEX[name].itemsize}x"
+            for name in _VERTEX.names or ()
+        )
+        return self._context.vertex_array(program, [(drawn.corners, layout, *names)], drawn.order)
+
+    def _layer(self, name: str) -> tuple[int, float]:
+        if name not in self._layers:
+            log.warning("there is no texture '%s', drawn plain (known: %s)", name, ", ".join(self._layers))
+            self._layers[name] = (0, 1.0)
+        return self._layers[name]
+
+    def _upload(self, textures: dict[str, Texture]) -> Any:
+        white = Texture(np.full((SIDE, SIDE, 3), 255, np.uint8))
+        every = {"": white, **textures}
+        self._layers = {name: (i, texture.metres) for i, (name, texture) in enumerate(every.items())}
+        pixels = np.stack([texture.pixels for texture in every.values()])
+        made = self._context.texture_array((SIDE, SIDE, len(every)), 3, pixels.tobytes(), alignment=1)
+        made.build_mipmaps()
+        made.filter = (self._context.LINEAR_MIPMAP_NEAREST, self._context.LINEAR)
+        return made
+
+    def _buffer(self, size: tuple[int, int]) -> Any:
+        if self._target is None or self._target[0] != size:
+            if self._target is not None:
+                for thing in self._target[1:]:
+                    thing.release()
+            colour, depth = self._context.texture(size, 4), self._context.depth_texture(size)
+            self._target = (size, self._context.framebuffer([colour], depth), colour, depth)
+        return self._target[1]
+
+    def _item(self, name: str) -> _Item:
+        if name not in self._items:
+            raise WorldError(name, "is not in the scene")
+        return self._items[name]
+
+    def _moving(self, name: str) -> _Item:
+        item = self._item(name)
+        if not item.moving:
+            item.moving = True
+            self._forget_still()
+        return item
+
+    def _forget_still(self) -> None:
+        if self._still is not None:
+            self._still.release()
+        self._still = None
+
+    def _release(self, item: _Item) -> None:
+        for drawn in item.drawn:
+            drawn.release()
+        item.drawn = []
+
+
+def make_renderer(prefer: str = "egl") -> SceneRenderer:
+    """The fastest renderer that this machine has: OpenGL on EGL, else PyBullet's own, with a warning that says why."""
+    if prefer == "egl":
+        try:
+            renderer = EglRenderer()
+        except WorldError as err:
+            log.warning("the camera is drawn by PyBullet's TinyRenderer, some 20 times slower: %s", err)
+        else:
+            log.info("the camera is drawn by OpenGL on EGL: %s", renderer.driver)
+            return renderer
+    from rosbot_patrol.simulation.render.tiny import TinyRenderer
+
+    return TinyRenderer()
+
+
+def _open_context() -> Any:
+    try:
+        import moderngl
+
+        return moderngl.create_context(standalone=True, backend="egl", require=330)  # type: ignore[arg-type]
+    except Exception as err:  # moderngl raises plain Exception, its loader OSError and ImportError
+        raise WorldError("EGL", f"OpenGL 3.3 without a display cannot be had: {err}") from err
+
+
+def _placed(item: _Item) -> list[_Arrays]:
+    placed = []
+    for (vertices, faces), visual in zip(item.arrays, item.visuals, strict=True):
+        matrix = item.pose @ visual
+        moved = vertices.copy()
+        moved["position"] = vertices["position"] @ matrix[:3, :3].T + matrix[:3, 3]
+        moved["normal"] = vertices["normal"] @ matrix[:3, :3].T
+        moved["part_layer_label"][:, 0] = 0
+        placed.append((moved, faces))
+    return placed
+
+
+def _projection(camera: Intrinsics) -> NDArray[np.float64]:
+    """Clip space from the optical frame; the picture's first row comes first in memory (OpenGL's last)."""
+    near, far, width, height = camera.near, camera.far, camera.width, camera.height
+    return np.array(
+        [
+            [2 * camera.fx / width, 0, (2 * camera.cx + 1) / width - 1, 0],
+            [0, 2 * camera.fy / height, (2 * camera.cy + 1) / height - 1, 0],
+            [0, 0, (far + near) / (far - near), -2 * far * near / (far - near)],
+            [0, 0, 1, 0],
+        ]
+    )
+
+
+def _metres(raw: NDArray[np.float32], camera: Intrinsics) -> NDArray[np.float32]:
+    metres = np.empty(raw.size, np.float32)
+    kernels.depth_from_clip(raw.ravel(), camera.near, camera.far, metres)
+    return metres.reshape(raw.shape)
+
+
+def _set(program: Any, name: str, value: NDArray[np.float64]) -> None:
+    program[name].write(np.ascontiguousarray(value, "<f4").tobytes())

@@ -1,0 +1,1 @@
+"""The simulated robot: URDF, wheels, odometry, battery, IMU."""

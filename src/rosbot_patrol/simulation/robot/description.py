@@ -1,0 +1,317 @@
+"""The robot as its URDF describes it: shapes, wheels, mass, and where each frame and sensor sits on the base.
+
+The base is the link that no joint carries. Driven wheels are named by their joints, by parameter or by the plug-in of a
+drive in the file, or else found: continuous joints whose axis lies across the robot, left and right of its middle,
+carried by no other moving joint (so the swivel and the wheel of a caster are none). Places are taken with all joints at
+zero.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.params import param
+from rosbot_patrol.simulation.robot.urdf import FindPackage, Joint, Urdf, lateral, read_urdf
+from rosbot_patrol.simulation.scene.scene import Body, Collision, Matrix, Visual
+from rosbot_patrol.simulation.scene.shapes import triangles_of
+
+log = logging.getLogger(__name__)
+
+_ACROSS = 0.7  # of an axle's direction to the side
+_MIDDLE = 1e-3  # a wheel nearer to the middle is on no side [m]
+_LASER = ("laser", "lidar", "scan")
+_CAMERA = ("camera", "kinect", "realsense", "astra")
+_COLOUR = ("rgb", "color", "colour")
+# Rows: the camera's x right, y down, z ahead, of a frame with x ahead, y left, z up.
+_BODY_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameParams:
+    """Links that the sensors sit on, where they are not to be found by their names."""
+
+    laser: str = param("", doc="link of the lidar, empty: found by its name")
+    camera: str = param("", doc="link of the camera, empty: found by its name")
+    imu: str = param("", doc="link of the inertial unit, empty: found by its name")
+    ranges: tuple[str, ...] = param((), doc="links of the range sensors, empty: found by their names")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hinge:
+    """A joint that moves, with the wheel that it may carry.
+
+    Attributes:
+        joint: its name.
+        radius: of the wheel [m], 0 where no shape tells it.
+        x, y, z: where the joint sits on the base [m].
+        contact_y: where the middle of the wheel is [m].
+        forward: 1 where a positive turn drives ahead, -1 where back.
+    """
+
+    joint: str
+    radius: float
+    x: float
+    y: float
+    z: float
+    contact_y: float
+    forward: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mount:
+    """A sensor: the frame that its messages name, and base_from_sensor."""
+
+    frame: str
+    pose: Matrix
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotDescription:
+    """What the simulator needs of a URDF.
+
+    Attributes:
+        source: where it comes from, for messages.
+        base: the base's link.
+        frames: base_from_frame of every link, shape (4, 4) each.
+        hinges: every joint that moves, in the order of the file.
+        left, right: joints of the driven wheels, on each side.
+        body: visuals and collisions in the frame of the base.
+        mass: of everything [kg].
+        laser, camera, imu: where each sensor sits, None where the robot has none. The camera looks along z.
+        ranges: the range sensors.
+    """
+
+    name: str
+    source: str
+    base: str
+    frames: dict[str, Matrix]
+    hinges: tuple[Hinge, ...]
+    left: tuple[str, ...]
+    right: tuple[str, ...]
+    body: Body
+    mass: float
+    laser: Mount | None = None
+    camera: Mount | None = None
+    imu: Mount | None = None
+    ranges: tuple[Mount, ...] = ()
+
+    @property
+    def wheels(self) -> tuple[Hinge, ...]:
+        """The driven wheels, in the order of the file."""
+        return tuple(h for h in self.hinges if h.joint in self.left or h.joint in self.right)
+
+    @property
+    def base_height(self) -> float:
+        """Height of the base's frame above the floor [m], with the driven wheels on it."""
+        return max((w.radius - w.z for w in self.wheels), default=0.0)
+
+    @property
+    def wheel_radius(self) -> float:
+        """Radius of the driven wheels [m], 0 where no shape tells it."""
+        return max((w.radius for w in self.wheels), default=0.0)
+
+    @property
+    def track(self) -> float:
+        """Distance between the contact lines of left and right wheels [m]."""
+        left = [w.contact_y for w in self.wheels if w.joint in self.left]
+        right = [w.contact_y for w in self.wheels if w.joint in self.right]
+        return float(np.mean(left) - np.mean(right)) if left and right else 0.0
+
+    @property
+    def is_skid_steered(self) -> bool:
+        """Whether a side has several wheels, which turning drags sideways."""
+        return max(len(self.left), len(self.right)) > 1
+
+    def fitted(self, left: Sequence[str], right: Sequence[str], frames: FrameParams) -> RobotDescription:
+        """The same robot with wheels and sensors as named; what is not named stays as it was found.
+
+        Raises:
+            WorldError: a name is not there, or no wheels are left to drive by on a side.
+        """
+        for side, names in (("left", left), ("right", right)):
+            for name in names:
+                if name not in {h.joint for h in self.hinges}:
+                    there = ", ".join(h.joint for h in self.hinges) or "none"
+                    told = f"drive.{side}_joints names '{name}', which is no joint that moves (there: {there})"
+                    raise WorldError(self.source, told)
+        if set(left) & set(right):
+            raise WorldError(self.source, f"'{min(set(left) & set(right))}' is named as a left and as a right joint")
+        chosen = replace(self, left=tuple(left) or self.left, right=tuple(right) or self.right)
+        if not chosen.left and not chosen.right:
+            raise WorldError(self.source, "has no continuous joint across the robot, so no wheels to drive by")
+        if not chosen.left or not chosen.right or chosen.track <= 0.0:
+            raise WorldError(self.source, "has wheels on one side only")
+        return replace(
+            chosen,
+            laser=self._mount(frames.laser, "laser") or self.laser,
+            camera=_looking(self._mount(frames.camera, "camera")) or self.camera,
+            imu=self._mount(frames.imu, "imu") or self.imu,
+            ranges=tuple(m for f in frames.ranges if (m := self._mount(f, "ranges"))) or self.ranges,
+        )
+
+    def _mount(self, link: str, key: str) -> Mount | None:
+        if not link:
+            return None
+        if link not in self.frames:
+            raise WorldError(self.source, f"frames.{key} names '{link}', which is no link of robot '{self.name}'")
+        return Mount(frame=link, pose=self.frames[link])
+
+
+def load_robot(path: str | Path, find_package: FindPackage = lambda _: None) -> RobotDescription:
+    """Read a URDF file; raises WorldError."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as err:
+        raise WorldError(path, f"cannot be read: {err.strerror}") from err
+    except UnicodeDecodeError as err:
+        raise WorldError(path, f"is no text in UTF-8 ({err.reason} at byte {err.start})") from err
+    return parse_robot(text, source=str(path), find_package=find_package)
+
+
+def parse_robot(
+    text: str, *, source: str = "robot_description", find_package: FindPackage = lambda _: None
+) -> RobotDescription:
+    """Read a URDF text.
+
+    Args:
+        text: the URDF (expanded, no xacro).
+        source: where it comes from, for messages.
+        find_package: folder of a package or model by name, None where it is not known.
+
+    Raises:
+        WorldError: it is no URDF, its joints form no tree, a number is none, or a mesh is missing.
+    """
+    urdf = read_urdf(text, source, find_package)
+    frames = urdf.frames()
+    visuals = [replace(v, pose=frames[n] @ v.pose) for n, link in urdf.links.items() for v in link.visuals]
+    collisions = [replace(c, pose=frames[n] @ c.pose) for n, link in urdf.links.items() for c in link.collisions]
+    left, right = _sides(urdf, frames)
+    return RobotDescription(
+        name=urdf.name,
+        source=source,
+        base=urdf.root,
+        frames=frames,
+        hinges=tuple(_hinge(j, urdf, frames) for j in urdf.joints if _moves(j)),
+        left=left,
+        right=right,
+        body=Body(name=urdf.name, kind="robot", static=False, visuals=tuple(visuals), collisions=tuple(collisions)),
+        mass=sum(link.mass for link in urdf.links.values()) or 5.0,
+        laser=_laser(urdf, frames),
+        camera=_camera(urdf, frames),
+        imu=_imu(urdf, frames),
+        ranges=tuple(
+            Mount(frame=n, pose=frames[n])
+            for n in urdf.links
+            if n.startswith("range_") or "sonar" in n or "ultrasonic" in n
+        ),
+    )
+
+
+def _moves(joint: Joint) -> bool:
+    return joint.kind in ("continuous", "revolute")
+
+
+def _sides(urdf: Urdf, frames: dict[str, Matrix]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    if all(urdf.drive):
+        return urdf.drive
+    carrier = {j.child: j for j in urdf.joints}
+
+    def is_carried(link: str) -> bool:
+        while link in carrier:
+            if carrier[link].kind != "fixed":
+                return True
+            link = carrier[link].parent
+        return False
+
+    found = [
+        j
+        for j in urdf.joints
+        if j.kind == "continuous" and abs(lateral(frames[j.child], j.axis)) > _ACROSS and not is_carried(j.parent)
+    ]
+    y = {j.name: float(frames[j.child][1, 3]) for j in found}
+    return tuple(n for n in y if y[n] > _MIDDLE), tuple(n for n in y if y[n] < -_MIDDLE)
+
+
+def _hinge(joint: Joint, urdf: Urdf, frames: dict[str, Matrix]) -> Hinge:
+    pose, link = frames[joint.child], urdf.links[joint.child]
+    radius, middle = _wheel(link.collisions or link.visuals, joint.axis, pose)
+    return Hinge(
+        joint=joint.name,
+        radius=radius,
+        x=float(pose[0, 3]),
+        y=float(pose[1, 3]),
+        z=float(pose[2, 3]),
+        contact_y=float(pose[1, 3]) + middle,
+        forward=1 if lateral(pose, joint.axis) >= 0.0 else -1,
+    )
+
+
+def _wheel(parts: Iterable[Collision | Visual], axis: tuple[float, ...] | None, pose: Matrix) -> tuple[float, float]:
+    """Radius of a wheel's shapes about its axle, and their middle to the left of its joint [m]; 0, 0 without shapes."""
+    parts = tuple(parts)
+    for part in parts:
+        if part.shape.kind in ("cylinder", "sphere"):
+            return part.shape.size[0], float((pose[:3, :3] @ part.pose[:3, 3])[1])
+    if not parts:
+        return 0.0, 0.0
+    points = np.vstack([triangles_of(p.shape)[0] @ p.pose[:3, :3].T + p.pose[:3, 3] for p in parts])
+    axle = pose[:3, :3].T @ [0.0, 1.0, 0.0] if axis is None else np.asarray(axis, float)
+    axle = axle / max(float(np.linalg.norm(axle)), 1e-9)
+    across = points - np.outer(points @ axle, axle)
+    sideways = (points @ pose[:3, :3].T)[:, 1]
+    return float(np.linalg.norm(across, axis=1).max()), float(sideways.min() + sideways.max()) / 2.0
+
+
+def _named(urdf: Urdf, words: Iterable[str]) -> list[str]:
+    return [name for name in urdf.links if any(word in name.lower() for word in words)]
+
+
+def _laser(urdf: Urdf, frames: dict[str, Matrix]) -> Mount | None:
+    for tag in urdf.sensors:
+        if tag.kind in ("ray", "gpu_ray"):
+            frame = tag.frame if tag.frame in frames else tag.link
+            return Mount(frame=frame, pose=frames[tag.link] @ tag.pose)
+    names = _named(urdf, _LASER)
+    best = next((n for n in ("laser", "laser_frame", "base_scan") if n in names), names[0] if names else None)
+    return None if best is None else Mount(frame=best, pose=frames[best])
+
+
+def _camera(urdf: Urdf, frames: dict[str, Matrix]) -> Mount | None:
+    for tag in urdf.sensors:
+        if tag.kind in ("camera", "depth", "multicamera"):
+            frame = tag.frame if tag.frame in frames else tag.link
+            return Mount(frame=frame, pose=frames[tag.link] @ tag.pose @ _BODY_FROM_OPTICAL)
+
+    def rank(name: str) -> tuple[bool, ...]:
+        low, pose = name.lower(), frames[name]
+        is_optical = abs(float(pose[2, 2])) < _ACROSS
+        return (
+            is_optical and low == "camera_depth_frame",
+            is_optical,
+            "optical" in low,
+            any(word in low for word in _COLOUR),
+            low.endswith("camera_link"),
+        )
+
+    names = _named(urdf, _CAMERA)
+    best = max(names, key=rank, default=None)
+    return None if best is None else _looking(Mount(frame=best, pose=frames[best]))
+
+
+def _looking(mount: Mount | None) -> Mount | None:
+    """The camera with z ahead: a frame whose z axis points up is one that looks along x."""
+    if mount is None or abs(float(mount.pose[2, 2])) < _ACROSS:
+        return mount
+    return replace(mount, pose=mount.pose @ _BODY_FROM_OPTICAL)
+
+
+def _imu(urdf: Urdf, frames: dict[str, Matrix]) -> Mount | None:
+    tagged = [tag.link for tag in urdf.sensors if tag.kind == "imu"]
+    names = tagged or _named(urdf, ("imu",))
+    return Mount(frame=names[0], pose=frames[names[0]]) if names else None

@@ -1,0 +1,1 @@
+"""Scenario files: who comes when, and what breaks."""

@@ -1,0 +1,316 @@
+"""A scenario: one yaml file that says world, seed, actors and their ways, doors, faults and when, and what is expected.
+
+    scenario = read_scenario("scenarios/intruder.yaml")
+
+Times count in simulated seconds from an event of the patrol: `start` of the simulation, `on_guard` (unless the file's
+`begin` says otherwise), `driving`, `looking`, `returning`, `home`, the first time that each of them comes.
+`scenario_player.py` plays it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from rosbot_patrol import params
+from rosbot_patrol.counts import count_of
+from rosbot_patrol.errors import ParamError, WorldError
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.params import param
+from rosbot_patrol.simulation.actors.doors import SPEED, SWING, DoorPlace, plain_door
+from rosbot_patrol.simulation.actors.walkers import Walker
+from rosbot_patrol.simulation.scenario.faults import EVENTS, Doorway, Fault, Timed, finite, read_fault
+from rosbot_patrol.yaml_files import read_mapping
+
+T = TypeVar("T")
+
+PLAYED = "Everything in the scenario has happened."  # the last thing that the simulator tells of it
+VERDICTS = ("confirmed", "clear", "unreachable", "unverified")
+
+
+def _points(points: Sequence[Sequence[float]]) -> str | None:
+    bad = next((p for p in points if len(p) not in (2, 3)), None)
+    return None if bad is None else f"expected points [x, y] or [x, y, yaw], got {list(bad)}"
+
+
+def _point(point: Sequence[float]) -> str | None:
+    return _points([point])
+
+
+def pose_of(point: Sequence[float]) -> Pose2D:
+    """[x, y] or [x, y, yaw] as a pose."""
+    return Pose2D(point[0], point[1], point[2] if len(point) == 3 else 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Way(Timed):
+    """Where an actor walks, from a time on."""
+
+    path: list[list[float]] = param([], check=_points, doc="points [x, y] or [x, y, yaw] in the frame map")
+    speed: float = param(0.8, unit="m/s", lo=0.05, hi=8.0, doc="how fast")
+    loop: bool = param(False, doc="again and again")
+    pause: float = param(0.0, unit="s", lo=0.0, check=finite, doc="stands that long at each point")
+    yields: bool = param(True, doc="stops before the robot; else it walks on, over it if need be")
+    roam: float = param(0.0, unit="m", lo=0.0, hi=50.0, doc="instead of a path: wanders within that radius")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActorEntry(Way):
+    """Someone who comes, walks, and may go again."""
+
+    name: str = param(doc="unique")
+    model: str = param("person", doc="person, fire_hydrant, cat, dog, poster")
+    look: str = param("", doc="name of a look, empty: drawn from the seed")
+    posture: str = param("", doc="of a person: standing, sitting, crouching, creeping")
+    start: list[float] = param(check=_point, doc="where it appears, [x, y] or [x, y, yaw]")
+    stays: float = param(0.0, unit="s", lo=0.0, check=finite, doc="gone after that long, 0: stays")
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkEntry(Way):
+    """A further way of an actor."""
+
+    actor: str = param(doc="its name")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoorEntry:
+    """A door that is hung before the beginning."""
+
+    name: str = param(doc="unique")
+    hinge: list[float] = param(check=_point, doc="[x, y, yaw]: the leaf lies along yaw where it is closed")
+    width: float = param(0.9, unit="m", lo=0.1, hi=5.0, doc="of the leaf")
+    swing: float = param(SWING, unit="rad", lo=-3.1, hi=3.1, doc="angle of the open door, counter-clockwise")
+    opening: float = param(0.0, lo=0.0, hi=1.0, doc="0: closed, 1: open")
+
+    @property
+    def place(self) -> DoorPlace:
+        """The door as the engine takes it."""
+        return plain_door(self.name, pose_of(self.hinge), width=self.width, swing=self.swing)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoorMove(Timed):
+    """A door opens or closes."""
+
+    door: str = param(doc="its name")
+    opening: float = param(lo=0.0, hi=1.0, doc="0: closed, 1: open")
+    speed: float = param(SPEED, unit="rad/s", lo=0.0, hi=10.0, doc="how fast, 0: at once")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trigger(Timed):
+    """A motion sensor calls, whatever it sees."""
+
+    sensor: int = param(lo=0, hi=255, doc="its id")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expect:
+    """What should have come of it."""
+
+    verdicts: dict[Any, Any] = param({}, doc="room: verdict of the last mission to it")
+    missions: int | None = param(None, lo=0, hi=1000, doc="how many, one for each room of `verdicts` unless said")
+    mails: int | None = param(None, lo=0, hi=1000, doc="how many")
+    home: bool = param(True, doc="the robot is home at the end")
+    within: float = param(600.0, unit="s", lo=1.0, check=finite, doc="simulated time from the first guard on")
+
+    @property
+    def least_missions(self) -> int:
+        """How many missions to wait for."""
+        return max(len(self.verdicts), 1) if self.missions is None else self.missions
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Where the robot is at the beginning, in the frame map."""
+
+    x: float = param(0.0, unit="m", check=finite, doc="place")
+    y: float = param(0.0, unit="m", check=finite, doc="place")
+    yaw: float = param(0.0, unit="rad", check=finite, doc="direction")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """World and settings; an empty name leaves what the launch file says. Files are relative to the scenario's."""
+
+    title: str = param("", doc="what it is about, in a line")
+    world: str = param("", doc="SDF file of the world")
+    motion_sensors: str = param("", doc="file of the motion sensors")
+    map: str = param("", doc="file of the map (yaml)")
+    room_points: str = param("", doc="file of the rooms' points")
+    seed: int | None = param(None, lo=0, doc="of all noise")
+    begin: str = param("on_guard", choices=EVENTS, doc="event that times count from where an entry says no `after`")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """What a file says, checked; `after` of every entry is filled in."""
+
+    file: str
+    setting: Setting
+    robot: Start | None = None
+    actors: tuple[ActorEntry, ...] = ()
+    walks: tuple[WalkEntry, ...] = ()
+    doors: tuple[DoorEntry, ...] = ()
+    door_moves: tuple[DoorMove, ...] = ()
+    doorways: dict[str, Doorway] = field(default_factory=dict)
+    faults: tuple[Fault, ...] = ()
+    triggers: tuple[Trigger, ...] = ()
+    expect: Expect | None = None
+
+    @property
+    def launch_arguments(self) -> dict[str, str]:
+        """Arguments of rosbot_patrol.launch that the file decides."""
+        s = self.setting
+        named = {
+            "world": s.world,
+            "motion_sensors": s.motion_sensors,
+            "map_file": s.map,
+            "path_to_params": s.room_points,
+            "seed": "" if s.seed is None else str(s.seed),
+        }
+        return {key: value for key, value in named.items() if value}
+
+
+_LISTS: dict[str, type] = {
+    "actors": ActorEntry,
+    "walks": WalkEntry,
+    "doors": DoorEntry,
+    "door_moves": DoorMove,
+    "triggers": Trigger,
+}
+
+
+def read_scenario(path: str | Path) -> Scenario:
+    """Read and check a file.
+
+    Raises:
+        ParamError: it cannot be read, a key is not known or a value is wrong; names file and key.
+    """
+    path = Path(path)
+    setting_keys = [key for key, *_ in params.declared(Setting)]
+    keys = [*setting_keys, "robot", *_LISTS, "doorways", "faults", "expect"]
+    tree = read_mapping(path, keys=", ".join(keys))
+    for key in tree:
+        if key not in keys:
+            raise ParamError(f"{path}: {key}", params.unknown_name(str(key), keys))
+    setting = params.load(Setting, {k: v for k, v in tree.items() if k in setting_keys}, name=f"{path}: ")
+    scenario = Scenario(
+        file=str(path),
+        setting=_located(setting, path),
+        robot=params.load_strict(Start, tree["robot"], name=f"{path}: robot/") if "robot" in tree else None,
+        doorways=_doorways(tree.get("doorways", {}), path),
+        faults=tuple(read_fault(t, source=name) for name, t in _listed(tree, "faults", path)),
+        expect=_expect(tree["expect"], path) if "expect" in tree else None,
+        **{key: tuple(_load(cls, t, name) for name, t in _listed(tree, key, path)) for key, cls in _LISTS.items()},
+    )
+    _check_names(scenario)
+    return _timed(scenario)
+
+
+def _listed(tree: Mapping[str, Any], key: str, path: Path) -> list[tuple[str, Any]]:
+    """Each entry of a list with its name for messages."""
+    entries = tree.get(key, [])
+    if not isinstance(entries, list):
+        raise ParamError(f"{path}: {key}", f"expected a list, got {entries!r}")
+    return [(f"{path}: {key}[{i}]/", entry) for i, entry in enumerate(entries)]
+
+
+def _load(cls: type[T], tree: Any, name: str) -> T:
+    entry = params.load_strict(cls, tree, name=name)
+    try:
+        if isinstance(entry, ActorEntry):
+            rng = np.random.default_rng(0)
+            Walker(entry.name, entry.model, entry.look, pose_of(entry.start), rng, posture=entry.posture)
+        if isinstance(entry, DoorEntry):
+            assert entry.place
+    except WorldError as err:
+        raise ParamError(name.rstrip("/"), str(err)) from err
+    if isinstance(entry, Way) and entry.roam and entry.path:
+        raise ParamError(f"{name}roam", "stands beside a path: an actor walks or wanders")
+    if isinstance(entry, WalkEntry) and not entry.roam and not entry.path:
+        raise ParamError(f"{name}path", "is missing, and so is roam")
+    return entry
+
+
+def _located(setting: Setting, path: Path) -> Setting:
+    changes: dict[str, Any] = {}
+    for key in ("world", "motion_sensors", "map", "room_points"):
+        named = getattr(setting, key)
+        if named:
+            file = path.parent / Path(named).expanduser()
+            if not file.is_file():
+                raise ParamError(f"{path}: {key}", f"'{named}' is no file (looked for {file})")
+            changes[key] = str(file.resolve())
+    return dataclasses.replace(setting, **changes)
+
+
+def _doorways(tree: Any, path: Path) -> dict[str, Doorway]:
+    if not isinstance(tree, Mapping):
+        raise ParamError(f"{path}: doorways", f"expected a place for each name, got {tree!r}")
+    return {str(n): params.load_strict(Doorway, t, name=f"{path}: doorways/{n}/") for n, t in tree.items()}
+
+
+def _expect(tree: Any, path: Path) -> Expect:
+    expect = params.load_strict(Expect, tree, name=f"{path}: expect/")
+    for room, verdict in expect.verdicts.items():
+        name = f"{path}: expect/verdicts/{room}"
+        if not isinstance(room, int) or isinstance(room, bool) or not 0 <= room <= 255:
+            raise ParamError(name, "is no room, expected its number")
+        if verdict not in VERDICTS:
+            raise ParamError(name, f"is {verdict!r}, expected one of {', '.join(VERDICTS)}")
+    return expect
+
+
+def _check_names(scenario: Scenario) -> None:
+    for key, entries in (("actors", scenario.actors), ("doors", scenario.doors)):
+        names = [entry.name for entry in entries]  # type: ignore[attr-defined]
+        for i, name in enumerate(names):
+            if not name or name in names[:i]:
+                problem = "is used twice" if name else "is empty"
+                raise ParamError(f"{scenario.file}: {key}[{i}]/name", f"'{name}' {problem}")
+
+
+def _timed(scenario: Scenario) -> Scenario:
+    """With the event that each entry counts from filled in."""
+    begin = scenario.setting.begin
+
+    def fill(entries: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(dataclasses.replace(entry, after=entry.after or begin) for entry in entries)
+
+    keys = ("actors", "walks", "door_moves", "faults", "triggers")
+    filled: dict[str, Any] = {key: fill(getattr(scenario, key)) for key in keys}
+    return dataclasses.replace(scenario, **filled)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What came of it: verdict of the last mission to each room, missions that ended, mails, is the robot home."""
+
+    verdicts: dict[int, str]
+    missions: int
+    mails: int
+    is_home: bool
+
+
+def disappointments(expect: Expect, outcome: Outcome) -> list[str]:
+    """A sentence for each thing that came otherwise than expected."""
+    found = []
+    for room, verdict in expect.verdicts.items():
+        told = outcome.verdicts.get(room)
+        if told != verdict:
+            was = f"it was {told}" if told else "no mission to it has ended"
+            found.append(f"The verdict for room {room} should have been {verdict}; {was}.")
+    if expect.missions is not None and outcome.missions != expect.missions:
+        found.append(f"{count_of(expect.missions, 'mission')} should have ended; there were {outcome.missions}.")
+    if expect.mails is not None and outcome.mails != expect.mails:
+        found.append(f"{count_of(expect.mails, 'mail')} should have been written; there were {outcome.mails}.")
+    if expect.home and not outcome.is_home:
+        found.append("The robot should have been home.")
+    return found

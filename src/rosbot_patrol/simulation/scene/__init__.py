@@ -1,0 +1,1 @@
+"""What stands in a world: bodies, shapes, lines of sight, floor plan."""

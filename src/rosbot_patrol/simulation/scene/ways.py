@@ -1,0 +1,94 @@
+"""Where actors can walk: not through what stands there, as cuts through the world at a few heights tell it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from rosbot_patrol.errors import WorldError
+from rosbot_patrol.geometry import Pose2D, distance
+from rosbot_patrol.simulation.scene.scene import Body
+from rosbot_patrol.simulation.scene.sight import Sight
+from rosbot_patrol.simulation.scene.slices import EMPTY, Slice, slice_bodies
+
+EYE_LEVEL = 1.3  # a wall is what is as high as this [m]
+LEVELS = (0.15, 0.75, EYE_LEVEL)  # who wanders meets nothing at these heights [m]
+
+
+class Ways:
+    """The ways through a world of things that stand still.
+
+    Args:
+        bodies: what stands there.
+    """
+
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        self.stand(bodies)
+
+    def stand(self, bodies: Sequence[Body]) -> None:
+        """Take what stands there anew."""
+        self._bodies = tuple(bodies)
+        self._cuts: dict[float, Slice] = {}
+        self.sight = Sight(bodies)
+
+    @property
+    def names(self) -> set[str]:
+        """Names of what stands there."""
+        return {body.name for body in self._bodies}
+
+    def cut(self, height: float) -> Slice:
+        """What a plane at a height [m] meets; made once."""
+        if height not in self._cuts:
+            self._cuts[height] = slice_bodies(self._bodies, height)
+        return self._cuts[height]
+
+    def check(self, actor: str, points: Sequence[Pose2D]) -> None:
+        """Refuse a path through a wall; furniture below eye level is not looked at.
+
+        Raises:
+            WorldError: names the wall, and between which points.
+        """
+        for a, b in pairwise(points):
+            if self.cut(EYE_LEVEL).is_blocked((a.x, a.y), (b.x, b.y)):
+                line = f"from ({a.x:.2f}, {a.y:.2f}) to ({b.x:.2f}, {b.y:.2f})"
+                raise WorldError(f"actor '{actor}'", f"cannot walk {line}: '{self._first_between(a, b)}' is there")
+
+    def is_free(self, start: Pose2D, goal: Pose2D, radius: float, doors: Sequence[Slice] = ()) -> bool:
+        """Whether an upright cylinder can go straight from one place to another and stand there.
+
+        Args:
+            start: where it is.
+            goal: where it goes.
+            radius: of the cylinder [m].
+            doors: cuts through what moves, one for each of LEVELS.
+        """
+        away = distance(start, goal)
+        if away == 0.0:
+            return True
+        dx, dy = (goal.x - start.x) / away, (goal.y - start.y) / away
+        for cut in (*map(self.cut, LEVELS), *doors):
+            for side in (-radius, 0.0, radius):
+                x, y = start.x - side * dy, start.y + side * dx
+                reach = away + math.sqrt(max(radius**2 - side**2, 0.0))
+                if cut.is_blocked((x, y), (x + reach * dx, y + reach * dy)):
+                    return False
+        return True
+
+    def _first_between(self, a: Pose2D, b: Pose2D) -> str:
+        for body in self._bodies:
+            if slice_bodies([body], EYE_LEVEL).is_blocked((a.x, a.y), (b.x, b.y)):
+                return body.name
+        return "something"
+
+
+def together(cuts: Sequence[Slice]) -> Slice:
+    """Several cuts as one."""
+    segments = [cut.segments for cut in cuts if len(cut.segments)]
+    circles = [cut.circles for cut in cuts if len(cut.circles)]
+    return Slice(
+        np.concatenate(segments) if segments else EMPTY.segments,
+        np.concatenate(circles) if circles else EMPTY.circles,
+    )

@@ -1,0 +1,1 @@
+"""Gazebo's world and model files (SDF)."""

@@ -1,0 +1,1 @@
+"""Simulated sensors: lidar, camera, range and motion sensors."""

@@ -1,0 +1,224 @@
+"""The RGB-D camera: a renderer's pictures with the limits and the noise of the real one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import Pose2D, Twist2D, compose
+from rosbot_patrol.params import param
+from rosbot_patrol.simulation.noise import noise_of
+from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, Mover, SceneRenderer
+from rosbot_patrol.simulation.sensors import picture_kernels as kernels
+
+_BANK = 8
+_BLUR_VIEWS = 4, 16  # pictures that a blurred one is the mean of: least, most
+_BLUR_TURN = 0.006  # between two of them where the camera turns [rad]
+_BRIGHT = 115.0  # mean colour that the automatic exposure aims at, of 255
+_GAINS = (0.4, 2.5)
+_NO_DEPTH_NOISE = np.zeros(0, np.float32)
+_ROBOT = "the robot, in the window"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraParams:
+    """The camera; defaults as Gazebo's openni_kinect plug-in was set up for the ROSbot, with a little noise."""
+
+    width: int = param(640, unit="px", lo=16, hi=4096, doc="width of a picture")
+    height: int = param(480, unit="px", lo=16, hi=4096, doc="height of a picture")
+    horizontal_fov: float = param(1.047, unit="rad", lo=0.1, hi=3.0, doc="opening")
+    depth_min: float = param(0.4, unit="m", lo=0.0, doc="nearer depth is NaN")
+    depth_max: float = param(5.0, unit="m", lo=0.1, doc="farther depth is NaN")
+    noise: float = param(2.0, lo=0.0, hi=50.0, doc="standard deviation of a colour, of 255")
+    depth_noise: float = param(0.0012, lo=0.0, doc="standard deviation of a depth at 1 m [m], grows with its square")
+    exposure: float = param(1.0, lo=0.01, hi=20.0, doc="gain of the colours, 1: a white face in full light is 255")
+    auto_exposure: bool = param(False, doc="choose the gain by each picture's own brightness")
+    blur: float = param(0.0, unit="s", lo=0.0, hi=0.2, doc="how long the shutter is open: motion blurs the colours")
+    renderer: str = param("egl", choices=("egl", "tiny"), doc="egl: OpenGL without a display; tiny: PyBullet's")
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The pinhole that the optics amount to."""
+        focal = self.width / 2.0 / np.tan(self.horizontal_fov / 2.0)
+        return Intrinsics(
+            width=self.width,
+            height=self.height,
+            fx=float(focal),
+            fy=float(focal),
+            cx=(self.width - 1.0) / 2.0,
+            cy=(self.height - 1.0) / 2.0,
+        )
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Colour (height, width, 3) and depth [m] (height, width), NaN where the sensor sees none."""
+
+    colour: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+
+
+@dataclass
+class Camera:
+    """Keeps a renderer's scene in step with the world; the renderer is made with the first picture.
+
+    Args:
+        params: optics and noise.
+        make_renderer: builds the renderer, in the thread that takes pictures.
+        bodies: what stands still.
+        seed: of the noise.
+    """
+
+    params: CameraParams
+    make_renderer: Callable[[], SceneRenderer]
+    bodies: Iterable[Body]
+    seed: int = 0
+    _renderer: SceneRenderer | None = None
+    _shown: dict[str, Mover] = field(default_factory=dict)
+    _put: dict[str, Body] = field(default_factory=dict)
+    _put_shown: dict[str, Body] = field(default_factory=dict)
+    _bank: list[NDArray[np.int8]] = field(default_factory=list)
+    _depth_bank: list[NDArray[np.float32]] = field(default_factory=list)
+
+    @property
+    def renderer(self) -> SceneRenderer:
+        """What draws; made here the first time."""
+        if self._renderer is None:
+            self._renderer = self.make_renderer()
+            for body in self.bodies:
+                self._renderer.add(body)
+            self._fill_banks()
+        return self._renderer
+
+    def take(
+        self,
+        world_from_optical: Matrix,
+        walkers: Iterable[Mover],
+        sample: int,
+        *,
+        colour: bool = True,
+        depth: bool = True,
+        earlier: Sequence[Matrix] = (),
+    ) -> Picture:
+        """One picture; `sample` is its number and chooses the noise. What is not asked for stays as it was drawn.
+
+        Args:
+            world_from_optical: where the camera is, shape (4, 4).
+            walkers: who is there.
+            sample: number of the picture.
+            colour: whether the colour is wanted with exposure and noise.
+            depth: whether the depth is wanted with its limits and noise.
+            earlier: where the camera was while the shutter was open.
+        """
+        self._show(list(walkers))
+        optics = self.params.intrinsics
+        blurred = [self.renderer.render(pose, optics)[0] for pose in earlier] if colour else []
+        drawn, metres = self.renderer.render(world_from_optical, optics)
+        if blurred:
+            drawn = np.rint(np.mean([*blurred, drawn], axis=0, dtype=np.float32)).astype(np.uint8)
+        return Picture(
+            self._noisy_colour(self._exposed(drawn), sample) if colour else drawn,
+            self._sensed_depth(metres, sample) if depth else metres,
+        )
+
+    def view(self, world_from_optical: Matrix, walkers: Iterable[Mover], robot: Body | None) -> NDArray[np.uint8]:
+        """A picture from elsewhere without noise, shape (height, width, 3), with the robot in it."""
+        self._show(list(walkers))
+        if robot is not None:
+            self.renderer.add(replace(robot, name=_ROBOT))
+        try:
+            return self.renderer.render(world_from_optical, self.params.intrinsics)[0]
+        finally:
+            if robot is not None:
+                self.renderer.remove(_ROBOT)
+
+    def put(self, body: Body) -> None:
+        """Show a further body that stands still; from any thread, as of the next picture."""
+        self._put[body.name] = body
+
+    def take_away(self, name: str) -> None:
+        """Show a body that was `put` there no longer."""
+        self._put.pop(name, None)
+
+    def close(self) -> None:
+        """Give the renderer back."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _show(self, walkers: list[Mover]) -> None:
+        renderer = self.renderer
+        self._show_put()
+        present = {w.name: w for w in walkers}
+        for name in [n for n, w in self._shown.items() if present.get(n) is not w]:
+            renderer.remove(name)
+            del self._shown[name]
+        for name, walker in present.items():
+            if name not in self._shown:
+                renderer.add(walker.body)
+                self._shown[name] = walker
+            renderer.move(name, walker.matrix)
+            parts = walker.pose_parts()
+            if parts is not None:
+                renderer.pose_visuals(name, parts)
+
+    def _show_put(self) -> None:
+        wanted = dict(self._put)
+        for name in [n for n, body in self._put_shown.items() if wanted.get(n) is not body]:
+            self.renderer.remove(name)
+            del self._put_shown[name]
+        for name in wanted.keys() - self._put_shown.keys():
+            self.renderer.add(wanted[name])
+            self._put_shown[name] = wanted[name]
+
+    def _fill_banks(self) -> None:
+        p = self.params
+        if p.noise > 0.0:
+            for i in range(_BANK):
+                flat = noise_of(self.seed, "camera", i).standard_normal((p.height, p.width, 3), dtype=np.float32)
+                self._bank.append(np.clip(np.rint(flat * p.noise), -127, 127).astype(np.int8))
+        if p.depth_noise > 0.0:
+            for i in range(_BANK):
+                flat = noise_of(self.seed, "depth", i).standard_normal((p.height, p.width), dtype=np.float32)
+                self._depth_bank.append(flat * np.float32(p.depth_noise))
+
+    def _exposed(self, colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        gain = self.params.exposure
+        if self.params.auto_exposure:
+            mean = float(colour[::8, ::8].mean())
+            gain = min(max(_BRIGHT / max(mean, 1.0), _GAINS[0]), _GAINS[1])
+        if gain == 1.0:
+            return colour
+        table = np.clip(np.rint(np.arange(256) * gain), 0, 255).astype(np.uint8)
+        return np.asarray(table[colour])
+
+    def _noisy_colour(self, colour: NDArray[np.uint8], sample: int) -> NDArray[np.uint8]:
+        if not self._bank:
+            return colour
+        noise = self._bank[sample % _BANK].ravel()
+        drawn, seen = colour.ravel(), np.empty(colour.size, np.uint8)
+        start = sample // _BANK * 37 % colour.shape[0] * colour.shape[1] * 3  # a bank's rows, rolled down
+        kernels.add_noise(drawn[:start], noise[colour.size - start :], seen[:start])
+        kernels.add_noise(drawn[start:], noise[: colour.size - start], seen[start:])
+        return seen.reshape(colour.shape)
+
+    def _sensed_depth(self, depth: NDArray[np.float32], sample: int) -> NDArray[np.float32]:
+        p = self.params
+        noise = self._depth_bank[sample % _BANK].ravel() if self._depth_bank else _NO_DEPTH_NOISE
+        sensed = np.empty(depth.size, np.float32)
+        exact = np.ascontiguousarray(depth, np.float32).ravel()
+        kernels.sense_depth(exact, noise, p.depth_min, p.depth_max, sensed)
+        return sensed.reshape(depth.shape)
+
+
+def poses_before(pose: Pose2D, twist: Twist2D, seconds: float) -> list[Pose2D]:
+    """Where a base that moves at a velocity [in its own frame] was while a shutter was open, its end left out."""
+    if seconds <= 0.0 or (twist.vx == twist.vy == twist.wz == 0.0):
+        return []
+    views = min(max(math.ceil(abs(twist.wz) * seconds / _BLUR_TURN), _BLUR_VIEWS[0]), _BLUR_VIEWS[1])
+    steps = [-seconds * k / views for k in range(views - 1, 0, -1)]
+    return [compose(pose, Pose2D(twist.vx * t, twist.vy * t, twist.wz * t)) for t in steps]

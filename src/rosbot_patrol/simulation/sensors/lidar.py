@@ -1,0 +1,100 @@
+"""A planar laser scanner that turns about its own axis, in the plane of the world."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose
+from rosbot_patrol.params import param
+from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.simulation.scene.slices import Slice
+
+_SECTORS = 36  # in which a sweep that takes time is cast
+_BEYOND = 1.0  # what a beam without return is told at, over the range, where it is to be a number [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LidarParams:
+    """The scanner; defaults as the ros1 branch of the robot's description has it."""
+
+    samples: int = param(720, lo=2, hi=10000, doc="beams of a sweep")
+    angle_min: float = param(-math.pi, unit="rad", lo=-math.pi, hi=math.pi, doc="direction of the first beam")
+    angle_max: float = param(math.pi, unit="rad", lo=-math.pi, hi=math.pi, doc="direction of the last beam")
+    range_min: float = param(0.2, unit="m", lo=0.0, doc="nearer is -inf (REP 117)")
+    range_max: float = param(12.0, unit="m", lo=0.01, doc="farther is no return")
+    resolution: float = param(0.01, unit="m", lo=0.0, doc="ranges are whole multiples of it, 0: not rounded")
+    noise: float = param(0.01, unit="m", lo=0.0, doc="standard deviation of a range")
+    no_return: str = param("inf", choices=("inf", "beyond"), doc="a beam without return is inf, or range_max + 1 m")
+    dropped: float = param(0.0, lo=0.0, hi=1.0, doc="share of the beams that by chance have no return")
+    dropped_as: str = param("inf", choices=("inf", "zero"), doc="what such a beam is: as without return, or 0")
+    sweep_time: float = param(0.0, unit="s", lo=0.0, hi=1.0, doc="how long a sweep takes: motion within it distorts it")
+    height_offset: float = param(0.0, unit="m", doc="height of the beams above the lidar")
+
+
+def measure_scan(
+    params: LidarParams,
+    scene: Slice,
+    world_from_laser: Pose2D,
+    stamp: float,
+    rng: np.random.Generator | None,
+    *,
+    frame: str = "laser",
+    twist: Twist2D = STOP,
+    flipped: bool = False,
+) -> LaserScan:
+    """One sweep.
+
+    Args:
+        params: the scanner.
+        scene: the cut through the world at the height of the beams.
+        world_from_laser: where the scanner is at the end of the sweep.
+        stamp: time of the end of the sweep [s].
+        rng: for noise and dropped beams, None for none.
+        frame: that the scan names.
+        twist: velocity of the scanner in its own frame, for a sweep that takes time.
+        flipped: whether it hangs upside down.
+    """
+    p = params
+    step = (p.angle_max - p.angle_min) / (p.samples - 1)
+    ranges = _lengths(p, scene, world_from_laser, step, twist, flipped)
+    if rng is not None:
+        noise = rng.normal(0.0, p.noise, p.samples) if p.noise > 0.0 else 0.0
+        ranges += noise  # inf stays inf
+    if p.resolution > 0.0:
+        ranges = np.rint(ranges / p.resolution) * p.resolution
+    ranges[ranges < p.range_min] = -math.inf
+    lost = math.inf if p.no_return == "inf" else p.range_max + _BEYOND
+    ranges[ranges > p.range_max] = lost
+    if rng is not None and p.dropped > 0.0:
+        ranges[rng.random(p.samples) < p.dropped] = lost if p.dropped_as == "inf" else 0.0
+    return LaserScan(
+        stamp=stamp - p.sweep_time,
+        frame_id=frame,
+        angle_min=p.angle_min,
+        angle_increment=step,
+        range_min=p.range_min,
+        range_max=p.range_max,
+        ranges=ranges,
+    )
+
+
+def _lengths(
+    p: LidarParams, scene: Slice, pose: Pose2D, step: float, twist: Twist2D, flipped: bool
+) -> NDArray[np.float64]:
+    """Lengths of the beams, without limits [m], shape (samples,)."""
+    sectors = _SECTORS if p.sweep_time > 0.0 and twist != STOP else 1
+    edges = np.linspace(0, p.samples, sectors + 1).round().astype(int)
+    ranges = np.empty(p.samples)
+    for low, high in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        ago = p.sweep_time * (1.0 - (low + high) / (2.0 * p.samples)) if sectors > 1 else 0.0
+        x, y, yaw = compose(pose, Pose2D(-twist.vx * ago, -twist.vy * ago, -twist.wz * ago))
+        if flipped:  # its angles run clockwise: cast from the last beam to the first
+            first = yaw - (p.angle_min + (high - 1) * step)
+            ranges[low:high] = scene.cast(x, y, first, step, high - low, math.inf)[::-1]
+        else:
+            ranges[low:high] = scene.cast(x, y, yaw + p.angle_min + low * step, step, high - low, math.inf)
+    return ranges
