@@ -50,10 +50,10 @@ from rosbot_patrol.geometry import Pose2D, compose, invert, transform_points
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.map_io import write_map
-from rosbot_patrol.replay.carmen import CarmenLog, noisy_odometry, read_log
-from rosbot_patrol.replay.mapping import map_log
-from rosbot_patrol.replay.plots import map_picture
-from rosbot_patrol.replay.relations import consecutive_pairs, relation_errors, revisit_pairs
+from rosbot_patrol.replay.bags.carmen import CarmenLog, noisy_odometry, read_log
+from rosbot_patrol.replay.results.mapping import map_log
+from rosbot_patrol.replay.results.plots import map_picture
+from rosbot_patrol.replay.results.relations import consecutive_pairs, relation_errors, revisit_pairs
 
 ROOT = Path(__file__).resolve().parents[1]
 

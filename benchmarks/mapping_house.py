@@ -28,7 +28,7 @@ from rosbot_patrol.grid import Grid
 from rosbot_patrol.maps.distance_kernels import bounded_distances
 from rosbot_patrol.maps.occupancy import FREE
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.replay.carmen import noisy_odometry
+from rosbot_patrol.replay.bags.carmen import noisy_odometry
 from rosbot_patrol.scan import LaserScan
 
 ROOT = Path(__file__).resolve().parents[1]

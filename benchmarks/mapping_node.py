@@ -22,7 +22,7 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 from tf2_msgs.msg import TFMessage
 
 from rosbot_patrol.geometry import Pose2D, compose, yaw_from_quaternion
-from rosbot_patrol.replay.carmen import CarmenLog
+from rosbot_patrol.replay.bags.carmen import CarmenLog
 from rosbot_patrol.ros.campaign.house import end_group
 from rosbot_patrol.ros.messages.convert import scan_to_msg, time_to_msg, transform_to_msg
 from rosbot_patrol.scan import LaserScan

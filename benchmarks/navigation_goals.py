@@ -4,7 +4,7 @@
     PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_goals.py [--goals 200] [--seed 1] [--house NAME]
 
 The robot's own programs (amcl, costmaps, move_base, collision guard) run in one process with the simulator, on its
-clock (`rosbot_patrol/replay/closed_loop.py`), each goal after the last, from where the robot then stands. Somebody
+clock (`rosbot_patrol/closed_loop/loop.py`), each goal after the last, from where the robot then stands. Somebody
 walks the robot's plan towards it or from behind it, once, or across it, to and fro over 2.4 to 5 m, at 0.5 to 1.2 m/s,
 and stops for nothing: whoever meets the robot steps over it, and at the end of the way has left. A contact with a wall
 or a thing always counts, one with somebody unless the robot's wheels had stood for 0.5 s. `ideal` is the plan's length
@@ -31,13 +31,13 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "src"))
 
+from rosbot_patrol.closed_loop.loop import ClosedLoop, Drive, read_profile  # noqa: E402
 from rosbot_patrol.costmap.costs import INSCRIBED  # noqa: E402
 from rosbot_patrol.errors import PlanningError, WorldError  # noqa: E402
 from rosbot_patrol.geometry import Pose2D  # noqa: E402
 from rosbot_patrol.grid import Grid  # noqa: E402
 from rosbot_patrol.maps.map_io import read_map  # noqa: E402
 from rosbot_patrol.planning.registry import make_global_planner  # noqa: E402
-from rosbot_patrol.replay.closed_loop import ClosedLoop, Drive, read_profile  # noqa: E402
 from rosbot_patrol.simulation.engine import Engine, EngineParams  # noqa: E402
 from rosbot_patrol.simulation.render.egl import make_renderer  # noqa: E402
 from rosbot_patrol.simulation.robot.description import load_robot  # noqa: E402

@@ -38,10 +38,10 @@ from made_bag import Maker, write_bag  # noqa: E402
 from rosbot_patrol.amcl.likelihood_field import blocked_distances  # noqa: E402
 from rosbot_patrol.geometry import Pose2D, compose, invert  # noqa: E402
 from rosbot_patrol.patrol.house.rooms import load_rooms  # noqa: E402
-from rosbot_patrol.replay.bag import Bag  # noqa: E402
-from rosbot_patrol.replay.carmen import noisy_odometry  # noqa: E402
+from rosbot_patrol.replay.bags.bag import Bag  # noqa: E402
+from rosbot_patrol.replay.bags.carmen import noisy_odometry  # noqa: E402
+from rosbot_patrol.replay.nodes.setup import Setup, build_replay  # noqa: E402
 from rosbot_patrol.replay.runner import run_replay  # noqa: E402
-from rosbot_patrol.replay.setup import Setup, build_replay  # noqa: E402
 
 BEGIN = 1_600_000_000.0
 TF_PER_SCAN = 5

@@ -19,11 +19,11 @@ from ros_processes import HERE, Process, Ros, wait_for
 from rosbags.highlevel import AnyReader
 
 from rosbot_patrol.geometry import wrap_angles
-from rosbot_patrol.replay.bag import Bag
+from rosbot_patrol.package_files import package_file
+from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.case import SUFFIX, read_case, run_case
-from rosbot_patrol.replay.package_files import package_file
-from rosbot_patrol.replay.results import Result
-from rosbot_patrol.replay.setup import node_of, read_parameters
+from rosbot_patrol.replay.nodes.setup import node_of, read_parameters
+from rosbot_patrol.replay.results.tables import Result
 
 BAGS = HERE.parent / "replay"
 FIRST = 131.53  # the end of the first mission in patrol.bag [s]; the next begins within a tenth of a second

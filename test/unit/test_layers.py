@@ -14,13 +14,14 @@ SRC = ROOT / "src" / "rosbot_patrol"
 ROWS: list[set[str]] = [
     {"errors", "kernels", "counts"},
     {"params", "files", "yaml_files"},
-    {"geometry", "tunable"},
+    {"geometry", "tunable", "package_files"},
     {"grid", "scan", "goal"},
-    {"maps", "images", "scan_line", "scan_check"},
+    {"maps", "images", "tf", "scan_line", "scan_check"},
     {"costmap"},
     {"planning", "amcl", "gmapping", "exploration", "detection", "rosserial", "control"},
     {"navigation", "patrol", "alerts", "sensors", "simulation"},
-    {"replay", "training", "campaign"},
+    {"closed_loop", "training", "campaign"},
+    {"replay"},
     {"ros"},
 ]
 ROW_OF = {name: i for i, row in enumerate(ROWS) for name in row}

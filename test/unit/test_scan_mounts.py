@@ -23,14 +23,14 @@ from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.intruder.lidar_motion import Witness
 from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
 from rosbot_patrol.patrol.search.coverage import sight_of_scan
-from rosbot_patrol.replay.patrol_sight import PatrolSight
-from rosbot_patrol.replay.scan_feed import ScanFeed
-from rosbot_patrol.replay.transform_tree import Edge, TransformTree
+from rosbot_patrol.replay.nodes.patrol_sight import PatrolSight
+from rosbot_patrol.replay.nodes.scan_feed import ScanFeed
 from rosbot_patrol.scan import LevelScan, level_scan
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.robot.description import load_robot
 from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
 from rosbot_patrol.simulation.sdf.world import load_world
+from rosbot_patrol.tf.tree import Edge, TransformTree
 
 ROOT = Path(__file__).resolve().parents[2]
 # A room without symmetry: 5 x 3 m, with a niche at its left.

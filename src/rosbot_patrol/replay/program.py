@@ -22,13 +22,13 @@ from pathlib import Path
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import BagError, ParamError, PatrolError
 from rosbot_patrol.maps.map_io import write_map
-from rosbot_patrol.replay.bag import Bag
+from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.case import SUFFIX, Case, read_case, run_case, with_tolerances
-from rosbot_patrol.replay.comparison import compare
-from rosbot_patrol.replay.plots import write_plots
-from rosbot_patrol.replay.results import Result, load_result, save_result
+from rosbot_patrol.replay.nodes.setup import NODES, Setup, node_of, parse_transform, read_parameters
+from rosbot_patrol.replay.results.comparison import compare
+from rosbot_patrol.replay.results.plots import write_plots
+from rosbot_patrol.replay.results.tables import Result, load_result, save_result
 from rosbot_patrol.replay.runner import chosen_topics
-from rosbot_patrol.replay.setup import NODES, Setup, node_of, parse_transform, read_parameters
 
 SAME, DIFFERS, BAD_INPUT = 0, 1, 2
 BAR, EVERY_S = 30, 0.1  # width of the progress bar, and how often it is drawn

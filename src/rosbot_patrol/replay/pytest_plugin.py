@@ -15,9 +15,9 @@ import pytest
 
 from rosbot_patrol.errors import PatrolError
 from rosbot_patrol.replay.case import SUFFIX, Case, read_case, run_case
-from rosbot_patrol.replay.comparison import Difference, compare
-from rosbot_patrol.replay.plots import write_plots
-from rosbot_patrol.replay.results import Result, load_result, save_result
+from rosbot_patrol.replay.results.comparison import Difference, compare
+from rosbot_patrol.replay.results.plots import write_plots
+from rosbot_patrol.replay.results.tables import Result, load_result, save_result
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from rosbot_patrol.errors import BagError
-from rosbot_patrol.replay.bag import Bag
-from rosbot_patrol.replay.records import Kind
-from rosbot_patrol.replay.results import Result
+from rosbot_patrol.replay.bags.bag import Bag
+from rosbot_patrol.replay.bags.records import Kind
+from rosbot_patrol.replay.results.tables import Result
 
 TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 

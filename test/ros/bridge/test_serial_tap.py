@@ -11,8 +11,8 @@ import rospy
 from rosbags.rosbag1 import Writer
 from rosbot_patrol.msg import SerialBytes
 
-from rosbot_patrol.replay.bag import Bag
-from rosbot_patrol.replay.serial_replay import CLOSED, DATA, KINDS, OPENED
+from rosbot_patrol.replay.bags.bag import Bag
+from rosbot_patrol.replay.nodes.bridge import CLOSED, DATA, KINDS, OPENED
 from rosbot_patrol.ros.bridge.report import SerialTap
 
 

@@ -12,7 +12,7 @@ import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.replay.transform_tree import Edge, TransformTree
+from rosbot_patrol.tf.tree import Edge, TransformTree
 
 FRAMES = ["map", "odom", "base_footprint", "base_link", "laser", "camera"]
 TICK = 1.0 / 64.0  # times that a float and nanoseconds both hold exactly

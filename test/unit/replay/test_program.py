@@ -13,11 +13,11 @@ from made_drive import drive_messages
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.kernels import cache_dir
 from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.package_files import package_file
 from rosbot_patrol.replay import program
 from rosbot_patrol.replay.case import read_case
-from rosbot_patrol.replay.package_files import package_file
-from rosbot_patrol.replay.results import load_result, save_result
-from rosbot_patrol.replay.setup import parse_transform
+from rosbot_patrol.replay.nodes.setup import parse_transform
+from rosbot_patrol.replay.results.tables import load_result, save_result
 
 pytest_plugins = ["pytester"]
 

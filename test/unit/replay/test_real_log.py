@@ -11,9 +11,9 @@ import yaml
 
 from rosbot_patrol import params
 from rosbot_patrol.gmapping.parameters import GmappingParams
-from rosbot_patrol.replay.carmen import noisy_odometry, read_log
-from rosbot_patrol.replay.mapping import map_log
-from rosbot_patrol.replay.relations import consecutive_pairs, relation_errors
+from rosbot_patrol.replay.bags.carmen import noisy_odometry, read_log
+from rosbot_patrol.replay.results.mapping import map_log
+from rosbot_patrol.replay.results.relations import consecutive_pairs, relation_errors
 from rosbot_patrol.scan import scan_problem
 
 ROOT = Path(__file__).parents[3]

@@ -1,0 +1,1 @@
+"""Navigation driven in a simulated world without ROS."""

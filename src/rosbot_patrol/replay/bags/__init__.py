@@ -1,0 +1,1 @@
+"""Recordings: bag files and CARMEN logs as records."""

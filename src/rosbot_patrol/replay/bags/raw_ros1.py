@@ -1,0 +1,116 @@
+"""Messages from their bytes in ROS 1, several times faster than by a general deserialiser.
+
+Those that come by the thousand, and those of an action, whose dozen of nested types a deserialiser would be made for
+at each opening of a bag. Only for the definitions whose md5 sums stand here; all other messages, and all of ROS 2, are
+rosbags' to read.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+
+from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.tf.tree import Edge
+
+SCAN_MD5 = "90c7ef2dc6895d81024acba2ac42f369"  # sensor_msgs/LaserScan
+TF_MD5 = "94810edda583a504dfda3829e70d7eec"  # tf2_msgs/TFMessage and tf/tfMessage
+COUNT_MD5 = "123675bf4420958597b5a78cb3800a1f"  # darknet_ros_msgs/ObjectCount
+GOAL_MD5 = "660d6895a1b9a16dce51fbdd9a64a56b"  # move_base_msgs/MoveBaseActionGoal
+RESULT_MD5 = "1eb06eeff08fa7ea874431638cb52332"  # move_base_msgs/MoveBaseActionResult
+
+_HEADER = struct.Struct("<IIII")  # seq, seconds, nanoseconds, length of the frame's name
+_BEAMS = struct.Struct("<7fI")  # angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max
+_COUNT, _INT8, _UINT8, _TIME = struct.Struct("<I"), struct.Struct("<b"), struct.Struct("<B"), struct.Struct("<II")
+_TRANSFORM = struct.Struct("<7d")  # x, y, z and the quaternion
+
+
+def read_scan(raw: bytes) -> LaserScan:
+    """A sensor_msgs/LaserScan; a stamp of 0 is none (NaN).
+
+    Raises:
+        struct.error, ValueError: the bytes end too early.
+    """
+    _, seconds, nanoseconds, length = _HEADER.unpack_from(raw)
+    at = _HEADER.size + length
+    frame = raw[_HEADER.size : at].decode()
+    angle_min, _, increment, _, _, range_min, range_max, count = _BEAMS.unpack_from(raw, at)
+    ranges = np.frombuffer(raw, dtype="<f4", count=count, offset=at + _BEAMS.size).astype(np.float64)
+    return LaserScan(
+        stamp=(seconds + nanoseconds / 1e9) or math.nan,
+        frame_id=frame.lstrip("/"),
+        angle_min=angle_min,
+        angle_increment=increment,
+        range_min=range_min,
+        range_max=range_max,
+        ranges=ranges,
+    )
+
+
+def read_count(raw: bytes) -> tuple[float, int]:
+    """A darknet_ros_msgs/ObjectCount: when the picture was taken [s], and how many objects were in it.
+
+    Raises:
+        struct.error: the bytes end too early.
+    """
+    _, seconds, nanoseconds, length = _HEADER.unpack_from(raw)
+    return seconds + nanoseconds / 1e9, _INT8.unpack_from(raw, _HEADER.size + length)[0]
+
+
+def read_goal(raw: bytes) -> str:
+    """The id of a move_base_msgs/MoveBaseActionGoal.
+
+    Raises:
+        struct.error, ValueError: the bytes end too early or the id is no text.
+    """
+    return _goal_id(raw)[0]
+
+
+def read_result(raw: bytes) -> tuple[str, int, str]:
+    """A move_base_msgs/MoveBaseActionResult: id of the goal, its status (actionlib_msgs/GoalStatus), what was said.
+
+    Raises:
+        struct.error, ValueError: the bytes end too early or the texts are none.
+    """
+    goal, at = _goal_id(raw)
+    (status,) = _UINT8.unpack_from(raw, at)
+    text, _ = _text(raw, at + _UINT8.size)
+    return goal, status, text
+
+
+def _goal_id(raw: bytes) -> tuple[str, int]:
+    """The text of the actionlib_msgs/GoalID behind the header, and where it ends."""
+    *_, length = _HEADER.unpack_from(raw)
+    return _text(raw, _HEADER.size + length + _TIME.size)
+
+
+def _text(raw: bytes, at: int) -> tuple[str, int]:
+    """A string at a place, and where it ends."""
+    (length,) = _COUNT.unpack_from(raw, at)
+    at += _COUNT.size
+    if at + length > len(raw):
+        raise struct.error(f"a text of {length} bytes does not fit into {len(raw) - at}")
+    return raw[at : at + length].decode(), at + length
+
+
+def read_transforms(raw: bytes) -> list[Edge]:
+    """A tf2_msgs/TFMessage.
+
+    Raises:
+        struct.error, ValueError: the bytes end too early or a name is no text.
+    """
+    edges, at = [], _COUNT.size
+    for _ in range(_COUNT.unpack_from(raw)[0]):
+        _, seconds, nanoseconds, length = _HEADER.unpack_from(raw, at)
+        at += _HEADER.size
+        parent = raw[at : at + length].decode()
+        at += length
+        (length,) = _COUNT.unpack_from(raw, at)
+        at += _COUNT.size
+        child = raw[at : at + length].decode()
+        at += length
+        edges.append(Edge(parent, child, seconds + nanoseconds / 1e9, *_TRANSFORM.unpack_from(raw, at)))
+        at += _TRANSFORM.size
+    return edges

@@ -1,0 +1,142 @@
+"""What the messages of a bag become: plain records that know no ROS.
+
+Messages come as bytes and as rosbags' objects, whose fields are named as in ROS 2 (stamp.sec, stamp.nanosec).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.errors import MapError
+from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
+from rosbot_patrol.grid import Grid, GridInfo, occupancy_grid
+from rosbot_patrol.replay.bags import definitions, raw_ros1
+from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.tf.tree import Edge
+
+ANY = "*"
+
+
+class MapRecord(NamedTuple):
+    """A nav_msgs/OccupancyGrid and its frame."""
+
+    grid: Grid
+    frame: str
+
+
+class PoseRecord(NamedTuple):
+    """A geometry_msgs/PoseWithCovarianceStamped: frame, time [s], pose, covariance, shape (6, 6)."""
+
+    frame: str
+    stamp: float
+    pose: Pose2D
+    covariance: NDArray[np.float64]
+
+
+class Refused(NamedTuple):
+    """A message that is whole, but says something that makes no sense; the nodes leave it out with a warning."""
+
+    problem: str
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One message type that a replay can use.
+
+    Attributes:
+        convert: makes the record of a message as rosbags gives it.
+        needed: fields that the definition must have.
+        fast: makes the same of ROS 1 bytes.
+        md5: of the one definition that `fast` knows; ANY: the bytes do not matter.
+    """
+
+    convert: Callable[[Any], Any]
+    needed: Mapping[str, str]
+    fast: Callable[[bytes], Any] | None = None
+    md5: str = ""
+
+
+def stamp_of(stamp: Any) -> float:
+    """A message's time [s]."""
+    return float(stamp.sec + stamp.nanosec / 1e9)
+
+
+def scan_of(message: Any) -> LaserScan:
+    """sensor_msgs/LaserScan; a stamp of 0 is none (NaN)."""
+    return LaserScan(
+        stamp=stamp_of(message.header.stamp) or math.nan,
+        frame_id=message.header.frame_id.lstrip("/"),
+        angle_min=message.angle_min,
+        angle_increment=message.angle_increment,
+        range_min=message.range_min,
+        range_max=message.range_max,
+        ranges=np.array(message.ranges, dtype=np.float64),
+    )
+
+
+def edges_of(message: Any) -> list[Edge]:
+    """tf2_msgs/TFMessage."""
+    return [_edge(each) for each in message.transforms]
+
+
+def _edge(message: Any) -> Edge:
+    header, t, q = message.header, message.transform.translation, message.transform.rotation
+    stamp = stamp_of(header.stamp)
+    return Edge(header.frame_id, message.child_frame_id, stamp, t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+
+
+def map_of(message: Any) -> MapRecord | Refused:
+    """nav_msgs/OccupancyGrid; refused where its size or its origin makes no sense."""
+    origin = _pose(message.info.origin, "the orientation of a map's origin in the bag")
+    if isinstance(origin, Refused):
+        return origin
+    info = GridInfo(
+        resolution=float(message.info.resolution),
+        width=int(message.info.width),
+        height=int(message.info.height),
+        origin_x=origin.x,
+        origin_y=origin.y,
+        yaw=origin.yaw,
+    )
+    try:
+        grid = occupancy_grid(info, message.data, "map")
+    except MapError as err:
+        return Refused(f"it {err.problem}")
+    return MapRecord(grid, message.header.frame_id.lstrip("/"))
+
+
+def pose_of(message: Any) -> PoseRecord | Refused:
+    """geometry_msgs/PoseWithCovarianceStamped; refused where it is no pose."""
+    pose = _pose(message.pose.pose, "the orientation of a pose in the bag")
+    if isinstance(pose, Refused):
+        return pose
+    header = message.header
+    covariance = np.array(message.pose.covariance, dtype=np.float64).reshape(6, 6)
+    return PoseRecord(header.frame_id.lstrip("/"), stamp_of(header.stamp), pose, covariance)
+
+
+def _pose(message: Any, what: str) -> Pose2D | Refused:
+    p, q = message.position, message.orientation
+    if not (math.isfinite(p.x) and math.isfinite(p.y)):
+        return Refused(f"({p.x}, {p.y}) is no position")
+    try:
+        return Pose2D(float(p.x), float(p.y), yaw_from_quaternion(q.x, q.y, q.z, q.w, what=what))
+    except ValueError as err:
+        return Refused(str(err))
+
+
+_TRANSFORMS = Kind(edges_of, definitions.TRANSFORMS, raw_ros1.read_transforms, raw_ros1.TF_MD5)
+
+KINDS: dict[str, Kind] = {
+    "sensor_msgs/msg/LaserScan": Kind(scan_of, definitions.SCAN, raw_ros1.read_scan, raw_ros1.SCAN_MD5),
+    "tf2_msgs/msg/TFMessage": _TRANSFORMS,
+    "tf/msg/tfMessage": _TRANSFORMS,
+    "nav_msgs/msg/OccupancyGrid": Kind(map_of, definitions.GRID),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": Kind(pose_of, definitions.POSE_ESTIMATE),
+}

@@ -1,0 +1,1 @@
+"""Nodes fed from recordings."""

@@ -1,0 +1,55 @@
+"""move_base as the patrol of a bag knew it: its answers, each to the goal of the same number."""
+
+from __future__ import annotations
+
+import math
+
+from rosbot_patrol.goal import Goal, GoalLink, GoalState
+from rosbot_patrol.replay.nodes.patrol_records import GoalRecord, OutcomeRecord
+
+SILENCE = 5.0  # the server counts as down when its status was not heard for so long [s]
+SUCCEEDED = 3  # actionlib_msgs/GoalStatus
+WORDS = {
+    2: "the goal was given up for another",
+    5: "the goal was rejected",
+    8: "the goal was called back",
+    9: "the goal was lost",
+}
+
+
+class BagLink:
+    """Answers to goals. The n-th goal of the replay is taken for the n-th of the bag, and ends when that ended."""
+
+    def __init__(self) -> None:
+        self._heard = -math.inf
+        self._goals: list[str] = []  # of the bag
+        self._outcomes: dict[str, OutcomeRecord] = {}
+        self._tag, self._sent = "", 0
+
+    def hear_status(self, now: float) -> None:
+        """The server lives."""
+        self._heard = now
+
+    def hear_goal(self, record: GoalRecord) -> None:
+        """A goal that was sent then."""
+        if record.goal not in self._goals:
+            self._goals.append(record.goal)
+
+    def hear_outcome(self, record: OutcomeRecord) -> None:
+        """How a goal ended then."""
+        self._outcomes[record.goal] = record
+
+    def send(self, goal: Goal) -> None:
+        """A goal of the replay."""
+        self._tag, self._sent = goal.tag, self._sent + 1
+
+    def state(self, now: float) -> GoalLink:
+        """How server and goal stand at a time [s]."""
+        is_up = now - self._heard < SILENCE
+        if not self._tag:
+            return GoalLink(is_up=is_up)
+        outcome = self._outcomes.get(self._goals[self._sent - 1]) if self._sent <= len(self._goals) else None
+        if outcome is None:
+            return GoalLink(is_up=is_up, tag=self._tag, state=GoalState.ACTIVE)
+        state = GoalState.SUCCEEDED if outcome.status == SUCCEEDED else GoalState.FAILED
+        return GoalLink(is_up=is_up, tag=self._tag, state=state, text=outcome.text or WORDS.get(outcome.status, ""))

@@ -1,0 +1,209 @@
+"""What a replay is made of (node, parameters, map, missing transforms), and the replays by their nodes' names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rosbot_patrol import params
+from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.detection.choice import make_detector
+from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.errors import ParamError
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.package_files import package_file, read_move_base
+from rosbot_patrol.patrol.house.known_objects import load_known
+from rosbot_patrol.patrol.house.rooms import load_rooms
+from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.mission.params import InputParams, NodeParams, manager_params
+from rosbot_patrol.replay.nodes import amcl as amcl_replay
+from rosbot_patrol.replay.nodes import bridge as serial_replay
+from rosbot_patrol.replay.nodes import detector as detector_replay
+from rosbot_patrol.replay.nodes import gmapping as gmapping_replay
+from rosbot_patrol.replay.nodes import move_base as move_base_replay
+from rosbot_patrol.replay.nodes import patrol as patrol_replay
+from rosbot_patrol.replay.nodes import patrol_log
+from rosbot_patrol.replay.runner import Field, Input, Replay
+from rosbot_patrol.rosserial.settings import SerialNodeParams
+from rosbot_patrol.sensors.sensor_file import load_sensors
+from rosbot_patrol.tf.tree import Edge
+from rosbot_patrol.yaml_files import read_mapping
+
+POINTS = "params/room_points.yaml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What a replay is made of.
+
+    Attributes:
+        node: whose.
+        tree: its parameters; None: those of the package's config.
+        name: of the parameters in messages.
+        map: yaml of the map, None for the bag's.
+        static: transforms that the bag lacks.
+        seed: of all chance.
+        rooms: points file of the patrol, None for the parameter path_to_params or the package's.
+    """
+
+    node: str
+    tree: Mapping[str, Any] | None = None
+    name: str = "~"
+    map: Path | None = None
+    static: Sequence[Edge] = field(default_factory=tuple)
+    seed: int = 0
+    rooms: Path | None = None
+
+
+@dataclass(frozen=True)
+class Node:
+    """A node that can be replayed.
+
+    Attributes:
+        config: its parameters in the package, "" where there are none.
+        build: makes its replay of a setup; raises ParamError or MapError.
+        fields: how its result is compared.
+        inputs: what it hears, where nothing is given instead.
+    """
+
+    config: str
+    build: Callable[[Setup], Replay]
+    fields: Mapping[str, Field]
+    inputs: Sequence[Input]
+
+
+def build_replay(setup: Setup) -> Replay:
+    """The replay of a setup.
+
+    Raises:
+        ParamError: the node or a parameter is not known or makes no sense.
+        MapError: the map cannot be used.
+    """
+    return node_of(setup.node).build(setup)
+
+
+def node_of(name: str) -> Node:
+    """A node by its name; raises ParamError, which names the nearest."""
+    if name not in NODES:
+        raise ParamError("node", params.unknown_name(name, NODES))
+    return NODES[name]
+
+
+def read_parameters(path: Path, node: str) -> Mapping[str, Any]:
+    """The parameters of a node from a yaml, as it stands or under the node's name (as of `rosparam dump`).
+
+    Raises:
+        ParamError: the file cannot be read.
+    """
+    tree = read_mapping(path, keys=f"of {node}")
+    own = tree.get(node)
+    return own if isinstance(own, dict) else tree
+
+
+def parse_transform(text: str) -> Edge:
+    """A static transform as static_transform_publisher takes it: x y z yaw pitch roll (or a quaternion) PARENT CHILD.
+
+    Raises:
+        ParamError: it makes no sense.
+    """
+    words = text.split()
+    try:
+        numbers = [float(word) for word in words[:-2]]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (6, 7) or not all(map(math.isfinite, numbers)):
+        expected = "expected 'x y z yaw pitch roll PARENT CHILD' or 'x y z qx qy qz qw PARENT CHILD'"
+        raise ParamError("transform", f"{expected}, got '{text}'")
+    turn = numbers[3:] if len(numbers) == 7 else _quaternion(*numbers[3:])
+    return Edge(words[-2], words[-1], 0.0, *numbers[:3], *turn)
+
+
+def _quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
+    """Of turns about z, then y, then x of the turned axes [rad]."""
+    (sr, sp, sy), (cr, cp, cy) = ((f(roll / 2), f(pitch / 2), f(yaw / 2)) for f in (math.sin, math.cos))
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def _parameters(setup: Setup) -> tuple[Mapping[str, Any], str]:
+    if setup.tree is not None:
+        return setup.tree, setup.name
+    path = package_file(node_of(setup.node).config)
+    return read_parameters(path, setup.node), f"{path}: "
+
+
+def _amcl(setup: Setup) -> Replay:
+    tree, name = _parameters(setup)
+    loaded = params.load(AmclParams, tree, name=name, ignore=["saved_pose"])
+    grid = None if setup.map is None else read_map(setup.map)
+    return amcl_replay.AmclReplay(loaded, grid=grid, seed=setup.seed, static=setup.static)
+
+
+def _gmapping(setup: Setup) -> Replay:
+    tree, name = _parameters(setup)
+    changes: dict[str, Any] = {"seed": setup.seed} if setup.seed else {}
+    if setup.map is not None:
+        changes["map_file"] = str(setup.map)
+    return gmapping_replay.GmappingReplay(
+        params.load(GmappingParams, {**tree, **changes}, name=name), static=setup.static
+    )
+
+
+def _patrol(setup: Setup) -> Replay:
+    tree, name = _parameters(setup)
+    points = setup.rooms or tree.get("path_to_params") or package_file(POINTS)
+    own = {**tree, "path_to_params": str(points)}
+    node = params.load(NodeParams, own, name=name, ignore=set(tree))
+    frames = params.load(InputParams, tree, name=name, ignore=set(tree))
+    rooms = load_rooms(Path(points))
+    names = {room.id: room.name for room in rooms}
+    return patrol_replay.PatrolReplay(
+        node,
+        manager_params(node, lambda cls: params.load(cls, tree, name=name, ignore=set(tree)), name),
+        frames,
+        rooms=rooms,
+        sensors=load_sensors(node.sensors, names, rooms_source=str(rooms.source)),
+        judge=Judge(node.judge, load_known(node.known_objects)),
+        static=setup.static,
+    )
+
+
+def _detector(setup: Setup) -> Replay:
+    tree, name = _parameters(setup)
+    loaded = params.load(DarknetParams, tree, name=name)
+    topic = loaded.subscribers.camera_reading.topic
+    detector = make_detector(loaded, str(package_file("models")))
+    is_told = "subscribers" in tree
+    return detector_replay.DetectorReplay(detector, topic if is_told else detector_replay.INPUTS[0].topic)
+
+
+def _move_base(setup: Setup) -> Replay:
+    folder = package_file(node_of(setup.node).config)
+    tree, name = (read_move_base(folder), f"{folder}: ") if setup.tree is None else (setup.tree, setup.name)
+    grid = None if setup.map is None else read_map(setup.map)
+    return move_base_replay.MoveBaseReplay(tree, name, grid=grid, static=setup.static)
+
+
+def _serial(setup: Setup) -> Replay:
+    tree, name = ({"port": "tcp"}, "") if setup.tree is None else (setup.tree, setup.name)
+    loaded = params.load(SerialNodeParams, tree, name=name)
+    silence = loaded.silence_timeout if loaded.is_tcp else None
+    return serial_replay.SerialReplay(loaded.policy(name), silence)
+
+
+NODES: dict[str, Node] = {
+    "amcl": Node("config/tuned/amcl.yaml", _amcl, amcl_replay.FIELDS, amcl_replay.INPUTS),
+    "darknet_ros": Node("models/house.yaml", _detector, detector_replay.FIELDS, detector_replay.INPUTS),
+    "move_base": Node("config/tuned", _move_base, move_base_replay.FIELDS, move_base_replay.INPUTS),
+    "patrol_robot": Node("config/tuned/watch.yaml", _patrol, patrol_log.FIELDS, patrol_replay.INPUTS),
+    "serial_node": Node("", _serial, serial_replay.FIELDS, serial_replay.INPUTS),
+    "slam_gmapping": Node("config/gmapping.yaml", _gmapping, gmapping_replay.FIELDS, gmapping_replay.INPUTS),
+}

@@ -1,0 +1,1 @@
+"""Results of a replay: tables, comparison with stored ones, plots."""
