@@ -35,7 +35,7 @@ sys.path.insert(0, str(ROOT / "src"))
 from one_core import run  # noqa: E402
 
 from rosbot_patrol.costmap.layered import LayeredCostmap  # noqa: E402
-from rosbot_patrol.costmap.obstacle import observe  # noqa: E402
+from rosbot_patrol.costmap.layers.obstacle import observe  # noqa: E402
 from rosbot_patrol.costmap.params import read_costmap  # noqa: E402
 from rosbot_patrol.errors import ControlError  # noqa: E402
 from rosbot_patrol.geometry import Pose2D, Twist2D  # noqa: E402

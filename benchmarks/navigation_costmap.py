@@ -33,9 +33,9 @@ sys.path.insert(0, str(ROOT / "src"))
 from one_core import run  # noqa: E402
 
 from rosbot_patrol.costmap.bounds import Bounds  # noqa: E402
-from rosbot_patrol.costmap.inflation import InflationLayer  # noqa: E402
 from rosbot_patrol.costmap.layered import LayeredCostmap  # noqa: E402
-from rosbot_patrol.costmap.obstacle import observe  # noqa: E402
+from rosbot_patrol.costmap.layers.inflation import InflationLayer  # noqa: E402
+from rosbot_patrol.costmap.layers.obstacle import observe  # noqa: E402
 from rosbot_patrol.costmap.params import read_costmap  # noqa: E402
 from rosbot_patrol.geometry import Pose2D  # noqa: E402
 from rosbot_patrol.maps.map_io import read_map  # noqa: E402

@@ -40,7 +40,7 @@ from shortest_paths import path_price, path_to, pulled_straight, spread  # noqa:
 from rosbot_patrol.costmap.bounds import Bounds  # noqa: E402
 from rosbot_patrol.costmap.costs import LETHAL, costs_of_occupancy  # noqa: E402
 from rosbot_patrol.costmap.footprint import Footprint, padded  # noqa: E402
-from rosbot_patrol.costmap.inflation import InflationLayer  # noqa: E402
+from rosbot_patrol.costmap.layers.inflation import InflationLayer  # noqa: E402
 from rosbot_patrol.costmap.params import InflationParams  # noqa: E402
 from rosbot_patrol.geometry import Pose2D  # noqa: E402
 from rosbot_patrol.grid import Grid, GridInfo  # noqa: E402

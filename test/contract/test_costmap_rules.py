@@ -15,9 +15,9 @@ from rosbot_patrol.costmap import costmap_kernels as kernels
 from rosbot_patrol.costmap.bounds import Bounds
 from rosbot_patrol.costmap.costs import costs_of_occupancy, occupancy_of
 from rosbot_patrol.costmap.footprint import Footprint
-from rosbot_patrol.costmap.inflation import InflationLayer
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import observe
+from rosbot_patrol.costmap.layers.inflation import InflationLayer
+from rosbot_patrol.costmap.layers.obstacle import observe
 from rosbot_patrol.costmap.params import InflationParams, read_costmap
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo

@@ -15,7 +15,7 @@ import pytest
 from rosbot_patrol.costmap.bounds import Bounds
 from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL, UNKNOWN
 from rosbot_patrol.costmap.footprint import Footprint, circle_footprint
-from rosbot_patrol.costmap.inflation import InflationLayer
+from rosbot_patrol.costmap.layers.inflation import InflationLayer
 from rosbot_patrol.costmap.params import InflationParams
 from rosbot_patrol.errors import GoalOccupied, NoPath, OutOfBounds, PlanningError, StartOccupied
 from rosbot_patrol.geometry import Pose2D

@@ -13,8 +13,8 @@ from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import ControlError, ParamError
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, wrap_angle
 from rosbot_patrol.grid import Grid, GridInfo
+from rosbot_patrol.planning.global_planners.navfn import with_headings
 from rosbot_patrol.planning.interfaces import LocalView
-from rosbot_patrol.planning.navfn import with_headings
 from rosbot_patrol.planning.registry import DWA, LOCAL_PLANNERS, TRAJECTORY, TUNABLE, make_local_planner, short_name
 
 CORNERS = np.array([[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]])

@@ -14,7 +14,7 @@ from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams
 from rosbot_patrol.control.movers import MoverWatch
 from rosbot_patrol.costmap.costs import LETHAL
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import height_problem, observe_level
+from rosbot_patrol.costmap.layers.obstacle import height_problem, observe_level
 from rosbot_patrol.costmap.params import SourceParams, read_costmap
 from rosbot_patrol.geometry import Pose2D, Transform, Twist2D
 from rosbot_patrol.grid import Grid, GridInfo

@@ -24,7 +24,7 @@ from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams
 from rosbot_patrol.control.give_way import GiveWay, GiveWayParams
 from rosbot_patrol.control.movers import MoverParams, MoverWatch
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import observe_level
+from rosbot_patrol.costmap.layers.obstacle import observe_level
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert
 from rosbot_patrol.grid import Grid

@@ -17,10 +17,12 @@ import numpy as np
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds, merged
 from rosbot_patrol.costmap.costs import FREE, LETHAL, UNKNOWN, CostCells
 from rosbot_patrol.costmap.footprint import Footprint
-from rosbot_patrol.costmap.inflation import InflationLayer
-from rosbot_patrol.costmap.keepout import KeepoutLayer
-from rosbot_patrol.costmap.layer import Layer
-from rosbot_patrol.costmap.obstacle import ObstacleLayer
+from rosbot_patrol.costmap.layers.inflation import InflationLayer
+from rosbot_patrol.costmap.layers.keepout import KeepoutLayer
+from rosbot_patrol.costmap.layers.layer import Layer
+from rosbot_patrol.costmap.layers.obstacle import ObstacleLayer
+from rosbot_patrol.costmap.layers.range_layer import RangeSensorLayer
+from rosbot_patrol.costmap.layers.static import StaticLayer
 from rosbot_patrol.costmap.params import (
     CostmapConfig,
     CostmapParams,
@@ -30,10 +32,8 @@ from rosbot_patrol.costmap.params import (
     ObstacleParams,
     StaticParams,
 )
-from rosbot_patrol.costmap.range_layer import RangeSensorLayer
 from rosbot_patrol.costmap.scrolling import ScrollingCells, strips
-from rosbot_patrol.costmap.sensor_params import RangeSensorParams
-from rosbot_patrol.costmap.static import StaticLayer
+from rosbot_patrol.costmap.sources.sensor_params import RangeSensorParams
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
 

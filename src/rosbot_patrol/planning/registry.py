@@ -9,11 +9,14 @@ from typing import Any
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import load
-from rosbot_patrol.planning.dwa_params import RENAMED, DWAPlannerParams, with_new_names
-from rosbot_patrol.planning.dwa_planner import DWAPlanner
-from rosbot_patrol.planning.global_planner import GlobalPlannerParams, PotentialFieldPlanner
+from rosbot_patrol.planning.global_planners.global_planner import GlobalPlannerParams, PotentialFieldPlanner
+from rosbot_patrol.planning.global_planners.navfn import NavfnParams, NavfnPlanner
 from rosbot_patrol.planning.interfaces import GlobalPlanner, LocalPlanner, Recovery
-from rosbot_patrol.planning.navfn import NavfnParams, NavfnPlanner
+from rosbot_patrol.planning.local_planners.base import SamplingPlanner
+from rosbot_patrol.planning.local_planners.dwa_params import RENAMED, DWAPlannerParams, with_new_names
+from rosbot_patrol.planning.local_planners.dwa_planner import DWAPlanner
+from rosbot_patrol.planning.local_planners.trajectory_params import TrajectoryPlannerParams
+from rosbot_patrol.planning.local_planners.trajectory_planner import TrajectoryPlanner
 from rosbot_patrol.planning.recoveries import (
     ClearCostmap,
     ClearCostmapParams,
@@ -22,9 +25,6 @@ from rosbot_patrol.planning.recoveries import (
     Rotate,
     RotateParams,
 )
-from rosbot_patrol.planning.trajectory_planner import TrajectoryPlanner
-from rosbot_patrol.planning.trajectory_planner_base import SamplingPlanner
-from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 from rosbot_patrol.tunable import tunable
 
 NAVFN, GLOBAL_PLANNER = "navfn/NavfnROS", "global_planner/GlobalPlanner"

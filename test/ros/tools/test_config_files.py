@@ -23,8 +23,8 @@ from rosbot_patrol.patrol.guard.arming import load_rules
 from rosbot_patrol.patrol.guard.schedule import load_schedule
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.patrol.intruder.sightings import WatchParams
+from rosbot_patrol.planning.local_planners.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.planning.registry import make_global_planner
-from rosbot_patrol.planning.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
 from rosbot_patrol.ros.patrol.settings import NodeParams, load_flat
 from rosbot_patrol.ros.sensors import watch_node as sensor_watch_node

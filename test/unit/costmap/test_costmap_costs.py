@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from rosbot_patrol.costmap import inflation_kernels as kernels
 from rosbot_patrol.costmap.bounds import Bounds
 from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL, UNKNOWN, costs_of_occupancy, occupancy_of
 from rosbot_patrol.costmap.footprint import Footprint
-from rosbot_patrol.costmap.inflation import InflationLayer, cost_at, cost_table
+from rosbot_patrol.costmap.layers import inflation_kernels as kernels
+from rosbot_patrol.costmap.layers.inflation import InflationLayer, cost_at, cost_table
 from rosbot_patrol.costmap.params import InflationParams
 from rosbot_patrol.grid import GridInfo
 

@@ -9,7 +9,7 @@ import pytest
 
 from rosbot_patrol.costmap.bounds import Bounds, merged
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import observe
+from rosbot_patrol.costmap.layers.obstacle import observe
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo

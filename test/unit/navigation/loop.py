@@ -12,7 +12,7 @@ import yaml
 from house import cast, scan_of
 
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import observe
+from rosbot_patrol.costmap.layers.obstacle import observe
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import PlanningError
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import observe
+from rosbot_patrol.costmap.layers.obstacle import observe
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle

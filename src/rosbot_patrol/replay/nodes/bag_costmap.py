@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
+from rosbot_patrol.costmap.layers.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import LaserTilted, TransformError
 from rosbot_patrol.geometry import Pose2D

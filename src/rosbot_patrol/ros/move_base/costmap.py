@@ -17,10 +17,10 @@ from rospy.numpy_msg import numpy_msg
 
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds
 from rosbot_patrol.costmap.costs import occupancy_of
-from rosbot_patrol.costmap.keepout import KeepoutLayer
 from rosbot_patrol.costmap.layered import LayeredCostmap
+from rosbot_patrol.costmap.layers.keepout import KeepoutLayer
+from rosbot_patrol.costmap.layers.static import StaticLayer
 from rosbot_patrol.costmap.params import CostmapConfig, CostmapParams
-from rosbot_patrol.costmap.static import StaticLayer
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo

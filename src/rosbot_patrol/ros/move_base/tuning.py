@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from rosbot_patrol.costmap.layer import Layer
+from rosbot_patrol.costmap.layers.layer import Layer
 from rosbot_patrol.costmap.params import (
     CostmapParams,
     InflationParams,

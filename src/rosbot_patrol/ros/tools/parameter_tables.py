@@ -20,7 +20,7 @@ from rosbot_patrol.costmap.params import (
     StaticParams,
     VoxelParams,
 )
-from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
+from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.images.compressed import CompressedParams
@@ -32,11 +32,11 @@ from rosbot_patrol.patrol.guard.battery import BatteryParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.mission.look import LookParams
 from rosbot_patrol.patrol.mission.turn import SpinParams
-from rosbot_patrol.planning.dwa_params import DWAPlannerParams
-from rosbot_patrol.planning.global_planner import GlobalPlannerParams
-from rosbot_patrol.planning.navfn import NavfnParams
+from rosbot_patrol.planning.global_planners.global_planner import GlobalPlannerParams
+from rosbot_patrol.planning.global_planners.navfn import NavfnParams
+from rosbot_patrol.planning.local_planners.dwa_params import DWAPlannerParams
+from rosbot_patrol.planning.local_planners.trajectory_params import TrajectoryPlannerParams
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
-from rosbot_patrol.planning.trajectory_planner_params import TrajectoryPlannerParams
 from rosbot_patrol.ros.detector.republish_node import RepublishParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
 from rosbot_patrol.ros.gmapping.explore_node import ExploreParams

@@ -13,7 +13,7 @@ from made_bag import Maker, write_bag
 from made_drive import BEGIN, LASER, drive, room_map, scan_at
 
 from rosbot_patrol.geometry import Pose2D, compose, invert
-from rosbot_patrol.planning import trajectory_planner
+from rosbot_patrol.planning.local_planners import trajectory_planner
 from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.nodes.move_base import FIELDS
 from rosbot_patrol.replay.nodes.setup import Setup, build_replay

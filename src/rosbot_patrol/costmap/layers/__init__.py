@@ -1,0 +1,1 @@
+"""Layers of a costmap: static, obstacle, range sensor, keepout, inflation."""

@@ -1,0 +1,1 @@
+"""What an obstacle layer sees by: scans, point clouds, depth pictures."""

@@ -1,0 +1,1 @@
+"""GlobalPlanner and NavfnROS: the way over a costmap."""

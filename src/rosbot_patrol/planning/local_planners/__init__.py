@@ -1,0 +1,1 @@
+"""TrajectoryPlannerROS and DWAPlannerROS: the velocity that follows a plan."""
