@@ -101,7 +101,7 @@ def measure(missions: int = MISSIONS) -> dict[str, float]:
     from real_smtp import RealSmtp
 
     from rosbot_patrol.ros.campaign.house import Master
-    from rosbot_patrol.rosserial.tcp_client import EspClient
+    from rosbot_patrol.rosserial.device.tcp_client import EspClient
 
     with tempfile.TemporaryDirectory(prefix="alerts-") as name:
         folder = Path(name)

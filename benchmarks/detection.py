@@ -152,9 +152,9 @@ def write_tiny(folder: Path) -> int:
     """yolov2-tiny with random weights and the picture; how many classes it has."""
     import cv2
 
-    from rosbot_patrol.detection.darknet_cfg import read_cfg
-    from rosbot_patrol.detection.darknet_weights import format_weights
-    from rosbot_patrol.detection.random_weights import random_weights
+    from rosbot_patrol.detection.darknet.cfg import read_cfg
+    from rosbot_patrol.detection.darknet.random_weights import random_weights
+    from rosbot_patrol.detection.darknet.weights import format_weights
 
     spec = read_cfg(str(CFG))
     weights = random_weights(spec, np.random.default_rng(0))

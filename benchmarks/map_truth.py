@@ -15,8 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from rosbot_patrol.amcl.field_kernels import cast_ray
-from rosbot_patrol.amcl.likelihood_field import blocked_distances
+from rosbot_patrol.amcl.scan_model.field_kernels import cast_ray
+from rosbot_patrol.amcl.scan_model.likelihood_field import blocked_distances
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.distance_kernels import bounded_distances

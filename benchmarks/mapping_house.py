@@ -19,8 +19,8 @@ import numpy as np
 from map_truth import map_figures, plan
 from numpy.typing import NDArray
 
-from rosbot_patrol.amcl.field_kernels import cast_ray
-from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances
+from rosbot_patrol.amcl.scan_model.field_kernels import cast_ray
+from rosbot_patrol.amcl.scan_model.likelihood_field import Field, blocked_distances
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.gmapping.slam import Slam

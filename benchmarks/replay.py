@@ -35,7 +35,7 @@ import made_patrol  # noqa: E402
 import mapping_house  # noqa: E402
 from made_bag import Maker, write_bag  # noqa: E402
 
-from rosbot_patrol.amcl.likelihood_field import blocked_distances  # noqa: E402
+from rosbot_patrol.amcl.scan_model.likelihood_field import blocked_distances  # noqa: E402
 from rosbot_patrol.geometry import Pose2D, compose, invert  # noqa: E402
 from rosbot_patrol.patrol.house.rooms import load_rooms  # noqa: E402
 from rosbot_patrol.replay.bags.bag import Bag  # noqa: E402

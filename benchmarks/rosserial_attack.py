@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from rosserial import HERE, Bridge, Child, ear, free_port, program
 
-from rosbot_patrol.rosserial.keys import add_key, new_key
+from rosbot_patrol.rosserial.protocol.keys import add_key, new_key
 
 ATTACKS = HERE.parent / "test" / "unit" / "rosserial" / "attacks.py"
 SOURCE = "127.0.0.66"

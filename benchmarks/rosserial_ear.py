@@ -23,7 +23,7 @@ import numpy as np
 import rosgraph
 from rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
 
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5
 
 TOPIC = "/motion_trigger"
 FRAME = 6  # bytes of a TCPROS frame: a length, id, move

@@ -29,11 +29,11 @@ from typing import Any
 
 import numpy as np
 
-from rosbot_patrol.rosserial.client_session import DeviceSession
-from rosbot_patrol.rosserial.keys import read_keys
-from rosbot_patrol.rosserial.packet import encode
-from rosbot_patrol.rosserial.proof import Prover
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicInfo, pack_esp_trigger
+from rosbot_patrol.rosserial.device.client_session import DeviceSession
+from rosbot_patrol.rosserial.protocol.keys import read_keys
+from rosbot_patrol.rosserial.protocol.packet import encode
+from rosbot_patrol.rosserial.protocol.proof import Prover
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicInfo, pack_esp_trigger
 
 INFO = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=ESP_TRIGGER_MD5)
 PERIOD = 0.5

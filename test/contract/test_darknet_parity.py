@@ -11,14 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
-from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg
-from rosbot_patrol.detection.darknet_weights import format_weights, read_weights
-from rosbot_patrol.detection.decode import iou
+from rosbot_patrol.detection.darknet.cfg import parse_cfg, read_cfg
+from rosbot_patrol.detection.darknet.decode import iou
+from rosbot_patrol.detection.darknet.families import FAMILIES, cfg_text
+from rosbot_patrol.detection.darknet.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.random_weights import random_weights
+from rosbot_patrol.detection.darknet.weights import format_weights, read_weights
 from rosbot_patrol.detection.detector import IOU_THRESHOLD, DarknetDetector
-from rosbot_patrol.detection.families import FAMILIES, cfg_text
-from rosbot_patrol.detection.letterbox import Letterbox
 from rosbot_patrol.detection.network import CvNetwork, load_network
-from rosbot_patrol.detection.random_weights import random_weights
 from rosbot_patrol.images.encodings import Picture
 
 HERE = Path(__file__).parent

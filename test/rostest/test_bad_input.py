@@ -35,12 +35,12 @@ from ros_processes import Process, free_port, wait_for
 from rosbot_patrol.alerts.post.outbox import Outbox
 from rosbot_patrol.alerts.post.texts import incident_notice
 from rosbot_patrol.alerts.records.incident import Incident
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_weights import format_weights
-from rosbot_patrol.detection.random_weights import random_weights
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.random_weights import random_weights
+from rosbot_patrol.detection.darknet.weights import format_weights
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.maps.map_io import write_map
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

@@ -13,8 +13,8 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import Process, Ros, wait_for
 
-from rosbot_patrol.detection.darknet_cfg import parse_cfg
-from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights
+from rosbot_patrol.detection.darknet.cfg import parse_cfg
+from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

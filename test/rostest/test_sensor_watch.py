@@ -14,9 +14,9 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import PATIENCE, free_port, wait_for
 
-from rosbot_patrol.rosserial.keys import add_key, new_key
-from rosbot_patrol.rosserial.poor_link import LinkQuality
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.poor_link import LinkQuality
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
+from rosbot_patrol.rosserial.protocol.keys import add_key, new_key
 
 ROOT = Path(__file__).resolve().parents[2]
 TRIGGER = ["/motion_trigger", "rosbot_patrol/EspTrigger"]

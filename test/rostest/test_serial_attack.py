@@ -10,8 +10,8 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import free_port, wait_for
 
-from rosbot_patrol.rosserial.keys import add_key, new_key
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
+from rosbot_patrol.rosserial.protocol.keys import add_key, new_key
 
 ATTACKS = Path(__file__).parents[1] / "unit" / "rosserial" / "attacks.py"
 SECONDS = 5.0

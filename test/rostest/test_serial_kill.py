@@ -16,9 +16,9 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import Process, free_port, wait_for
 
-from rosbot_patrol.rosserial.packet import Parser, encode
-from rosbot_patrol.rosserial.tcp_client import EspClient
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, REQUEST_TOPICS, TopicId, TopicInfo, pack_topic_info
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
+from rosbot_patrol.rosserial.protocol.packet import Parser, encode
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, REQUEST_TOPICS, TopicId, TopicInfo, pack_topic_info
 
 LAUNCH = """
 <launch>

@@ -16,9 +16,9 @@ import contextlib
 
 from ros_processes import PATIENCE, free_port, wait_for
 
-from rosbot_patrol.rosserial.packet import Parser, encode
-from rosbot_patrol.rosserial.tcp_client import EspClient
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_log, pack_topic_info
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
+from rosbot_patrol.rosserial.protocol.packet import Parser, encode
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_log, pack_topic_info
 
 STRING, BOOL = "992ce8a1687cec8c8bd883ec73ca41d1", "8b94c1b53db61fb6aed406028ad6332a"
 SET_BOOL_REQUEST, SET_BOOL_RESPONSE = BOOL, "937c9679a518e3a18d831e57125ea522"

@@ -15,7 +15,7 @@ from ros_processes import Process, wait_for
 PORT = 11411
 SENSOR = """
 import sys
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
 sensor = EspClient(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])).start()
 print("started", flush=True)
 for line in sys.stdin:

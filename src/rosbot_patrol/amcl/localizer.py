@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.amcl.kld import KldRule
-from rosbot_patrol.amcl.known_map import KnownMap
-from rosbot_patrol.amcl.motion_model import OdometryNoise, move_particles
-from rosbot_patrol.amcl.odometry_track import OdometryTrack, Reading
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.particle_filter import Estimate, ParticleFilter
+from rosbot_patrol.amcl.particles.kld import KldRule
+from rosbot_patrol.amcl.particles.motion_model import OdometryNoise, move_particles
+from rosbot_patrol.amcl.particles.odometry_track import OdometryTrack, Reading
+from rosbot_patrol.amcl.particles.particle_filter import Estimate, ParticleFilter
+from rosbot_patrol.amcl.scan_model.known_map import KnownMap
+from rosbot_patrol.amcl.scan_model.sensor_model import Beams, pick_beams
 from rosbot_patrol.amcl.seeker import Seeker
-from rosbot_patrol.amcl.sensor_model import Beams, pick_beams
 from rosbot_patrol.amcl.trust import State, Trust, Witness, agreement
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid

@@ -13,11 +13,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.amcl.floor import Floor
-from rosbot_patrol.amcl.kld import KldRule
-from rosbot_patrol.amcl.likelihood_field import Field
-from rosbot_patrol.amcl.particle_filter import Estimate, ParticleFilter
-from rosbot_patrol.amcl.sensor_model import Beams, SensorModel, Weighing
+from rosbot_patrol.amcl.particles.kld import KldRule
+from rosbot_patrol.amcl.particles.particle_filter import Estimate, ParticleFilter
+from rosbot_patrol.amcl.scan_model.floor import Floor
+from rosbot_patrol.amcl.scan_model.likelihood_field import Field
+from rosbot_patrol.amcl.scan_model.sensor_model import Beams, SensorModel, Weighing
 from rosbot_patrol.amcl.trust import agreement
 from rosbot_patrol.geometry import Pose2D, angle_difference, wrap_angles
 

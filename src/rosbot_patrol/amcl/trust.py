@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rosbot_patrol.amcl import agreement_kernels as kernels
-from rosbot_patrol.amcl.likelihood_field import Field
-from rosbot_patrol.amcl.particle_filter import Estimate
-from rosbot_patrol.amcl.sensor_model import Beams
+from rosbot_patrol.amcl.particles.particle_filter import Estimate
+from rosbot_patrol.amcl.scan_model import agreement_kernels as kernels
+from rosbot_patrol.amcl.scan_model.likelihood_field import Field
+from rosbot_patrol.amcl.scan_model.sensor_model import Beams
 from rosbot_patrol.geometry import Pose2D, compose
 
 NEAR_M = 0.2  # from an obstacle: a beam that ends there is explained

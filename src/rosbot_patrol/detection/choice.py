@@ -6,8 +6,8 @@ import importlib
 import logging
 
 from rosbot_patrol.counts import count_of
-from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.detection.detector import Detector, load_detector
+from rosbot_patrol.detection.params import DarknetParams
 
 log = logging.getLogger(__name__)
 

@@ -16,11 +16,11 @@ from typing import Protocol
 
 import numpy as np
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_layers import NetworkSpec
-from rosbot_patrol.detection.darknet_weights import read_weights
-from rosbot_patrol.detection.decode import Candidates, decode
-from rosbot_patrol.detection.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.decode import Candidates, decode
+from rosbot_patrol.detection.darknet.layers import NetworkSpec
+from rosbot_patrol.detection.darknet.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.weights import read_weights
 from rosbot_patrol.detection.network import Network, load_network
 from rosbot_patrol.errors import DetectorError
 from rosbot_patrol.images.encodings import Picture

@@ -12,7 +12,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from rosbot_patrol.detection.decode import Candidates, suppress_by_objectness
+from rosbot_patrol.detection.darknet.decode import Candidates, suppress_by_objectness
 from rosbot_patrol.detection.detector import IOU_THRESHOLD, Detection, to_detections
 from rosbot_patrol.images.encodings import Picture
 

@@ -10,9 +10,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from rosbot_patrol.detection.darknet_layers import Convolutional, Head, NetworkSpec
-from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights
-from rosbot_patrol.detection.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.layers import Convolutional, Head, NetworkSpec
+from rosbot_patrol.detection.darknet.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights
 from rosbot_patrol.errors import DetectorError
 from rosbot_patrol.images.encodings import Picture
 
@@ -112,7 +112,7 @@ def load_network(spec: NetworkSpec, weights: Sequence[ConvWeights], *, threads: 
     if spec.channels not in (1, 3):
         raise DetectorError(f"{spec.source}: takes {spec.channels} channels, pictures have 1 or 3")
     if importlib.util.find_spec("onnxruntime") is not None:
-        builder = importlib.import_module("rosbot_patrol.detection.onnx_build")
+        builder = importlib.import_module("rosbot_patrol.detection.darknet.onnx_build")
         return OnnxNetwork(builder.build_model(spec, weights), channels=spec.channels, threads=threads)
     if importlib.util.find_spec("cv2") is None:
         raise DetectorError("neither onnxruntime nor OpenCV (cv2) is installed, so no network can be computed")

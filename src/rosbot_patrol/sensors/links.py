@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rosbot_patrol.rosserial.device_log import read_stuck_line
+from rosbot_patrol.rosserial.device.device_log import read_stuck_line
 from rosbot_patrol.sensors.problems import Link
 
 MAX_LINKS = 2000  # a gateway may speak for many sensors; beyond that the one not heard for longest is forgotten

@@ -19,7 +19,7 @@ from typing import Any
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import param
-from rosbot_patrol.rosserial.policy import parse_networks
+from rosbot_patrol.rosserial.server.policy import parse_networks
 from rosbot_patrol.yaml_files import read_mapping
 
 PLACE_KEYS = frozenset({"port", "x", "y", "z", "yaw"})  # the simulator's

@@ -13,7 +13,7 @@ from std_msgs.msg import Time
 
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.ros.bridge.channels import DeviceService, message_class, serialize, service_class
-from rosbot_patrol.rosserial import topics
+from rosbot_patrol.rosserial.protocol import topics
 
 
 def test_md5_sums_are_upstreams():

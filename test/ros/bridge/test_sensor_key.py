@@ -5,7 +5,7 @@ import re
 import pytest
 
 from rosbot_patrol.ros.bridge import esp_client_node, sensor_key_node
-from rosbot_patrol.rosserial.keys import read_keys
+from rosbot_patrol.rosserial.protocol.keys import read_keys
 
 
 def run(module, monkeypatch, *arguments):

@@ -21,8 +21,8 @@ from rosbot_patrol.ros.bridge import publishers as serial_publishers
 from rosbot_patrol.ros.bridge.channels import check_md5, serialize
 from rosbot_patrol.ros.bridge.layouts import Layout, VaryingLayout, layout, raw_from, raw_message
 from rosbot_patrol.ros.bridge.publishers import WAITING, Outlet, Publishers
-from rosbot_patrol.rosserial.old_types import OLD_TYPES
-from rosbot_patrol.rosserial.topics import TopicInfo
+from rosbot_patrol.rosserial.protocol.old_types import OLD_TYPES
+from rosbot_patrol.rosserial.protocol.topics import TopicInfo
 
 
 def info(name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=EspTrigger._md5sum):

@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("rospkg", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.detection.darknet_cfg import parse_cfg
-from rosbot_patrol.detection.darknet_weights import format_weights
-from rosbot_patrol.detection.random_weights import random_weights
+from rosbot_patrol.detection.darknet.cfg import parse_cfg
+from rosbot_patrol.detection.darknet.random_weights import random_weights
+from rosbot_patrol.detection.darknet.weights import format_weights
 from rosbot_patrol.detection.weights_catalogue import CATALOGUE, WeightsFile
 from rosbot_patrol.ros.detector.download_weights import Bar, get, run
 

@@ -16,7 +16,7 @@ from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.ros.bridge import channels as serial_channels
 from rosbot_patrol.ros.bridge.layouts import raw_from
 from rosbot_patrol.ros.runtime.node import Worker
-from rosbot_patrol.rosserial.topics import TopicInfo
+from rosbot_patrol.rosserial.protocol.topics import TopicInfo
 
 
 class Caller:

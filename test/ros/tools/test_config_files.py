@@ -15,7 +15,7 @@ import roslaunch.xmlloader
 
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.costmap.params import read_costmap
-from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load

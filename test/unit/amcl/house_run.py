@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.amcl.field_kernels import cast_ray
-from rosbot_patrol.amcl.likelihood_field import Field, blocked_distances
+from rosbot_patrol.amcl.scan_model.field_kernels import cast_ray
+from rosbot_patrol.amcl.scan_model.likelihood_field import Field, blocked_distances
 from rosbot_patrol.geometry import Pose2D, angle_difference, compose, invert
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.scan import LaserScan

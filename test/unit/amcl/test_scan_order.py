@@ -10,8 +10,8 @@ import pytest
 from house_run import MOUNT, Moment, drive, error, house_map, scan_at
 
 from rosbot_patrol.amcl.localizer import Localizer
-from rosbot_patrol.amcl.odometry_track import OdometryTrack, Reading
 from rosbot_patrol.amcl.parameters import AmclParams
+from rosbot_patrol.amcl.particles.odometry_track import OdometryTrack, Reading
 from rosbot_patrol.geometry import Pose2D, compose, invert
 
 TUTORIAL = AmclParams(odom_model_type="diff-corrected", update_min_d=0.5, update_min_a=1.0)

@@ -12,12 +12,12 @@ import yaml
 from house_run import MOUNT, ROOT, Moment, drive, error, house_map, scan_at
 
 from rosbot_patrol import params
-from rosbot_patrol.amcl.floor import Floor
-from rosbot_patrol.amcl.known_map import KnownMap
 from rosbot_patrol.amcl.localizer import Localizer
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.particle_filter import Estimate
-from rosbot_patrol.amcl.sensor_model import pick_beams
+from rosbot_patrol.amcl.particles.particle_filter import Estimate
+from rosbot_patrol.amcl.scan_model.floor import Floor
+from rosbot_patrol.amcl.scan_model.known_map import KnownMap
+from rosbot_patrol.amcl.scan_model.sensor_model import pick_beams
 from rosbot_patrol.amcl.trust import State, Witness, agreement
 from rosbot_patrol.geometry import Pose2D, compose, invert
 from rosbot_patrol.grid import Grid

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.detection import draw
-from rosbot_patrol.detection.darknet_cfg import parse_cfg
-from rosbot_patrol.detection.darknet_params import DarknetParams
-from rosbot_patrol.detection.darknet_weights import format_weights
-from rosbot_patrol.detection.decode import Candidates
+from rosbot_patrol.detection.darknet.cfg import parse_cfg
+from rosbot_patrol.detection.darknet.decode import Candidates
+from rosbot_patrol.detection.darknet.random_weights import random_weights
+from rosbot_patrol.detection.darknet.weights import format_weights
 from rosbot_patrol.detection.detector import DarknetDetector, Detection, load_detector, to_detections
 from rosbot_patrol.detection.draw import COLOURS, draw_boxes
 from rosbot_patrol.detection.network import load_network
-from rosbot_patrol.detection.random_weights import random_weights
+from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.errors import DetectorError, ImageError
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import load

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from floors import drawn_map
 
-from rosbot_patrol.amcl.field_kernels import cast_ray
-from rosbot_patrol.amcl.likelihood_field import blocked_distances
+from rosbot_patrol.amcl.scan_model.field_kernels import cast_ray
+from rosbot_patrol.amcl.scan_model.likelihood_field import blocked_distances
 from rosbot_patrol.exploration.explorer import Explorer, ExplorerParams
 from rosbot_patrol.exploration.frontiers import Borders, FrontierParams
 from rosbot_patrol.geometry import Pose2D

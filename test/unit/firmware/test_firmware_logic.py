@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rosbot_patrol.rosserial.device_log import STUCK_AFTER, stuck_line
-from rosbot_patrol.rosserial.packet import Parser, encode
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, ESP_TRIGGER_TYPES
+from rosbot_patrol.rosserial.device.device_log import STUCK_AFTER, stuck_line
+from rosbot_patrol.rosserial.protocol.packet import Parser, encode
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, ESP_TRIGGER_TYPES
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 HOST = REPOSITORY / "firmware" / "host"

@@ -11,7 +11,7 @@ from rosbot_patrol.errors import ParamError
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.params import load
 from rosbot_patrol.planning.registry import make_global_planner, make_local_planner
-from rosbot_patrol.rosserial.settings import SerialNodeParams
+from rosbot_patrol.rosserial.server.settings import SerialNodeParams
 
 
 def local_planner(plugin, **values):

@@ -15,9 +15,9 @@ import threading
 import time
 from collections.abc import Callable
 
-from rosbot_patrol.rosserial.packet import SYNC, Parser, checksum, encode
-from rosbot_patrol.rosserial.proof import Prover
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_log, pack_topic_info
+from rosbot_patrol.rosserial.protocol.packet import SYNC, Parser, checksum, encode
+from rosbot_patrol.rosserial.protocol.proof import Prover
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_log, pack_topic_info
 
 TRIGGER = "rosbot_patrol/EspTrigger"
 

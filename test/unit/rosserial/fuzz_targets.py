@@ -5,9 +5,21 @@ what it decides is what is sent, in which pieces, and when. Used by test_fuzz.py
 found) and by benchmarks/fuzz_rosserial.py (millions of inputs).
 """
 
-from rosbot_patrol.rosserial import proof
-from rosbot_patrol.rosserial.client_session import Configured, DeviceSession, Message, NotTrusted, Unconfigured
-from rosbot_patrol.rosserial.events import (
+from rosbot_patrol.rosserial.device.client_session import Configured, DeviceSession, Message, NotTrusted, Unconfigured
+from rosbot_patrol.rosserial.protocol import proof
+from rosbot_patrol.rosserial.protocol.packet import OVERHEAD, Parser, checksum, encode
+from rosbot_patrol.rosserial.protocol.topics import (
+    ESP_TRIGGER_MD5,
+    REQUEST_TOPICS,
+    TX_STOP,
+    ParamValues,
+    TopicId,
+    TopicInfo,
+    pack_log,
+    pack_time,
+    pack_topic_info,
+)
+from rosbot_patrol.rosserial.server.events import (
     Announced,
     Event,
     Garbled,
@@ -20,20 +32,8 @@ from rosbot_patrol.rosserial.events import (
     SyncLost,
     TimeAsked,
 )
-from rosbot_patrol.rosserial.packet import OVERHEAD, Parser, checksum, encode
-from rosbot_patrol.rosserial.policy import TRUSTED, Policy, parse_rules
-from rosbot_patrol.rosserial.session import Session
-from rosbot_patrol.rosserial.topics import (
-    ESP_TRIGGER_MD5,
-    REQUEST_TOPICS,
-    TX_STOP,
-    ParamValues,
-    TopicId,
-    TopicInfo,
-    pack_log,
-    pack_time,
-    pack_topic_info,
-)
+from rosbot_patrol.rosserial.server.policy import TRUSTED, Policy, parse_rules
+from rosbot_patrol.rosserial.server.session import Session
 
 KEY = bytes(range(32))
 OTHER_KEY = bytes(range(1, 33))

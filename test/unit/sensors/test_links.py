@@ -1,9 +1,9 @@
 from pathlib import Path
 
-from rosbot_patrol.rosserial.client_session import DeviceSession
-from rosbot_patrol.rosserial.device_log import STUCK_AFTER, read_stuck_line, stuck_line
-from rosbot_patrol.rosserial.policy import Policy
-from rosbot_patrol.rosserial.session import Session
+from rosbot_patrol.rosserial.device.client_session import DeviceSession
+from rosbot_patrol.rosserial.device.device_log import STUCK_AFTER, read_stuck_line, stuck_line
+from rosbot_patrol.rosserial.server.policy import Policy
+from rosbot_patrol.rosserial.server.session import Session
 from rosbot_patrol.sensors.links import MAX_LINKS, Links
 from rosbot_patrol.sensors.problems import Link
 

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights, read_weights
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights, read_weights
 
 
 def average(one: Sequence[ConvWeights], other: Sequence[ConvWeights]) -> list[ConvWeights]:

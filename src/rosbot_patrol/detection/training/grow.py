@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from rosbot_patrol.detection.darknet_layers import Convolutional, Layer, NetworkSpec, Route, Shortcut
-from rosbot_patrol.detection.darknet_weights import ConvWeights
+from rosbot_patrol.detection.darknet.layers import Convolutional, Layer, NetworkSpec, Route, Shortcut
+from rosbot_patrol.detection.darknet.weights import ConvWeights
 from rosbot_patrol.detection.training.network import Darknet
 from rosbot_patrol.detection.training.shrink import change_weights_file
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import torch
 
-from rosbot_patrol.detection.darknet_layers import NetworkSpec
-from rosbot_patrol.detection.darknet_weights import format_weights, read_weights
+from rosbot_patrol.detection.darknet.layers import NetworkSpec
+from rosbot_patrol.detection.darknet.weights import format_weights, read_weights
 from rosbot_patrol.detection.training.loss import Truth, yolo_losses
 from rosbot_patrol.detection.training.muon import StackedMuon
 from rosbot_patrol.detection.training.network import Darknet

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import torch
 import torch.nn.functional as fn
 
-from rosbot_patrol.detection.darknet_layers import Yolo
+from rosbot_patrol.detection.darknet.layers import Yolo
 from rosbot_patrol.detection.training.apart import APART, cut_apart, shared_and_union
 
 MATCH = 0.45

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from rosbot_patrol.detection.darknet_layers import (
+from rosbot_patrol.detection.darknet.layers import (
     Convolutional,
     Layer,
     Maxpool,
@@ -18,7 +18,7 @@ from rosbot_patrol.detection.darknet_layers import (
     Upsample,
     Yolo,
 )
-from rosbot_patrol.detection.darknet_weights import ConvWeights
+from rosbot_patrol.detection.darknet.weights import ConvWeights
 from rosbot_patrol.errors import DetectorError
 
 _ACTIVATIONS: dict[str, Callable[[], nn.Module]] = {

@@ -14,10 +14,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from rosbot_patrol.detection import decode
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_weights import read_weights
-from rosbot_patrol.detection.letterbox import Letterbox
+from rosbot_patrol.detection.darknet import decode
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.weights import read_weights
 from rosbot_patrol.detection.network import load_network
 from rosbot_patrol.detection.training.dataset import Pictures, asked, batch_of
 from rosbot_patrol.detection.training.labels import HEIGHT, WIDTH, column

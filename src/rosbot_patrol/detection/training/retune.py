@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_layers import NetworkSpec, Yolo
-from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights, read_weights
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.layers import NetworkSpec, Yolo
+from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights, read_weights
 from rosbot_patrol.detection.training.dataset import Pictures
 from rosbot_patrol.detection.training.report import find_all, load_forward
 from rosbot_patrol.detection.training.scoring import Found

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rosbot_patrol.detection import decode
+from rosbot_patrol.detection.darknet import decode
 from rosbot_patrol.detection.training.dataset import asked
 from rosbot_patrol.detection.training.labels import column
 

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_layers import Convolutional, Layer, NetworkSpec, Route, Shortcut
-from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights, read_weights
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.layers import Convolutional, Layer, NetworkSpec, Route, Shortcut
+from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights, read_weights
 
 Ids = np.ndarray
 LINEAR = 2.0  # deviations by which new channels are lifted, so that the leaky activation hardly bends them

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
+from rosbot_patrol.detection.darknet.cfg import read_cfg
 from rosbot_patrol.detection.training.anchors import find_anchors, write_anchors
 from rosbot_patrol.detection.training.dataset import Pictures, batch_of
 from rosbot_patrol.detection.training.learner import Learner, computes_bf16, schedule

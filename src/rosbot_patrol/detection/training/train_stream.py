@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 import torch
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
+from rosbot_patrol.detection.darknet.cfg import read_cfg
 from rosbot_patrol.detection.training import stream
 from rosbot_patrol.detection.training.dataset import read_labels
 from rosbot_patrol.detection.training.device_mixing import Mixer

@@ -16,7 +16,8 @@ from rosbot_patrol.replay.bags.definitions import STAMP as HEADER
 from rosbot_patrol.replay.bags.records import Kind, stamp_of
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
 from rosbot_patrol.replay.runner import Field, Input
-from rosbot_patrol.rosserial.events import (
+from rosbot_patrol.rosserial.protocol.topics import TopicId
+from rosbot_patrol.rosserial.server.events import (
     Announced,
     Event,
     Garbled,
@@ -28,9 +29,8 @@ from rosbot_patrol.rosserial.events import (
     SyncLost,
     TimeAsked,
 )
-from rosbot_patrol.rosserial.policy import Policy
-from rosbot_patrol.rosserial.session import Session
-from rosbot_patrol.rosserial.topics import TopicId
+from rosbot_patrol.rosserial.server.policy import Policy
+from rosbot_patrol.rosserial.server.session import Session
 
 OPENED, DATA, CLOSED = 0, 1, 2  # rosbot_patrol/SerialBytes
 TICK_S = 0.5  # between two looks for what did not come

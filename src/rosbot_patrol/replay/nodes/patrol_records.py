@@ -10,7 +10,7 @@ from rosbot_patrol.patrol.mission.inputs import Battery, Box
 from rosbot_patrol.replay.bags import raw_ros1
 from rosbot_patrol.replay.bags.definitions import STAMP
 from rosbot_patrol.replay.bags.records import ANY, Kind, Refused, stamp_of
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5
 
 CHARGING = 1  # sensor_msgs/BatteryState.POWER_SUPPLY_STATUS_CHARGING
 LOOK = "look"  # rosbot_patrol/SensorEvent.LOOK

@@ -11,7 +11,7 @@ from typing import Any
 from rosbot_patrol import params
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.detection.choice import make_detector
-from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.maps.map_io import read_map
@@ -28,7 +28,7 @@ from rosbot_patrol.replay.nodes import move_base as move_base_replay
 from rosbot_patrol.replay.nodes import patrol as patrol_replay
 from rosbot_patrol.replay.nodes import patrol_log
 from rosbot_patrol.replay.runner import Field, Input, Replay
-from rosbot_patrol.rosserial.settings import SerialNodeParams
+from rosbot_patrol.rosserial.server.settings import SerialNodeParams
 from rosbot_patrol.sensors.sensor_file import load_sensors
 from rosbot_patrol.tf.tree import Edge
 from rosbot_patrol.yaml_files import read_mapping

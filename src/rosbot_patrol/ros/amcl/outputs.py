@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from numpy.typing import NDArray
 
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.particle_filter import Estimate
+from rosbot_patrol.amcl.particles.particle_filter import Estimate
 from rosbot_patrol.amcl.trust import State, Trust
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.msg import LocalizationHealth

@@ -18,9 +18,9 @@ from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.msg import EspTrigger
 from rosbot_patrol.ros.bridge.layouts import raw_from, raw_message, raw_service
 from rosbot_patrol.ros.runtime.node import Worker
-from rosbot_patrol.rosserial.complaints import printable
-from rosbot_patrol.rosserial.old_types import find_old_type
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_TYPES, TopicInfo
+from rosbot_patrol.rosserial.protocol.old_types import find_old_type
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_TYPES, TopicInfo
+from rosbot_patrol.rosserial.server.complaints import printable
 
 log = logging.getLogger(__name__)
 

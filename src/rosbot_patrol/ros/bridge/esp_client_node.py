@@ -11,8 +11,8 @@ import sys
 import time
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.rosserial.keys import key_of
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
+from rosbot_patrol.rosserial.protocol.keys import key_of
 
 
 def _arguments() -> argparse.Namespace:

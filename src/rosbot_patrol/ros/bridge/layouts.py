@@ -16,7 +16,7 @@ import rospy
 
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ProtocolError
-from rosbot_patrol.rosserial.topics import TopicInfo
+from rosbot_patrol.rosserial.protocol.topics import TopicInfo
 
 _ARRAY = re.compile(r"^(.+)\[(\d*)\]$")
 _SIZES = {"time": 8, "duration": 8, "bool": 1, "byte": 1, "char": 1, "float32": 4, "float64": 8}

@@ -10,7 +10,7 @@ import rospy
 
 from rosbot_patrol.msg import SensorLink, SensorLinks
 from rosbot_patrol.ros.runtime.node import Worker
-from rosbot_patrol.rosserial.client import Client
+from rosbot_patrol.rosserial.server.client import Client
 from rosbot_patrol.sensors.links import Links
 from rosbot_patrol.sensors.problems import Link
 

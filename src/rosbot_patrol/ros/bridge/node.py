@@ -34,12 +34,12 @@ from rosbot_patrol.ros.bridge.links import LinkTeller
 from rosbot_patrol.ros.bridge.publishers import SETTLING, Publishers
 from rosbot_patrol.ros.bridge.report import Report, SerialTap
 from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node
-from rosbot_patrol.rosserial.client import Client
-from rosbot_patrol.rosserial.complaints import Complaints
-from rosbot_patrol.rosserial.policy import Policy
-from rosbot_patrol.rosserial.server import SerialServer
-from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT, SerialNodeParams
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, unpack_esp_trigger
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, unpack_esp_trigger
+from rosbot_patrol.rosserial.server.client import Client
+from rosbot_patrol.rosserial.server.complaints import Complaints
+from rosbot_patrol.rosserial.server.policy import Policy
+from rosbot_patrol.rosserial.server.server import SerialServer
+from rosbot_patrol.rosserial.server.settings import DEFAULT_TCP_PORT, SerialNodeParams
 from rosbot_patrol.sensors.registry import Change, MotionSensors, SensorStatus
 
 log = logging.getLogger(__name__)

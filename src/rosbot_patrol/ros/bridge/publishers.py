@@ -22,8 +22,8 @@ import rospy
 from rosbot_patrol.errors import ProtocolError
 from rosbot_patrol.ros.bridge.channels import check_md5, message_class
 from rosbot_patrol.ros.bridge.layouts import layout
-from rosbot_patrol.rosserial.old_types import find_old_type
-from rosbot_patrol.rosserial.topics import TopicInfo
+from rosbot_patrol.rosserial.protocol.old_types import find_old_type
+from rosbot_patrol.rosserial.protocol.topics import TopicInfo
 
 log = logging.getLogger(__name__)
 

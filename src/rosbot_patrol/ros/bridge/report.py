@@ -13,9 +13,9 @@ import rospy
 
 from rosbot_patrol.msg import SerialBytes
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
-from rosbot_patrol.rosserial.client import Client
-from rosbot_patrol.rosserial.report import RECENT, choose
-from rosbot_patrol.rosserial.server import SerialServer
+from rosbot_patrol.rosserial.server.client import Client
+from rosbot_patrol.rosserial.server.report import RECENT, choose
+from rosbot_patrol.rosserial.server.server import SerialServer
 from rosbot_patrol.sensors.registry import SensorStatus
 
 PERIOD = 1.0

@@ -9,7 +9,7 @@ import argparse
 import sys
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.rosserial.keys import add_key, c_define, new_key, yaml_line
+from rosbot_patrol.rosserial.protocol.keys import add_key, c_define, new_key, yaml_line
 
 
 def main() -> None:

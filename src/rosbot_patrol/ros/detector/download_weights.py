@@ -12,8 +12,8 @@ from pathlib import Path
 
 import rospkg
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_weights import read_weights
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.weights import read_weights
 from rosbot_patrol.detection.download import fetch
 from rosbot_patrol.detection.weights_catalogue import CATALOGUE, WeightsFile
 from rosbot_patrol.errors import DetectorError

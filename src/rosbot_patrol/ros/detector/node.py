@@ -35,8 +35,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
 from rosbot_patrol.detection.choice import make_detector
-from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.detection.detector import Detection, Detector
+from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.ros.detector.action import CheckForObjects

@@ -12,8 +12,8 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from rosbot_patrol.errors import ParamError, PatrolError
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
-from rosbot_patrol.rosserial.poor_link import PERFECT, LinkQuality
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.poor_link import PERFECT, LinkQuality
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.scenario.faults import KINDS, Fault, LinkPoor, read_fault
 from rosbot_patrol.srv import (

@@ -38,9 +38,9 @@ from rosbot_patrol.ros.simulator.pace import Lockstep, LockstepParams, Pace, Sha
 from rosbot_patrol.ros.simulator.packages import model_folders, package_finder
 from rosbot_patrol.ros.simulator.requests import Requests
 from rosbot_patrol.ros.simulator.scenario import ScenarioRunner
-from rosbot_patrol.rosserial.keys import read_keys
-from rosbot_patrol.rosserial.settings import DEFAULT_TCP_PORT
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
+from rosbot_patrol.rosserial.protocol.keys import read_keys
+from rosbot_patrol.rosserial.server.settings import DEFAULT_TCP_PORT
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.render.egl import make_renderer
 from rosbot_patrol.simulation.robot.description import RobotDescription, load_robot, parse_robot

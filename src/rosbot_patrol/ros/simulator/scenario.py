@@ -11,7 +11,7 @@ import rospy
 from std_msgs.msg import String
 
 from rosbot_patrol.msg import PatrolState
-from rosbot_patrol.rosserial.tcp_client import EspClient
+from rosbot_patrol.rosserial.device.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.scenario.file import PLAYED, Scenario
 from rosbot_patrol.simulation.scenario.player import ScenarioPlayer

@@ -21,7 +21,7 @@ from rosbot_patrol.costmap.params import (
     VoxelParams,
 )
 from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
-from rosbot_patrol.detection.darknet_params import DarknetParams
+from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.images.compressed import CompressedParams
 from rosbot_patrol.images.compressed_depth import CompressedDepthParams
@@ -48,7 +48,7 @@ from rosbot_patrol.ros.sensors.watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.simulator.node import SimulatorParams
 from rosbot_patrol.ros.tools.narrator_node import NarratorParams
-from rosbot_patrol.rosserial.settings import SerialNodeParams
+from rosbot_patrol.rosserial.server.settings import SerialNodeParams
 from rosbot_patrol.sensors.sensor_file import SensorSpec
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
 from rosbot_patrol.simulation.scenario import file as scenario

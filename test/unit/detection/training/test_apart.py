@@ -9,9 +9,9 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 
-from rosbot_patrol.detection import decode  # noqa: E402
-from rosbot_patrol.detection.darknet_cfg import read_cfg  # noqa: E402
-from rosbot_patrol.detection.darknet_layers import Yolo  # noqa: E402
+from rosbot_patrol.detection.darknet import decode  # noqa: E402
+from rosbot_patrol.detection.darknet.cfg import read_cfg  # noqa: E402
+from rosbot_patrol.detection.darknet.layers import Yolo  # noqa: E402
 from rosbot_patrol.detection.training.apart import APART, MOST, cut_apart  # noqa: E402
 from rosbot_patrol.detection.training.loss import CUT, Truth, yolo_loss  # noqa: E402
 from rosbot_patrol.detection.training.scoring import SUPPRESSION  # noqa: E402

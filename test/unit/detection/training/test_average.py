@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rosbot_patrol.detection.darknet_cfg import read_cfg
-from rosbot_patrol.detection.darknet_weights import format_weights, read_weights
-from rosbot_patrol.detection.random_weights import random_weights
+from rosbot_patrol.detection.darknet.cfg import read_cfg
+from rosbot_patrol.detection.darknet.random_weights import random_weights
+from rosbot_patrol.detection.darknet.weights import format_weights, read_weights
 from rosbot_patrol.detection.training import average
 
 CFG = str(Path(__file__).parents[4] / "models/house.cfg")

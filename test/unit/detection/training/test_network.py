@@ -10,8 +10,8 @@ from small_networks import small_cfg
 
 torch = pytest.importorskip("torch", reason="PyTorch is installed only in the environment of scripts/train_network")
 
-from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg  # noqa: E402
-from rosbot_patrol.detection.darknet_weights import format_weights, parse_weights, weights_size  # noqa: E402
+from rosbot_patrol.detection.darknet.cfg import parse_cfg, read_cfg  # noqa: E402
+from rosbot_patrol.detection.darknet.weights import format_weights, parse_weights, weights_size  # noqa: E402
 from rosbot_patrol.detection.training.grow import grow  # noqa: E402
 from rosbot_patrol.detection.training.learner import Learner, Optimiser, computes_bf16, schedule  # noqa: E402
 from rosbot_patrol.detection.training.loss import Truth, yolo_loss, yolo_losses  # noqa: E402
@@ -115,8 +115,8 @@ def test_the_loss_is_least_for_the_right_values_and_leads_there() -> None:
         optimiser.step()
         losses.append(float(total))
     assert losses[-1] < 0.1 * losses[0]
-    from rosbot_patrol.detection.decode import decode
-    from rosbot_patrol.detection.letterbox import Letterbox
+    from rosbot_patrol.detection.darknet.decode import decode
+    from rosbot_patrol.detection.darknet.letterbox import Letterbox
 
     raw = [value.detach().numpy()[0] for value in values]
     found = decode(SPEC.heads, raw, Letterbox(384, 288, 384, 288), threshold=0.3, iou_threshold=0.4)

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rosbot_patrol.detection.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.letterbox import Letterbox
 from rosbot_patrol.detection.training import overlay, patterns, render, visibility
 from rosbot_patrol.detection.training.furniture import box, build, placed
 from rosbot_patrol.detection.training.labels import COLUMNS, column

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from small_networks import small_cfg
 
-from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg
-from rosbot_patrol.detection.darknet_weights import read_weights
+from rosbot_patrol.detection.darknet.cfg import parse_cfg, read_cfg
+from rosbot_patrol.detection.darknet.weights import read_weights
 from rosbot_patrol.detection.training.labels import COLUMNS
 from rosbot_patrol.detection.training.retune import find_figures, main, retune
 from rosbot_patrol.detection.training.scoring import Found

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rosbot_patrol.detection.darknet_cfg import parse_cfg, read_cfg
-from rosbot_patrol.detection.darknet_layers import NetworkSpec
-from rosbot_patrol.detection.darknet_weights import ConvWeights, format_weights, read_weights
-from rosbot_patrol.detection.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.cfg import parse_cfg, read_cfg
+from rosbot_patrol.detection.darknet.layers import NetworkSpec
+from rosbot_patrol.detection.darknet.letterbox import Letterbox
+from rosbot_patrol.detection.darknet.random_weights import random_weights
+from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights, read_weights
 from rosbot_patrol.detection.network import load_network
-from rosbot_patrol.detection.random_weights import random_weights
 from rosbot_patrol.detection.training import shrink as module
 from rosbot_patrol.detection.training.shrink import shrink
 from rosbot_patrol.images.encodings import Picture

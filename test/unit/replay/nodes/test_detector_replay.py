@@ -10,8 +10,8 @@ from made_bag import Maker, write_bag
 
 from rosbot_patrol.detection import detector as darknet
 from rosbot_patrol.detection.choice import make_detector
-from rosbot_patrol.detection.darknet_params import DarknetParams
 from rosbot_patrol.detection.detector import Detection
+from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import load
 from rosbot_patrol.replay.bags.bag import Bag

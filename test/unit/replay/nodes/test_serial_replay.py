@@ -17,11 +17,11 @@ from rosbot_patrol.replay.nodes.setup import Setup, build_replay
 from rosbot_patrol.replay.results.comparison import compare
 from rosbot_patrol.replay.results.tables import Result
 from rosbot_patrol.replay.runner import run_replay
-from rosbot_patrol.rosserial import packet
-from rosbot_patrol.rosserial.packet import encode
-from rosbot_patrol.rosserial.server import SerialServer
-from rosbot_patrol.rosserial.settings import SerialNodeParams
-from rosbot_patrol.rosserial.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_topic_info
+from rosbot_patrol.rosserial.protocol import packet
+from rosbot_patrol.rosserial.protocol.packet import encode
+from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_topic_info
+from rosbot_patrol.rosserial.server.server import SerialServer
+from rosbot_patrol.rosserial.server.settings import SerialNodeParams
 
 ROOT = Path(__file__).resolve().parents[4]
 BYTES = "rosbot_patrol/msg/SerialBytes"

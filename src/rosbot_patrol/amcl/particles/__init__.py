@@ -1,0 +1,1 @@
+"""The particle filter: moved by odometry, weighed, drawn anew."""

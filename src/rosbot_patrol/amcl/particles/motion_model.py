@@ -1,0 +1,95 @@
+"""How far the wheels may lie: the four odometry models of amcl.
+
+`diff` and `omni` take the variances for standard deviations, as upstream's deprecated models do; `diff-corrected` and
+`omni-corrected` are the models of Probabilistic Robotics, section 5.4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.amcl.particles import motion_kernels as kernels
+from rosbot_patrol.geometry import Pose2D, angle_difference
+
+Array = NDArray[np.float64]
+MotionModelName = Literal["diff", "omni", "diff-corrected", "omni-corrected"]
+MOTION_MODELS = ("diff", "omni", "diff-corrected", "omni-corrected")
+
+_STILL = 0.01  # m; a shorter way has no direction to speak of
+
+
+@dataclass(frozen=True, kw_only=True)
+class OdometryNoise:
+    """alpha 1: turning from turning, 2: turning from driving, 3: driving from driving, 4: driving from turning, 5:
+    sliding from driving (only `omni`).
+    """
+
+    alpha1: float = 0.2
+    alpha2: float = 0.2
+    alpha3: float = 0.2
+    alpha4: float = 0.2
+    alpha5: float = 0.2
+
+
+def move_particles(
+    poses: Array, start: Pose2D, end: Pose2D, name: str, alphas: OdometryNoise, rng: np.random.Generator
+) -> None:
+    """Move particles in place as the odometry moved from `start` to `end`, each with its own error."""
+    move = _slide if name.startswith("omni") else _turn_drive_turn
+    deviation = math.sqrt if name.endswith("-corrected") else float
+    move(poses, start, end, alphas, rng, deviation)
+
+
+def _turn_drive_turn(
+    poses: Array,
+    start: Pose2D,
+    end: Pose2D,
+    a: OdometryNoise,
+    rng: np.random.Generator,
+    deviation: Callable[[float], float],
+) -> None:
+    way = math.hypot(end.x - start.x, end.y - start.y)
+    first = 0.0 if way < _STILL else angle_difference(math.atan2(end.y - start.y, end.x - start.x), start.yaw)
+    second = angle_difference(angle_difference(end.yaw, start.yaw), first)
+    turn1, turn2 = _turn_size(first), _turn_size(second)  # driving backwards is no half turn
+    sigma = np.array(
+        [
+            deviation(a.alpha1 * turn1**2 + a.alpha2 * way**2),
+            deviation(a.alpha3 * way**2 + a.alpha4 * (turn1**2 + turn2**2)),
+            deviation(a.alpha1 * turn2**2 + a.alpha2 * way**2),
+        ]
+    )
+    noise = rng.standard_normal(poses.shape)
+    kernels.move_turn_drive_turn(poses, np.array([first, way, second]), sigma, noise)
+
+
+def _turn_size(turn: float) -> float:
+    return min(abs(turn), abs(angle_difference(turn, math.pi)))
+
+
+def _slide(
+    poses: Array,
+    start: Pose2D,
+    end: Pose2D,
+    a: OdometryNoise,
+    rng: np.random.Generator,
+    deviation: Callable[[float], float],
+) -> None:
+    way = math.hypot(end.x - start.x, end.y - start.y)
+    turn = angle_difference(end.yaw, start.yaw)
+    direction = angle_difference(math.atan2(end.y - start.y, end.x - start.x), start.yaw)
+    sigma = np.array(
+        [
+            deviation(a.alpha3 * way**2 + a.alpha1 * turn**2),
+            deviation(a.alpha1 * turn**2 + a.alpha5 * way**2),
+            deviation(a.alpha4 * turn**2 + a.alpha2 * way**2),
+        ]
+    )
+    noise = rng.standard_normal(poses.shape)
+    kernels.move_sliding(poses, np.array([direction, way, turn]), sigma, noise)

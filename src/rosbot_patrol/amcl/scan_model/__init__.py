@@ -1,0 +1,1 @@
+"""How well a scan fits the map at a pose."""

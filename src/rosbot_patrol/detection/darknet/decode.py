@@ -1,0 +1,174 @@
+"""From the values of a network's heads to boxes, as darknet computes them.
+
+Threshold rules: a box counts when its objectness is above the threshold, a class of it when objectness times class is.
+Boxes are shares of the picture: x and y of the centre, width, height.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rosbot_patrol.detection.darknet.layers import Head, Region, Yolo
+from rosbot_patrol.detection.darknet.letterbox import Letterbox
+
+BLOCK = 64
+"""Boxes compared with all others at once."""
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Boxes before and after suppression.
+
+    Args:
+        boxes: centre x, centre y, width, height, shape (N, 4).
+        objectness: shape (N,).
+        probabilities: of each class, 0 where not above the threshold, shape (N, classes).
+    """
+
+    boxes: np.ndarray
+    objectness: np.ndarray
+    probabilities: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+    def only(self, keep: np.ndarray) -> Candidates:
+        """Those that `keep` (a mask, or indices in a new order) names."""
+        return Candidates(self.boxes[keep], self.objectness[keep], self.probabilities[keep])
+
+
+def decode_head(head: Head, values: np.ndarray, net_size: tuple[int, int], threshold: float) -> Candidates:
+    """The boxes of one head above the threshold, as shares of the network's input.
+
+    Args:
+        head: a Region or Yolo layer.
+        values: what the layer before it gave, shape (channels, rows, columns).
+        net_size: width and height of the network's input [px].
+        threshold: on objectness and on probability.
+    """
+    rows, columns = values.shape[1:]
+    grid = values.reshape(len(head.anchors), head.classes + 5, rows, columns)
+    objectness = _objectness(head, grid[:, 4])
+    # row by row, column by column, anchor by anchor, the order in which darknet counts
+    at = np.argwhere((objectness > threshold).transpose(1, 2, 0))
+    row, column, anchor = at.T
+    found = grid[anchor, :, row, column].reshape(len(at), head.classes + 5)
+    scores = objectness[anchor, row, column]
+    anchors = np.asarray(head.anchors, dtype=np.float32)[anchor]
+    boxes = _boxes(head, found[:, :4], np.stack([column, row], axis=1), anchors, (columns, rows), net_size)
+    probabilities = scores[:, None] * _classes(head, found[:, 5:])
+    return Candidates(boxes, scores, np.where(probabilities > threshold, probabilities, np.float32(0.0)))
+
+
+def decode(
+    heads: list[Head], values: list[np.ndarray], place: Letterbox, *, threshold: float, iou_threshold: float
+) -> Candidates:
+    """The boxes of a picture: all heads, mapped back through the letterbox, suppressed as darknet_ros does.
+
+    Args:
+        heads: the network's heads.
+        values: what the layer before each gave, shape (channels, rows, columns).
+        place: where the picture lay in the input.
+        threshold: on objectness and on probability.
+        iou_threshold: of two boxes that overlap more, the one of lower objectness goes.
+    """
+    return suppress_by_objectness(candidates(heads, values, place, threshold=threshold), iou_threshold)
+
+
+def candidates(heads: list[Head], values: list[np.ndarray], place: Letterbox, *, threshold: float) -> Candidates:
+    """As `decode`, without suppression."""
+    net_size = (place.net_width, place.net_height)
+    parts = [decode_head(head, array, net_size, threshold) for head, array in zip(heads, values, strict=True)]
+    boxes = np.concatenate([part.boxes for part in parts])
+    objectness = np.concatenate([part.objectness for part in parts])
+    return Candidates(place.to_picture(boxes), objectness, np.concatenate([part.probabilities for part in parts]))
+
+
+def suppress_by_objectness(found: Candidates, iou_threshold: float) -> Candidates:
+    """Whatever its class, a box goes that overlaps one of higher objectness (darknet's do_nms_obj); sorted by it."""
+    ranked = found.only(np.argsort(-found.objectness, kind="stable"))
+    alive = np.ones(len(ranked), dtype=bool)
+    for start in range(0, len(ranked), BLOCK):
+        rows = start + np.flatnonzero(alive[start : start + BLOCK])
+        apart = iou(ranked.boxes[rows, None], ranked.boxes[None, start:]) <= iou_threshold
+        for row, i in zip(apart, rows, strict=True):
+            if alive[i]:
+                alive[i + 1 :] &= row[i + 1 - start :]
+    return ranked.only(alive)
+
+
+def suppress_by_class(found: Candidates, iou_threshold: float) -> Candidates:
+    """Of each class by itself, as the program `darknet detector test` does (darknet's do_nms_sort)."""
+    probabilities = found.probabilities.copy()
+    for column in probabilities.T:
+        order = np.argsort(-column, kind="stable")
+        order = order[column[order] > 0.0]
+        for rank, i in enumerate(order):
+            if column[i] > 0.0:
+                later = order[rank + 1 :]
+                column[later[iou(found.boxes[i], found.boxes[later]) > iou_threshold]] = 0.0
+    return Candidates(found.boxes, found.objectness, probabilities)
+
+
+def iou(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Intersection over union of boxes, last axis x, y, width, height, the others as numpy broadcasts them."""
+    with np.errstate(invalid="ignore"):
+        half, halves = box[..., 2:] / 2, boxes[..., 2:] / 2
+        low = np.maximum(box[..., :2] - half, boxes[..., :2] - halves)
+        high = np.minimum(box[..., :2] + half, boxes[..., :2] + halves)
+        width, height = (np.maximum(high[..., axis] - low[..., axis], 0.0) for axis in (0, 1))
+        shared = width * height
+        union = box[..., 2] * box[..., 3] + boxes[..., 2] * boxes[..., 3] - shared
+    return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0.0)
+
+
+def logistic(values: np.ndarray) -> np.ndarray:
+    """1 / (1 + exp(-x)), computed in double as darknet does, float32."""
+    with np.errstate(over="ignore"):
+        return (1.0 / (1.0 + np.exp(-values.astype(np.float64)))).astype(np.float32)
+
+
+def softmax(values: np.ndarray) -> np.ndarray:
+    """Along the last axis, float32."""
+    powers = np.exp(values - values.max(axis=-1, keepdims=True))
+    return powers / powers.sum(axis=-1, keepdims=True)
+
+
+def _objectness(head: Head, raw: np.ndarray) -> np.ndarray:
+    if isinstance(head, Region) and head.background:
+        return np.ones_like(raw)
+    if isinstance(head, Yolo) and head.new_coords:
+        return raw  # the convolution before it is logistic already
+    return logistic(raw)
+
+
+def _classes(head: Head, raw: np.ndarray) -> np.ndarray:
+    if isinstance(head, Region) and head.softmax:
+        return softmax(raw)
+    if isinstance(head, Yolo) and head.new_coords:
+        return raw
+    return logistic(raw)
+
+
+def _boxes(
+    head: Head,
+    raw: np.ndarray,
+    cells: np.ndarray,
+    anchors: np.ndarray,
+    grid_size: tuple[int, int],
+    net_size: tuple[int, int],
+) -> np.ndarray:
+    """Boxes as shares of the input, shape (N, 4), from what the network says about each of N cells."""
+    scale = np.asarray(net_size if isinstance(head, Yolo) else grid_size, dtype=np.float32)
+    if isinstance(head, Yolo) and head.new_coords:
+        offsets, sizes = raw[:, :2], 4.0 * raw[:, 2:] ** 2
+    else:
+        offsets = logistic(raw[:, :2])
+        with np.errstate(over="ignore"):
+            sizes = np.exp(raw[:, 2:])
+    if isinstance(head, Yolo) and head.scale_x_y != 1.0:
+        offsets = offsets * head.scale_x_y - 0.5 * (head.scale_x_y - 1.0)
+    centres = (cells + offsets) / np.asarray(grid_size, dtype=np.float32)
+    return np.concatenate([centres, sizes * anchors / scale], axis=1).astype(np.float32)

@@ -1,0 +1,1 @@
+"""A motion sensor in software, as its firmware speaks."""

@@ -1,0 +1,208 @@
+"""The device's side of rosserial, without sockets: bytes in, events out, frames to send.
+
+Behaves as rosserial_client's NodeHandle: answers a topic request with a time request and its topics, asks for the time
+every 2.5 s, and takes itself for disconnected after 11 s without an answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rosbot_patrol.errors import ProtocolError
+from rosbot_patrol.rosserial.protocol.packet import Packet, Parser, encode
+from rosbot_patrol.rosserial.protocol.proof import Prover
+from rosbot_patrol.rosserial.protocol.topics import (
+    TopicId,
+    TopicInfo,
+    pack_log,
+    pack_time,
+    pack_topic_info,
+    unpack_time,
+)
+
+SYNC_PERIOD = 2.5
+SYNC_TIMEOUT = 11.0
+FRAME_TIMEOUT = 1.0  # a frame that stalls for longer is given up
+
+
+@dataclass(frozen=True)
+class Message:
+    """The server sent a message on a topic that the device subscribes."""
+
+    topic_id: int
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Configured:
+    """The server asked for the topics and was told them."""
+
+
+@dataclass(frozen=True)
+class Unconfigured:
+    """The server stopped the traffic, or it is gone: it has not answered for long."""
+
+    reason: str
+    is_gone: bool = False
+
+
+@dataclass(frozen=True)
+class NotTrusted:
+    """The server is not the one that the device wants, or will not take the device; hang up and try again later."""
+
+    reason: str
+
+
+DeviceEvent = Message | Configured | Unconfigured | NotTrusted
+
+
+class DeviceSession:
+    """One connection of a device.
+
+    Args:
+        publishers: topics that it publishes; subscribers: topics that it listens to.
+        max_payload: longest message taken from the server [bytes].
+        prover: answers the challenge of a server with keys, a new one each time; None for a device without a key.
+        insist: whether to talk only to a server that has shown that it has the key.
+    """
+
+    def __init__(
+        self,
+        publishers: Sequence[TopicInfo],
+        subscribers: Sequence[TopicInfo] = (),
+        *,
+        max_payload: int = 512,
+        prover: Prover | None = None,
+        insist: bool = False,
+    ) -> None:
+        if insist and prover is None:
+            raise ValueError("a device without a key cannot insist on it")
+        self._publishers = tuple(publishers)
+        self._subscribers = tuple(subscribers)
+        self._parser = Parser(max_payload)
+        self._output: list[bytes] = []
+        self._last_bytes = 0.0
+        self._last_request = 0.0
+        self._last_answer = 0.0
+        self._asked = self._answered = 0  # how often for the time
+        self._prover = prover
+        self._is_trusted = not insist
+        self._awaits_answer = False
+        self._offset: float | None = None
+        self.configured = False
+
+    def server_time(self, now: float) -> float | None:
+        """The server's time at `now` [s], None before the first answer."""
+        return None if self._offset is None else now + self._offset
+
+    def receive(self, data: bytes, now: float) -> list[DeviceEvent]:
+        """Take bytes of the server; return what they mean."""
+        self._last_bytes = now
+        return self._packets(self._parser.feed(data), now)
+
+    def closed(self) -> list[DeviceEvent]:
+        """The server ended the connection; what that means where it says more."""
+        if self._awaits_answer:
+            return [NotTrusted("the bridge did not take the proof, it has another key of this sensor or none")]
+        return []
+
+    def tick(self, now: float) -> list[DeviceEvent]:
+        """Ask for the time where it is due; notice that the server is gone, or a frame of it cut off."""
+        events: list[DeviceEvent] = []
+        while self._parser.pending and now - self._last_bytes > FRAME_TIMEOUT:
+            events += self._packets(self._parser.give_up(), now)
+        if not self.configured:
+            return events
+        if now - self._last_answer > SYNC_TIMEOUT:
+            self.configured = False
+            return [*events, Unconfigured("no time from the server for 11 s", is_gone=True)]
+        if now - self._last_request > SYNC_PERIOD:
+            self._request_time(now)
+        return events
+
+    def publish(self, topic_id: int, data: bytes) -> bool:
+        """Queue a message; False where the topics have not been negotiated."""
+        if not self.configured:
+            return False
+        self._output.append(encode(topic_id, data))
+        return True
+
+    def request_receipt(self, now: float) -> int:
+        """Ask the server to show that it has what was published so far; give the number to `has_receipt`.
+
+        It asks for the time: the server answers frames in their order, and publishes before it answers.
+        """
+        self._request_time(now)
+        return self._asked
+
+    def has_receipt(self, number: int) -> bool:
+        """Whether the server has shown that."""
+        return self._answered >= number
+
+    def log(self, level: int, text: str) -> bool:
+        """Queue a line for the server's log, level 0 (debug) to 4 (fatal); False where nobody listens."""
+        if not self.configured:
+            return False
+        self._output.append(encode(TopicId.LOG, pack_log(level, text)))
+        return True
+
+    def take_output(self) -> list[bytes]:
+        """Frames to send, each in one piece."""
+        frames, self._output = self._output, []
+        return frames
+
+    def _packets(self, packets: list[Packet], now: float) -> list[DeviceEvent]:
+        return [event for packet in packets for event in self._packet(packet, now)]
+
+    def _packet(self, packet: Packet, now: float) -> list[DeviceEvent]:
+        if packet.topic_id in (TopicId.CHALLENGE, TopicId.PROOF):
+            return self._prove(packet)
+        if not self._is_trusted:
+            return [NotTrusted("the bridge did not show that it has this sensor's key")]
+        if packet.topic_id == TopicId.PUBLISHER:
+            return self._negotiate(now)
+        if packet.topic_id == TopicId.TIME:
+            try:
+                self._offset = unpack_time(packet.data) - now
+            except ProtocolError:
+                return []
+            self._last_answer = now
+            self._answered += 1
+            return []
+        if packet.topic_id == TopicId.TX_STOP:
+            self.configured = False
+            return [Unconfigured("the server stopped the traffic")]
+        return [Message(packet.topic_id, packet.data)]
+
+    def _prove(self, packet: Packet) -> list[DeviceEvent]:
+        if self._prover is None:
+            return [NotTrusted("the bridge asks for a key, and this sensor has none")]
+        if packet.topic_id == TopicId.PROOF:
+            if not self._prover.confirms(packet.data):
+                return [NotTrusted("the bridge does not have this sensor's key")]
+            self._is_trusted, self._awaits_answer = True, False
+            return []
+        try:
+            self._output.append(self._prover.answer(packet.data))
+            self._awaits_answer = True
+        except ProtocolError as err:
+            return [NotTrusted(f"the bridge sent {err.problem}")]
+        return []
+
+    def _negotiate(self, now: float) -> list[DeviceEvent]:
+        self._request_time(now)
+        for info in self._publishers:
+            self._output.append(encode(TopicId.PUBLISHER, pack_topic_info(info)))
+        for info in self._subscribers:
+            self._output.append(encode(TopicId.SUBSCRIBER, pack_topic_info(info)))
+        self._last_answer = now
+        first = not self.configured
+        self.configured = True
+        return [Configured()] if first else []
+
+    def _request_time(self, now: float) -> None:
+        self._last_request = now
+        self._asked += 1
+        known = self.server_time(now) or 0.0  # as far as it knows, so that the server can see a clock that is off
+        self._output.append(encode(TopicId.TIME, pack_time(int(known), int(known % 1.0 * 1e9))))

@@ -1,0 +1,1 @@
+"""The bytes of rosserial: framing, topic negotiation, keys."""

@@ -1,0 +1,1 @@
+"""The bridge: connections, sessions, what each device may do."""
