@@ -167,11 +167,12 @@ def quality(folder: Path) -> tuple[dict[str, float], str]:
     """How well our network does on pictures that its training never saw, and the whole table."""
     import yaml
 
-    from rosbot_patrol.detection.training.dataset import Pictures
-    from rosbot_patrol.detection.training.report import find_all, load_forward
-    from rosbot_patrol.detection.training.scoring import average_precision, figures, groups, say
+    sys.path.insert(0, str(ROOT))  # training/ is no part of the installed package
+    from training.judging.report import find_all, load_forward
+    from training.judging.scoring import average_precision, figures, groups, say
+    from training.learning.dataset import Pictures
 
-    draw = [sys.executable, "-m", "rosbot_patrol.detection.training.render", str(folder), "--set", "test"]
+    draw = [sys.executable, "-m", "training.pictures.render", str(folder), "--set", "test"]
     subprocess.run(draw, cwd=ROOT, check=True, capture_output=True, text=True)
     cfg, weights = ROOT / "models/house.cfg", ROOT / "models/house.weights"
     shipped = yaml.safe_load((ROOT / "models/house.yaml").read_text(encoding="utf-8"))["yolo_model"]["threshold"][

@@ -20,7 +20,7 @@ ROWS: list[set[str]] = [
     {"costmap"},
     {"planning", "amcl", "gmapping", "exploration", "detection", "rosserial", "control"},
     {"navigation", "patrol", "alerts", "sensors", "simulation"},
-    {"closed_loop", "training", "campaign"},
+    {"closed_loop", "campaign"},
     {"replay"},
     {"ros"},
 ]
@@ -50,8 +50,6 @@ def modules() -> list[Path]:
 
 def package_of(path: Path) -> str:
     parts = path.relative_to(SRC).parts
-    if parts[:2] == ("detection", "training"):
-        return "training"  # not part of the detector: it draws its pictures with the simulation
     return parts[0] if len(parts) > 1 else path.stem
 
 
@@ -85,7 +83,7 @@ def test_imports_go_down_only(path: Path) -> None:
     for name, line, _ in imports(path):
         if not name.startswith("rosbot_patrol."):
             continue
-        other = "training" if name.startswith("rosbot_patrol.detection.training") else name.split(".")[1]
+        other = name.split(".")[1]
         allowed = (
             other == own
             or ROW_OF.get(other, 99) < ROW_OF[own]
@@ -110,8 +108,8 @@ def test_only_ros_knows_ros(path: Path) -> None:
     "path", [p for p in modules() if package_of(p) != "ros"], ids=lambda p: str(p.relative_to(SRC))
 )
 def test_pure_code_has_no_clock(path: Path) -> None:
-    if path.name in {"kernels.py"} or "training" in path.parts:
-        return  # programs of the set-up: they report how long they took
+    if path.name == "kernels.py":
+        return  # a program of the set-up: it reports how long it took
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             owner = node.func.value

@@ -1,0 +1,1 @@
+"""The network as PyTorch has it, its loss, and the training."""
