@@ -23,9 +23,9 @@ from rosbot_patrol.alerts.records.incident import Event
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.sightings import Confirmation
-from rosbot_patrol.patrol.mission.commands import Commands, Notice, Report
-from rosbot_patrol.patrol.mission.record import Mission, Phase, Verdict
+from rosbot_patrol.patrol.records.commands import Commands, Notice, Report
+from rosbot_patrol.patrol.records.findings import Confirmation
+from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.story.mission_log import Chronicle
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 

@@ -31,9 +31,9 @@ from rosbot_patrol.patrol.house.regions import part_rooms
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.patrol.intruder.lidar_motion import Witness
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
-from rosbot_patrol.patrol.mission.inputs import Box, Eye
-from rosbot_patrol.patrol.search.coverage import Coverage, sight_of_scan, sight_on_map
-from rosbot_patrol.patrol.search.viewpoints import ViewpointPlanner
+from rosbot_patrol.patrol.records.inputs import Box, Eye
+from rosbot_patrol.patrol.visibility.coverage import Coverage, sight_of_scan, sight_on_map
+from rosbot_patrol.patrol.visibility.viewpoints import ViewpointPlanner
 from rosbot_patrol.scan import LaserScan
 
 ROOT = Path(__file__).resolve().parents[1]

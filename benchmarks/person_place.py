@@ -31,7 +31,7 @@ from rosbot_patrol.patrol.house.floor import floor_of
 from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
-from rosbot_patrol.patrol.mission.inputs import Box, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 from rosbot_patrol.simulation.scene.matrices import from_pose2d
 from rosbot_patrol.simulation.sdf.world import load_world
 

@@ -33,7 +33,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import load
 from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
-from rosbot_patrol.patrol.mission.inputs import Box, Frame
+from rosbot_patrol.patrol.records.inputs import Box, Frame
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.render.egl import make_renderer
 from rosbot_patrol.simulation.robot.description import load_robot

@@ -10,8 +10,8 @@ import yaml
 from page_list import PAGES, ROOT
 
 from rosbot_patrol.patrol.guard.schedule import load_schedule
-from rosbot_patrol.patrol.house.known_objects import load_known
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
+from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.replay.case import read_case
 from rosbot_patrol.sensors.sensor_file import load_sensors
 from rosbot_patrol.simulation.scenario.file import read_scenario

@@ -22,7 +22,7 @@ from rosbot_patrol.patrol.house.floor import floor_of
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.intruder.lidar_motion import Witness
 from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
-from rosbot_patrol.patrol.search.coverage import sight_of_scan
+from rosbot_patrol.patrol.visibility.coverage import sight_of_scan
 from rosbot_patrol.replay.nodes.patrol_sight import PatrolSight
 from rosbot_patrol.replay.nodes.scan_feed import ScanFeed
 from rosbot_patrol.scan import LevelScan, level_scan

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rosbot_patrol.patrol.mission.record import Verdict
+from rosbot_patrol.patrol.records.mission import Verdict
 
 UNSURE = (Verdict.UNVERIFIED.value,)
 STRANDED = (Verdict.UNVERIFIED.value, Verdict.UNREACHABLE.value)

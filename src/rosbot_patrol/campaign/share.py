@@ -11,7 +11,7 @@ import numpy as np
 from rosbot_patrol.campaign.floor import EYE, VIEW_WIDTH, Floor
 from rosbot_patrol.campaign.truth import Track
 from rosbot_patrol.geometry import Pose2D, distance
-from rosbot_patrol.patrol.search.coverage import Coverage, CoverageParams, Eye, Sight
+from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Eye, Sight
 from rosbot_patrol.simulation.scene.slices import Slice
 
 RATE = 10.0  # pictures that the detector looks at, of simulated time [Hz]

@@ -11,7 +11,7 @@ from rosbot_ekf.msg import Imu
 from rosbot_ekf.srv import Configuration, ConfigurationResponse
 from sensor_msgs.msg import BatteryState, Range
 
-from rosbot_patrol.patrol.mission.inputs import Battery
+from rosbot_patrol.patrol.records.inputs import Battery
 from rosbot_patrol.ros.bridge.channels import message_class, service_class
 from rosbot_patrol.ros.drive.twist_mux_node import Eyes
 from rosbot_patrol.ros.patrol import inputs as patrol_inputs

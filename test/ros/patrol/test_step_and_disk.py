@@ -16,8 +16,8 @@ from rosbot_patrol.srv import ArmRequest
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.mission.inputs import Guarded
 from rosbot_patrol.patrol.mission.params import InputParams
+from rosbot_patrol.patrol.records.inputs import Guarded
 from rosbot_patrol.ros.patrol import orders as patrol_orders
 from rosbot_patrol.ros.patrol.inputs import PatrolInputs
 

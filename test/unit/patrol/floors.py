@@ -10,7 +10,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.patrol.house.floor import Floor, floor_of
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.search.coverage import sight_on_map
+from rosbot_patrol.patrol.visibility.coverage import sight_on_map
 from rosbot_patrol.scan import LaserScan
 
 BEAMS = 720

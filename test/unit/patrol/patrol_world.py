@@ -6,9 +6,9 @@ import math
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalLink, GoalState
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.mission.inputs import Box, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.mission.manager import PatrolManager
-from rosbot_patrol.patrol.mission.record import Phase
+from rosbot_patrol.patrol.records.inputs import Box, Frame, Guarded, Inputs
+from rosbot_patrol.patrol.records.mission import Phase
 
 ROOMS = Rooms(
     tuple(Room(id=i, name=f"name{i}", pose=Pose2D(10.0 * i, 0.0, 0.0)) for i in range(4)), source="rooms.yaml"

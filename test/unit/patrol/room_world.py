@@ -13,11 +13,11 @@ from rosbot_patrol.goal import GoalLink, GoalState
 from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.exclusions import Judge
-from rosbot_patrol.patrol.mission.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
 from rosbot_patrol.patrol.mission.manager import ManagerParams, PatrolManager
-from rosbot_patrol.patrol.mission.record import Phase
-from rosbot_patrol.patrol.search.coverage import sight_on_map
+from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
+from rosbot_patrol.patrol.records.mission import Phase
 from rosbot_patrol.patrol.search.room_search import Eyes, SightParams
+from rosbot_patrol.patrol.visibility.coverage import sight_on_map
 
 WIDTH = 1.047
 HOUSE = (

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.patrol.calls.own_motion import OwnMotion
-from rosbot_patrol.patrol.calls.queue import MissionQueue, Origin, PriorityParams, Request
+from rosbot_patrol.patrol.calls.queue import MissionQueue, PriorityParams
 from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.mission.commands import Ignored
-from rosbot_patrol.patrol.mission.inputs import Inputs
-from rosbot_patrol.patrol.mission.record import Mission, Phase, mission_id
+from rosbot_patrol.patrol.records.commands import Ignored
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.records.mission import Mission, Phase, mission_id
+from rosbot_patrol.patrol.records.request import Origin, Request
 
 log = logging.getLogger(__name__)
 

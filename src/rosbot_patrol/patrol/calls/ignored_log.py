@@ -6,7 +6,7 @@ import dataclasses
 import json
 from pathlib import Path
 
-from rosbot_patrol.patrol.mission.commands import Ignored
+from rosbot_patrol.patrol.records.commands import Ignored
 
 MOST = 1 << 20  # [bytes] before the file becomes the old one
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rosbot_patrol.patrol.mission.commands import Word
+from rosbot_patrol.patrol.records.commands import Word
 
 KIND = "the sensors' watch"
 

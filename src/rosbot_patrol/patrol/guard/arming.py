@@ -25,7 +25,7 @@ from rosbot_patrol.params import param
 from rosbot_patrol.patrol.guard.modes import DISARMED, MODES, parse_mode, unknown_mode
 from rosbot_patrol.patrol.guard.wall_times import Window, parse_window, parse_zone
 from rosbot_patrol.patrol.house.rooms import Rooms, choose_rooms
-from rosbot_patrol.patrol.mission.inputs import Guarded
+from rosbot_patrol.patrol.records.inputs import Guarded
 from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)

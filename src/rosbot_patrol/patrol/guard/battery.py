@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.mission.inputs import Battery
+from rosbot_patrol.patrol.records.inputs import Battery
 
 log = logging.getLogger(__name__)
 

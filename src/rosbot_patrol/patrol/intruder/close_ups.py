@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.patrol.intruder.exclusions import PET, Judge, goes_on
-from rosbot_patrol.patrol.mission.inputs import Box, Eye, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 
 _SAME = 1.0  # so near to each other two sightings are of one [m]
 _SPEED = 1.0  # it may have walked so fast since [m/s]

@@ -7,12 +7,11 @@ import logging
 
 from rosbot_patrol.patrol.house.regions import NOBODYS
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.persons import Person
-from rosbot_patrol.patrol.intruder.sightings import Confirmation
-from rosbot_patrol.patrol.mission.commands import Commands, Notice, Release
-from rosbot_patrol.patrol.mission.inputs import Frame, Inputs
 from rosbot_patrol.patrol.mission.mission_run import Conduct
-from rosbot_patrol.patrol.mission.record import Mission, Verdict
+from rosbot_patrol.patrol.records.commands import Commands, Notice, Release
+from rosbot_patrol.patrol.records.findings import Confirmation, Person
+from rosbot_patrol.patrol.records.inputs import Frame, Inputs
+from rosbot_patrol.patrol.records.mission import Mission, Verdict
 from rosbot_patrol.patrol.story import status_text as saying
 
 log = logging.getLogger(__name__)

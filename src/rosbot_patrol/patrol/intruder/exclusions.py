@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Floor
-from rosbot_patrol.patrol.mission.inputs import Box, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import logging
 from collections.abc import Iterable
 
 from rosbot_patrol.geometry import angle_difference, distance
-from rosbot_patrol.patrol.mission.inputs import Eye, Frame
+from rosbot_patrol.patrol.records.inputs import Eye, Frame
 
 MOVED = 0.05  # so far from where the picture was new, it is none of this place [m]
 TURNED = 0.05  # likewise [rad]

@@ -35,7 +35,7 @@ from rosbot_patrol.patrol.intruder.measure_depth import (
     upright,
     whose,
 )
-from rosbot_patrol.patrol.mission.inputs import Box, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 Array = NDArray[np.float64]
 

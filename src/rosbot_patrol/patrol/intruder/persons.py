@@ -11,7 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.mission.inputs import Measured
+from rosbot_patrol.patrol.records.findings import Person
+from rosbot_patrol.patrol.records.inputs import Measured
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,26 +22,6 @@ class PeopleParams:
     same_person: float = param(1.0, unit="m", lo=0.1, doc="so near to where one was seen it is the same person")
     walking_speed: float = param(1.0, unit="m/s", lo=0.0, doc="farther by this for each second that has passed")
     walked_most: float = param(5.0, unit="m", lo=0.0, doc="but no farther: beyond it is somebody else")
-
-
-@dataclass(kw_only=True)
-class Person:
-    """One who was met.
-
-    Attributes:
-        number: from 1 on.
-        x: last place in map [m]; y: likewise; error: of it [m]; at: when [s].
-        sightings: how often confirmed; label: class of object; room: where, for people.
-    """
-
-    number: int
-    x: float | None
-    y: float | None
-    error: float
-    at: float
-    sightings: int = 0
-    label: str = ""
-    room: str = ""
 
 
 class People:

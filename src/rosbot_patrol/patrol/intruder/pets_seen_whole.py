@@ -15,8 +15,8 @@ from rosbot_patrol.geometry import angle_difference
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.lidar_motion import Thing
 from rosbot_patrol.patrol.intruder.second_looks import shows_whole
-from rosbot_patrol.patrol.mission.inputs import Box, Eye
-from rosbot_patrol.patrol.search.coverage import Sight
+from rosbot_patrol.patrol.records.inputs import Box, Eye
+from rosbot_patrol.patrol.visibility.coverage import Sight
 
 _PICTURES = 8  # in a row, of the same thing
 _LATE = 0.5  # a thing that the lidar has not seen for so long is not where it was [s]

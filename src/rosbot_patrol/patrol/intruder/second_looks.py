@@ -17,8 +17,8 @@ import numpy as np
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
-from rosbot_patrol.patrol.mission.inputs import Eye
-from rosbot_patrol.patrol.search.coverage import Sight
+from rosbot_patrol.patrol.records.inputs import Eye
+from rosbot_patrol.patrol.visibility.coverage import Sight
 
 _SAME_FAR = 1.5  # boxes too far off to be measured that are nearer are of one thing, and so are those too near [m]
 _SAME_SUSPECT = 0.9  # what looks like a person moves by less as it is measured from elsewhere [m]

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.intruder.exclusions import Judge
-from rosbot_patrol.patrol.mission.inputs import Box, Frame, Measured
+from rosbot_patrol.patrol.records.findings import Confirmation
+from rosbot_patrol.patrol.records.inputs import Box, Frame, Measured
 
 _AS_GOOD = 1.3  # so much larger may an error be in a newer picture
 
@@ -43,27 +44,6 @@ class WatchParams:
     same_place: float = param(
         1.0, unit="m", lo=0.1, doc="boxes of one person are so near to each other from picture to picture"
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Confirmation:
-    """An intruder, as far as the detector can tell.
-
-    Attributes:
-        label: its class.
-        probability: median over the pictures that show it.
-        stamp: the camera's, of the picture that shows it best [s].
-        boxes: alarm boxes in that picture, the best first.
-        pictures: how many showed it.
-        measured: its place and size as they were last measured well, None where nothing tells.
-    """
-
-    label: str
-    probability: float
-    stamp: float
-    boxes: tuple[Box, ...]
-    pictures: int
-    measured: Measured | None = None
 
 
 class Watch:

@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.intruder.sightings import Confirmation
-from rosbot_patrol.patrol.mission.inputs import Box, Measured
+from rosbot_patrol.patrol.records.findings import Confirmation
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 _PICTURES = 100  # of a side that are kept
 _PART = 0.25  # what the place of a part of it is worth, at the picture's edge

@@ -24,20 +24,20 @@ import logging
 from collections.abc import Mapping
 from typing import Any
 
-from rosbot_patrol.patrol.calls.queue import Origin, Request
 from rosbot_patrol.patrol.guard.battery import BatteryWatch
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.intruder.frozen_camera import SamePictures
 from rosbot_patrol.patrol.mission import resume as recall
-from rosbot_patrol.patrol.mission.commands import Commands, Word
-from rosbot_patrol.patrol.mission.inputs import Frame, Inputs, ScanView
 from rosbot_patrol.patrol.mission.mission_run import Viewpoints
 from rosbot_patrol.patrol.mission.orders import Ordered
 from rosbot_patrol.patrol.mission.params import ManagerParams
 from rosbot_patrol.patrol.mission.phases import Views
-from rosbot_patrol.patrol.mission.record import Mission, Phase, Verdict
 from rosbot_patrol.patrol.mission.steady import Heard
+from rosbot_patrol.patrol.records.commands import Commands, Word
+from rosbot_patrol.patrol.records.inputs import Frame, Inputs, ScanView
+from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
+from rosbot_patrol.patrol.records.request import Origin, Request
 
 log = logging.getLogger(__name__)
 

@@ -14,14 +14,14 @@ from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.intruder.persons import People
 from rosbot_patrol.patrol.intruder.sightings import Watch
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspects
-from rosbot_patrol.patrol.mission.commands import Commands, Report
 from rosbot_patrol.patrol.mission.drive import Drive, DriveStep
-from rosbot_patrol.patrol.mission.inputs import Inputs
 from rosbot_patrol.patrol.mission.params import ManagerParams
 from rosbot_patrol.patrol.mission.phases import LookAround, LookParts, OneTurn, Trip, Views
 from rosbot_patrol.patrol.mission.readiness import Readiness
-from rosbot_patrol.patrol.mission.record import Mission, Phase, Verdict
 from rosbot_patrol.patrol.mission.steady import SteadyClock
+from rosbot_patrol.patrol.records.commands import Commands, Report
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.story import status_text as saying
 
 log = logging.getLogger(__name__)

@@ -8,13 +8,13 @@ from typing import Any
 
 from rosbot_patrol.patrol.calls.call_filter import Intake
 from rosbot_patrol.patrol.calls.own_motion import OwnMotion
-from rosbot_patrol.patrol.calls.queue import Origin, Request
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.decision import Lookout
 from rosbot_patrol.patrol.mission import resume as recall
-from rosbot_patrol.patrol.mission.commands import Commands
 from rosbot_patrol.patrol.mission.params import ManagerParams
-from rosbot_patrol.patrol.mission.record import Phase, Verdict
+from rosbot_patrol.patrol.records.commands import Commands
+from rosbot_patrol.patrol.records.mission import Phase, Verdict
+from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.patrol.story import status_text as saying
 
 log = logging.getLogger(__name__)

@@ -18,9 +18,9 @@ from rosbot_patrol.patrol.intruder.persons import PeopleParams
 from rosbot_patrol.patrol.intruder.sightings import WatchParams
 from rosbot_patrol.patrol.intruder.weak_sightings import SuspectParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
-from rosbot_patrol.patrol.mission.look import LookParams
-from rosbot_patrol.patrol.mission.turn import SpinParams
+from rosbot_patrol.patrol.search.look import LookParams
 from rosbot_patrol.patrol.search.room_search import SightParams
+from rosbot_patrol.patrol.search.turn import SpinParams
 
 ALARM_CLASSES = ["person", "fire hydrant"]
 

@@ -12,11 +12,11 @@ from rosbot_patrol.goal import GoalLink
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
 from rosbot_patrol.patrol.mission.drive import Drive, DriveParams, DriveStep
-from rosbot_patrol.patrol.mission.inputs import Inputs
-from rosbot_patrol.patrol.mission.look import Look, LookParams, LookStep
-from rosbot_patrol.patrol.mission.record import Mission
-from rosbot_patrol.patrol.mission.turn import SpinParams
-from rosbot_patrol.patrol.search.viewpoints import Viewpoint
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.records.mission import Mission
+from rosbot_patrol.patrol.search.look import Look, LookParams, LookStep
+from rosbot_patrol.patrol.search.turn import SpinParams
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
 Choose = Callable[[], Sequence[Pose2D]]
 

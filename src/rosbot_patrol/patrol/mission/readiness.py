@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rosbot_patrol.patrol.mission.inputs import Inputs
-from rosbot_patrol.patrol.mission.look import LookParams
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.search.look import LookParams
 
 
 class Readiness:

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.patrol.calls.call_filter import Intake
-from rosbot_patrol.patrol.calls.queue import MissionQueue, Request, request_from_plain, request_to_plain
+from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.mission.record import Mission, Verdict, mission_from_plain, mission_to_plain
+from rosbot_patrol.patrol.records.mission import Mission, Verdict, mission_from_plain, mission_to_plain
+from rosbot_patrol.patrol.records.request import Request, request_from_plain, request_to_plain
 
 if TYPE_CHECKING:
     from rosbot_patrol.patrol.mission.manager import PatrolManager

@@ -19,10 +19,10 @@ from rosbot_patrol.patrol.intruder.lidar_motion import Witness, WitnessParams, o
 from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
 from rosbot_patrol.patrol.intruder.second_looks import Doubt, Doubts
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
-from rosbot_patrol.patrol.mission.inputs import Eye, Inputs
-from rosbot_patrol.patrol.mission.record import Mission
-from rosbot_patrol.patrol.search.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
-from rosbot_patrol.patrol.search.viewpoints import Viewpoint, ViewpointParams, ViewpointPlanner
+from rosbot_patrol.patrol.records.inputs import Eye, Inputs
+from rosbot_patrol.patrol.records.mission import Mission
+from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint, ViewpointParams, ViewpointPlanner
 from rosbot_patrol.scan import scan_points
 
 log = logging.getLogger(__name__)

@@ -14,8 +14,8 @@ from typing import Any
 from rosbot_patrol.alerts.records.incident import NO_ROOM, Event, Incident
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.mission.commands import Commands, Notice
-from rosbot_patrol.patrol.mission.record import Mission
+from rosbot_patrol.patrol.records.commands import Commands, Notice
+from rosbot_patrol.patrol.records.mission import Mission
 
 BEFORE = 60.0  # [s] of what the sensors said before a mission began, in its record
 _WAY_STEP = 0.15  # [m] between two points of the way

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from rosbot_patrol.patrol.mission.record import Phase, Verdict
+from rosbot_patrol.patrol.records.mission import Phase, Verdict
 
 
 @dataclass(frozen=True, kw_only=True)

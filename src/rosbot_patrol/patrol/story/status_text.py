@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.sightings import Confirmation
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
-from rosbot_patrol.patrol.mission.commands import Report
-from rosbot_patrol.patrol.mission.record import Mission, Phase
+from rosbot_patrol.patrol.records.commands import Report
+from rosbot_patrol.patrol.records.findings import Confirmation
+from rosbot_patrol.patrol.records.mission import Mission, Phase
 
 _WHERE = {Phase.DRIVING: "on the way to", Phase.LOOKING: "in"}
 

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.patrol.calls.queue import Origin, Request
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.exclusions import Judge
-from rosbot_patrol.patrol.mission.inputs import Battery, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import InputParams, ManagerParams, NodeParams
 from rosbot_patrol.patrol.mission.robot_place import RobotPlace
+from rosbot_patrol.patrol.records.inputs import Battery, Frame, Guarded, Inputs
+from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.patrol.search.room_search import Eyes
 from rosbot_patrol.replay.bags.records import KINDS, MapRecord, Refused
 from rosbot_patrol.replay.nodes import patrol_records as heard

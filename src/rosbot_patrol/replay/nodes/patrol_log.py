@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rosbot_patrol.patrol.mission.commands import Commands
-from rosbot_patrol.patrol.mission.record import Mission
+from rosbot_patrol.patrol.records.commands import Commands
+from rosbot_patrol.patrol.records.mission import Mission
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
 from rosbot_patrol.replay.runner import Field
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from rosbot_patrol.patrol.guard.battery import battery_of
 from rosbot_patrol.patrol.intruder.measure import Lens
-from rosbot_patrol.patrol.mission.inputs import Battery, Box
+from rosbot_patrol.patrol.records.inputs import Battery, Box
 from rosbot_patrol.replay.bags import raw_ros1
 from rosbot_patrol.replay.bags.definitions import STAMP
 from rosbot_patrol.replay.bags.records import ANY, Kind, Refused, stamp_of

@@ -20,9 +20,9 @@ from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
 from rosbot_patrol.patrol.intruder.measure import Lens, View, measure
-from rosbot_patrol.patrol.mission.inputs import Eye, Frame, ScanView
 from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
 from rosbot_patrol.patrol.mission.robot_place import RobotPlace
+from rosbot_patrol.patrol.records.inputs import Eye, Frame, ScanView
 from rosbot_patrol.replay.nodes.patrol_records import LensRecord
 from rosbot_patrol.scan import LaserScan, level_scan, scan_points
 from rosbot_patrol.tf.tree import TransformTree

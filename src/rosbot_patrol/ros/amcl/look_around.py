@@ -16,7 +16,7 @@ import rospy
 from geometry_msgs.msg import Twist
 
 from rosbot_patrol.errors import TransformError
-from rosbot_patrol.patrol.mission.turn import Spin, SpinParams
+from rosbot_patrol.patrol.search.turn import Spin, SpinParams
 from rosbot_patrol.ros.runtime.node import Worker, now
 from rosbot_patrol.ros.runtime.transforms import Transforms
 

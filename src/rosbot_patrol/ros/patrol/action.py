@@ -11,12 +11,12 @@ import actionlib
 
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.msg import PatrolAction, PatrolFeedback, PatrolResult
-from rosbot_patrol.patrol.calls.queue import Origin, Request
 from rosbot_patrol.patrol.guard.schedule import all_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.mission.commands import Report
 from rosbot_patrol.patrol.mission.manager import PatrolManager
-from rosbot_patrol.patrol.mission.record import Mission
+from rosbot_patrol.patrol.records.commands import Report
+from rosbot_patrol.patrol.records.mission import Mission
+from rosbot_patrol.patrol.records.request import Origin, Request
 
 CANCELLED = "cancelled by the program that asked for it"
 

@@ -26,7 +26,7 @@ from rosbot_patrol.alerts.records.store import recall_incident
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.calls.ignored_log import IgnoredLog
-from rosbot_patrol.patrol.mission.commands import Commands, Ignored, Notice, Release, Word
+from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, Release, Word
 from rosbot_patrol.patrol.story.mission_log import Entry, person_room
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.patrol.pictures import PictureRing

@@ -22,14 +22,14 @@ from rosbot_patrol.errors import LaserTilted, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.msg import EspTrigger, SensorEvent
 from rosbot_patrol.patrol.calls.journal import Journal
-from rosbot_patrol.patrol.calls.queue import Origin, Request
 from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.patrol.guard.battery import battery_of
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.mission.inputs import Battery, Box, Frame, Guarded, Inputs
 from rosbot_patrol.patrol.mission.params import InputParams
 from rosbot_patrol.patrol.mission.resume import PatrolStore
 from rosbot_patrol.patrol.mission.robot_place import RobotPlace
+from rosbot_patrol.patrol.records.inputs import Battery, Box, Frame, Guarded, Inputs
+from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.ros.patrol.sight import PatrolEyes
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN
 from rosbot_patrol.ros.runtime.latest import Latest

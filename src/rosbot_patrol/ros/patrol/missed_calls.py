@@ -11,8 +11,8 @@ import rospy
 
 from rosbot_patrol.msg import SensorStates
 from rosbot_patrol.patrol.calls.liveness import Vigil
-from rosbot_patrol.patrol.calls.queue import Request
 from rosbot_patrol.patrol.calls.repeats import Repeats
+from rosbot_patrol.patrol.records.request import Request
 from rosbot_patrol.ros.runtime.node import now
 
 log = logging.getLogger(__name__)

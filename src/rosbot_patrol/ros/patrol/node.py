@@ -34,18 +34,18 @@ from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.calls.journal import Journal
-from rosbot_patrol.patrol.calls.queue import Origin, Request
 from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules, load_rules, read_memory
 from rosbot_patrol.patrol.guard.emergency import EmergencyStop
 from rosbot_patrol.patrol.guard.schedule import Schedule, load_schedule
-from rosbot_patrol.patrol.house.known_objects import load_known
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.intruder.exclusions import Judge
-from rosbot_patrol.patrol.mission.commands import Commands, Word
-from rosbot_patrol.patrol.mission.inputs import Box, Inputs
+from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.patrol.mission.manager import PatrolManager
-from rosbot_patrol.patrol.mission.record import Phase
 from rosbot_patrol.patrol.mission.resume import PatrolStore
+from rosbot_patrol.patrol.records.commands import Commands, Word
+from rosbot_patrol.patrol.records.inputs import Box, Inputs
+from rosbot_patrol.patrol.records.mission import Phase
+from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.patrol.search.room_search import Eyes
 from rosbot_patrol.patrol.story.mission_log import Chronicle
 from rosbot_patrol.ros.patrol.action import PatrolActions

@@ -15,15 +15,15 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
 
 from rosbot_patrol.msg import Arming as ArmingMsg
-from rosbot_patrol.patrol.calls.queue import Origin, Request
 from rosbot_patrol.patrol.guard.arming import Arming, write_memory
 from rosbot_patrol.patrol.guard.emergency import SERVICE, TOPIC, EmergencyStop
 from rosbot_patrol.patrol.guard.modes import DISARMED
 from rosbot_patrol.patrol.guard.schedule import all_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.mission.commands import Word
-from rosbot_patrol.patrol.mission.inputs import Guarded
 from rosbot_patrol.patrol.mission.manager import PatrolManager
+from rosbot_patrol.patrol.records.commands import Word
+from rosbot_patrol.patrol.records.inputs import Guarded
+from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.ros.messages import convert
 from rosbot_patrol.ros.patrol.move_base import MoveBase
 from rosbot_patrol.ros.runtime.callers import CallerService, caller_of

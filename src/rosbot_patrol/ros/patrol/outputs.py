@@ -17,9 +17,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from rosbot_patrol.geometry import STOP, Twist2D
 from rosbot_patrol.msg import PatrolState
-from rosbot_patrol.patrol.intruder.persons import Person
-from rosbot_patrol.patrol.mission.commands import Report
-from rosbot_patrol.patrol.mission.record import Mission, Phase
+from rosbot_patrol.patrol.records.commands import Report
+from rosbot_patrol.patrol.records.findings import Person
+from rosbot_patrol.patrol.records.mission import Mission, Phase
 from rosbot_patrol.ros.messages import convert
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 

@@ -9,7 +9,7 @@ import rospy
 
 from rosbot_patrol.msg import SensorStates
 from rosbot_patrol.patrol.guard.absence import Absence
-from rosbot_patrol.patrol.mission.commands import Word
+from rosbot_patrol.patrol.records.commands import Word
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 
 log = logging.getLogger(__name__)

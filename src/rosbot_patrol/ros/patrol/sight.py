@@ -27,9 +27,9 @@ from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
 from rosbot_patrol.patrol.intruder.measure import View, measure
-from rosbot_patrol.patrol.mission.inputs import Box, Eye, Frame, ScanView
 from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
 from rosbot_patrol.patrol.mission.robot_place import RobotPlace
+from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, ScanView
 from rosbot_patrol.ros.messages import convert
 from rosbot_patrol.ros.messages.fast_arrays import GridMsg
 from rosbot_patrol.ros.patrol.depth_ring import DepthRing, Lenses

@@ -25,8 +25,8 @@ from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import MapError, ParamError, TransformError
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.patrol.house.floor import Floor, floor_of
-from rosbot_patrol.patrol.house.marking import Marks
 from rosbot_patrol.patrol.house.rooms import load_rooms, save_rooms
+from rosbot_patrol.patrol.visibility.marking import Marks
 from rosbot_patrol.ros.messages.convert import grid_from_msg
 from rosbot_patrol.ros.messages.fast_arrays import GridMsg
 from rosbot_patrol.ros.runtime.latest import Latest

@@ -30,8 +30,8 @@ from rosbot_patrol.params import declared, table
 from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
-from rosbot_patrol.patrol.mission.look import LookParams
-from rosbot_patrol.patrol.mission.turn import SpinParams
+from rosbot_patrol.patrol.search.look import LookParams
+from rosbot_patrol.patrol.search.turn import SpinParams
 from rosbot_patrol.planning.global_planners.global_planner import GlobalPlannerParams
 from rosbot_patrol.planning.global_planners.navfn import NavfnParams
 from rosbot_patrol.planning.local_planners.dwa_params import DWAPlannerParams

@@ -5,7 +5,7 @@ import json
 from rosbot_patrol.alerts.post.delayed_notices import HeldNotices
 from rosbot_patrol.alerts.post.notice import Notice
 from rosbot_patrol.patrol.calls.ignored_log import MOST, IgnoredLog
-from rosbot_patrol.patrol.mission.commands import Ignored
+from rosbot_patrol.patrol.records.commands import Ignored
 
 
 def test_a_notice_waits_and_is_gone_when_removed(tmp_path):

@@ -6,8 +6,8 @@ import pytest
 from floors import points
 from room_world import POINT, World
 
-from rosbot_patrol.patrol.calls.queue import Origin, Request
-from rosbot_patrol.patrol.mission.record import Verdict
+from rosbot_patrol.patrol.records.mission import Verdict
+from rosbot_patrol.patrol.records.request import Origin, Request
 
 HOME = (2.0, 4.7)
 OFF = {"outside": (40.0, 3.0), "in a wall": (3.0, 3.5), "beyond the wall": (12.3, 4.0)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rosbot_patrol.patrol.guard.absence import Absence
-from rosbot_patrol.patrol.mission.commands import Word
+from rosbot_patrol.patrol.records.commands import Word
 
 
 def steps(absence: Absence, begin: float, end: float, *, heard: bool = False) -> list[tuple[float, Word]]:

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rosbot_patrol.patrol.guard.battery import BatteryParams, BatteryWatch, battery_of, check_battery
-from rosbot_patrol.patrol.mission.inputs import Battery
+from rosbot_patrol.patrol.records.inputs import Battery
 
 TURTLEBOT3 = BatteryParams(battery_voltage_first=True)
 

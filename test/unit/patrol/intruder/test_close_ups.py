@@ -10,7 +10,7 @@ from floors import drawn_floor
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.close_ups import CloseUps
 from rosbot_patrol.patrol.intruder.exclusions import Judge
-from rosbot_patrol.patrol.mission.inputs import Box, Eye, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 
 
 def box(

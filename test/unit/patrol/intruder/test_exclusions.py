@@ -4,7 +4,7 @@ import pytest
 from floors import TWO_ROOMS, drawn_floor
 
 from rosbot_patrol.patrol.intruder.exclusions import Judge, Known
-from rosbot_patrol.patrol.mission.inputs import Box, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 FLOOR = drawn_floor(*TWO_ROOMS)
 

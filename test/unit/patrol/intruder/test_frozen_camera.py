@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.frozen_camera import SamePictures
-from rosbot_patrol.patrol.mission.inputs import Eye, Frame
+from rosbot_patrol.patrol.records.inputs import Eye, Frame
 
 
 def frame(x: float = 0.0, yaw: float = 0.0, *, same: bool = False, lens: bool = True) -> Frame:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.patrol.intruder.legs import go_straight_up
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
-from rosbot_patrol.patrol.mission.inputs import Box, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 EYE, AWAY, WALL, STEP = 0.22, 0.6, 3.0, 0.01
 HEIGHTS = np.linspace(0.48, 0.02, 48)

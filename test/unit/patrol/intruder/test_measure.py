@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
-from rosbot_patrol.patrol.mission.inputs import Box
+from rosbot_patrol.patrol.records.inputs import Box
 
 LENS = Lens(fx=554.38, fy=554.38, cx=320.0, cy=240.0, width=640, height=480)
 HEIGHT = 0.22  # of the camera [m]

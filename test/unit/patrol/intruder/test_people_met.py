@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from rosbot_patrol.patrol.intruder.persons import People
-from rosbot_patrol.patrol.mission.inputs import Measured
+from rosbot_patrol.patrol.records.inputs import Measured
 
 
 def at(x: float, y: float = 0.0, error: float = 0.1) -> Measured:

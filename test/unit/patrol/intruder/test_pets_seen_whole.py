@@ -10,8 +10,8 @@ import pytest
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.lidar_motion import Thing
 from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
-from rosbot_patrol.patrol.mission.inputs import Box, Eye
-from rosbot_patrol.patrol.search.coverage import Sight
+from rosbot_patrol.patrol.records.inputs import Box, Eye
+from rosbot_patrol.patrol.visibility.coverage import Sight
 
 EYE = Eye(pose=Pose2D(0.0, 0.0, 0.0), width=1.0)
 OPEN = Sight(x=0.0, y=0.0, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 6.0))

@@ -9,8 +9,8 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.second_looks import Doubts
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect, Suspects
-from rosbot_patrol.patrol.mission.inputs import Box, Eye, Measured
-from rosbot_patrol.patrol.search.coverage import Sight
+from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
+from rosbot_patrol.patrol.visibility.coverage import Sight
 
 SEEN_IN = 3
 ALL_AROUND = Sight(x=3.0, y=0.0, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 5.0))

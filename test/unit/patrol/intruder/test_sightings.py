@@ -2,7 +2,7 @@ import pytest
 
 from rosbot_patrol.patrol.intruder.exclusions import Judge, Known
 from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
-from rosbot_patrol.patrol.mission.inputs import Box, Frame, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Frame, Measured
 
 
 def box(label="person", probability=0.9, xmin=100, ymin=100, xmax=200, ymax=400):

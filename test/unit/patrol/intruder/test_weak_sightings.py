@@ -6,7 +6,7 @@ import pytest
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.weak_sightings import SuspectParams, Suspects
-from rosbot_patrol.patrol.mission.inputs import Box, Measured
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 WEST, SOUTH, SOUTH_WEST = Pose2D(-3.0, 0.0, 0.0), Pose2D(0.0, -3.0, 1.57), Pose2D(-3.0, -1.0, 0.3)
 

@@ -10,9 +10,9 @@ from room_world import ROOMS, Place, World
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.goal import GoalLink
-from rosbot_patrol.patrol.mission.inputs import Battery, Frame, Inputs, ScanView
 from rosbot_patrol.patrol.mission.manager import PatrolManager
-from rosbot_patrol.patrol.mission.record import Verdict
+from rosbot_patrol.patrol.records.inputs import Battery, Frame, Inputs, ScanView
+from rosbot_patrol.patrol.records.mission import Verdict
 
 BEGAN = 100.0
 HOUR, YEAR = 3600.0, 3600.0 * 24 * 365

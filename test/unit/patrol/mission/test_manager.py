@@ -6,11 +6,12 @@ import pytest
 from patrol_world import ROOMS, World, looking, phase
 
 from rosbot_patrol.goal import GoalLink, GoalState
-from rosbot_patrol.patrol.calls.queue import MissionQueue, Request, request_to_plain
-from rosbot_patrol.patrol.mission.inputs import Guarded
+from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import ManagerParams
-from rosbot_patrol.patrol.mission.record import Phase, Verdict
+from rosbot_patrol.patrol.records.inputs import Guarded
+from rosbot_patrol.patrol.records.mission import Phase, Verdict
+from rosbot_patrol.patrol.records.request import Request, request_to_plain
 
 
 def test_an_empty_room_is_clear_and_the_robot_comes_home_after_one_turn():

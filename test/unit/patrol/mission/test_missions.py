@@ -9,13 +9,14 @@ from patrol_world import ROOMS, World, looking, phase
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.calls.queue import Origin, PriorityParams, Request
+from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams, check_battery
-from rosbot_patrol.patrol.mission.inputs import Battery, Guarded
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import ManagerParams
-from rosbot_patrol.patrol.mission.record import Phase, Verdict
-from rosbot_patrol.patrol.search.viewpoints import Viewpoint
+from rosbot_patrol.patrol.records.inputs import Battery, Guarded
+from rosbot_patrol.patrol.records.mission import Phase, Verdict
+from rosbot_patrol.patrol.records.request import Origin, Request
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
 
 def ask(*rooms, origin=Origin.SCHEDULE):

@@ -7,9 +7,9 @@ from patrol_world import PERSON, ROOMS, World, phase
 
 from rosbot_patrol.alerts.records.incident import NO_ROOM, Incident
 from rosbot_patrol.patrol.house.regions import NOBODYS
-from rosbot_patrol.patrol.mission.inputs import Measured
 from rosbot_patrol.patrol.mission.manager import PatrolManager
-from rosbot_patrol.patrol.mission.record import Phase, mission_from_plain, mission_to_plain
+from rosbot_patrol.patrol.records.inputs import Measured
+from rosbot_patrol.patrol.records.mission import Phase, mission_from_plain, mission_to_plain
 from rosbot_patrol.patrol.story.mission_log import Chronicle
 
 

@@ -12,11 +12,11 @@ from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalState
 from rosbot_patrol.patrol.intruder.camera_tracking import TrackParams
 from rosbot_patrol.patrol.intruder.exclusions import Judge, Known
-from rosbot_patrol.patrol.mission.inputs import Inputs
 from rosbot_patrol.patrol.mission.manager import ManagerParams
-from rosbot_patrol.patrol.mission.record import Phase
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.records.mission import Phase
 from rosbot_patrol.patrol.search.room_search import Eyes, SightParams
-from rosbot_patrol.patrol.search.viewpoints import ViewpointParams
+from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams
 
 
 def test_a_room_is_looked_at_from_further_viewpoints_until_enough_is_seen() -> None:

@@ -5,9 +5,9 @@ import pytest
 from rosbot_patrol.alerts.records.incident import Event
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.sightings import Confirmation
-from rosbot_patrol.patrol.mission.commands import Commands, Ignored, Notice, Report
-from rosbot_patrol.patrol.mission.record import Mission, Phase, Verdict
+from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, Report
+from rosbot_patrol.patrol.records.findings import Confirmation
+from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.story.mission_log import Chronicle
 
 WALL = 1_790_000_000.0

@@ -8,8 +8,8 @@ import pytest
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.intruder.measure import Lens
-from rosbot_patrol.patrol.mission.inputs import Box, Frame
 from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
+from rosbot_patrol.patrol.records.inputs import Box, Frame
 from rosbot_patrol.replay.nodes.patrol_records import LensRecord
 from rosbot_patrol.replay.nodes.patrol_sight import HELD, PatrolSight
 from rosbot_patrol.scan import LaserScan

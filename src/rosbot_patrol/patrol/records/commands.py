@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.goal import Goal
-from rosbot_patrol.patrol.intruder.persons import Person
-from rosbot_patrol.patrol.intruder.sightings import Confirmation
-from rosbot_patrol.patrol.mission.record import Mission, Phase
+from rosbot_patrol.patrol.records.findings import Confirmation, Person
+from rosbot_patrol.patrol.records.mission import Mission, Phase
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from rosbot_patrol.patrol.calls.queue import Origin
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.intruder.sightings import Confirmation
+from rosbot_patrol.patrol.records.findings import Confirmation
+from rosbot_patrol.patrol.records.request import Origin
 
 View = tuple[float, float, float]  # x [m], y [m], yaw [rad] in map
 

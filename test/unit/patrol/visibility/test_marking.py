@@ -9,8 +9,8 @@ import pytest
 from floors import drawn_floor
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.house.marking import Marks
 from rosbot_patrol.patrol.house.rooms import Room, Rooms, load_rooms, save_rooms
+from rosbot_patrol.patrol.visibility.marking import Marks
 
 FLOOR = drawn_floor(
     "###############",

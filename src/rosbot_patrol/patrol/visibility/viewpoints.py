@@ -16,7 +16,7 @@ from rosbot_patrol.geometry import Pose2D, wrap_angles
 from rosbot_patrol.maps.ways import steps_over
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Array, Floor, Mask
-from rosbot_patrol.patrol.search.coverage import CoverageParams, sight_on_map, visible
+from rosbot_patrol.patrol.visibility.coverage import CoverageParams, sight_on_map, visible
 
 _FAR = math.inf
 _ROOMY = 0.6  # so far from all that the map shows nothing low that it does not show is met: the feet of a chair [m]

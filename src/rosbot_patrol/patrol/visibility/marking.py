@@ -5,8 +5,8 @@ from __future__ import annotations
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.floor import Floor
 from rosbot_patrol.patrol.house.rooms import MAX_ROOMS, Room, Rooms, bad_name
-from rosbot_patrol.patrol.search.coverage import CoverageParams
-from rosbot_patrol.patrol.search.viewpoints import ViewpointParams, ViewpointPlanner
+from rosbot_patrol.patrol.visibility.coverage import CoverageParams
+from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams, ViewpointPlanner
 
 TURN_CLEARANCE = 0.2  # the robot needs to turn on the spot [m]
 PASSAGE = 0.15  # half the narrowest gap that it drives through [m]

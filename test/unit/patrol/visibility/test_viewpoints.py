@@ -8,8 +8,8 @@ from floors import TWO_ROOMS, drawn_floor, points
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.regions import part_rooms
-from rosbot_patrol.patrol.search.coverage import Coverage, CoverageParams, Eye, sight_on_map
-from rosbot_patrol.patrol.search.viewpoints import ViewpointParams, ViewpointPlanner
+from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Eye, sight_on_map
+from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams, ViewpointPlanner
 
 WIDTH = 1.047
 L_ROOM = (

@@ -3,9 +3,9 @@ import math
 import pytest
 
 from rosbot_patrol.geometry import Pose2D, wrap_angle
-from rosbot_patrol.patrol.mission.inputs import Inputs
-from rosbot_patrol.patrol.mission.look import Look, LookParams
-from rosbot_patrol.patrol.mission.turn import SpinParams
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.search.look import Look, LookParams
+from rosbot_patrol.patrol.search.turn import SpinParams
 
 
 def turn(odom_gain=1.0, map_offset=lambda truth: 0.0, has_pose=True, stuck_after=None):

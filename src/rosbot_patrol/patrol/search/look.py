@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.goal import Goal
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.mission.inputs import Inputs
-from rosbot_patrol.patrol.mission.turn import Spin, SpinParams
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.search.turn import Spin, SpinParams
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.goal import GoalLink
-from rosbot_patrol.patrol.calls.queue import Request
 from rosbot_patrol.patrol.house.regions import RoomRegions
+from rosbot_patrol.patrol.records.request import Request
 from rosbot_patrol.scan import LaserScan
 
 _SLACK = 3.0, 0.04  # of a detector's boxes: pixels, and share of the height

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rosbot_patrol.geometry import wrap_angle
-from rosbot_patrol.patrol.mission.turn import Spin, SpinParams, wrap_turn
+from rosbot_patrol.patrol.search.turn import Spin, SpinParams, wrap_turn
 
 
 class Base:

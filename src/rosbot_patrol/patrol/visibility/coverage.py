@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.geometry import Pose2D, wrap_angles
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Array, Floor, Mask
-from rosbot_patrol.patrol.mission.inputs import Eye as Eye
+from rosbot_patrol.patrol.records.inputs import Eye as Eye
 from rosbot_patrol.scan import LaserScan
 
 _FRAY = (

@@ -9,7 +9,7 @@ from floors import TWO_ROOMS, drawn_floor, points
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.floor import Floor
 from rosbot_patrol.patrol.house.regions import part_rooms
-from rosbot_patrol.patrol.search.coverage import Coverage, CoverageParams, Eye, Sight, sight_of_scan, sight_on_map
+from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Eye, Sight, sight_of_scan, sight_on_map
 from rosbot_patrol.scan import LaserScan
 
 WIDTH = 1.047
