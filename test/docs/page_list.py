@@ -9,6 +9,7 @@ PAGES = sorted(
     str(path.relative_to(ROOT))
     for path in (
         ROOT / "README.md",
+        ROOT / "CONTRIBUTING.md",
         *(ROOT / "docs").glob("*.md"),
         *(ROOT / folder / "README.md" for folder in ("firmware", "models", "benchmarks")),
     )

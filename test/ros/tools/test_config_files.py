@@ -30,7 +30,8 @@ from rosbot_patrol.ros.patrol.settings import NodeParams, load_flat
 from rosbot_patrol.ros.sensors import watch_node as sensor_watch_node
 from rosbot_patrol.ros.simulator.demo_intruder_node import read_walk
 from rosbot_patrol.ros.simulator.node import SimulatorParams
-from rosbot_patrol.ros.tools.parameter_tables import document
+from rosbot_patrol.ros.tools.launch_page import FILES
+from rosbot_patrol.ros.tools.parameter_tables import pages
 from rosbot_patrol.simulation.scenario.file import read_scenario
 from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
@@ -154,9 +155,15 @@ def test_rooms_sensors_and_walks_agree() -> None:
         assert read_walk(ROOT / "config" / "house_demo.yaml", room).path
 
 
-def test_the_page_of_parameters_is_up_to_date() -> None:
-    page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
-    assert page == document(), "run scripts/parameter_tables"
+def test_generated_pages_are_up_to_date() -> None:
+    found = pages(ROOT)
+    assert {path.name for path in found} == {"parameters.md", "launch.md"}
+    for path, text in found.items():
+        assert path.read_text(encoding="utf-8") == text, "run scripts/parameter_tables"
+
+
+def test_the_page_of_launch_files_has_all_of_them() -> None:
+    assert set(FILES) == {path.stem for path in (ROOT / "launch").glob("*.launch")}
 
 
 @pytest.mark.parametrize("scenario", sorted(p.name for p in (ROOT / "scenarios").glob("*.yaml")))

@@ -1,4 +1,4 @@
-"""docs/parameters.md, made from the declarations: `scripts/parameter_tables`."""
+"""docs/parameters.md and docs/launch.md, made from declarations and launch files: `scripts/parameter_tables`."""
 
 from __future__ import annotations
 
@@ -47,6 +47,7 @@ from rosbot_patrol.ros.patrol.settings import NodeParams
 from rosbot_patrol.ros.sensors.watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.simulator.node import SimulatorParams
+from rosbot_patrol.ros.tools.launch_page import launch_page
 from rosbot_patrol.ros.tools.narrator_node import NarratorParams
 from rosbot_patrol.rosserial.server.settings import SerialNodeParams
 from rosbot_patrol.sensors.sensor_file import SensorSpec
@@ -175,17 +176,20 @@ def document() -> str:
     return "\n".join(lines) + "\n"
 
 
+def pages(root: Path) -> dict[Path, str]:
+    """The generated pages of a checkout, and what they should say."""
+    return {root / "docs/parameters.md": document(), root / "docs/launch.md": launch_page(root / "launch")}
+
+
 def main() -> int:
-    """Write the page, or with --check compare it; exit status 1 where it is out of date."""
-    target, text = Path(sys.argv[1]), document()
+    """Write the pages, or with --check compare them; exit status 1 where one is out of date."""
+    found = pages(Path(sys.argv[1]))
     if "--check" in sys.argv[2:]:
-        current = target.read_text(encoding="utf-8") if target.exists() else ""
-        if current != text:
-            sys.stderr.write(f"{target} is out of date: run scripts/parameter_tables\n")
-            return 1
-        return 0
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(text, encoding="utf-8")
+        old = [path for path, text in found.items() if not path.exists() or path.read_text(encoding="utf-8") != text]
+        sys.stderr.writelines(f"{path} is out of date: run scripts/parameter_tables\n" for path in old)
+        return 1 if old else 0
+    for path, text in found.items():
+        path.write_text(text, encoding="utf-8")
     return 0
 
 
