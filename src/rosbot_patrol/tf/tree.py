@@ -65,8 +65,8 @@ class TransformTree:
         """Forget what moves: time went back."""
         self._above = {frame: above for frame, above in self._above.items() if isinstance(above, _Static)}
 
-    def lookup(self, target: str, source: str, stamp: float | None = None) -> Transform:
-        """target_from_source at a time [s], or the newest that is known of all on the way.
+    def transform(self, target: str, source: str, stamp: float | None = None) -> Transform:
+        """Look up target_from_source at a time [s], or the newest time that all transforms between them share.
 
         Raises:
             TransformNotYet: a frame is not known, not connected, or not until that time: it may still come.
@@ -86,16 +86,16 @@ class TransformTree:
         raise self._unknown(target, source, problem or other_problem)
 
     def newest(self, target: str, source: str) -> tuple[Transform, float]:
-        """The newest target_from_source and its time [s], 0 where nothing between them moves; raises as `lookup`."""
+        """The newest target_from_source and its time [s], 0 where nothing between them moves; raises as `transform`."""
         stamp = self._newest_common(target.lstrip("/"), source.lstrip("/"))
-        return self.lookup(target, source, stamp), stamp
+        return self.transform(target, source, stamp), stamp
 
-    def pose(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
-        """The planar part of `lookup`; raises as that does."""
-        return self.lookup(target, source, stamp).pose
+    def lookup(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
+        """Look up the planar part of `transform`; raises as that does."""
+        return self.transform(target, source, stamp).pose
 
     def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
-        """The planar part of `newest`."""
+        """Look up the planar part of `newest`; raises as that does."""
         found, stamp = self.newest(target, source)
         return found.pose, stamp
 

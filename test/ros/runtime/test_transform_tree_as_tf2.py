@@ -43,7 +43,7 @@ def as_tf2_says(buffer, target, source, stamp):
 
 def as_ours_says(tree, target, source, stamp):
     try:
-        return np.array(tree.lookup(target, source, stamp))
+        return np.array(tree.transform(target, source, stamp))
     except TransformError:
         return None
 

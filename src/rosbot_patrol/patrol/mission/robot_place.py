@@ -6,18 +6,10 @@ newest of both are put together, each with an age limit of its own: a localisati
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.patrol.mission.params import InputParams
-
-
-class Frames(Protocol):
-    """Planar transforms."""
-
-    def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
-        """The newest `target_from_source` and its stamp [s], 0 where nothing moves; raises TransformError."""
+from rosbot_patrol.tf.frames import Frames
 
 
 class RobotPlace:

@@ -135,7 +135,7 @@ class AmclReplay:
                 frame=record.frame,
                 stamp=record.stamp,
                 global_frame=self._params.global_frame_id.lstrip("/"),
-                odometry=lambda stamp: self._feed.tree.pose(self._feed.odom, self._feed.base, stamp),
+                odometry=lambda stamp: self._feed.tree.lookup(self._feed.odom, self._feed.base, stamp),
             )
         except ValueError:
             self._counts["ignored"] += 1

@@ -97,7 +97,7 @@ class BagCostmap:
         waiting, self._scans = list(self._scans), deque(maxlen=KEPT)
         for scan in waiting:
             try:
-                level = level_scan(scan, self._transforms.lookup(self.frame, scan.frame_id, scan.stamp), self.frame)
+                level = level_scan(scan, self._transforms.transform(self.frame, scan.frame_id, scan.stamp), self.frame)
             except LaserTilted as err:
                 self._check.refuse(str(err), now)
                 continue

@@ -174,7 +174,7 @@ class MoveBaseReplay:
         try:
             pose = record.pose
             if record.frame != self._global.frame:
-                pose = self._tree.pose(self._global.frame, record.frame) @ pose
+                pose = self._tree.lookup(self._global.frame, record.frame) @ pose
         except TransformError:
             self._counts["refused"] += 1
             return
@@ -218,7 +218,7 @@ class MoveBaseReplay:
             return
         frame, scan = self._local.frame, self._unseen
         try:
-            level = level_scan(scan, self._tree.lookup(frame, scan.frame_id, scan.stamp), frame)
+            level = level_scan(scan, self._tree.transform(frame, scan.frame_id, scan.stamp), frame)
         except TransformError:
             return
         self._watch.see(level.scan, level.pose)
@@ -228,7 +228,7 @@ class MoveBaseReplay:
         """What the navigator sees, None where the robot's pose is not known."""
         try:
             pose_global, pose_local = self._global.robot_pose(now), self._local.robot_pose(now)
-            local_from_plan = self._tree.pose(self._local.frame, self._global.frame)
+            local_from_plan = self._tree.lookup(self._local.frame, self._global.frame)
         except TransformError:
             return None
         twist, heard_at = self._velocity

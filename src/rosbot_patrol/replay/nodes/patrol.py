@@ -252,7 +252,7 @@ class PatrolReplay:
         if self._nearest is None or self._nearest[0] is not scan:
             base = self._frames.base_frame
             try:
-                points = level_scan(scan, self._tree.lookup(base, scan.frame_id), base).points
+                points = level_scan(scan, self._tree.transform(base, scan.frame_id), base).points
             except TransformError:
                 return None
             self._nearest = scan, float(np.hypot(*points.T).min()) if len(points) else None

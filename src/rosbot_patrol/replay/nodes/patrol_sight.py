@@ -89,7 +89,7 @@ class PatrolSight:
             return self._scan[1]
         world = self._frames.map_frame
         try:
-            level = level_scan(scan, self._tree.lookup(world, scan.frame_id, scan.stamp), world)
+            level = level_scan(scan, self._tree.transform(world, scan.frame_id, scan.stamp), world)
         except LaserTilted:
             return None
         except TransformError:
@@ -127,11 +127,11 @@ class PatrolSight:
         """Of the camera in map at a moment, z from the floor, shape (4, 4); None where it is not known."""
         world, odom = self._frames.map_frame, self._frames.odom_frame
         try:
-            pose = self._tree.lookup(world, frame, stamp).matrix
+            pose = self._tree.transform(world, frame, stamp).matrix
         except TransformError:
             try:  # the map's part of it comes later than odometry
                 self._place.map_from_odom(stamp)  # raises where it is too old
-                pose = self._tree.lookup(world, odom).matrix @ self._tree.lookup(odom, frame, stamp).matrix
+                pose = self._tree.transform(world, odom).matrix @ self._tree.transform(odom, frame, stamp).matrix
             except TransformError:
                 return None
         pose[2, 3] -= self._topics.floor_height

@@ -68,5 +68,5 @@ class ScanFeed:
         return {"left out": self.problem} if self.problem else {}
 
     def _place(self, scan: LaserScan) -> PlacedScan:
-        level = level_scan(scan, self.tree.lookup(self.base, scan.frame_id), self.base)
-        return PlacedScan(level.scan, self.tree.pose(self.odom, self.base, scan.stamp), level.pose)
+        level = level_scan(scan, self.tree.transform(self.base, scan.frame_id), self.base)
+        return PlacedScan(level.scan, self.tree.lookup(self.odom, self.base, scan.stamp), level.pose)

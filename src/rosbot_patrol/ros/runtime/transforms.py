@@ -56,7 +56,7 @@ class Transforms:
         return ""
 
     def transform(self, target: str, source: str, stamp: float | None = None) -> Transform:
-        """`target_from_source` in space at a time [s], or the newest.
+        """Look up `target_from_source` in space at a time [s], the newest for None.
 
         Raises:
             TransformError: it is not known, or not at that time.
@@ -65,7 +65,7 @@ class Transforms:
         return self._find(target, source, when)[0]
 
     def lookup(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
-        """The planar part of `transform`; raises as that does."""
+        """Look up the planar part of `transform`; raises as that does."""
         return self.transform(target, source, stamp).pose
 
     def lookup_matrix(self, target: str, source: str, stamp: float) -> NDArray[np.float64]:
@@ -73,7 +73,7 @@ class Transforms:
         return self.transform(target, source, stamp).matrix
 
     def lookup_stamped(self, target: str, source: str) -> tuple[Pose2D, float]:
-        """The newest `target_from_source` and its stamp [s]; raises TransformError."""
+        """Look up the newest `target_from_source` and its stamp [s], 0 if nothing moves; raises TransformError."""
         found, stamp = self._find(target, source, rospy.Time(0))
         return found.pose, stamp
 

@@ -85,5 +85,5 @@ def test_a_scan_has_its_place_in_map() -> None:
 def test_a_transform_as_a_matrix() -> None:
     tree = TransformTree()
     tree.add(Edge("a", "b", 0.0, 1.0, 2.0, 3.0, *OPTICAL), is_static=True)
-    matrix = tree.lookup("a", "b").matrix
+    matrix = tree.transform("a", "b").matrix
     assert (matrix @ [0.0, 0.0, 1.0, 1.0]).tolist() == pytest.approx([2.0, 2.0, 3.0, 1.0])
