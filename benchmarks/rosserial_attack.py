@@ -3,12 +3,12 @@
 
     python3 benchmarks/rosserial_attack.py [--json FILE] [--quick] [--sensors 100]
 
-The attacks are those of the tests (test/unit/rosserial/attacks.py), one after the other and then all at once from eight
-addresses, each against a bridge with lists and against one with keys. The attacker is a process of its own at low
-priority, as one on another machine would take no time of this one. Latency is of the sensors' heartbeats, from `send`
+The attacks are those of the tests (test/process/rosserial/attacks.py), one after the other and then all at once from
+eight addresses, each against a bridge with lists and against one with keys. The attacker is a process of its own at low
+priority: on another machine it would take no time of this one. Latency is that of the sensors' heartbeats, from `send`
 to a bare TCPROS subscriber, each with all of the bridge's work for the attacker beside it. Memory is the bridge's RSS.
-`forged` are messages in another's name that came through, `allowed` those of the one sensor that the attacker's address
-may be where there are lists.
+`forged` counts messages in another's name that came through. `allowed` counts those of the one sensor that the
+attacker's address may be under lists.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from rosserial import HERE, Bridge, Child, ear, free_port, program
 
 from rosbot_patrol.rosserial.protocol.keys import add_key, new_key
 
-ATTACKS = HERE.parent / "test" / "unit" / "rosserial" / "attacks.py"
+ATTACKS = HERE.parent / "test" / "process" / "rosserial" / "attacks.py"
 SOURCE = "127.0.0.66"
 ALLOWED_ID = 201  # with lists the attacker's address may be that sensor, so that messages come through
 EVERYTHING = "all at once, 8 addresses"

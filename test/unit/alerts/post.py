@@ -7,6 +7,8 @@ from rosbot_patrol.alerts.post.channel_queue import Pace
 from rosbot_patrol.alerts.post.dispatcher import Clocks, Postman
 from rosbot_patrol.alerts.post.notice import Notice
 from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.post.receipts import Receipts
+from rosbot_patrol.alerts.post.spare_post import SparePost
 
 
 class Time:
@@ -74,3 +76,23 @@ def deliver_all(post, *, look=True):
         while (delivery := post.deliver(name)) is not None:
             done.append(delivery)
     return done
+
+
+def spare(*channels, time=None):
+    return SparePost(channels, clocks=(time or Time()).clocks, seed=1)
+
+
+def send_all(post, *names):
+    """Whatever is due on these channels of a spare post."""
+    done = []
+    for name in names:
+        while (delivery := post.deliver(name)) is not None:
+            done.append(delivery)
+    return done
+
+
+def settle(post, folder):
+    """Hand what a spare post holds to the outbox on disk."""
+    box = Outbox(folder)
+    box.make()
+    return post.settle(box, Receipts(folder / "taken.jsonl"))

@@ -1,6 +1,3 @@
-import subprocess
-import sys
-
 import cv2
 import numpy as np
 import pytest
@@ -130,20 +127,6 @@ def test_half_a_jpeg_is_read_as_far_as_it_goes_or_is_a_sentence():
     assert np.abs(back.pixels[:60].astype(int) - picture.pixels[:60]).mean() < 12
     with pytest.raises(ImageError):
         decompress(text, data[:100])
-
-
-def test_jpegs_there_and_back_do_without_opencv():
-    code = """
-import sys
-import numpy as np
-from rosbot_patrol.images.compressed import CompressedParams, compress, decompress
-from rosbot_patrol.images.encodings import Picture
-for encoding, channels in (("rgb8", 3), ("bgr8", 3), ("rgba8", 4), ("bgra8", 4), ("mono8", 1)):
-    text, data = compress(Picture(np.full((8, 8, channels), 90, np.uint8), encoding), CompressedParams())
-    assert decompress(text, data).encoding == encoding
-sys.exit("cv2" in sys.modules)
-"""
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_a_part_of_a_picture_is_compressed_as_it_is():

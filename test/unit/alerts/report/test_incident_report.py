@@ -1,8 +1,6 @@
 import dataclasses
 import io
 import re
-import shutil
-import subprocess
 from html.parser import HTMLParser
 
 import numpy as np
@@ -158,35 +156,6 @@ def test_an_empty_map_and_none_at_all_can_be_drawn_on():
     empty = Grid(GridInfo(resolution=0.05, width=20, height=20), np.full((20, 20), -1, np.int8))
     for view in (crop_map(empty), view_of_marks(Marks()), view_of_marks(Marks(path=[(0, 0), (3, 1)], person=(2, 2)))):
         assert draw_map(view, Marks(path=[(0, 0), (1, 1)], person=(50.0, 50.0))).startswith(b"\x89PNG")
-
-
-_MEASURE = """<script>
-const lines = cell => {
-  const range = document.createRange();
-  range.selectNodeContents(cell);
-  return range.getClientRects().length;
-};
-const kinds = Math.max(...[...document.querySelectorAll("td.time + td")].map(lines));
-const cut = [...document.querySelectorAll(".phases span")].filter(s => s.scrollWidth > s.clientWidth).length;
-document.title = `lines ${kinds} cut ${cut} wider ${document.documentElement.scrollWidth > innerWidth}`;
-</script>"""
-
-
-@pytest.mark.long
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")
-@pytest.mark.parametrize("width", [360, 1100])
-def test_no_word_is_split_on_a_phone_or_a_desk(full, tmp_path, width):
-    words = ("sensor", "emergency", "returning")
-    events = tuple(Event(wall=full.wall + i, kind=kind, text="sees motion " * 20) for i, kind in enumerate(words))
-    path = Event(wall=full.wall + 9.0, kind="notice", text="maildir:/" + "root" * 40)
-    times = (("waiting", full.wall - 1.0), *full.times)
-    shown = dataclasses.replace(full, events=(*events, path), times=times)
-    page = tmp_path / "report.html"
-    text = render_report(shown, Evidence(read=lambda _: jpeg())).replace("Content-Security-Policy", "x-no-policy")
-    page.write_text(text.replace("</body>", _MEASURE + "</body>"))
-    command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", f"--window-size={width},2000", "--dump-dom"]
-    done = subprocess.run([*command, page.as_uri()], capture_output=True, text=True, timeout=60.0)
-    assert "<title>lines 1 cut 0 wider false</title>" in done.stdout, re.findall("<title>.*", done.stdout)
 
 
 def test_only_the_last_column_may_break_a_word():

@@ -2,54 +2,15 @@
 
 from __future__ import annotations
 
-import socket
-from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pytest
-from made_bag import NOETIC, Maker, write_bag
-from rosbags.typesys import get_types_from_msg
+from serial_bag import OTHER, announce, bag_of, replayed
 
-from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.nodes.bridge import CLOSED, DATA, FIELDS, OPENED
-from rosbot_patrol.replay.nodes.setup import Setup, build_replay
 from rosbot_patrol.replay.results.comparison import compare
-from rosbot_patrol.replay.results.tables import Result
-from rosbot_patrol.replay.runner import run_replay
 from rosbot_patrol.rosserial.protocol import packet
 from rosbot_patrol.rosserial.protocol.packet import encode
-from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicId, TopicInfo, pack_topic_info
-from rosbot_patrol.rosserial.server.server import SerialServer
-from rosbot_patrol.rosserial.server.settings import SerialNodeParams
-
-ROOT = Path(__file__).resolve().parents[4]
-BYTES = "rosbot_patrol/msg/SerialBytes"
-if BYTES not in NOETIC.types:
-    text = (ROOT / "msg" / "SerialBytes.msg").read_text().replace("\nHeader header", "\nstd_msgs/Header header")
-    NOETIC.register(get_types_from_msg(text, BYTES))
-
-ESP = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=ESP_TRIGGER_MD5)
-OTHER = TopicInfo(topic_id=126, name="cmd_vel", message_type="geometry_msgs/Twist", md5="x")
-PEER, TOPIC = "10.0.0.7:4321", "/serial_node/bytes"
-
-
-def announce(info: TopicInfo = ESP) -> bytes:
-    return encode(TopicId.PUBLISHER, pack_topic_info(info))
-
-
-def bag_of(folder: Path, happened: Sequence[tuple[float, int, bytes]], peer: str = PEER) -> Path:
-    maker = Maker()
-    messages = [
-        (when, TOPIC, maker.new(BYTES, maker.header(when, ""), event, peer, "10.0.0.7", np.frombuffer(data, np.uint8)))
-        for when, event, data in happened
-    ]
-    return write_bag(folder / "bridge.bag", messages)
-
-
-def replayed(path: Path) -> Result:
-    with Bag(path) as bag:
-        return run_replay(bag, build_replay(Setup(node="serial_node")))
 
 
 def session_bytes(triggers: int = 5) -> list[tuple[float, int, bytes]]:
@@ -65,52 +26,6 @@ def test_messages_topics_and_refusals(tmp_path: Path) -> None:
     assert "cmd_vel" in result.tables["events"]["text"][1]
     counts = result.counts
     assert (counts["connections"], counts["messages"], counts["refused"], counts["garbled"]) == (1, 5, 1, 0)
-
-
-class Nobody:
-    """The other side of a server, which says nothing."""
-
-    def __getattr__(self, name: str) -> object:
-        return lambda *args, **more: None
-
-
-class Recorder:
-    """A tap that writes down what rosbag would."""
-
-    def __init__(self) -> None:
-        self.happened: list[tuple[float, int, bytes]] = []
-
-    def opened(self, client: object) -> None:
-        self._note(OPENED, b"")
-
-    def data(self, client: object, data: bytes) -> None:
-        self._note(DATA, data)
-
-    def closed(self, client: object) -> None:
-        self._note(CLOSED, b"")
-
-    def _note(self, event: int, data: bytes) -> None:
-        self.happened.append((10.0 + 0.1 * len(self.happened), event, data))
-
-
-def test_what_a_real_server_taps_is_replayed(tmp_path: Path) -> None:
-    tap = Recorder()
-    server = SerialServer(Nobody(), SerialNodeParams(port="tcp").policy(""), tap=tap)
-    (port,) = server.listen([0], "127.0.0.1")
-    with socket.create_connection(("127.0.0.1", port)) as device:
-        device.sendall(announce() + encode(125, b"\x02\x01"))
-        for _ in range(100):
-            server.poll(0.01)
-            if any(event == DATA for _, event, _ in tap.happened):
-                break
-    for _ in range(100):
-        server.poll(0.01)
-        if tap.happened[-1][1] == CLOSED:
-            break
-    server.close()
-    assert [event for _, event, _ in tap.happened] == [OPENED, DATA, CLOSED]
-    result = replayed(bag_of(tmp_path, tap.happened))
-    assert result.tables["messages"]["topic"].tolist() == ["motion_trigger"]
 
 
 def test_frames_that_come_in_pieces(tmp_path: Path) -> None:

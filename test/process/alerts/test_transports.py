@@ -1,4 +1,3 @@
-import dataclasses
 import mailbox
 import socket
 import time
@@ -8,7 +7,6 @@ import pytest
 from smtp_server import SmtpServer
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
-from rosbot_patrol.alerts.channels.maildir import MaildirTransport
 from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer as Server
 from rosbot_patrol.alerts.channels.smtp import SmtpTransport
@@ -22,41 +20,6 @@ def told(make_incident):
 
 def smtp(server, envelope, **given):
     return SmtpTransport(Server(host="localhost", port=server.port, timeout=1.0, **given), envelope)
-
-
-def test_a_maildir_reads_back(tmp_path, told, envelope):
-    place = MaildirTransport(tmp_path / "mail", envelope).send(told)
-    factory = mailbox.Maildir(tmp_path / "mail", create=False)
-    ((key, _),) = factory.items()
-    read = mailbox.email.message_from_bytes(factory.get_bytes(key), policy=default)
-    assert read["Subject"] == "rosbot patrol node"
-    assert [part.get_content() for part in read.iter_attachments()] == [b"\xff\xd8 a picture"]
-    assert place.startswith(str(tmp_path / "mail" / "new"))
-    assert list((tmp_path / "mail" / "tmp").iterdir()) == []
-
-
-@pytest.mark.parametrize("seen", [False, True])
-def test_a_maildir_takes_an_incident_once(tmp_path, told, envelope, seen):
-    transport = MaildirTransport(tmp_path, envelope)
-    first = transport.send(told)
-    if seen:
-        box = mailbox.Maildir(tmp_path, create=False)
-        key = box.keys()[0]
-        message = box[key]
-        message.set_subdir("cur")
-        message.add_flag("S")
-        box[key] = message
-    again = transport.send(told)
-    assert len(mailbox.Maildir(tmp_path, create=False)) == 1
-    assert seen or again == first
-    transport.send(dataclasses.replace(told, id=told.id + "0"))
-    assert len(mailbox.Maildir(tmp_path, create=False)) == 2
-
-
-def test_a_maildir_that_cannot_be_written_is_named(tmp_path, told, envelope):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(DeliveryError, match=f"the Maildir {tmp_path}/file does not take the mail"):
-        MaildirTransport(tmp_path / "file", envelope).send(told)
 
 
 def test_smtp_delivers_the_whole_mail(told, envelope):

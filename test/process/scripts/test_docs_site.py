@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("mkdocs", reason="needs what scripts/bootstrap --test installs")
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_the_site_is_whole_and_needs_no_net(tmp_path: Path) -> None:

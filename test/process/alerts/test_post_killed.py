@@ -15,8 +15,6 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 pytest.importorskip("aiosmtpd.smtp", reason="needs python3-aiosmtpd")
 from post_process import ENVELOPE, STALE
 from real_smtp import RealSmtp
@@ -24,7 +22,7 @@ from real_smtp import RealSmtp
 from rosbot_patrol.alerts.post.notice import Notice
 from rosbot_patrol.alerts.post.outbox import Outbox
 
-PROGRAM = str(Path(__file__).resolve().parents[1] / "post_process.py")
+PROGRAM = str(Path(__file__).resolve().with_name("post_process.py"))
 
 
 def start(*arguments):

@@ -1,0 +1,1 @@
+from incidents import envelope, make_incident, quick_disk  # noqa: F401 -- fixtures
