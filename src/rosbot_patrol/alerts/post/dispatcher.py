@@ -16,7 +16,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
 from rosbot_patrol.alerts.channels.mail import token
@@ -27,7 +26,6 @@ from rosbot_patrol.alerts.post.memory_outbox import MemoryOutbox
 from rosbot_patrol.alerts.post.notice import Notice
 from rosbot_patrol.alerts.post.outbox import Outbox, Waiting
 from rosbot_patrol.alerts.post.receipts import Receipt, Receipts
-from rosbot_patrol.alerts.post.upgrade import adopt_mails
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import write_atomic
 
@@ -91,7 +89,6 @@ class Postman:
         who: this process, for people.
         clocks: time.
         seed: for the jitter.
-        legacy: folders of mails that the version before left.
         down_after: a channel that is down for so long is told on the others [s].
         stale_after: who gave no sign of life for so long delivers no more [s].
     """
@@ -104,7 +101,6 @@ class Postman:
         who: str = "",
         clocks: Clocks | None = None,
         seed: int | None = None,
-        legacy: Sequence[Path] = (),
         down_after: float = 1800.0,
         stale_after: float = STALE,
     ) -> None:
@@ -117,7 +113,7 @@ class Postman:
             self.receipts = Receipts(outbox.folder / "taken.jsonl")
             self.lock = FileLock(outbox.folder / "lock", who, stale_after=stale_after, clock=self._clocks.now)
         self._rng = random.Random(seed)
-        self._legacy, self._down_after, self._stale_after = legacy, down_after, stale_after
+        self._down_after, self._stale_after = down_after, stale_after
         self._lanes: dict[str, Lane] = {}
         self._unwritten: list[Receipt] = []
         self._waiting: list[Waiting] = []
@@ -150,7 +146,6 @@ class Postman:
             if self.lock.seized_from:
                 who, silent = self.lock.seized_from, self._stale_after
                 log.error("%s, which delivered the notices, gave no sign of life for %.0f s: taking over", who, silent)
-            self._adopt()
             self._read_receipts()
             now, wall = self._clocks.now(), self._clocks.wall()
             for name, channel in self.channels.items():
@@ -288,14 +283,6 @@ class Postman:
             self.receipts.read_new()
         except OSError as err:  # rather twice than never
             log.error("%s cannot be read: %s; what was taken before may be sent again", self.receipts.path, err)
-
-    def _adopt(self) -> None:
-        if not isinstance(self.outbox, Outbox):
-            return
-        try:
-            adopt_mails(self.outbox, self._legacy)
-        except OSError as err:
-            log.error("the mails that the version before left waiting cannot be taken over now: %s", err)
 
     def _is_open(self, entry: Waiting, name: str) -> bool:
         channel = self.channels[name]

@@ -25,7 +25,7 @@ from rosbot_patrol.files import sync_folder, write_atomic
 
 log = logging.getLogger(__name__)
 
-_NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|eml)")
+_NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.notice")
 _BROKEN = re.compile(r"\d{12}-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|(?P<set_aside>broken))")
 _SCRATCH = re.compile(r"\..*\.(?P<pid>\d+)\.tmp")
 _BAD_FILE = (errno.EIO, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EBADMSG, errno.ELOOP)  # holds up no other

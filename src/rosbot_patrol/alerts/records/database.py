@@ -10,10 +10,10 @@ returns. Tables:
   that was there already (the clock had jumped): all others are in the order of time, so that a search finds the rows of
   a time span without looking at each.
 
-A file of a later version is never written: a new one is begun beside it, with this version in its name. One that makes
-no sense is renamed, never deleted.
+A file of a later version is never written: a new one is begun beside it, with this version in its name. One of an
+earlier version, or one that makes no sense, is renamed and never deleted.
 
-Rows of the incidents' database; all but reading within a transaction.
+Functions that write rows are called within a transaction.
 """
 
 from __future__ import annotations
@@ -80,18 +80,6 @@ CREATE TRIGGER incidents_changed AFTER UPDATE OF tags, words ON incidents BEGIN
   INSERT INTO incidents_text(rowid, tags, words) VALUES (new.seq, new.tags, new.words); END;
 """
 
-# from version to version: each brings a database to the next one
-_MIGRATIONS = {
-    1: """
-ALTER TABLE incidents ADD COLUMN late INTEGER NOT NULL DEFAULT 0;
-UPDATE incidents SET late = 1 WHERE seq IN (SELECT seq FROM (SELECT seq, wall,
-  max(wall) OVER (ORDER BY seq ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING) AS newest FROM incidents)
-  WHERE wall < newest);
-CREATE INDEX incidents_in_order ON incidents(wall) WHERE late = 0;
-CREATE INDEX incidents_late ON incidents(wall) WHERE late = 1;
-""",
-}
-
 
 def beside(path: Path) -> Path:
     """Where this version keeps its incidents when the file at `path` is a later version's."""
@@ -134,7 +122,7 @@ def open_for_reading(path: Path, *, any_version: bool = False) -> sqlite3.Connec
     version = VERSION if any_version else connection.execute("PRAGMA user_version").fetchone()[0]
     if version < VERSION:
         connection.close()
-        raise StoreError(path, f"is of version {version}; the patrol brings it up to date when it starts")
+        raise StoreError(path, f"is of version {version}; the patrol makes a new one of it when it starts")
     return connection
 
 
@@ -172,13 +160,13 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
             f"BEGIN IMMEDIATE;{_SCHEMA}PRAGMA application_id={APPLICATION_ID};PRAGMA user_version={VERSION};COMMIT;"
         )
         return
-    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID or not 1 <= version <= VERSION:
+    if connection.execute("PRAGMA application_id").fetchone()[0] != APPLICATION_ID or version > VERSION:
         raise StoreError(path, "is a database, but not one of incidents", is_corrupt=True)
+    if version < VERSION:
+        raise StoreError(path, f"is of version {version}, this program knows version {VERSION}", is_corrupt=True)
     problem = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
     if problem != "ok":
         raise StoreError(path, f"is damaged: {problem.splitlines()[0]}", is_corrupt=True)
-    for older in range(version, VERSION):
-        connection.executescript(f"BEGIN IMMEDIATE;{_MIGRATIONS[older]}PRAGMA user_version={older + 1};COMMIT;")
 
 
 def _version(path: Path) -> int:

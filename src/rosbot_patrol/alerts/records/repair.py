@@ -1,9 +1,8 @@
-"""Putting right at the start what a crash left between database and folders, and taking in what older versions kept.
+"""Repair at the start: what a crash left between database and folders.
 
 - A picture that no row names, in the folder of an open record: it is taken into the record.
 - A picture of an open record that is not there: the record says so.
 - A folder of a removed record: it goes.
-- A folder with an incident.json, of before there was a database: it becomes a closed record.
 - Any other folder without a record is left alone (of a database that was set aside, or of a later version).
 """
 
@@ -11,15 +10,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection
-from dataclasses import replace
 
-from rosbot_patrol.alerts.records import chain, incident_json
+from rosbot_patrol.alerts.records import chain
 from rosbot_patrol.alerts.records.database import (
-    close_incident,
     errors_of,
     insert_event,
     insert_file,
-    insert_incident,
     transaction,
 )
 from rosbot_patrol.alerts.records.files import REPORT
@@ -46,11 +42,7 @@ def repair(store: IncidentStore, *, wall: float) -> list[str]:
     for incident_id in sorted(strays & removed):
         store.folder.remove(incident_id)
         said.append(f"incident {incident_id} had been removed; its files are gone now, too")
-    migrated = [incident_id for incident_id in sorted(strays - removed) if _migrate(store, incident_id, wall)]
-    if migrated:
-        one, many = "incident of an older version was", "incidents of an older version were"
-        said.append(f"{count_of(len(migrated), one, many)} taken into the database")
-    unknown = strays - removed - set(migrated)
+    unknown = strays - removed
     if unknown and not store.later_version:
         root = store.folder.root
         one, many = f"folder in {root} has no record here and is", f"folders in {root} have no record here and are"
@@ -120,20 +112,3 @@ def _removed(store: IncidentStore) -> set[str]:
     with errors_of(store.path):
         rows = store.connection.execute("SELECT incident FROM links WHERE kind=?", (chain.REMOVAL,))
         return {row["incident"] for row in rows}
-
-
-def _migrate(store: IncidentStore, incident_id: str, wall: float) -> bool:
-    old = incident_json.load_incident(store.folder.root, incident_id)
-    if old is None:
-        return False
-    files = tuple(
-        replace(_stored(store, incident_id, name), caption="", role="detection" if name.endswith(".jpg") else "other")
-        for name in store.folder.names(incident_id)
-        if name != REPORT
-    )
-    note = Event(wall=wall, kind="note", text="taken over from incident.json of an older version")
-    incident = replace(old, files=files, events=(note,), closed=old.wall)
-    with transaction(store.connection, store.path):
-        insert_incident(store.connection, incident)
-        close_incident(store.connection, incident, wall)
-    return True

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.records.database import NAME
 from rosbot_patrol.alerts.records.incident import Incident
-from rosbot_patrol.alerts.records.incident_json import load_incident
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.records.verify import verify
 from rosbot_patrol.campaign.crash_ledger import Books, Journal, KeptRecord, balance, everything_killed, next_patrol
@@ -112,9 +111,6 @@ def kept_records(state_dir: Path) -> list[KeptRecord]:
         with IncidentStore(state_dir, read_only=True) as store:
             ids = [row["id"] for row in store.connection.execute("SELECT id FROM incidents ORDER BY seq")]
             incidents = [store.get(name) for name in ids]
-    else:
-        folder = state_dir / "incidents"
-        incidents = [load_incident(folder, path.name) for path in sorted(folder.glob("*"))]
     return [
         KeptRecord(
             id=found.id,

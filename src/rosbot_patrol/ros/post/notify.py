@@ -97,8 +97,7 @@ def flush(folder: Path, channels: list[Channel]) -> int:
     if not folder.is_dir():
         return show(folder)
     fast = [replace(channel, pace=replace(channel.pace, interval=0.0)) for channel in channels]
-    legacy = (folder, folder.parent / "sensor_outbox")
-    postman = Postman(Outbox(folder), fast, who="notify --flush", legacy=legacy)
+    postman = Postman(Outbox(folder), fast, who="notify --flush")
     if postman.take_over():
         with postman.lock.beating():
             left = _flush_here(postman)

@@ -58,8 +58,7 @@ class OwnerPost:
         around = Surroundings(home=ros_home(), environ=os.environ, host=socket.gethostname())
         channels = make_channels(mail, around, prefix=rospy.get_name() + "/")
         self._outbox = Outbox(state_dir / "outbox")
-        legacy = (self._outbox.folder, state_dir / "sensor_outbox")
-        self._postman = Postman(self._outbox, channels, who=self._who, legacy=legacy)
+        self._postman = Postman(self._outbox, channels, who=self._who)
         self._wakes = {channel.name: threading.Event() for channel in channels}
         self._wake = threading.Event()
         self._listeners: list[Callable[[Delivery], None]] = []

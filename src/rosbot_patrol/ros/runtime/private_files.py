@@ -16,7 +16,7 @@ from pathlib import Path
 log = logging.getLogger(__name__)
 
 UMASK = 0o077
-_FOLDERS = ("outbox", "sensor_outbox", "held", "incidents")
+_FOLDERS = ("outbox", "held", "incidents")
 _FILES = ("*.json*", "*.jsonl*", "incidents.*", "alive*", "*.lock", ".*.tmp")
 _MAILDIR = ("cur", "new", "tmp")
 

@@ -5,7 +5,6 @@ import pytest
 from PIL import Image
 
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox, RawPicture, to_jpeg
-from rosbot_patrol.alerts.records.incident_json import load_incident, save_incident
 from rosbot_patrol.errors import AlertError
 
 COLOUR = {"rgb8": (0, 200, 40), "bgr8": (40, 200, 0), "rgba8": (0, 200, 40, 255), "bgra8": (40, 200, 0, 255)}
@@ -61,16 +60,6 @@ def test_boxes_off_the_picture_do_no_harm(corners):
 def test_what_cannot_be_attached_is_said(bad, said):
     with pytest.raises(AlertError, match=said):
         to_jpeg(bad)
-
-
-def test_an_incident_reads_back(tmp_path, make_incident):
-    incident = make_incident(confirmed=1_790_000_000.0)
-    home = save_incident(tmp_path, incident, b"jpeg")
-    assert load_incident(tmp_path, incident.id) == incident
-    assert (home / "picture.jpg").read_bytes() == b"jpeg"
-    assert load_incident(tmp_path, "another") is None
-    (home / "incident.json").write_text("{}")
-    assert load_incident(tmp_path, incident.id) is None
 
 
 def test_a_label_at_the_right_edge_is_whole():

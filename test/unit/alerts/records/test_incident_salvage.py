@@ -1,4 +1,3 @@
-import json
 import random
 import shutil
 import sqlite3
@@ -103,7 +102,7 @@ def test_a_later_versions_database_is_left_as_it_is(quick_disk, make_incident):
         assert verify(store).records == 0
 
 
-def test_a_database_of_the_first_version_is_brought_up_to_date(quick_disk, make_incident):
+def test_a_database_of_an_earlier_version_is_set_aside_and_its_records_are_copied(quick_disk, make_incident):
     with IncidentStore(quick_disk, wall=1.0) as store:
         for i, wall in enumerate((10.0, 30.0, 20.0, 40.0)):
             store.begin(make_incident(id=f"m{i}", wall=wall))
@@ -112,35 +111,16 @@ def test_a_database_of_the_first_version_is_brought_up_to_date(quick_disk, make_
             store.connection.execute(statement)
         store.connection.execute("ALTER TABLE incidents DROP COLUMN late")
         store.connection.execute("PRAGMA user_version=1")
+    with pytest.raises(StoreError, match="is of version 1; the patrol makes a new one"):
+        IncidentStore(quick_disk, read_only=True)
     store, said = open_store(quick_disk, wall=WALL)
-    assert said == []
+    assert len(said) == 1
+    assert "is of version 1, this program knows version 2; it was set aside as" in said[0]
+    assert "4 incidents copied" in said[0]
     rows = store.connection.execute("SELECT late FROM incidents ORDER BY seq").fetchall()
     assert [row["late"] for row in rows] == [0, 0, 1, 0]
     assert verify(store).records == 4
-
-
-def test_incidents_of_before_there_was_a_database_are_taken_over(quick_disk):
-    root = quick_disk / "incidents"
-    for name, verdict in (("20260101T000000Z-1", "confirmed"), ("20260102T000000Z-1", "")):
-        (root / name).mkdir(parents=True)
-        tree = {"id": name, "wall": 1.7e9, "ros_time": 3.0, "room_id": 2, "room_name": "hall", "phase": "looking"}
-        tree |= {"object_class": "person", "probability": 0.9, "pictures": 3, "verdict": verdict, "reason": "seen"}
-        tree |= {"pose": [1.0, 2.0, 0.1], "sightings": 4, "final": True}
-        (root / name / "incident.json").write_text(json.dumps(tree))
-        (root / name / "picture.jpg").write_bytes(b"jpeg")
-    (root / "mine").mkdir()
-    (root / "bad").mkdir()
-    (root / "bad" / "incident.json").write_text("[]")
-    store, _ = open_store(quick_disk, wall=WALL)
-    said = repair(store, wall=WALL)
-    assert said[0] == "2 incidents of an older version were taken into the database"
-    assert said[1].startswith("2 folders in")
-    kept = store.get("20260101T000000Z-1")
-    assert (kept.verdict, kept.confirmed, kept.pose) == ("confirmed", 1.7e9, (1.0, 2.0, 0.1))
-    assert {file.name for file in kept.files} == {"incident.json", "picture.jpg"}
-    assert store.get("20260102T000000Z-1").verdict == "unverified"
     assert verify(store).fits
-    assert len(repair(store, wall=WALL)) == 1
 
 
 def test_what_a_crash_left_between_folder_and_database_is_put_right(quick_disk, make_incident):
