@@ -1,1 +1,1 @@
-"""Incidents and the mails about them, kept on disk until a transport took them."""
+"""Incidents, and what the owner is told about them."""

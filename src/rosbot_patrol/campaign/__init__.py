@@ -1,1 +1,1 @@
-"""Campaigns: many seeded patrols of a simulated house, each judged against what really was there."""
+"""Many seeded patrols of simulated houses, judged by what was really there."""

@@ -1,1 +1,1 @@
-"""Between those who command the base and the base: who is heard, and what is safe."""
+"""What happens to a velocity command on its way to the wheels: priority, giving way, collision guard."""

@@ -1,1 +1,1 @@
-"""Costmaps of layers: a map, what the lidar sees, and costs around both."""
+"""Costmaps made of layers (costmap_2d)."""

@@ -1,1 +1,1 @@
-"""See things in pictures: darknet networks, their files and their decoding."""
+"""Detectors: what they find in a picture."""

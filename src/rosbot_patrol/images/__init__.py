@@ -1,1 +1,1 @@
-"""Pictures as they travel: ROS encodings and compressed bytes <-> numpy arrays."""
+"""Encodings of pictures: ROS messages and compressed bytes to numpy arrays and back."""

@@ -1,1 +1,1 @@
-"""Maps: files, pictures, occupancy."""
+"""Occupancy grids: map files, pictures of maps, distances, ways."""

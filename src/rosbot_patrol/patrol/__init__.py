@@ -1,1 +1,1 @@
-"""Missions: rooms, driving there, looking around, when a detection is an intruder."""
+"""The guard: calls, missions, the search of a room, who is an intruder, verdicts."""

@@ -1,1 +1,1 @@
-"""Recorded data fed through the same objects that run on the robot."""
+"""Recorded bags run through the cores of the nodes, offline and the same each time."""

@@ -1,1 +1,1 @@
-"""rosserial: framing and negotiation as pure state machines, and a small server and device over real links."""
+"""The protocol of the motion sensors: pure state machines, a server, a device."""

@@ -1,1 +1,1 @@
-"""Motion sensors: who they are, what they last said, and when one has gone silent."""
+"""Motion sensors: which there are, what each said last, which is silent or faulty."""

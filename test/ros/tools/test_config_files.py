@@ -157,7 +157,7 @@ def test_rooms_sensors_and_walks_agree() -> None:
 
 def test_generated_pages_are_up_to_date() -> None:
     found = pages(ROOT)
-    assert {path.name for path in found} == {"parameters.md", "launch.md"}
+    assert {path.name for path in found} == {"parameters.md", "launch.md", "architecture.md"}
     for path, text in found.items():
         assert path.read_text(encoding="utf-8") == text, "run scripts/parameter_tables"
 

@@ -1,1 +1,1 @@
-"""Calls of the motion sensors: filtered, queued, written down."""
+"""Calls of the motion sensors: filtered, queued, kept on disk."""

@@ -1,1 +1,1 @@
-"""Where in a room to look from, and how much of it has been seen."""
+"""The search of a room: turns, viewpoints, second looks, until enough was seen."""

@@ -1,1 +1,1 @@
-"""How much of a room has been seen, and from where more of it can be."""
+"""What a camera can see of a floor: coverage, viewpoints, room points that are fit."""

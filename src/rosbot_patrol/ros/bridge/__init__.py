@@ -1,1 +1,1 @@
-"""The node rosserial's serial_node: motion sensors to ROS topics."""
+"""rosserial's serial_node: from motion sensors to ROS topics; and the virtual sensors."""

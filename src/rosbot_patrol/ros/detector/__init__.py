@@ -1,1 +1,1 @@
-"""The node darknet_ros, and the nodes and programs around its pictures."""
+"""The nodes darknet_ros and republish, and the download of weights."""

@@ -1,1 +1,1 @@
-"""The nodes that pass commands to the wheels: twist_mux and teleop_twist_keyboard."""
+"""The nodes twist_mux and teleop_twist_keyboard."""

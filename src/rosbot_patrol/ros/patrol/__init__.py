@@ -1,1 +1,1 @@
-"""The node patrol."""
+"""The node patrol_robot."""

@@ -1,1 +1,1 @@
-"""Notices and incidents on ROS: who sends them, and the programs notify and incidents."""
+"""Delivery of notices, and the programs notify and incidents."""

@@ -1,1 +1,1 @@
-"""The node simulator, and what is asked of it while it runs."""
+"""The node simulator, and the programs around it."""

@@ -1,4 +1,4 @@
-"""docs/parameters.md and docs/launch.md, made from declarations and launch files: `scripts/parameter_tables`."""
+"""docs/parameters.md, docs/launch.md and the tree of docs/architecture.md: `scripts/parameter_tables` writes them."""
 
 from __future__ import annotations
 
@@ -49,6 +49,7 @@ from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.simulator.node import SimulatorParams
 from rosbot_patrol.ros.tools.launch_page import launch_page
 from rosbot_patrol.ros.tools.narrator_node import NarratorParams
+from rosbot_patrol.ros.tools.source_tree import with_tree
 from rosbot_patrol.rosserial.server.settings import SerialNodeParams
 from rosbot_patrol.sensors.sensor_file import SensorSpec
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
@@ -178,7 +179,12 @@ def document() -> str:
 
 def pages(root: Path) -> dict[Path, str]:
     """The generated pages of a checkout, and what they should say."""
-    return {root / "docs/parameters.md": document(), root / "docs/launch.md": launch_page(root / "launch")}
+    architecture = root / "docs/architecture.md"
+    return {
+        root / "docs/parameters.md": document(),
+        root / "docs/launch.md": launch_page(root / "launch"),
+        architecture: with_tree(architecture.read_text(encoding="utf-8"), root / "src/rosbot_patrol"),
+    }
 
 
 def main() -> int:
