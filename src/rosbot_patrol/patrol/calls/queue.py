@@ -15,14 +15,16 @@ from rosbot_patrol.patrol.records.request import Origin, Request
 
 @dataclass(frozen=True, kw_only=True)
 class PriorityParams:
-    """Who goes first: a greater number does."""
+    """Priorities of the mission queue; the greatest number goes first."""
 
-    priority_trigger: int = param(40, lo=0, hi=100, doc="of a room whose motion sensor called; greater goes first")
-    priority_action: int = param(30, lo=0, hi=100, doc="of a room that a program or a person asked for")
-    priority_silent_sensor: int = param(20, lo=0, hi=100, doc="of a room whose sensor has gone silent")
-    priority_schedule: int = param(10, lo=0, hi=100, doc="of a room of a scheduled round")
+    priority_trigger: int = param(
+        40, lo=0, hi=100, doc="priority of a room whose motion sensor called; the greatest number goes first"
+    )
+    priority_action: int = param(30, lo=0, hi=100, doc="priority of a room requested by a program or a person")
+    priority_silent_sensor: int = param(20, lo=0, hi=100, doc="priority of a room whose sensor has fallen silent")
+    priority_schedule: int = param(10, lo=0, hi=100, doc="priority of a room in a scheduled round")
     preempt: bool = param(
-        True, doc="a motion sensor's call puts the look of a round or at a silent sensor back into the queue"
+        True, doc="a motion sensor's call sends a scheduled look, or a look at a silent sensor, back to the queue"
     )
 
     def of(self, origin: Origin) -> int:

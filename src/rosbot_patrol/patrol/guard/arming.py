@@ -33,21 +33,23 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class ModeSpec:
-    """What a mode guards: a group of each of armed_away, armed_home and night in the file."""
+    """What a mode guards: the groups armed_away, armed_home and night of the file."""
 
-    rooms: Any = param("all", doc="all, or a list of rooms by number or name, whose sensors count")
-    exit_delay: float = param(30.0, unit="s", lo=0.0, hi=600.0, doc="time to leave after arming")
-    entry_delay: float = param(0.0, unit="s", lo=0.0, hi=600.0, doc="so long notices wait after an entry room called")
+    rooms: Any = param("all", doc="rooms whose sensors count: all, or a list by number or name")
+    exit_delay: float = param(30.0, unit="s", lo=0.0, hi=600.0, doc="time to leave the house after arming")
+    entry_delay: float = param(
+        0.0, unit="s", lo=0.0, hi=600.0, doc="time that notices wait after a call from an entry room"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmingFile:
-    """The keys of config/arming.yaml."""
+    """Keys of config/arming.yaml."""
 
-    first_mode: str = param("armed_away", choices=MODES, doc="mode of a fresh install")
-    entry_rooms: list[Any] = param([], doc="rooms, by number or name, through which people come in")
+    first_mode: str = param("armed_away", choices=MODES, doc="mode after installation")
+    entry_rooms: list[Any] = param([], doc="rooms through which people come in, by number or name")
     quiet_hours: list[Any] = param([], doc="windows {from, to, days} in which no round starts")
-    time_zone: str = param("", doc="of the quiet hours, such as Europe/Warsaw; empty: this machine's")
+    time_zone: str = param("", doc="time zone of the quiet hours, such as Europe/Warsaw; empty: this machine's")
     armed_away: ModeSpec = ModeSpec()
     armed_home: ModeSpec = ModeSpec()
     night: ModeSpec = ModeSpec()

@@ -17,19 +17,22 @@ _OTHER = 0.8  # below this part of battery_low_voltage it is another battery: ce
 
 @dataclass(frozen=True, kw_only=True)
 class BatteryParams:
-    """When to go home to charge."""
+    """Battery levels at which the robot goes home and patrols again."""
 
     battery_low: float = param(0.2, lo=0.0, hi=1.0, doc="share of the charge below which the robot goes home")
-    battery_ok: float = param(0.4, lo=0.0, hi=1.0, doc="share of the charge from which on it patrols again")
+    battery_ok: float = param(0.4, lo=0.0, hi=1.0, doc="share of the charge at which it patrols again")
     battery_low_voltage: float = param(
-        10.8, unit="V", lo=0.0, doc="the same by voltage, for a battery without a share (ROSbot: 3 cells); 0: not used"
+        10.8,
+        unit="V",
+        lo=0.0,
+        doc="voltage below which it goes home, if the battery reports no share (ROSbot: 3 cells); 0: not used",
     )
-    battery_ok_voltage: float = param(11.4, unit="V", lo=0.0, doc="voltage from which on it patrols again")
+    battery_ok_voltage: float = param(11.4, unit="V", lo=0.0, doc="voltage at which it patrols again")
     battery_voltage_first: bool = param(
-        False, doc="judge by voltage even if there is a share (TurtleBot3: its share is volts / 11.1)"
+        False, doc="use the voltage even if a share is reported (TurtleBot3: its share is volts / 11.1)"
     )
     battery_timeout: float = param(
-        60.0, unit="s", lo=1.0, doc="a battery silent for longer is not known, and not low for that"
+        60.0, unit="s", lo=1.0, doc="maximum age of the battery state; an older one is unknown, not low"
     )
 
 

@@ -40,21 +40,23 @@ GUARDING = frozenset(MODES) - {DISARMED}
 class RoundSpec:
     """One entry of `rounds`."""
 
-    name: str = param(doc="for people; no two have the same")
+    name: str = param(doc="name in messages, unique in the file")
     at: list[Any] = param([], doc='times of day, such as "22:30"')
-    days: list[Any] = param([], doc="days of the week on which the times hold, mon to sun; none: every day")
+    days: list[Any] = param([], doc="days of the week for those times, mon to sun; empty: every day")
     every: float = param(0.0, unit="s", lo=0.0, doc="interval in ROS time, at least 60; 0: none")
-    rooms: Any = param("all", doc="all, or a list of rooms by number or name, in this order")
-    modes: list[str] = param([], doc="modes in which it holds; none: all but disarmed")
-    missed: str = param("once", choices=("once", "skip"), doc="what becomes of a round whose time was missed")
+    rooms: Any = param("all", doc="rooms to visit, in this order: all, or a list by number or name")
+    modes: list[str] = param([], doc="modes in which the round runs; empty: all but disarmed")
+    missed: str = param(
+        "once", choices=("once", "skip"), doc="treatment of a missed round: once: run it once, skip: leave it out"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScheduleFile:
-    """The keys of config/patrol_schedule.yaml."""
+    """Keys of config/patrol_schedule.yaml."""
 
-    rounds: list[Any] = param(doc="the rounds; may be empty")
-    time_zone: str = param("", doc="of the times of day, such as Europe/Warsaw; empty: this machine's")
+    rounds: list[Any] = param(doc="list of rounds; may be empty")
+    time_zone: str = param("", doc="time zone of the times of day, such as Europe/Warsaw; empty: this machine's")
 
 
 @dataclass(frozen=True, kw_only=True)

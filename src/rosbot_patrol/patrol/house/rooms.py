@@ -98,7 +98,7 @@ def bad_name(value: str) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry:
-    name: str = params.param(doc="for people", check=bad_name)
+    name: str = params.param(doc="name in messages", check=bad_name)
     x: float = params.param(unit="m", check=_not_finite)
     y: float = params.param(unit="m", check=_not_finite)
     angle: float = params.param(doc="heading, in the file's angle_unit", check=_not_finite)
@@ -106,8 +106,8 @@ class _Entry:
 
 @dataclass(frozen=True, kw_only=True)
 class _File:
-    rooms_num: int = params.param(lo=1, hi=MAX_ROOMS, doc="how many rooms are listed, room0 with them")
-    rooms: dict[str, Any] = params.param(doc="room0, room1, ...")
+    rooms_num: int = params.param(lo=1, hi=MAX_ROOMS, doc="number of rooms listed, room0 included")
+    rooms: dict[str, Any] = params.param(doc="entries room0, room1, ...")
     angle_unit: str = params.param("", choices=("", "deg", "rad"), doc="unit of every angle")
 
 

@@ -16,16 +16,18 @@ from rosbot_patrol.params import param
 
 @dataclass(frozen=True, kw_only=True)
 class TrackParams:
-    """How to keep somebody in view."""
+    """Keeping a person in the camera's view."""
 
     track_time: float = param(
-        8.0, unit="s", lo=0.0, doc="so long the camera is kept on whom it sees, lost and found or not; 0: never"
+        8.0, unit="s", lo=0.0, doc="longest time the camera follows somebody, interruptions included; 0: never"
     )
-    track_lost: float = param(1.5, unit="s", lo=0.1, doc="a person not seen for so long is lost")
-    track_pause: float = param(20.0, unit="s", lo=0.0, doc="after that the patrol goes on for so long whatever it sees")
-    track_gain: float = param(1.5, unit="1/s", lo=0.1, hi=10.0, doc="turning speed for each radian that is missing")
-    track_speed: float = param(0.8, unit="rad/s", lo=0.05, hi=6.0, doc="top turning speed")
-    track_band: float = param(0.08, unit="rad", lo=0.0, hi=1.0, doc="so far beside the middle is good enough")
+    track_lost: float = param(1.5, unit="s", lo=0.1, doc="time without a sighting after which the person is lost")
+    track_pause: float = param(
+        20.0, unit="s", lo=0.0, doc="pause after track_time, in which the patrol goes on whatever the camera shows"
+    )
+    track_gain: float = param(1.5, unit="1/s", lo=0.1, hi=10.0, doc="turning speed per radian of bearing error")
+    track_speed: float = param(0.8, unit="rad/s", lo=0.05, hi=6.0, doc="top turning speed while following")
+    track_band: float = param(0.08, unit="rad", lo=0.0, hi=1.0, doc="dead band around the image centre")
 
 
 class Track:

@@ -15,16 +15,23 @@ from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 @dataclass(frozen=True, kw_only=True)
 class JudgeParams:
-    """What a person may look like."""
+    """Sizes and places that a person can have."""
 
     person_top_min: float = param(
-        0.9, unit="m", lo=0.0, doc="whose top is lower is a pet, unless it is long as one who lies"
+        0.9,
+        unit="m",
+        lo=0.0,
+        doc="minimum height of a person's top; anything lower counts as a pet unless it is `lying_length` long",
     )
-    person_top_max: float = param(2.3, unit="m", lo=0.5, doc="what is taller is no person")
-    person_height_min: float = param(0.3, unit="m", lo=0.0, doc="what shows of a person is as high as this at least")
-    lying_length: float = param(1.25, unit="m", lo=0.3, doc="what is as wide as this may be one who lies or creeps")
-    person_width_max: float = param(2.2, unit="m", lo=0.5, doc="what is wider is no person")
-    outside_after: float = param(1.0, unit="m", lo=0.0, doc="what is so far off the map's floor is outside the house")
+    person_top_max: float = param(2.3, unit="m", lo=0.5, doc="maximum height of a person's top")
+    person_height_min: float = param(0.3, unit="m", lo=0.0, doc="minimum visible height of a person")
+    lying_length: float = param(
+        1.25, unit="m", lo=0.3, doc="minimum width at which something low may be a person who lies or crawls"
+    )
+    person_width_max: float = param(2.2, unit="m", lo=0.5, doc="maximum width of a person")
+    outside_after: float = param(
+        1.0, unit="m", lo=0.0, doc="distance from the map's free floor beyond which a sighting is outside the house"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,16 +29,16 @@ def _bad_name(value: str) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry:
-    name: str = params.param(doc="for people", check=_bad_name)
+    name: str = params.param(doc="name in messages", check=_bad_name)
     x: float = params.param(unit="m", check=_not_finite)
     y: float = params.param(unit="m", check=_not_finite)
-    radius: float = params.param(0.5, unit="m", lo=0.05, hi=5.0, doc="nothing within alarms")
-    label: str = params.param("", doc="class of object; empty: all of them")
+    radius: float = params.param(0.5, unit="m", lo=0.05, hi=5.0, doc="radius within which nothing raises an alarm")
+    label: str = params.param("", doc="object class that is ignored there; empty: all")
 
 
 @dataclass(frozen=True, kw_only=True)
 class _File:
-    objects: list[Any] = params.param(doc="one for each thing")
+    objects: list[Any] = params.param(doc="list of the known objects")
 
 
 def load_known(path: str | Path) -> tuple[Known, ...]:

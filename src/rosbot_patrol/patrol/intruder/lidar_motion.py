@@ -21,23 +21,29 @@ from rosbot_patrol.scan import LaserScan, scan_points
 
 @dataclass(frozen=True, kw_only=True)
 class WitnessParams:
-    """What counts as something that moved."""
+    """Conditions under which a lidar track counts as moving."""
 
-    witness_reach: float = param(6.0, unit="m", lo=0.5, doc="nothing farther is followed")
-    off_map: float = param(0.3, unit="m", lo=0.05, doc="a point so far from all that the map shows is not of it")
+    witness_reach: float = param(6.0, unit="m", lo=0.5, doc="maximum range of lidar points that are tracked")
+    off_map: float = param(
+        0.3, unit="m", lo=0.05, doc="minimum distance of a lidar point from everything on the map to be tracked"
+    )
     lost_share: float = param(
-        0.4, lo=0.05, hi=1.0, doc="where more of the points are off the map, the pose is not believed"
+        0.4, lo=0.05, hi=1.0, doc="share of points off the map above which the pose is distrusted and the scan ignored"
     )
-    moved: float = param(0.3, unit="m", lo=0.05, doc="so far from where it was first seen a thing has moved")
-    moved_drift: float = param(
-        0.05, lo=0.0, doc="and by this for each metre from the robot, as its heading is not exact"
+    moved: float = param(
+        0.3, unit="m", lo=0.05, doc="distance from where it was first seen at which an object counts as moved"
     )
-    thing_gap: float = param(0.4, unit="m", lo=0.05, doc="nearer points are of one thing: two legs, one person")
-    thing_size: float = param(1.2, unit="m", lo=0.1, doc="what is larger is furniture or the wall of another room")
-    thing_points: int = param(3, lo=1, doc="beams that must agree on a thing")
-    thing_jump: float = param(0.6, unit="m", lo=0.1, doc="farthest that a thing gets from one look to the next")
-    thing_memory: float = param(1.5, unit="s", lo=0.1, doc="a thing not seen for so long is forgotten")
-    witness_period: float = param(0.2, unit="s", lo=0.0, doc="scans that follow faster are left out")
+    moved_drift: float = param(0.05, lo=0.0, doc="added to `moved` per metre of distance, for the heading error")
+    thing_gap: float = param(
+        0.4, unit="m", lo=0.05, doc="points closer than this belong to one object: two legs, one person"
+    )
+    thing_size: float = param(
+        1.2, unit="m", lo=0.1, doc="larger groups of points are furniture or the wall of another room"
+    )
+    thing_points: int = param(3, lo=1, doc="minimum number of lidar points on an object")
+    thing_jump: float = param(0.6, unit="m", lo=0.1, doc="maximum movement of an object between two scans")
+    thing_memory: float = param(1.5, unit="s", lo=0.1, doc="time without a sighting after which an object is forgotten")
+    witness_period: float = param(0.2, unit="s", lo=0.0, doc="minimum time between the scans used")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,11 +17,13 @@ from rosbot_patrol.patrol.records.inputs import Measured
 
 @dataclass(frozen=True, kw_only=True)
 class PeopleParams:
-    """When two sightings are of one person."""
+    """Conditions under which two sightings are of the same person."""
 
-    same_person: float = param(1.0, unit="m", lo=0.1, doc="so near to where one was seen it is the same person")
-    walking_speed: float = param(1.0, unit="m/s", lo=0.0, doc="farther by this for each second that has passed")
-    walked_most: float = param(5.0, unit="m", lo=0.0, doc="but no farther: beyond it is somebody else")
+    same_person: float = param(1.0, unit="m", lo=0.1, doc="sightings closer than this belong to the same person")
+    walking_speed: float = param(
+        1.0, unit="m/s", lo=0.0, doc="growth of that distance with the time since the last sighting"
+    )
+    walked_most: float = param(5.0, unit="m", lo=0.0, doc="limit of that growth; beyond it stands another person")
 
 
 class People:

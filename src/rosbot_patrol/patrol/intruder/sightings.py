@@ -25,24 +25,24 @@ _AS_GOOD = 1.3  # so much larger may an error be in a newer picture
 
 @dataclass(frozen=True, kw_only=True)
 class WatchParams:
-    """What makes an intruder."""
+    """Sightings that make an intruder."""
 
-    frames: int = param(3, lo=1, hi=100, doc="pictures that have to show it")
-    window: int = param(5, lo=1, hi=100, doc="out of this many last pictures")
-    span: float = param(0.2, unit="s", lo=0.0, hi=10.0, doc="least time from the first of them to the last")
-    max_age: float = param(10.0, unit="s", lo=0.1, doc="older pictures are forgotten")
-    min_score: float = param(0.65, lo=0.0, hi=1.0, doc="least median of the probabilities")
+    frames: int = param(3, lo=1, hi=100, doc="minimum number of images that show the intruder")
+    window: int = param(5, lo=1, hi=100, doc="number of latest images in which they are counted")
+    span: float = param(0.2, unit="s", lo=0.0, hi=10.0, doc="minimum time between the first and the last of them")
+    max_age: float = param(10.0, unit="s", lo=0.1, doc="maximum age of an image")
+    min_score: float = param(0.65, lo=0.0, hi=1.0, doc="minimum median score of the boxes")
     cut_score: float = param(
-        0.8, lo=0.0, hi=1.0, doc="the same where every box ends at the picture's left or right edge, if it is more"
+        0.8, lo=0.0, hi=1.0, doc="`min_score` when every box touches the left or right image border, if larger"
     )
     thing_score: float = param(
-        0.8, lo=0.0, hi=1.0, doc="the same for a class that is no person, whose size tells little, if it is more"
+        0.8, lo=0.0, hi=1.0, doc="`min_score` for classes other than person, as their size tells little, if larger"
     )
-    min_height: int = param(16, unit="px", lo=1, doc="smaller boxes are not believed")
-    min_aspect: float = param(0.15, lo=0.0, doc="least height / width of a box")
-    max_aspect: float = param(8.0, lo=0.1, doc="greatest height / width of a box")
+    min_height: int = param(16, unit="px", lo=1, doc="minimum height of a box; smaller boxes are ignored")
+    min_aspect: float = param(0.15, lo=0.0, doc="minimum height / width of a box")
+    max_aspect: float = param(8.0, lo=0.1, doc="maximum height / width of a box")
     same_place: float = param(
-        1.0, unit="m", lo=0.1, doc="boxes of one person are so near to each other from picture to picture"
+        1.0, unit="m", lo=0.1, doc="boxes closer than this in successive images belong to the same person"
     )
 
 

@@ -27,24 +27,29 @@ _PART = 0.25  # what the place of a part of it is worth, at the picture's edge
 
 @dataclass(frozen=True, kw_only=True)
 class SuspectParams:
-    """What weak sights make of a place."""
+    """Conclusions from uncertain sightings at one place."""
 
-    weak_score: float = param(0.5, lo=0.0, hi=1.0, doc="least median of a side's probabilities")
-    weak_pictures: int = param(5, lo=1, hi=100, doc="pictures from one side that have to show it")
+    weak_score: float = param(0.5, lo=0.0, hi=1.0, doc="minimum median score from one side for a weak sighting")
+    weak_pictures: int = param(5, lo=1, hi=100, doc="minimum number of images from one side for a weak sighting")
     doubt_pictures: int = param(
-        2, lo=1, hi=100, doc="pictures from one side, however unsure, that make a place worth a look from elsewhere"
+        2, lo=1, hi=100, doc="number of images from one side, at any score, that make a place worth a second look"
     )
-    grave_score: float = param(0.4, lo=0.0, hi=1.0, doc="least median of a side that shows it for long")
+    grave_score: float = param(0.4, lo=0.0, hi=1.0, doc="minimum median score from one side of something seen for long")
     grave_pictures: int = param(
-        20, lo=1, hi=_PICTURES, doc="from one side, with that median, and without a second look the room is not clear"
+        20,
+        lo=1,
+        hi=_PICTURES,
+        doc="this many images from one side at `grave_score` need a second look, else the verdict is unverified",
     )
     cut_score: float = param(
-        0.8, lo=0.0, hi=1.0, doc="`weak_score` of a side all of whose boxes the picture's side cuts, if it is more"
+        0.8, lo=0.0, hi=1.0, doc="`weak_score` for a side seen only in boxes cut by the image border, if larger"
     )
-    weak_sides: int = param(2, lo=1, hi=10, doc="sides from which it has to look like a person")
-    side_angle: float = param(0.6, unit="rad", lo=0.05, hi=3.1, doc="seen from so far aside is another side")
-    weak_error: float = param(0.6, unit="m", lo=0.05, doc="what is not known better than that has no place")
-    weak_apart: float = param(0.7, unit="m", lo=0.1, doc="farther apart are two things")
+    weak_sides: int = param(2, lo=1, hi=10, doc="number of sides from which it must look like a person")
+    side_angle: float = param(
+        0.6, unit="rad", lo=0.05, hi=3.1, doc="viewing directions this far apart count as separate sides"
+    )
+    weak_error: float = param(0.6, unit="m", lo=0.05, doc="ignore sightings whose position error is larger")
+    weak_apart: float = param(0.7, unit="m", lo=0.1, doc="sightings farther apart than this are two objects")
 
 
 @dataclass

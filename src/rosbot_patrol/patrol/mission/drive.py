@@ -11,17 +11,17 @@ from rosbot_patrol.params import param
 
 @dataclass(frozen=True, kw_only=True)
 class DriveParams:
-    """How long and how often to try to get somewhere."""
+    """Time limits and attempts of a drive to a goal."""
 
     goal_timeout: float = param(
-        0.0, unit="s", lo=0.0, doc="longest drive; 0: 60 s and 40 s for each metre as the crow flies"
+        0.0, unit="s", lo=0.0, doc="time limit of a drive; 0: 60 s plus 40 s per metre of straight distance"
     )
-    goal_attempts: int = param(2, lo=1, hi=20, doc="how often a goal is tried")
+    goal_attempts: int = param(2, lo=1, hi=20, doc="number of attempts at a goal")
     other_viewpoints: int = param(
-        3, lo=0, hi=20, doc="other free points of the room to try where its own cannot be reached, each once"
+        3, lo=0, hi=20, doc="number of other free points tried when the room's own point is unreachable, once each"
     )
-    retry_delay: float = param(2.0, unit="s", lo=0.0, doc="pause before a goal is tried again")
-    server_wait: float = param(60.0, unit="s", lo=0.0, doc="how long to wait for move_base in one drive, in all")
+    retry_delay: float = param(2.0, unit="s", lo=0.0, doc="pause before the next attempt at a goal")
+    server_wait: float = param(60.0, unit="s", lo=0.0, doc="longest total wait for move_base in one drive")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,17 +27,24 @@ ALARM_CLASSES = ["person", "fire hydrant"]
 
 @dataclass(frozen=True, kw_only=True)
 class BehaviourParams:
-    """What the node and its manager share."""
+    """Parameters that the node and its manager share."""
 
-    alarm_classes: list[str] = param(ALARM_CLASSES, doc="classes of objects that alarm")
+    alarm_classes: list[str] = param(ALARM_CLASSES, doc="object classes that raise an alarm")
     own_motion_radius: float = param(
-        2.0, unit="m", lo=0.0, doc="so near to a room's point the moving robot is what its sensor sees"
+        2.0,
+        unit="m",
+        lo=0.0,
+        doc="distance from the room's point within which the moving robot explains the sensor's call",
     )
     own_motion_memory: float = param(
-        2.0, unit="s", lo=0.0, hi=60.0, doc="so long after it was near the robot is still what the sensor saw"
+        2.0,
+        unit="s",
+        lo=0.0,
+        hi=60.0,
+        doc="time after the robot's passage in which it still explains the sensor's call",
     )
     resume_max_age: float = param(
-        43200.0, unit="s", lo=0.0, doc="a call that is older than this after a restart is reported, not followed"
+        43200.0, unit="s", lo=0.0, doc="age beyond which a call found after a restart is reported instead of followed"
     )
 
 
@@ -58,68 +65,73 @@ class ManagerParams(BehaviourParams):
 
 @dataclass(frozen=True, kw_only=True)
 class EyesTopics:
-    """Where camera, depth and map are heard."""
+    """Topics of camera, depth and map, and the limits of what they show."""
 
-    camera_info_topic: str = param("camera/rgb/camera_info", doc="lens of the camera that the detector looks through")
+    camera_info_topic: str = param("camera/rgb/camera_info", doc="calibration of the detector's camera")
     depth_topic: str = param(
-        "camera/depth/image_raw", doc="depth in m (32FC1) or mm (16UC1), for places and posters; empty: none"
+        "camera/depth/image_raw",
+        doc="depth in m (32FC1) or mm (16UC1), to place boxes and reject flat pictures; empty: none",
     )
     depth_info_topic: str = param(
-        "camera/depth/camera_info", doc="lens of the depth camera; silent: the colour camera's"
+        "camera/depth/camera_info", doc="calibration of the depth camera; if silent, that of the colour camera is used"
     )
     depth_reach: float = param(
         4.5,
         unit="m",
         lo=0.0,
-        doc="what is farther than depth tells, and stands on nothing new, is looked at from nearer",
+        doc="boxes beyond this range without a lidar hit are approached before they count",
     )
-    view_range: float = param(8.0, unit="m", lo=0.5, doc="so far off is what no beam comes back from")
+    view_range: float = param(8.0, unit="m", lo=0.5, doc="range assumed for lidar beams without a return")
     floor_height: float = param(
-        -0.04, unit="m", doc="height of the floor in the map's frame: base_link is at the axles"
+        -0.04, unit="m", doc="height of the floor in the map frame; negative, as base_link lies at the axles"
     )
     off_map: float = param(
-        0.3, unit="m", lo=0.05, hi=1.0, doc="a lidar's point so far from all on the map is not of it"
+        0.3,
+        unit="m",
+        lo=0.05,
+        hi=1.0,
+        doc="minimum distance of a lidar point from everything on the map to count as not mapped",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class InputParams:
-    """Where the patrol's inputs come from, and how long they are good."""
+    """Sources of the patrol's inputs, and their maximum ages."""
 
-    base_frame: str = param("base_link", doc="the robot")
-    odom_frame: str = param("odom", doc="frame in which a turn is measured")
+    base_frame: str = param("base_link", doc="frame of the robot")
+    odom_frame: str = param("odom", doc="frame in which turns are measured")
     map_frame: str = param("map", doc="frame of the points file")
-    pose_timeout: float = param(0.5, unit="s", lo=0.05, doc="an older odom -> base_link is not known")
+    pose_timeout: float = param(0.5, unit="s", lo=0.05, doc="maximum age of odom -> base_link")
     map_timeout: float = param(
         2.0, unit="s", lo=0.1, doc="maximum age of map -> odom, which amcl repeats with each scan; older: no pose"
     )
-    scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="an older scan says nothing of obstacles")
+    scan_timeout: float = param(1.0, unit="s", lo=0.05, doc="maximum age of a scan used for obstacles")
     battery_topic: str = param("battery", doc="state of the battery (TurtleBot3: battery_state)")
     latched_window: float = param(
-        10.0, unit="s", lo=0.0, doc="so long after its start a latched trigger that it had before is not taken again"
+        10.0, unit="s", lo=0.0, doc="for this long after start, latched triggers already handled are ignored"
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class NodeParams(BehaviourParams, SightParams):
-    """The node's own parameters; those of mail, drive, look, turn and watch come beside them."""
+    """The node's own parameters; mail, drive, look, turn and sightings have their own declarations."""
 
     path_to_params: str = param(doc="points file (the tutorial's name)")
-    sensors: str = param("", doc="file of the sensors; empty or none: a sensor's id is the number of its room")
+    sensors: str = param("", doc="sensors file; empty or missing: a sensor's id is the number of its room")
     state_dir: str = param(
         "", doc="folder of outbox, incidents and queue; empty: rosbot_patrol(-NAMESPACE) in ROS's home"
     )
-    image_topic: str = param("camera/rgb/image_raw", doc="camera for the mail's picture; empty: none")
-    rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="steps of the patrol, at most")
+    image_topic: str = param("camera/rgb/image_raw", doc="camera for the pictures in mails; empty: none")
+    rate: float = param(25.0, unit="Hz", lo=5.0, hi=100.0, doc="maximum rate of the patrol's steps")
     sensor_watch_after: float = param(
-        20.0, unit="s", lo=6.0, doc="a sensor_watch that was there and says nothing for so long has gone, or hangs"
+        20.0, unit="s", lo=6.0, doc="silence after which a running sensor_watch counts as gone or hung"
     )
     sensor_watch_notice_after: float = param(
-        60.0, unit="s", lo=0.0, doc="that lasting so long the owner is told, and again when it is over for so long"
+        60.0, unit="s", lo=0.0, doc="duration of that failure, and of the recovery, before the owner is notified"
     )
-    schedule: str = param("", doc="file of the rounds; empty: none")
-    arming: str = param("", doc="file of the modes; empty: all rooms in each mode, without delays")
-    known_objects: str = param("", doc="file of things that look like somebody (patrol/known_objects); empty: none")
+    schedule: str = param("", doc="file of the scheduled rounds; empty: none")
+    arming: str = param("", doc="file of the arming modes; empty: every mode guards all rooms, without delays")
+    known_objects: str = param("", doc="file of objects that look like a person (patrol/known_objects); empty: none")
     watch: WatchParams = WatchParams()
     suspects: SuspectParams = SuspectParams()
     judge: JudgeParams = JudgeParams()

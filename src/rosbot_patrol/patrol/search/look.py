@@ -18,19 +18,25 @@ from rosbot_patrol.patrol.search.turn import Spin, SpinParams
 
 @dataclass(frozen=True, kw_only=True)
 class LookParams:
-    """What a look around needs to count."""
+    """Conditions under which a look around counts."""
 
-    detector_timeout: float = param(3.0, unit="s", lo=0.1, doc="a detector silent for longer has not watched")
-    camera_timeout: float = param(3.0, unit="s", lo=0.1, doc="a camera silent for longer has not watched")
-    detector_wait: float = param(10.0, unit="s", lo=0.0, doc="wait this long for detector and camera before turning")
-    linger: float = param(1.0, unit="s", lo=0.0, hi=30.0, doc="wait after the turn for the detector's last pictures")
+    detector_timeout: float = param(
+        3.0, unit="s", lo=0.1, doc="maximum silence of the detector during a look that counts"
+    )
+    camera_timeout: float = param(
+        3.0, unit="s", lo=0.1, doc="maximum time without a new camera image during a look that counts"
+    )
+    detector_wait: float = param(10.0, unit="s", lo=0.0, doc="longest wait for detector and camera before the turn")
+    linger: float = param(1.0, unit="s", lo=0.0, hi=30.0, doc="wait after the turn for the detector's last images")
     correction_min: float = param(
-        0.04, unit="rad", lo=0.01, doc="a turn is corrected where the map says it is off by this"
+        0.04, unit="rad", lo=0.01, doc="smallest error of the turn, measured in the map, that is corrected"
     )
     correction_max: float = param(
-        0.4, unit="rad", lo=0.0, hi=3.0, doc="off by more the pose in the map is not believed"
+        0.4, unit="rad", lo=0.0, hi=3.0, doc="larger errors are taken for a wrong pose and not corrected"
     )
-    hold: float = param(2.0, unit="s", lo=0.0, hi=30.0, doc="stand still this long while something may be an intruder")
+    hold: float = param(
+        2.0, unit="s", lo=0.0, hi=30.0, doc="longest stop in the turn while something may be an intruder"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,16 +37,21 @@ _LATE = 0.15  # a turn that would have begun so far back is begun where the robo
 
 @dataclass(frozen=True, kw_only=True)
 class SightParams:
-    """How thoroughly a room is looked at; the patrol's node has these as its own."""
+    """Thoroughness of a room's search; the patrol node has these as its own parameters."""
 
     look_around: str = param(
-        "full", choices=("full", "spin"), doc="full: from further viewpoints, too; spin: one turn at the room's point"
+        "full",
+        choices=("full", "spin"),
+        doc="full: search from further viewpoints, too; spin: one turn at the room's point",
     )
     person_distance: float = param(
-        1.0, unit="m", lo=0.0, doc="no viewpoint lies nearer to whom it has met, and no way to one passes nearer"
+        1.0, unit="m", lo=0.0, doc="minimum distance of viewpoints and routes from anyone already met"
     )
     clear_share: float = param(
-        0.5, lo=0.0, hi=1.0, doc="with less of the floor seen a room is not clear but unverified"
+        0.5,
+        lo=0.0,
+        hi=1.0,
+        doc="share of the floor that must be seen for the verdict clear; with less it is unverified",
     )
     coverage: CoverageParams = CoverageParams()
     viewpoints: ViewpointParams = ViewpointParams()

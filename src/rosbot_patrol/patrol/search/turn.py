@@ -18,16 +18,22 @@ from rosbot_patrol.params import param
 
 @dataclass(frozen=True, kw_only=True)
 class SpinParams:
-    """How to turn on the spot."""
+    """Turning on the spot: speeds, time limit, clearance."""
 
-    spin_speed: float = param(0.75, unit="rad/s", lo=0.05, hi=6.0, doc="top speed of the look-around")
+    spin_speed: float = param(0.75, unit="rad/s", lo=0.05, hi=6.0, doc="top turning speed of the look-around")
     spin_min_speed: float = param(0.2, unit="rad/s", lo=0.01, hi=6.0, doc="slowest speed that still turns the robot")
-    spin_deceleration: float = param(0.6, unit="rad/s^2", lo=0.01, doc="how it slows down towards the end")
-    spin_latency: float = param(0.1, unit="s", lo=0.0, hi=2.0, doc="from a command to its effect in the pose")
-    spin_settle: float = param(0.4, unit="s", lo=0.0, hi=5.0, doc="time at rest before the angle is read")
-    spin_timeout: float = param(0.0, unit="s", lo=0.0, doc="longest turn, pauses apart; 0: three times what it takes")
-    spin_clearance: float = param(0.22, unit="m", lo=0.0, hi=2.0, doc="do not turn with something nearer than this")
-    spin_wait: float = param(10.0, unit="s", lo=0.0, doc="wait this long for an obstacle to go or the pose to come")
+    spin_deceleration: float = param(0.6, unit="rad/s^2", lo=0.01, doc="deceleration towards the end of the turn")
+    spin_latency: float = param(0.1, unit="s", lo=0.0, hi=2.0, doc="delay from a command to its effect in the pose")
+    spin_settle: float = param(0.4, unit="s", lo=0.0, hi=5.0, doc="time at rest before the final angle is read")
+    spin_timeout: float = param(
+        0.0, unit="s", lo=0.0, doc="time limit of a turn without pauses; 0: three times the ideal duration plus 5 s"
+    )
+    spin_clearance: float = param(
+        0.22, unit="m", lo=0.0, hi=2.0, doc="minimum distance of obstacles from the robot's centre while it turns"
+    )
+    spin_wait: float = param(
+        10.0, unit="s", lo=0.0, doc="longest wait for an obstacle to leave or for the heading in odom"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,17 +30,27 @@ _WIDTH = 0.02  # between two bearings of a view from the map [rad]
 
 @dataclass(frozen=True, kw_only=True)
 class CoverageParams:
-    """What counts as seen."""
+    """Conditions under which a piece of floor counts as seen."""
 
-    view_range: float = param(8.0, unit="m", lo=0.5, doc="farther away the detector does not tell a person for sure")
-    view_near: float = param(0.5, unit="m", lo=0.0, doc="nobody stands unseen nearer than this to the robot")
+    view_range: float = param(
+        8.0, unit="m", lo=0.5, doc="maximum range at which the detector recognises a person reliably"
+    )
+    view_near: float = param(
+        0.5, unit="m", lo=0.0, doc="floor within this distance of the robot always counts as in view"
+    )
     view_edge: float = param(
-        0.03, unit="rad", lo=0.0, hi=0.5, doc="at either edge of the picture this much does not count"
+        0.03, unit="rad", lo=0.0, hi=0.5, doc="margin at the left and right image border that does not count"
     )
     view_slack: float = param(
-        0.15, unit="m", lo=0.0, hi=1.0, doc="floor so little behind what stands counts: half of a person still shows"
+        0.15,
+        unit="m",
+        lo=0.0,
+        hi=1.0,
+        doc="floor this close behind an obstacle still counts: half of a person shows there",
     )
-    seen_in: int = param(3, lo=1, hi=100, doc="pictures that must have had a place in view")
+    seen_in: int = param(
+        3, lo=1, hi=100, doc="number of images in which a piece of floor must be in view to count as seen"
+    )
 
 
 @dataclass(frozen=True)

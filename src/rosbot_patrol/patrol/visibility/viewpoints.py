@@ -29,40 +29,46 @@ _NEARER = 0.7  # where there is no other side, so much nearer than before is a s
 
 @dataclass(frozen=True, kw_only=True)
 class ViewpointParams:
-    """Where one may look from, and what it must be worth."""
+    """Limits of further viewpoints, and the gain that makes one worth the drive."""
 
-    coverage_goal: float = param(0.95, lo=0.0, hi=1.0, doc="share of the room's floor that is enough")
-    viewpoints_most: int = param(4, lo=0, hi=50, doc="further viewpoints in one mission, at most")
+    coverage_goal: float = param(0.95, lo=0.0, hi=1.0, doc="share of the room's floor to be seen")
+    viewpoints_most: int = param(4, lo=0, hi=50, doc="maximum number of further viewpoints in one mission")
     second_looks_most: int = param(
         8,
         lo=0,
         hi=50,
-        doc="viewpoints in one mission that are for what looks like a person, at most, beside the others",
+        doc="maximum number of additional viewpoints for something that looks like a person",
     )
-    viewpoints_time: float = param(150.0, unit="s", lo=0.0, doc="no further viewpoint is begun later than this")
+    viewpoints_time: float = param(150.0, unit="s", lo=0.0, doc="time after which no further viewpoint is started")
     look_again: bool = param(
         True,
-        doc="nobody was found, and sensor or lidar saw something move: once more at what was seen before that",
+        doc="if nobody was found but sensor or lidar noticed motion, search the earlier views once more",
     )
-    viewpoint_gain: float = param(0.01, lo=0.0, hi=1.0, doc="share of the floor that a viewpoint must show anew")
+    viewpoint_gain: float = param(
+        0.01, lo=0.0, hi=1.0, doc="minimum share of the floor that a viewpoint must newly show"
+    )
     hideout: float = param(
         0.2,
         unit="m",
         lo=0.0,
         hi=2.0,
-        doc="radius of unseen floor that could hide somebody, however much is seen; 0: none",
+        doc="radius of unseen floor that could hide a person, searched even at coverage_goal; 0: none",
     )
     viewpoint_clearance: float = param(
-        0.35, unit="m", lo=0.1, doc="from a viewpoint to the nearest thing, so that the robot can turn there"
+        0.35, unit="m", lo=0.1, doc="minimum distance from a viewpoint to obstacles, so that the robot can turn"
     )
     passage_clearance: float = param(
-        0.22, unit="m", lo=0.05, doc="half the narrowest gap that a viewpoint is reached through"
+        0.22, unit="m", lo=0.05, doc="half the width of the narrowest gap on a route to a viewpoint"
     )
-    viewpoint_spacing: float = param(0.4, unit="m", lo=0.1, doc="between the places that are compared")
+    viewpoint_spacing: float = param(0.4, unit="m", lo=0.1, doc="grid spacing of candidate viewpoints")
     other_side: float = param(
-        0.8, unit="rad", lo=0.0, hi=3.1, doc="so far aside a second look at something like a person is from"
+        0.8,
+        unit="rad",
+        lo=0.0,
+        hi=3.1,
+        doc="minimum change of viewing direction for a second look at something like a person",
     )
-    doorway_depth: float = param(1.0, unit="m", lo=0.0, doc="so far outside of the room a viewpoint may lie")
+    doorway_depth: float = param(1.0, unit="m", lo=0.0, doc="maximum distance of a viewpoint outside the room")
 
 
 @dataclass(frozen=True, kw_only=True)
