@@ -21,16 +21,20 @@ _SHARP_WIDTH = 160  # [px]: sharpness is judged on a picture of this width
 
 @dataclass(frozen=True, kw_only=True)
 class EvidenceParams:
-    """What is kept of the camera's pictures."""
+    """Which camera pictures are kept for an incident."""
 
-    evidence_before: float = param(5.0, unit="s", lo=0.0, hi=30.0, doc="pictures from so long before somebody was seen")
-    evidence_after: float = param(10.0, unit="s", lo=0.0, hi=120.0, doc="and from so long after it")
-    evidence_rate: float = param(5.0, unit="Hz", lo=0.2, hi=15.0, doc="of these, so many a second")
-    evidence_mb: float = param(40.0, unit="MB", lo=4.0, hi=1000.0, doc="memory for them; the oldest go when it is full")
-    evidence_always: bool = param(
-        False, doc="pictures are gathered also between missions, so that the seconds before a call are there too"
+    evidence_before: float = param(5.0, unit="s", lo=0.0, hi=30.0, doc="length of the clip before a sighting")
+    evidence_after: float = param(10.0, unit="s", lo=0.0, hi=120.0, doc="length of the clip after a sighting")
+    evidence_rate: float = param(5.0, unit="Hz", lo=0.2, hi=15.0, doc="pictures per second in the clip")
+    evidence_mb: float = param(
+        40.0, unit="MB", lo=4.0, hi=1000.0, doc="memory for recent pictures; when full, the oldest are dropped"
     )
-    look_pictures: int = param(8, lo=0, hi=60, doc="pictures of each look around that are kept, whatever the verdict")
+    evidence_always: bool = param(
+        False, doc="collect pictures between missions, too, so that the seconds before a call are kept"
+    )
+    look_pictures: int = param(
+        8, lo=0, hi=60, doc="number of pictures kept from each look around, whatever the verdict"
+    )
 
 
 class EvidenceRing:

@@ -30,13 +30,18 @@ _RESERVE_BYTES = 2 * MB  # what the database needs to write down that something 
 
 @dataclass(frozen=True, kw_only=True)
 class RetentionParams:
-    """How long incidents are kept, and how much of the disk they may take."""
+    """How long incidents are kept, and how much of the disk they may use."""
 
-    keep_clear_days: float = param(30.0, unit="d", lo=0.0, doc="incidents whose verdict is clear go when older")
-    keep_days: float = param(365.0, unit="d", lo=0.0, doc="all other incidents go when older")
-    keep_mb: float = param(2000.0, unit="MB", lo=10.0, doc="room for incidents and their pictures; the oldest go")
+    keep_clear_days: float = param(30.0, unit="d", lo=0.0, doc="maximum age of incidents with the verdict clear")
+    keep_days: float = param(365.0, unit="d", lo=0.0, doc="maximum age of all other incidents")
+    keep_mb: float = param(
+        2000.0,
+        unit="MB",
+        lo=10.0,
+        doc="maximum size of all incidents with their pictures; the oldest are removed first",
+    )
     keep_free_mb: float = param(
-        200.0, unit="MB", lo=0.0, doc="room that stays free on the disk: the oldest incidents but confirmed ones go"
+        200.0, unit="MB", lo=0.0, doc="free disk space to keep; below it the oldest incidents go, except confirmed ones"
     )
 
 
