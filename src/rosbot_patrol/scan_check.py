@@ -21,11 +21,12 @@ class ScanCheck:
 
     Attributes:
         problem: why the newest scan was left out, "" where it was not.
+        lost: as given.
     """
 
     def __init__(self, lost: str) -> None:
         self.problem = ""
-        self._lost = lost
+        self.lost = lost
         self._said: set[str] = set()
         self._bad_at = self._good_at = -math.inf
 
@@ -51,7 +52,7 @@ class ScanCheck:
         if len(self._said) >= _SAID:
             self._said.clear()
         self._said.add(problem)
-        log.warning("%s; %s", problem, self._lost)
+        log.warning("%s; %s", problem, self.lost)
 
     def lasts(self, now: float, patience: float) -> bool:
         """Whether no scan could be used for some time [s], though they come."""

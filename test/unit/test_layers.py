@@ -17,7 +17,7 @@ ROWS: list[set[str]] = [
     {"geometry", "tunable", "package_files"},
     {"grid", "scan", "goal"},
     {"maps", "images", "tf", "scan_line", "scan_check"},
-    {"costmap"},
+    {"costmap", "scan_feed"},
     {"planning", "amcl", "gmapping", "exploration", "detection", "rosserial", "control"},
     {"navigation", "patrol", "alerts", "sensors", "simulation"},
     {"closed_loop", "campaign"},

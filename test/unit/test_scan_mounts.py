@@ -24,8 +24,8 @@ from rosbot_patrol.patrol.intruder.lidar_motion import Witness
 from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
 from rosbot_patrol.patrol.visibility.coverage import sight_of_scan
 from rosbot_patrol.replay.nodes.patrol_sight import PatrolSight
-from rosbot_patrol.replay.nodes.scan_feed import ScanFeed
 from rosbot_patrol.scan import LevelScan, level_scan
+from rosbot_patrol.scan_feed import ScanFeed
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.robot.description import load_robot
 from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
@@ -224,9 +224,8 @@ def test_a_replays_patrol_sees_the_same_room(mount: Transform) -> None:
 
 @every_mount
 def test_amcl_and_gmapping_are_fed_with_the_same_room(mount: Transform) -> None:
-    feed = ScanFeed("odom", "base_link")
-    feed.hear_transforms(edges_of(mount), is_static=True)
-    feed.hear_scan(measure(mount, ROOM), 10.0)
+    feed = ScanFeed(tree_of(mount), "odom", "base_link", lost="nothing is mapped")
+    feed.hear(measure(mount, ROOM), 10.0)
     (placed,) = feed.placed(10.0)
     assert distance_to_walls(LevelScan(placed.scan, placed.base_from_laser).points).max() < 0.02
 
@@ -235,9 +234,8 @@ def test_a_laser_that_looks_up_the_wall_is_refused_by_the_replays() -> None:
     mount, scan = mounted(roll=0.8), measure(mounted(), ROOM)
     rooms = Rooms((Room(id=0, name="home", pose=Pose2D()),), source="rooms")
     assert PatrolSight(EyesTopics(), InputParams(), rooms, ["person"], tree_of(mount)).look(scan) is None
-    feed = ScanFeed("odom", "base_link")
-    feed.hear_transforms(edges_of(mount), is_static=True)
-    feed.hear_scan(scan, 10.0)
+    feed = ScanFeed(tree_of(mount), "odom", "base_link", lost="nothing is mapped")
+    feed.hear(scan, 10.0)
     assert list(feed.placed(13.0)) == []
     assert "the laser 'laser' is tilted by 46 deg in 'base_link'" in feed.problem
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,15 @@ from rosbot_patrol.geometry import Pose2D, compose, invert
 
 Array = NDArray[np.float64]
 OdometryAt = Callable[[float | None], Pose2D]  # odom_from_base at a time [s] or the newest; raises TransformError
+
+
+class PoseRecord(NamedTuple):
+    """A geometry_msgs/PoseWithCovarianceStamped: frame, time [s], pose, covariance, shape (6, 6)."""
+
+    frame: str
+    stamp: float
+    pose: Pose2D
+    covariance: Array
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from rosbot_patrol.errors import TransformError, TransformNotYet, TransformTooOld
@@ -60,6 +61,11 @@ class TransformTree:
         if not isinstance(known, _Moving):
             known = self._above[child] = _Moving(self._cache_s)
         return known.add(edge.stamp, parent, place)
+
+    def add_all(self, edges: Iterable[Edge], *, is_static: bool = False) -> None:
+        """Take in several transforms; those that make no sense are left out as by `add`."""
+        for edge in edges:
+            self.add(edge, is_static=is_static)
 
     def clear(self) -> None:
         """Forget what moves: time went back."""

@@ -10,6 +10,7 @@ from rosbot_patrol.geometry import Pose2D, Transform
 from rosbot_patrol.ros.runtime import scan_queue
 from rosbot_patrol.ros.runtime.scan_queue import ScanQueue
 from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan_feed import ScanFeed
 
 
 class LateTf:
@@ -46,17 +47,20 @@ def scan_at(stamp):
 def queued(monkeypatch):
     monkeypatch.setattr(scan_queue, "POLL_S", 0.0)
     monkeypatch.setattr(scan_queue, "IDLE_S", 0.0)
+    monkeypatch.setattr(scan_queue, "now", lambda: 0.0)
 
     def made(tf, stamps):
-        queue = ScanQueue(tf, "odom", "base_link")
+        feed = ScanFeed(tf, "odom", "base_link", lost="nothing happens")
+        queue = ScanQueue(feed)
         for stamp in stamps:
             queue.put(scan_at(stamp))
-        return queue
+        return queue, feed
 
     return made
 
 
-def taken(queue, tries=20):
+def taken(made, tries=20):
+    queue, _ = made
     found = [queue.take() for _ in range(tries)]
     return [placed.scan.stamp for placed in found if placed is not None]
 
@@ -73,12 +77,12 @@ def test_order_holds_however_tf_trickles_in(queued, step):
 
 
 def test_a_scan_from_before_tf_began_holds_up_no_other(queued):
-    queue = queued(LateTf(5.0, first=1.05), [1.0, 1.1, 1.2])
-    assert taken(queue) == [1.1, 1.2]
-    assert queue.dropped == 0  # it waits until it is a second old
+    queue, feed = queued(LateTf(5.0, first=1.05), [1.0, 1.1, 1.2])
+    assert taken((queue, feed)) == [1.1, 1.2]
+    assert feed.dropped == 0  # it waits until it is a second old
 
 
 def test_a_clock_that_is_set_back_begins_a_new_queue(queued):
-    queue = queued(LateTf(5.0), [4.0, 4.1])
+    queue, feed = queued(LateTf(5.0), [4.0, 4.1])
     queue.put(scan_at(1.0))
-    assert taken(queue) == [1.0]
+    assert taken((queue, feed)) == [1.0]

@@ -12,6 +12,8 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 from rosbot_patrol.ros.runtime import scan_watch
 from rosbot_patrol.ros.runtime.scan_watch import ScanWatch
 from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan_feed import ScanFeed
+from rosbot_patrol.tf.tree import TransformTree
 
 
 class Clock:
@@ -30,13 +32,24 @@ def scan_of(value: float, **changes: float) -> LaserScan:
     return LaserScan(frame_id="laser", ranges=np.full(360, value), **{**values, **changes})
 
 
-def hear(watch: ScanWatch, clock: Clock, scan: LaserScan, seconds: float) -> list[bool]:
-    heard = []
-    for _ in range(round(10 * seconds)):
-        clock.time += 0.1
-        watch.hear()
-        heard.append(watch.is_usable(scan))
-    return heard
+class Listener:
+    """A node's feed of scans and its watch over them."""
+
+    def __init__(self, clock: Clock, lost: str) -> None:
+        self.clock = clock
+        self.feed = ScanFeed(TransformTree(), "odom", "base_link", lost=lost)
+        self.watch = ScanWatch(None, self.feed.check)
+
+    def hear(self, scan: LaserScan, seconds: float) -> list[bool]:
+        heard = []
+        for _ in range(round(10 * seconds)):
+            self.clock.time += 0.1
+            self.watch.hear()
+            heard.append(self.feed.hear(scan, self.clock.time))
+        return heard
+
+    def tend(self) -> str:
+        return self.watch.tend(self.clock.time)
 
 
 @pytest.mark.parametrize(
@@ -48,19 +61,19 @@ def hear(watch: ScanWatch, clock: Clock, scan: LaserScan, seconds: float) -> lis
     ],
 )
 def test_scans_that_say_nothing_are_told_until_they_are_well(clock, caplog, scan, named):
-    watch = ScanWatch(None, "no pose is published")
-    assert all(hear(watch, clock, scan_of(2.0), 1.0))
-    assert not any(hear(watch, clock, scan, 0.5))
-    assert watch.tend(clock.time) == ""
-    assert not any(hear(watch, clock, scan, 5.0))
-    assert named in watch.tend(clock.time)
-    assert watch.tend(clock.time).endswith("; no pose is published")
+    listener = Listener(clock, "no pose is published")
+    assert all(listener.hear(scan_of(2.0), 1.0))
+    assert not any(listener.hear(scan, 0.5))
+    assert listener.tend() == ""
+    assert not any(listener.hear(scan, 5.0))
+    assert named in listener.tend()
+    assert listener.tend().endswith("; no pose is published")
     assert len(caplog.records) == 1
-    assert all(hear(watch, clock, scan_of(2.0), 0.2))
-    assert watch.tend(clock.time) == ""
+    assert all(listener.hear(scan_of(2.0), 0.2))
+    assert listener.tend() == ""
 
 
 @pytest.mark.parametrize("limit", [math.inf, 3.4028234663852886e38])
 def test_a_scan_without_an_upper_limit_is_usable(clock, limit):
-    watch = ScanWatch(None, "nothing is mapped")
-    assert all(hear(watch, clock, scan_of(2.0, range_max=limit), 1.0))
+    listener = Listener(clock, "nothing is mapped")
+    assert all(listener.hear(scan_of(2.0, range_max=limit), 1.0))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rosbot_patrol.amcl.initial_pose import PoseRecord
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.geometry import Pose2D, yaw_from_quaternion
 from rosbot_patrol.grid import Grid, GridInfo, occupancy_grid
@@ -28,15 +28,6 @@ class MapRecord(NamedTuple):
 
     grid: Grid
     frame: str
-
-
-class PoseRecord(NamedTuple):
-    """A geometry_msgs/PoseWithCovarianceStamped: frame, time [s], pose, covariance, shape (6, 6)."""
-
-    frame: str
-    stamp: float
-    pose: Pose2D
-    covariance: NDArray[np.float64]
 
 
 class Refused(NamedTuple):

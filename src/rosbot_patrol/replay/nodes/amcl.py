@@ -1,4 +1,4 @@
-"""amcl over a bag: its Localizer, fed as its node feeds it.
+"""amcl over a bag: the core that its node runs, fed with the bag's records.
 
 Scans wait for the odometry of their stamp; a pose of /initialpose counts with the motion since; the map is the one that
 is given, else that of /map (the first of them, or each where `use_map_topic` is set and `first_map_only` is not).
@@ -13,18 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from rosbot_patrol.amcl.initial_pose import taken_pose
-from rosbot_patrol.amcl.localizer import Localizer, Outcome
+from rosbot_patrol.amcl.core import AmclCore, Step
+from rosbot_patrol.amcl.initial_pose import PoseRecord
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.errors import MapError
-from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.replay.bags.records import KINDS, MapRecord, PoseRecord, Refused
-from rosbot_patrol.replay.nodes.scan_feed import ScanFeed
+from rosbot_patrol.replay.bags.records import KINDS, MapRecord, Refused
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
 from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
-from rosbot_patrol.scan_line import PlacedScan
-from rosbot_patrol.tf.tree import Edge
+from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.tf.tree import Edge, TransformTree
 
 INPUTS = (
     Input(name="scan", types=("sensor_msgs/LaserScan",)),
@@ -53,7 +51,7 @@ FIELDS = {
 
 
 class AmclReplay:
-    """A Localizer and the decisions of its node.
+    """An AmclCore on the bag's clock.
 
     Args:
         params: of amcl.
@@ -71,11 +69,10 @@ class AmclReplay:
         self, params: AmclParams, *, grid: Grid | None = None, seed: int = 0, static: Iterable[Edge] = ()
     ) -> None:
         self._params = params
-        self._localizer = Localizer(params, np.random.default_rng(seed))
-        self._feed = ScanFeed(params.odom_frame_id, params.base_frame_id)
-        self._feed.hear_transforms(static, is_static=True)
+        self._tree = TransformTree()
+        self._tree.add_all(static, is_static=True)
+        self._core = AmclCore(params, self._tree, np.random.default_rng(seed))
         self._has_own_map = grid is not None
-        self._odom_from_base: Pose2D | None = None
         self._next_health = -math.inf
         self._counts = dict.fromkeys(("maps", "initial_poses", "ignored", "updates", "resampled", "late", "found"), 0)
         self._poses = Rows(
@@ -96,23 +93,25 @@ class AmclReplay:
     def hear(self, name: str, now: float, content: Any) -> None:
         """Take in a record of the input of that name, recorded at a time [s]."""
         self._tell_health(now)
-        if isinstance(content, Refused):
-            self._counts["ignored"] += 1
-        elif isinstance(content, MapRecord):
-            self._hear_map(content)
-        elif isinstance(content, PoseRecord):
-            self._initial_pose(content)
-        elif name == "scan":
-            self._feed.hear_scan(content, now)
-        else:
-            self._feed.hear_transforms(content, is_static=name == "tf_static")
-        for placed in self._feed.placed(now):
-            self._step(placed)
+        match content:
+            case Refused():
+                self._counts["ignored"] += 1
+            case MapRecord():
+                self._hear_map(content)
+            case PoseRecord():
+                self._counts["initial_poses" if self._core.hear_initial_pose(content, now) else "ignored"] += 1
+            case LaserScan():
+                self._core.feed.hear(content, now)
+            case _:
+                self._tree.add_all(content, is_static=name == "tf_static")
+        for placed in self._core.feed.placed(now):
+            self._note(self._core.step(placed))
 
     def finish(self) -> Result:
         """Poses that were given out, health each second, counts."""
         tables = {"poses": self._poses.table(), "health": self._health.table()}
-        return Result("amcl", self._feed.facts(), counts=self._feed.counts() | self._counts, tables=tables)
+        feed = self._core.feed
+        return Result("amcl", feed.facts(), counts=feed.counts() | self._counts, tables=tables)
 
     def _hear_map(self, record: MapRecord) -> None:
         is_wanted = self._params.use_map_topic and not self._params.first_map_only
@@ -124,31 +123,11 @@ class AmclReplay:
             self._counts["ignored"] += 1
 
     def _take_map(self, grid: Grid) -> None:
-        self._localizer.set_map(grid)
+        self._core.hear_map(grid)
         self._counts["maps"] += 1
 
-    def _initial_pose(self, record: PoseRecord) -> None:
-        try:
-            taken = taken_pose(
-                record.pose,
-                record.covariance,
-                frame=record.frame,
-                stamp=record.stamp,
-                global_frame=self._params.global_frame_id.lstrip("/"),
-                odometry=lambda stamp: self._feed.tree.lookup(self._feed.odom, self._feed.base, stamp),
-            )
-        except ValueError:
-            self._counts["ignored"] += 1
-            return
-        self._counts["initial_poses"] += 1
-        self._localizer.set_pose(taken.pose, taken.covariance, taken.odom_from_base)
-        if self._params.force_update_after_initialpose:
-            self._localizer.request_update()
-
-    def _step(self, placed: PlacedScan) -> None:
-        outcome = self._localizer.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
-        if not outcome.is_late:
-            self._odom_from_base = placed.odom_from_base
+    def _note(self, step: Step) -> None:
+        outcome = step.outcome
         for name, happened in (
             ("updates", outcome.updated),
             ("resampled", outcome.resampled),
@@ -156,25 +135,18 @@ class AmclReplay:
             ("found", outcome.is_found),
         ):
             self._counts[name] += happened
-        self._note(placed.scan.stamp, outcome)
-
-    def _note(self, stamp: float, outcome: Outcome) -> None:
         estimate = outcome.estimate
         if estimate is not None:
             spread = np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0)).tolist()
             weight, count = float(estimate.cluster_weight), estimate.particles
-            self._poses.add(stamp, *estimate.pose, *spread, weight, count, outcome.is_found)
+            self._poses.add(step.stamp, *estimate.pose, *spread, weight, count, outcome.is_found)
 
     def _tell_health(self, now: float) -> None:
         if now < self._next_health:
             return
         stamp = now if math.isinf(self._next_health) else self._next_health
         self._next_health = stamp + HEALTH_S * (1.0 + math.floor((now - stamp) / HEALTH_S))
-        correction, odometry = self._localizer.map_from_odom, self._odom_from_base
-        if correction is None or odometry is None:
-            pose: tuple[float, ...] = (math.nan, math.nan, math.nan)
-        else:
-            pose = compose(correction, odometry)
-        trust = self._localizer.trust
-        state, seeking = trust.state.name.lower(), self._localizer.is_seeking
-        self._health.add(now, *pose, state, trust.belief, trust.agreement, seeking, self._feed.dropped)
+        pose = self._core.pose or (math.nan, math.nan, math.nan)
+        trust = self._core.trust
+        state, seeking = trust.state.name.lower(), self._core.is_seeking
+        self._health.add(now, *pose, state, trust.belief, trust.agreement, seeking, self._core.feed.dropped)

@@ -1,8 +1,4 @@
-"""slam_gmapping over a bag: its Slam, fed as its node feeds it.
-
-Scans wait for the odometry of their stamp, every `throttle_scans`-th is taken in, and a map is made at most once in
-`map_update_interval`.
-"""
+"""slam_gmapping over a bag: the core that its node runs, fed with the bag's records."""
 
 from __future__ import annotations
 
@@ -12,24 +8,21 @@ from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rosbot_patrol.gmapping.core import GmappingCore, Step
 from rosbot_patrol.gmapping.parameters import GmappingParams
-from rosbot_patrol.gmapping.slam import Outcome
-from rosbot_patrol.gmapping.start import started
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.replay.bags.records import KINDS
-from rosbot_patrol.replay.nodes.scan_feed import ScanFeed
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows, Table
 from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
-from rosbot_patrol.scan_line import PlacedScan
-from rosbot_patrol.tf.tree import Edge
+from rosbot_patrol.tf.tree import Edge, TransformTree
 
 INPUTS = (
     Input(name="scan", types=("sensor_msgs/LaserScan",)),
     Input(name="tf", types=TF_TYPES),
     Input(name="tf_static", types=TF_TYPES, is_needed=False),
 )
-WAITING = 50  # scans, as the node's
 
 FIELDS = {
     **{f"{table}.{axis}": Field(tolerance=0.05, unit="m") for table in ("poses", "trajectory") for axis in "xy"},
@@ -49,7 +42,7 @@ FIELDS = {
 
 
 class GmappingReplay:
-    """A Slam and the decisions of its node.
+    """A GmappingCore on the bag's clock.
 
     Args:
         params: of slam_gmapping; with `map_file` a saved map is gone on with.
@@ -63,12 +56,9 @@ class GmappingReplay:
     kinds = KINDS
 
     def __init__(self, params: GmappingParams, *, static: Iterable[Edge] = ()) -> None:
-        self._params = params
-        self._slam = started(params)
-        self._feed = ScanFeed(params.odom_frame, params.base_frame, WAITING)
-        self._feed.hear_transforms(static, is_static=True)
-        self._heard = 0
-        self._map_stamp = -math.inf
+        self._tree = TransformTree()
+        self._tree.add_all(static, is_static=True)
+        self._core = GmappingCore(params, self._tree)
         self._counts = {"updates": 0, "resampled": 0, "blind": 0}
         self._poses = Rows(STAMP, "x", "y", "yaw", "entropy", "effective", "failed")
         self._maps = Rows(STAMP, "known", "occupied", "digest")
@@ -78,51 +68,43 @@ class GmappingReplay:
 
     def hear(self, name: str, now: float, content: Any) -> None:
         """Take in a record of the input of that name, recorded at a time [s]."""
-        if name == "scan":
-            self._heard += 1
-            if (self._heard - 1) % self._params.throttle_scans == 0:
-                self._feed.hear_scan(content, now)
-        else:
-            self._feed.hear_transforms(content, is_static=name == "tf_static")
-        for placed in self._feed.placed(now):
-            self._step(placed)
+        feed = self._core.feed
+        if name != "scan":
+            self._tree.add_all(content, is_static=name == "tf_static")
+        elif self._core.is_wanted():
+            feed.hear(content, now)
+        for placed in feed.placed(now):
+            self._note(self._core.step(placed))
 
     def finish(self) -> Result:
         """The best pose at each update, the maps on the way, the best particle's whole way and its map."""
         tables = {"poses": self._poses.table(), "maps": self._maps.table(), "trajectory": self._trajectory()}
-        counts = self._feed.counts() | self._counts
-        maps = {"map": known_part(self._slam.grid())}
-        return Result("slam_gmapping", self._feed.facts(), counts, tables, maps)
+        feed = self._core.feed
+        maps = {"map": known_part(self._core.slam.grid())}
+        return Result("slam_gmapping", feed.facts(), feed.counts() | self._counts, tables, maps)
 
-    def _step(self, placed: PlacedScan) -> None:
-        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
+    def _note(self, step: Step) -> None:
+        outcome, slam = step.outcome, self._core.slam
+        self._counts["blind"] += outcome.is_blind
         if not outcome.updated:
-            self._counts["blind"] += outcome.is_blind
             return
-        self._note(placed.scan.stamp, outcome)
-        since = placed.scan.stamp - self._map_stamp
-        if since > self._params.map_update_interval or since < 0.0:
-            self._map_stamp = placed.scan.stamp
-            self._note_map(placed.scan.stamp)
-
-    def _note(self, stamp: float, outcome: Outcome) -> None:
         self._counts["updates"] += 1
         self._counts["resampled"] += outcome.resampled
-        self._counts["blind"] += outcome.is_blind
-        pose = self._slam.poses[self._slam.best].tolist()
-        self._poses.add(stamp, *pose, self._slam.entropy, outcome.effective, outcome.failed)
+        pose = slam.poses[slam.best].tolist()
+        self._poses.add(step.stamp, *pose, slam.entropy, outcome.effective, outcome.failed)
+        if step.grid is not None:
+            self._note_map(step.stamp, step.grid.cells)
 
-    def _note_map(self, stamp: float) -> None:
-        cells = self._slam.grid().cells
+    def _note_map(self, stamp: float, cells: NDArray[np.int8]) -> None:
         digest = hashlib.sha256(np.ascontiguousarray(cells).tobytes()).hexdigest()[:12]
         known, occupied = int(np.count_nonzero(cells >= 0)), int(np.count_nonzero(cells == 100))
         self._maps.add(stamp, known, occupied, digest)
 
     def _trajectory(self) -> Table:
-        if not self._slam.stamps:
+        if not self._core.slam.stamps:
             return Rows(STAMP, "x", "y", "yaw").table()
-        x, y, yaw = self._slam.trajectory.T
-        return {STAMP: np.array(self._slam.stamps), "x": x, "y": y, "yaw": yaw}
+        x, y, yaw = self._core.slam.trajectory.T
+        return {STAMP: np.array(self._core.slam.stamps), "x": x, "y": y, "yaw": yaw}
 
 
 def known_part(grid: Grid) -> Grid:

@@ -24,8 +24,6 @@ dynamic_reconfigure: see `amcl_tuning`.
 from __future__ import annotations
 
 import logging
-import math
-import threading
 
 import numpy as np
 import rospy
@@ -35,31 +33,28 @@ from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 from std_srvs.srv import Empty, EmptyResponse, Trigger, TriggerResponse
 
-from rosbot_patrol.amcl.initial_pose import taken_pose
-from rosbot_patrol.amcl.localizer import Localizer, Outcome, start_of
+from rosbot_patrol.amcl.core import AmclCore
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.trust import State
-from rosbot_patrol.geometry import Pose2D, compose
-from rosbot_patrol.grid import Grid
 from rosbot_patrol.ros.amcl.look_around import LookAround
 from rosbot_patrol.ros.amcl.maps import MapSource
 from rosbot_patrol.ros.amcl.outputs import AmclOutputs, spread_of, verdict
 from rosbot_patrol.ros.amcl.saved_pose import SavedPose
 from rosbot_patrol.ros.amcl.tuning import AmclTuning
-from rosbot_patrol.ros.messages.convert import pose2d_from_pose, scan_from_msg
+from rosbot_patrol.ros.messages.convert import initial_pose_from_msg, scan_from_msg
 from rosbot_patrol.ros.messages.fast_arrays import SetMapFast
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import Loop, load_params, now, run_node
 from rosbot_patrol.ros.runtime.process import Priority
-from rosbot_patrol.ros.runtime.scan_queue import PlacedScan, ScanQueue
+from rosbot_patrol.ros.runtime.scan_queue import ScanQueue
 from rosbot_patrol.ros.runtime.scan_watch import ScanWatch
 from rosbot_patrol.ros.runtime.transforms import Transforms
+from rosbot_patrol.scan_line import PlacedScan
 
 log = logging.getLogger(__name__)
 
 
 class AmclNode:
-    """The edge of a Localizer.
+    """The topics, services and threads of an AmclCore.
 
     Args:
         params: of amcl.
@@ -67,25 +62,17 @@ class AmclNode:
 
     def __init__(self, params: AmclParams) -> None:
         self._params = params
-        self._global = params.global_frame_id.lstrip("/")
-        self._odom = params.odom_frame_id.lstrip("/")
-        self._base = params.base_frame_id.lstrip("/")
-        self._lock = threading.Lock()  # of the localizer
-        self._localizer = Localizer(params, np.random.default_rng())
         self._transforms = Transforms()
-        self._scans = ScanQueue(self._transforms, self._odom, self._base)
-        self._watch = ScanWatch(self._transforms, "no pose is published")
-        self._odom_from_base: Pose2D | None = None
-        self._stamp = -math.inf  # of the newest scan taken in
-        self._was_placed = False  # by initialpose, set_map or global_localization
+        self._core = AmclCore(params, self._transforms, np.random.default_rng())
+        self._scans = ScanQueue(self._core.feed)
+        self._watch = ScanWatch(self._transforms, self._core.feed.check)
         self._saved = SavedPose()
         self._is_first = True
         self._health = Health()
-        self._maps = MapSource(params, self._take_map)
+        self._maps = MapSource(params, self._core.hear_map)
         self._outputs = AmclOutputs(params)
-        self._look_around = LookAround(self._transforms, self._odom, self._base, self._is_found)
-        self._late = 0  # scans
-        self._was_seeking = False
+        feed = self._core.feed
+        self._look_around = LookAround(self._transforms, feed.odom, feed.base, lambda: self._core.is_found)
         self._services = [
             rospy.Service("global_localization", Empty, self._localize_globally),
             rospy.Service("request_nomotion_update", Empty, self._request_update),
@@ -114,144 +101,94 @@ class AmclNode:
     # Inputs
 
     def _scan(self, message: LaserScanMsg) -> None:
-        scan = scan_from_msg(message)
         self._watch.hear()
-        if self._watch.is_usable(scan):
-            self._scans.put(scan)
-
-    def _take_map(self, grid: Grid) -> None:
-        with self._lock:
-            self._localizer.set_map(grid)
+        self._scans.put(scan_from_msg(message))
 
     def _set_map(self, request: SetMapRequest) -> SetMapResponse:
         taken = self._maps.take(request.map, "set_map")
         if taken:
             self._initial_pose(request.initial_pose)
             if self._params.force_update_after_set_map:
-                self._request_update(None)
+                self._core.request_update()
         return SetMapResponse(success=taken)
 
     def _initial_pose(self, message: PoseWithCovarianceStamped) -> None:
         try:
-            taken = taken_pose(
-                pose2d_from_pose(message.pose.pose, "the orientation of an initial pose"),
-                np.array(message.pose.covariance),
-                frame=message.header.frame_id.lstrip("/"),
-                stamp=message.header.stamp.to_sec(),
-                global_frame=self._global,
-                odometry=lambda stamp: self._transforms.lookup(self._odom, self._base, stamp),
-            )
+            record = initial_pose_from_msg(message)
         except ValueError as err:
             log.warning("initial pose is ignored: %s", err)
             return
-        for note in taken.notes:
-            log.warning("%s", note)
-        log.info("Setting pose (%.6f): %.3f %.3f %.3f", now(), *taken.pose)
-        with self._lock:
-            self._was_placed = True
-            self._localizer.set_pose(taken.pose, taken.covariance, taken.odom_from_base)
-            if self._params.force_update_after_initialpose:
-                self._localizer.request_update()
+        self._core.hear_initial_pose(record, now())
 
     def _localize_globally(self, _request: object) -> EmptyResponse:
-        with self._lock:
-            started = self._was_placed = self._localizer.localize_globally()
-        if started:
+        if self._core.localize_globally():
             log.info("Initializing with uniform distribution")
         else:
             log.error("global_localization: there is no map with free floor yet")
         return EmptyResponse()
 
     def _relocalize(self, _request: object) -> TriggerResponse:
-        with self._lock:
-            started = self._localizer.seek()
-        if not started:
+        if not self._core.seek():
             return TriggerResponse(False, "there is no map with free floor yet, or the parameter seek is 'never'")
         self._look_around.start()
         log.info("searching the whole map for the robot, and looking around once")
         return TriggerResponse(True, "searching the whole map, and looking around once: see ~health")
 
-    def _is_found(self) -> bool:
-        return self._localizer.trust.state is State.LOCALISED and not self._localizer.is_seeking
-
     def _take_params(self, params: AmclParams) -> None:
-        with self._lock:
-            self._localizer.reconfigure(params)
-            self._params = self._outputs.params = params
+        self._core.configure(params)
+        self._params = self._outputs.params = params
         self._saving.set_rate(max(params.save_pose_rate, 0.1))
 
     def _request_update(self, _request: object) -> EmptyResponse:
-        with self._lock:
-            self._localizer.request_update()
+        self._core.request_update()
         return EmptyResponse()
 
     # Step and outputs
 
     def _step(self, placed: PlacedScan) -> None:
-        scan = placed.scan
         if self._is_first:
             self._is_first = False
             self._resume(placed)
-        with self._lock:
-            outcome = self._localizer.update(scan, placed.odom_from_base, placed.base_from_laser)
-            correction = self._localizer.map_from_odom
-            poses = self._localizer.filter.poses
-            if not outcome.is_late:
-                self._odom_from_base, self._stamp = placed.odom_from_base, scan.stamp
-        self._late += outcome.is_late
-        if correction is not None and not outcome.is_late:
-            self._outputs.send_correction(correction, scan.stamp)
-        if outcome.is_blind:
+        step = self._core.step(placed)
+        if step.map_from_odom is not None:
+            self._outputs.send_correction(step.map_from_odom, step.stamp)
+        if step.outcome.is_blind:
+            frame = placed.scan.frame_id
             rospy.logwarn_throttle(
-                10.0, f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
+                10.0, f"no beam of the scan of frame '{frame}' measured anything: only the odometry is followed"
             )
-        if outcome.estimate is not None:
-            self._outputs.send_pose(outcome.estimate, scan.stamp)
-        if outcome.updated:
-            self._outputs.send_cloud(poses, scan.stamp)
-        self._tell_of_search(outcome)
-
-    def _tell_of_search(self, outcome: Outcome) -> None:
-        if outcome.is_found and outcome.estimate is not None:
-            x, y, yaw = outcome.estimate.pose
-            log.warning("found the robot at %.2f %.2f %.2f, the estimate has moved there", x, y, yaw)
-        was, self._was_seeking = self._was_seeking, self._localizer.is_seeking
-        if self._was_seeking and not was:
-            log.warning("searching the whole map for the robot: %s", self._localizer.trust.reason or "asked to")
-        elif was and not self._was_seeking and not outcome.is_found:
-            log.info("the search is over: the estimate came right by itself, or a pose was set")
+        if step.outcome.estimate is not None:
+            self._outputs.send_pose(step.outcome.estimate, step.stamp)
+        if step.outcome.updated:
+            self._outputs.send_cloud(step.particles, step.stamp)
 
     def _resume(self, placed: PlacedScan) -> None:
-        """Start from what an amcl before this one saved, where that is of this run."""
+        """Start from what an amcl before this one saved, if that is of this run."""
         own = self._saved.own(self._params, placed.scan.stamp)
         then = None if own is not None else self._saved.odometry(self._params, placed.odom_from_base)
-        if self._was_placed or (own is None and then is None):
-            return
-        with self._lock:
-            self._localizer.set_pose(*start_of(own or self._params), then)
+        if own is not None or then is not None:
+            self._core.resume(own or self._params, then)
 
     def _save_when_wanted(self, _now: float) -> None:
         if self._params.save_pose_rate > 0.0:
             self._save_pose()
 
     def _save_pose(self) -> None:
-        with self._lock:
-            correction, estimate = self._localizer.map_from_odom, self._localizer.estimate
-            odometry, stamp = self._odom_from_base, self._stamp
-        if correction is None or estimate is None or odometry is None:
+        fix = self._core.fix()
+        if fix is None:
             return
-        pose = compose(correction, odometry)
-        values = (*pose, *(float(v) for v in np.diag(estimate.covariance)))
+        values = (*fix.pose, *(float(v) for v in np.diag(fix.estimate.covariance)))
         try:
-            self._saved.save(values, stamp, odometry)
+            self._saved.save(values, fix.stamp, fix.odom_from_base)
         except (OSError, rospy.ROSException) as err:
             rospy.logwarn_throttle(30.0, f"the pose cannot be saved on the parameter server: {err}")
 
     def _tell_health(self, current: float) -> None:
         silence = self._watch.tend(current)
         level, message = (WARN, silence) if silence else self._state()
-        trust, estimate, seeking = self._localizer.trust, self._localizer.estimate, self._localizer.is_seeking
-        values: dict[str, object] = {"scans dropped": self._scans.dropped, "scans late": self._late}
+        core = self._core
+        trust, estimate, seeking = core.trust, core.estimate, core.is_seeking
+        values: dict[str, object] = {"scans dropped": core.feed.dropped, "scans late": core.late}
         if estimate is not None:
             spread = spread_of(estimate)
             values |= {f"std_{key}": f"{value:.3f}" for key, value in zip(("x", "y", "yaw"), spread, strict=True)}
@@ -260,15 +197,15 @@ class AmclNode:
         if level == OK:
             level, message = verdict(trust, estimate, self._params, seeking=seeking)
         self._health.set("Standard deviation", level, message, values)
-        self._outputs.send_health(trust, estimate, max(self._stamp, 0.0), seeking=seeking)
+        self._outputs.send_health(trust, estimate, max(core.stamp, 0.0), seeking=seeking)
 
     def _state(self) -> tuple[int, str]:
-        if not self._localizer.has_map:
+        if not self._core.has_map:
             return ERROR, "there is no map yet"
-        if self._scans.problem:
-            rospy.logwarn_throttle(10.0, f"scans are dropped: {self._scans.problem}")
-            return ERROR, f"scans are dropped: {self._scans.problem}"
-        if self._localizer.map_from_odom is None:
+        if self._core.feed.problem:
+            rospy.logwarn_throttle(10.0, f"scans are dropped: {self._core.feed.problem}")
+            return ERROR, f"scans are dropped: {self._core.feed.problem}"
+        if self._core.map_from_odom is None:
             return WARN, "waiting for the first scan"
         return OK, "localised"
 

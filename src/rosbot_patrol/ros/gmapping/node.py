@@ -27,26 +27,22 @@ from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 from std_msgs.msg import Float64
 
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.gmapping.core import GmappingCore
 from rosbot_patrol.gmapping.parameters import GmappingParams
-from rosbot_patrol.gmapping.slam import Outcome
-from rosbot_patrol.gmapping.start import started
+from rosbot_patrol.grid import Grid
 from rosbot_patrol.ros.messages.convert import grid_to_msg, scan_from_msg, transform_to_msg
 from rosbot_patrol.ros.messages.fast_arrays import GetMapFast, GridMsg
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import Loop, load_params, run_node
-from rosbot_patrol.ros.runtime.scan_queue import PlacedScan, ScanQueue
+from rosbot_patrol.ros.runtime.scan_queue import ScanQueue
 from rosbot_patrol.ros.runtime.scan_watch import ScanWatch
 from rosbot_patrol.ros.runtime.transforms import Transforms
-from rosbot_patrol.scan import LaserScan
 
 log = logging.getLogger(__name__)
 
-WAITING = 50  # scans: more than a fast lidar sends before one that tf cannot place is given up and told of
-
 
 class GmappingNode:
-    """The edge of a Slam.
+    """The topics, the service and the threads of a GmappingCore.
 
     Args:
         params: of slam_gmapping.
@@ -58,17 +54,12 @@ class GmappingNode:
     def __init__(self, params: GmappingParams) -> None:
         self._params = params
         self._map_frame = params.map_frame.lstrip("/")
-        self._odom = params.odom_frame.lstrip("/")
-        self._slam = started(params)
         self._transforms = Transforms()
-        self._scans = ScanQueue(self._transforms, self._odom, params.base_frame.lstrip("/"), WAITING)
-        self._watch = ScanWatch(self._transforms, "nothing is mapped")
-        self._heard = 0
-        self._map_stamp = -math.inf  # of the scan that the map was last made after
+        self._core = GmappingCore(params, self._transforms)
+        self._scans = ScanQueue(self._core.feed)
+        self._watch = ScanWatch(self._transforms, self._core.feed.check)
         self._map: GridMsg | None = None
-        self._correction = Pose2D()  # map_from_odom
         self._sent_stamp = -math.inf  # of the transform last told
-        self._note = ""  # what was wrong with the last update
         self._lock = threading.Lock()  # of the map's message
         self._health = Health()
         self._broadcaster = tf2_ros.TransformBroadcaster()
@@ -82,26 +73,27 @@ class GmappingNode:
 
     def run(self) -> None:
         """Work until shutdown."""
-        info, p = self._slam.maps.info, self._params
+        info, p = self._core.slam.maps.info, self._params
         log.info("Mapping %d X %d cells @ %.3f m with %d particles", info.width, info.height, p.delta, p.particles)
         Loop(1.0, self._tell_health, name="health").start()
         if self._params.transform_publish_period > 0.0:
             Loop(1.0 / self._params.transform_publish_period, self._send_transform, name="transform").start()
         while not rospy.is_shutdown():
             placed = self._scans.take()
-            if placed is not None:
-                self._step(placed)
+            if placed is None:
+                continue
+            step = self._core.step(placed)
+            if step.outcome.updated:
+                self._entropy.publish(Float64(data=self._core.slam.entropy))
+            if step.grid is not None:
+                self._publish_map(step.grid, step.stamp)
 
     # Inputs
 
     def _scan(self, message: LaserScanMsg) -> None:
         self._watch.hear()
-        self._heard += 1
-        if (self._heard - 1) % self._params.throttle_scans:
-            return
-        scan = scan_from_msg(message)
-        if self._watch.is_usable(scan):
-            self._scans.put(scan)
+        if self._core.is_wanted():
+            self._scans.put(scan_from_msg(message))
 
     def _get_map(self, _request: object) -> GetMapResponse:
         with self._lock:
@@ -109,37 +101,10 @@ class GmappingNode:
                 raise rospy.ServiceException("there is no map yet: no scan has been taken in")
             return GetMapFast._response_class(map=self._map)
 
-    # Step and outputs
+    # Outputs
 
-    def _step(self, placed: PlacedScan) -> None:
-        outcome = self._slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
-        if self._slam.map_from_odom is not None:
-            self._correction = self._slam.map_from_odom
-        self._note = self._describe(outcome, placed.scan)
-        if not outcome.updated:
-            return
-        self._entropy.publish(Float64(data=self._slam.entropy))
-        since = placed.scan.stamp - self._map_stamp
-        if self._map is None or since > self._params.map_update_interval or since < 0.0:
-            self._map_stamp = placed.scan.stamp
-            self._publish_map(placed.scan.stamp)
-
-    def _describe(self, outcome: Outcome, scan: LaserScan) -> str:
-        """What is wrong with an update, in a sentence; warned of now and then."""
-        text = ""
-        if outcome.is_blind:
-            text = f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
-        elif outcome.failed:
-            count = self._params.particles
-            text = f"scan matching failed for {outcome.failed} of {count} particles: they follow the odometry"
-        elif not outcome.updated:
-            return self._note
-        if text:
-            rospy.logwarn_throttle(10.0, text)
-        return text
-
-    def _publish_map(self, stamp: float) -> None:
-        plain = grid_to_msg(self._slam.grid(), self._map_frame, stamp, load_time=stamp)
+    def _publish_map(self, grid: Grid, stamp: float) -> None:
+        plain = grid_to_msg(grid, self._map_frame, stamp, load_time=stamp)
         message = GridMsg()
         message.header, message.info, message.data = plain.header, plain.info, plain.data
         with self._lock:
@@ -153,28 +118,31 @@ class GmappingNode:
         if stamp == self._sent_stamp:  # the clock stood, and tf warns of what it has heard
             return
         self._sent_stamp = stamp
-        self._broadcaster.sendTransform(transform_to_msg(self._correction, self._map_frame, self._odom, stamp))
+        self._broadcaster.sendTransform(
+            transform_to_msg(self._core.correction, self._map_frame, self._core.feed.odom, stamp)
+        )
 
     def _tell_health(self, current: float) -> None:
         silence = self._watch.tend(current)
         level, text = (WARN, silence) if silence else self._state()
-        maps = self._slam.maps
+        maps = self._core.slam.maps
         values = {
-            "updates": len(self._slam.stamps),
-            "scans dropped": self._scans.dropped,
+            "updates": len(self._core.slam.stamps),
+            "scans dropped": self._core.feed.dropped,
             "tiles": maps.tiles_used,
             "map [MB]": f"{maps.megabytes:.1f}",
         }
         self._health.set("", level, text, values)
 
     def _state(self) -> tuple[int, str]:
-        if self._scans.problem:
-            rospy.logwarn_throttle(10.0, f"scans are dropped: {self._scans.problem}")
-            return ERROR, f"scans are dropped: {self._scans.problem}"
-        if self._slam.map_from_odom is None:
+        core = self._core
+        if core.feed.problem:
+            rospy.logwarn_throttle(10.0, f"scans are dropped: {core.feed.problem}")
+            return ERROR, f"scans are dropped: {core.feed.problem}"
+        if core.slam.map_from_odom is None:
             return WARN, "waiting for the first scan"
-        if self._note:
-            return WARN, self._note
+        if core.problem:
+            return WARN, core.problem
         return OK, "mapping"
 
 

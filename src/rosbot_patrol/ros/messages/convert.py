@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Pose, PoseStamped, Quaternion, TransformStamped, Twist
+from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry, Path
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
+from rosbot_patrol.amcl.initial_pose import PoseRecord
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.geometry import Pose2D, Twist2D, quaternion_from_yaw, yaw_from_quaternion
 from rosbot_patrol.grid import Grid, GridInfo, occupancy_grid
@@ -48,6 +49,13 @@ def pose_to_msg(pose: Pose2D, frame: str, stamp: float) -> PoseStamped:
 def pose_from_msg(msg: PoseStamped) -> tuple[Pose2D, str, float]:
     """Pose, frame (no leading slash), stamp [s]; ValueError as `pose2d_from_pose`."""
     return pose2d_from_pose(msg.pose), msg.header.frame_id.lstrip("/"), msg.header.stamp.to_sec()
+
+
+def initial_pose_from_msg(msg: PoseWithCovarianceStamped) -> PoseRecord:
+    """A pose with its covariance for amcl; ValueError as `pose2d_from_pose`."""
+    pose = pose2d_from_pose(msg.pose.pose, "the orientation of an initial pose")
+    covariance = np.array(msg.pose.covariance, dtype=np.float64).reshape(6, 6)
+    return PoseRecord(msg.header.frame_id.lstrip("/"), msg.header.stamp.to_sec(), pose, covariance)
 
 
 def twist_to_msg(twist: Twist2D) -> Twist:

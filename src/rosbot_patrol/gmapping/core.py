@@ -1,0 +1,102 @@
+"""What the node slam_gmapping does with its inputs, without ROS: scans in, maps and corrections out.
+
+The node and its replay over a bag both run it.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.gmapping.parameters import GmappingParams
+from rosbot_patrol.gmapping.slam import Outcome
+from rosbot_patrol.gmapping.start import started
+from rosbot_patrol.grid import Grid
+from rosbot_patrol.scan import LaserScan
+from rosbot_patrol.scan_feed import ScanFeed
+from rosbot_patrol.scan_line import PlacedScan
+from rosbot_patrol.tf.frames import Frames
+
+log = logging.getLogger(__name__)
+
+_WAITING = 50  # scans: more than a fast lidar sends before one that tf cannot place is given up and told of
+_REPEAT = 10.0  # between two warnings about updates [s]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one scan brought.
+
+    Attributes:
+        stamp: time of the scan [s].
+        outcome: of the update.
+        grid: the map, None if none is due (at most one in `map_update_interval`).
+    """
+
+    stamp: float
+    outcome: Outcome
+    grid: Grid | None = None
+
+
+class GmappingCore:
+    """A Slam and everything that its node decides.
+
+    Args:
+        params: of slam_gmapping; with `map_file` a saved map is gone on with.
+        frames: transforms.
+
+    Raises:
+        MapError: the extent or the saved map makes no sense.
+
+    Attributes:
+        slam: the maps and poses.
+        feed: where scans come in and wait for the odometry.
+        correction: map_from_odom, the identity before the first update.
+        problem: what was wrong with the last update, "" if nothing.
+    """
+
+    def __init__(self, params: GmappingParams, frames: Frames) -> None:
+        self.slam = started(params)
+        self.feed = ScanFeed(frames, params.odom_frame, params.base_frame, lost="nothing is mapped", size=_WAITING)
+        self.correction = Pose2D()
+        self.problem = ""
+        self._params = params
+        self._heard = 0
+        self._map_stamp = -math.inf  # of the scan that the map was last made after
+        self._warned = -math.inf
+
+    def is_wanted(self) -> bool:
+        """Count a scan that came; whether it is one to take in: every `throttle_scans`-th is."""
+        self._heard += 1
+        return (self._heard - 1) % self._params.throttle_scans == 0
+
+    def step(self, placed: PlacedScan) -> Step:
+        """Take in a scan that `feed` has handed out."""
+        slam, stamp = self.slam, placed.scan.stamp
+        outcome = slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
+        if slam.map_from_odom is not None:
+            self.correction = slam.map_from_odom
+        self._judge(outcome, placed.scan)
+        since = stamp - self._map_stamp
+        if not outcome.updated or 0.0 <= since <= self._params.map_update_interval:
+            return Step(stamp, outcome)
+        self._map_stamp = stamp
+        return Step(stamp, outcome, slam.grid())
+
+    def _judge(self, outcome: Outcome, scan: LaserScan) -> None:
+        """Note what is wrong with an update, and warn of it now and then."""
+        if outcome.is_blind:
+            text = f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
+        elif outcome.failed:
+            count = self._params.particles
+            text = f"scan matching failed for {outcome.failed} of {count} particles: they follow the odometry"
+        elif not outcome.updated:
+            return
+        else:
+            text = ""
+        self.problem = text
+        if text and not 0.0 <= scan.stamp - self._warned <= _REPEAT:
+            self._warned = scan.stamp
+            log.warning("%s", text)
