@@ -10,6 +10,7 @@
     |  `- LaserTilted      a laser whose scan is no plan of the room
     |- BagError           a recorded bag that cannot be used
     |- ResultError        a stored result of a replay that cannot be used
+    |- StateError         a file of the state folder that cannot be used
     |- PlanningError      no global plan
     |  |- StartOccupied
     |  |- GoalOccupied
@@ -106,6 +107,10 @@ class BagError(_FileError):
 
 class ResultError(_FileError):
     """A stored result of a replay that cannot be used: which file, and why."""
+
+
+class StateError(_FileError):
+    """A file that a program of ours wrote and that cannot be used now: which file, and why."""
 
 
 class PlanningError(PatrolError):

@@ -1,9 +1,15 @@
-"""Files that are either whole or not there."""
+"""Files of state: whole or not there, JSON objects, and lines that are on the disk before they count."""
 
 from __future__ import annotations
 
+import errno
+import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+from rosbot_patrol.errors import StateError
 
 
 def write_atomic(path: Path, data: bytes) -> None:
@@ -40,3 +46,45 @@ def sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def write_json(path: Path, tree: Mapping[str, Any]) -> None:
+    """Write a JSON object with `write_atomic`. Raises OSError."""
+    write_atomic(path, json.dumps(tree, indent=1).encode())
+
+
+def read_json(path: Path) -> dict[str, Any] | None:
+    """The object in a JSON file; None if there is no such file.
+
+    Raises:
+        StateError: the file cannot be read, or holds no JSON object.
+    """
+    try:
+        tree = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, RecursionError) as err:
+        raise StateError(path, f"cannot be read ({err})") from err
+    if not isinstance(tree, dict):
+        raise StateError(path, "holds no group of values")
+    return tree
+
+
+def append_line(path: Path, line: bytes) -> None:
+    """Append bytes to a file, all or none, and sync them to the disk. The folder has to exist.
+
+    Raises:
+        OSError: the disk does not take them; the file is as it was.
+    """
+    is_new = not path.exists()
+    handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+    try:
+        size = os.fstat(handle).st_size
+        if os.write(handle, line) != len(line):
+            os.ftruncate(handle, size)
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        os.fdatasync(handle)
+    finally:
+        os.close(handle)
+    if is_new:
+        sync_folder(path.parent)

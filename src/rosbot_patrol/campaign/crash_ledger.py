@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from rosbot_patrol.campaign.crash_plan import ALL
 from rosbot_patrol.campaign.intervals import wilson
 from rosbot_patrol.campaign.plan import CLEAR
 from rosbot_patrol.counts import count_of
+from rosbot_patrol.files import append_line
 
 CLOCK_SLACK = 1.0  # between the clocks of two programs [s]
 
@@ -35,10 +35,7 @@ class Journal:
     def add(self, kind: str, **facts: Any) -> None:
         """Write a line. Raises OSError."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"kind": kind, **facts}, ensure_ascii=False) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+        append_line(self.path, json.dumps({"kind": kind, **facts}, ensure_ascii=False).encode() + b"\n")
 
     def read(self) -> list[dict[str, Any]]:
         """All lines so far."""

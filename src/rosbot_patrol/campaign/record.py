@@ -10,8 +10,8 @@ from typing import Any
 
 from rosbot_patrol.campaign.plan import CONFIRMED
 from rosbot_patrol.counts import count_of
-from rosbot_patrol.errors import ParamError
-from rosbot_patrol.files import write_atomic
+from rosbot_patrol.errors import ParamError, StateError
+from rosbot_patrol.files import read_json, write_json
 
 RESULT, PLAN, SETTINGS = "result.json", "patrol.json", "campaign.json"
 BESIDE = 1.0  # a notice that tells of a place so far from anybody tells of nobody [m]
@@ -160,7 +160,7 @@ class CampaignFolder:
         begun = _read(path)
         now = json.loads(json.dumps(asdict(settings)))
         if begun is None:
-            write_atomic(path, json.dumps(now, indent=1).encode())
+            write_json(path, now)
         elif (begun := {"faults": False, **begun}) != now:  # from before there were any
             differs = ", ".join(f"{k} {begun.get(k)}, not {v}" for k, v in now.items() if begun.get(k) != v)
             raise ParamError(str(folder), f"holds a campaign of another kind ({differs}): name another folder")
@@ -187,11 +187,6 @@ class CampaignFolder:
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError) as err:
-        raise ParamError(str(path), f"cannot be read ({err}): remove it") from err
-    if not isinstance(tree, dict):
-        raise ParamError(str(path), "is no record of a campaign: remove it")
-    return tree
+        return read_json(path)
+    except StateError as err:
+        raise ParamError(str(path), f"{err.problem}: remove it") from err

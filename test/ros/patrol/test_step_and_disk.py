@@ -116,13 +116,13 @@ def desk(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     monkeypatch.setattr(rospy, "Publisher", lambda *_, **__: SimpleNamespace(publish=published.append))
     monkeypatch.setattr(rospy, "get_time", lambda: 5.0)
     monkeypatch.setattr(patrol_orders, "CallerService", lambda *_: None)
-    write = patrol_orders.write_memory
+    write = patrol_orders.write_json
 
     def slowly(path: Path, memory) -> None:
         disk.write()
         write(path, memory)
 
-    monkeypatch.setattr(patrol_orders, "write_memory", slowly)
+    monkeypatch.setattr(patrol_orders, "write_json", slowly)
     later: list[object] = []
     made = patrol_orders.ArmingDesk(Arming(ArmingRules()), tmp_path / "arming.json", told.append, later.append)
     return SimpleNamespace(desk=made, disk=disk, published=published, told=told, file=tmp_path / "arming.json")

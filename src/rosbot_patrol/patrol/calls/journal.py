@@ -8,7 +8,6 @@ before lines are dropped: a kill between the two leaves more lines than the mark
 
 from __future__ import annotations
 
-import errno
 import json
 import logging
 import os
@@ -16,7 +15,8 @@ import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rosbot_patrol.files import sync_folder, write_whole
+from rosbot_patrol.errors import StateError
+from rosbot_patrol.files import append_line, read_json, write_whole
 
 log = logging.getLogger(__name__)
 
@@ -61,10 +61,7 @@ class Journal:
         number = self._mark.last + 1
         line = b"\n" * self._is_cut + json.dumps([number, room_id, wall]).encode() + b"\n"
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        is_new = not self._path.exists()
-        self._append(line)
-        if is_new:
-            sync_folder(self._path.parent)
+        append_line(self._path, line)
         self._is_cut = False
         self._mark = _Mark(last=number, size=self._mark.size + len(line), crc=zlib.crc32(line, self._mark.crc))
         self._try_mark()
@@ -77,17 +74,6 @@ class Journal:
             self._write_mark(mark)
             os.truncate(self._path, 0)
             self._mark = mark
-
-    def _append(self, line: bytes) -> None:
-        handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-        try:
-            size = os.fstat(handle).st_size
-            if os.write(handle, line) != len(line):
-                os.ftruncate(handle, size)
-                raise OSError(errno.ENOSPC, "No space left on device", str(self._path))
-            os.fdatasync(handle)
-        finally:
-            os.close(handle)
 
     def _write_mark(self, mark: _Mark) -> None:
         write_whole(self._mark_path, json.dumps(asdict(mark)).encode())
@@ -127,11 +113,11 @@ class Journal:
 
     def _read_mark(self) -> _Mark | None:
         try:
-            tree = json.loads(self._mark_path.read_bytes())
+            tree = read_json(self._mark_path)
+            if tree is None:  # of an earlier version, or the first start
+                return None
             return _Mark(last=int(tree["last"]), size=int(tree["size"]), crc=int(tree["crc"]))
-        except (FileNotFoundError, NotADirectoryError):  # of an earlier version, or the first start
-            return None
-        except (ValueError, KeyError, TypeError, OverflowError) as err:
+        except (StateError, ValueError, KeyError, TypeError, OverflowError) as err:
             log.error("%s cannot be used (%r): nobody can tell whether all calls are there", self._mark_path, err)
             return None
 

@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,7 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from rosbot_patrol import params
-from rosbot_patrol.files import write_atomic
+from rosbot_patrol.errors import StateError
+from rosbot_patrol.files import read_json
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.guard.modes import DISARMED, MODES, parse_mode, unknown_mode
 from rosbot_patrol.patrol.guard.wall_times import Window, parse_window, parse_zone
@@ -198,17 +198,7 @@ def _still(until: float | None, wall: float, delay: float) -> float | None:
 def read_memory(path: Path) -> Mapping[str, Any]:
     """What was kept of the mode; empty, and said, where it cannot be used."""
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(tree, dict):
-            raise ValueError("expected a group of values")
-        return tree
-    except FileNotFoundError:
+        return read_json(path) or {}
+    except StateError as err:
+        log.error("%s; the mode is that of a fresh install", err)
         return {}
-    except (OSError, ValueError) as err:
-        log.error("%s cannot be used (%s): the mode is that of a fresh install", path, err)
-        return {}
-
-
-def write_memory(path: Path, memory: Mapping[str, Any]) -> None:
-    """Keep what `snapshot` gave. Raises OSError."""
-    write_atomic(path, json.dumps(memory, indent=1).encode())

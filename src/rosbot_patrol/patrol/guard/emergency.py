@@ -14,7 +14,8 @@ import json
 import logging
 from pathlib import Path
 
-from rosbot_patrol.files import write_atomic
+from rosbot_patrol.errors import StateError
+from rosbot_patrol.files import read_json, write_atomic
 
 log = logging.getLogger(__name__)
 
@@ -70,14 +71,14 @@ class EmergencyStop:
 
     def _read(self) -> frozenset[str]:
         try:
-            tree = json.loads(self._path.read_bytes())
-        except (FileNotFoundError, NotADirectoryError):  # no such file: it was never pressed
+            tree = read_json(self._path)
+        except StateError as err:
+            if isinstance(err.__cause__, NotADirectoryError):  # no such file, as there is no folder
+                return frozenset()
+            return self._doubt(err.problem)
+        if tree in (None, {"held_by": []}):
             return frozenset()
-        except (OSError, ValueError, RecursionError) as err:
-            return self._doubt(str(err))
-        if tree == {"held_by": []}:
-            return frozenset()
-        held = tree.get("held_by") if isinstance(tree, dict) else None
+        held = tree.get("held_by")
         known = frozenset(name for name in held if name in (SERVICE, TOPIC)) if isinstance(held, list) else frozenset()
         return known if tree == {"held_by": sorted(known)} else known | self._doubt("it is no list of who pressed")
 

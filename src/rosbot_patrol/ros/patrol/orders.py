@@ -14,8 +14,9 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerRequest, TriggerResponse
 
+from rosbot_patrol.files import write_json
 from rosbot_patrol.msg import Arming as ArmingMsg
-from rosbot_patrol.patrol.guard.arming import Arming, write_memory
+from rosbot_patrol.patrol.guard.arming import Arming
 from rosbot_patrol.patrol.guard.emergency import SERVICE, TOPIC, EmergencyStop
 from rosbot_patrol.patrol.guard.modes import DISARMED
 from rosbot_patrol.patrol.guard.schedule import all_rooms
@@ -169,7 +170,7 @@ class ArmingDesk:
     def _keep(self, memory: Mapping[str, Any]) -> str:
         """Bring the mode to the disk; what was wrong with that."""
         try:
-            write_memory(self._path, memory)
+            write_json(self._path, memory)
         except OSError as err:
             log.error("the mode cannot be kept: %s; trying on", err)
             self._write_later(self._save)
@@ -180,7 +181,7 @@ class ArmingDesk:
         with self._keeping:
             with self._lock:
                 memory = self._arming.snapshot()
-            write_memory(self._path, memory)
+            write_json(self._path, memory)
 
     def _publish(self, guarded: Guarded, wall: float) -> None:
         message = ArmingMsg(mode=guarded.mode, all_rooms=guarded.rooms is None, quiet=guarded.is_quiet)

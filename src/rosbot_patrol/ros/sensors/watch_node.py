@@ -11,7 +11,6 @@ All durations are of the wall: sensors send their heartbeats in real time, whate
 
 from __future__ import annotations
 
-import json
 import logging
 import time
 from collections import deque
@@ -26,7 +25,8 @@ from std_msgs.msg import Empty
 from rosbot_patrol.alerts.channels.config import MailParams
 from rosbot_patrol.alerts.post.notice import Notice as PostNotice
 from rosbot_patrol.counts import count_of
-from rosbot_patrol.files import write_atomic
+from rosbot_patrol.errors import StateError
+from rosbot_patrol.files import read_json, write_json
 from rosbot_patrol.msg import Arming as ArmingMsg
 from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
@@ -205,7 +205,7 @@ class SensorWatch:
     def _remember(self, now: float) -> None:
         """Keep what was told, once the notices are on the disk themselves."""
         try:
-            write_atomic(self._memory, json.dumps(self._notices.snapshot(), indent=1).encode())
+            write_json(self._memory, self._notices.snapshot())
         except OSError as err:
             log.error("what was told cannot be kept in %s: %s; trying on", self._memory, err)
             self._retry_at = now + RETRY
@@ -221,13 +221,10 @@ def to_post(notice: Notice) -> PostNotice:
 def read_memory(path: Path) -> Mapping[str, Any] | None:
     """What was told before the program ended; None where there is nothing that makes sense."""
     try:
-        tree = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+        return read_json(path)
+    except StateError as err:
+        log.warning("%s; starting afresh", err)
         return None
-    except (OSError, ValueError) as err:
-        log.warning("%s cannot be used (%s), starting afresh", path, err)
-        return None
-    return tree if isinstance(tree, dict) else None
 
 
 def main() -> None:
