@@ -143,7 +143,7 @@ class Driver:
         for _ in range(SCAN_STEPS):
             self.engine.step()
         self.touched += bool(self.engine.touches())
-        return Moment(self.engine.pose, self.engine.odometry[0], self.engine.level_scan().scan)
+        return Moment(self.engine.pose, self.engine.robot.odometry.pose, self.engine.level_scan().scan)
 
     def record(self, moments: list[Moment]) -> Record:
         """What was driven."""

@@ -150,24 +150,24 @@ def send_somebody(loop: ClosedLoop, goal: Pose2D, rng: np.random.Generator) -> s
         return ""
     heading = math.atan2(ways[1].y - start.y, ways[1].x - start.x)
     try:
-        engine.spawn_actor("somebody", "person", "", Pose2D(start.x, start.y, heading))
+        engine.population.spawn_actor("somebody", "person", "", Pose2D(start.x, start.y, heading))
     except WorldError:
         return ""
     try:
         loops = kind == "across"
         path = [*ways[1:], *([start] if loops else [])]
-        engine.move_actor("somebody", path, speed, loop=loops, pause=1.0 if loops else 0.0, yields=False)
+        engine.population.move_actor("somebody", path, speed, loop=loops, pause=1.0 if loops else 0.0, yields=False)
     except WorldError:
-        engine.remove_actor("somebody")
+        engine.population.remove("somebody")
         return ""
     return f"{kind} {speed:.1f} m/s"
 
 
 def see_out(engine: Engine, *, always: bool = False) -> None:
     """Take somebody out who has come to the end of the way."""
-    for actor in engine.actors:
+    for actor in engine.population.walkers:
         if actor.name == "somebody" and (always or actor.has_arrived):
-            engine.remove_actor("somebody")
+            engine.population.remove("somebody")
 
 
 def drives(house: str, count: int, seed: int, *, only_block: int | None = None) -> Iterator[Result]:

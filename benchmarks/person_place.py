@@ -52,9 +52,9 @@ class Stage:
 
     def view(self) -> View:
         """From where the camera looks now."""
-        mount = self.engine.description.camera
+        mount = self.engine.robot.description.camera
         assert mount is not None
-        pose = from_pose2d(self.engine.pose, self.engine.description.base_height) @ mount.pose
+        pose = from_pose2d(self.engine.pose, self.engine.robot.description.base_height) @ mount.pose
         return View(self.lens, np.asarray(pose, np.float64))
 
     def look(self) -> tuple[list[Box], Depth, np.ndarray]:
@@ -87,7 +87,7 @@ def put(stage: Stage, kind: str, place: Pose2D, rng: np.random.Generator) -> Pos
         turned = place.yaw + bearing + math.pi if kind == "poster" else float(rng.uniform(-3, 3))
         posture = str(rng.choice(["", "", "creeping", "sitting", "crouching"])) if kind == "person" else ""
         try:
-            engine.spawn_actor(
+            engine.population.spawn_actor(
                 "it", kind, str(rng.choice(LOOKS)) if kind == "person" else "", Pose2D(x, y, turned), posture=posture
             )
         except WorldError:
@@ -113,7 +113,7 @@ def main() -> None:
                 if there is None:
                     continue
                 tell(stage, judge, kind, there, errors, told[kind])
-                stage.engine.remove_actor("it")
+                stage.engine.population.remove("it")
         stage.engine.close()
     report(errors, told, arguments.json)
 

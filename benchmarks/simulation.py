@@ -97,8 +97,8 @@ def make_engine(world: Path, *, with_actor: bool = True) -> Any:
     engine = Engine(load_world(world), EngineParams(seed=1), make_renderer=make_renderer)
     engine.spawn_robot(load_robot(URDF))
     if with_actor:
-        name = engine.spawn_actor("", "person", "", Pose2D(2.0, 0.5, 0.0))
-        engine.move_actor(name, [Pose2D(3.0, -0.5, 0.0), Pose2D(2.0, 0.5, 0.0)], 0.8, loop=True)
+        name = engine.population.spawn_actor("", "person", "", Pose2D(2.0, 0.5, 0.0))
+        engine.population.move_actor(name, [Pose2D(3.0, -0.5, 0.0), Pose2D(2.0, 0.5, 0.0)], 0.8, loop=True)
     return engine
 
 
@@ -128,7 +128,7 @@ def simulate(
         if heard and i % 20 == 4:
             engine.imu()
         if i % 10 == 0:
-            _ = engine.odometry
+            _ = engine.robot.odometry.pose
         if pictures and i % 20 == 10:
             engine.picture()
     return seconds / (time.perf_counter() - before)

@@ -65,7 +65,7 @@ def is_inside(engine: Engine, place: Pose2D) -> bool:
 
 def draw_places(engine: Engine, rng: np.random.Generator, count: int) -> Iterator[Pose2D]:
     """Places by chance."""
-    segments = engine.slices[0].segments.reshape(-1, 2)
+    segments = engine.ways.cut(engine.robot.lidar_height).segments.reshape(-1, 2)
     low, high = segments.min(axis=0), segments.max(axis=0)
     while count:
         x, y = rng.uniform(low, high)
@@ -93,7 +93,7 @@ def place_person(engine: Engine, place: Pose2D, rng: np.random.Generator, looks:
             continue
         posture = str(rng.choice(["", "", "creeping", "sitting", "crouching"]))
         try:
-            engine.spawn_actor("person_there", "person", str(rng.choice(looks)), spot, posture=posture)
+            engine.population.spawn_actor("person_there", "person", str(rng.choice(looks)), spot, posture=posture)
         except WorldError:
             continue
         return True
@@ -174,7 +174,7 @@ def main() -> None:
             frames = turn(engine, detector, place)
             for name, params in chosen.items():
                 found[name] += judge(params, frames) == "person"
-            engine.remove_actor("person_there")
+            engine.population.remove("person_there")
         sys.stderr.write(f"\r{turns} of {arguments.turns} places ")
     engine.close()
     in_workspace.require_figures(range(turns), "no place was looked from")

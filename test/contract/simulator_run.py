@@ -37,13 +37,13 @@ def make_engine(seed: int) -> Engine:
         make_renderer=make_renderer,
     )
     engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
-    engine.spawn_door(plain_door("door", Pose2D(0.9, 1.3, 0.0), width=0.7))
-    engine.spawn_actor("ann", "person", "", Pose2D(2.0, 0.5, 0.0))
-    engine.move_actor("ann", [Pose2D(3.0, -0.5), Pose2D(2.0, 0.5)], 0.8, True, pause=0.5)
-    engine.spawn_actor("bob", "person", "", Pose2D(2.5, 0.0, 0.0))
+    engine.population.spawn_door(plain_door("door", Pose2D(0.9, 1.3, 0.0), width=0.7))
+    engine.population.spawn_actor("ann", "person", "", Pose2D(2.0, 0.5, 0.0))
+    engine.population.move_actor("ann", [Pose2D(3.0, -0.5), Pose2D(2.0, 0.5)], 0.8, True, pause=0.5)
+    engine.population.spawn_actor("bob", "person", "", Pose2D(2.5, 0.0, 0.0))
     for name, model in (("tom", "cat"), ("rex", "dog")):
-        engine.spawn_actor(name, model, "", Pose2D(1.0 if model == "cat" else 2.8, -0.2, 0.0))
-        engine.roam_actor(name, 1.5, 0.7)
+        engine.population.spawn_actor(name, model, "", Pose2D(1.0 if model == "cat" else 2.8, -0.2, 0.0))
+        engine.population.roam_actor(name, 1.5, 0.7)
     return engine
 
 
@@ -53,25 +53,26 @@ def act(engine: Engine, i: int) -> None:
         t = i * STEP
         engine.command(Twist2D(0.3 * math.cos(t / 7.0), 0.0, 0.6 * math.sin(t / 3.0)))
     if i % 1000 == 200:
-        engine.set_door("door", 1.0 if i % 2000 == 200 else 0.0)
+        engine.population.set_door("door", 1.0 if i % 2000 == 200 else 0.0)
     if i == 3000:
-        engine.roam_actor("bob", 1.0, 1.2)
+        engine.population.roam_actor("bob", 1.0, 1.2)
 
 
 def _readings(engine: Engine) -> dict[str, tuple[int, Callable[[], Iterable[float] | np.ndarray]]]:
     """Sensor -> (steps between two samples, what it gives)."""
+    battery = engine.robot.battery
     return {
         "lidar": (20, lambda: engine.scan().ranges),
         "ranges": (40, lambda: list(engine.ranges().values())),
         "imu": (20, lambda: [engine.imu().yaw, *engine.imu().rates, *engine.imu().accelerations]),
-        "odometry": (10, lambda: [v for part in engine.odometry for v in part]),
-        "wheels": (20, lambda: [v for part in engine.wheels for v in part]),
+        "odometry": (10, lambda: [*engine.robot.odometry.pose, *engine.robot.odometry.twist]),
+        "wheels": (20, lambda: [v for part in engine.robot.wheels for v in part]),
         "truth": (10, lambda: [*engine.pose, *engine.twist]),
         "contacts": (4, lambda: [float(len(engine.touches())), *(t.force for t in engine.touches())]),
-        "motion": (20, lambda: [float(level) for level in engine.motion().values()]),
-        "battery": (200, lambda: [engine.battery.charge, engine.battery.voltage, engine.battery.current]),
-        "actors": (20, lambda: [v for a in engine.actors for v in (*a.pose, a.speed)]),
-        "doors": (20, lambda: [d.opening for d in engine.doors]),
+        "motion": (20, lambda: [float(level) for level in engine.motion_sensors.levels(engine.now).values()]),
+        "battery": (200, lambda: [battery.charge, battery.voltage, battery.current]),
+        "actors": (20, lambda: [v for a in engine.population.walkers for v in (*a.pose, a.speed)]),
+        "doors": (20, lambda: [d.opening for d in engine.population.doors]),
         "colour": (400, lambda: engine.picture().colour.ravel()),
         "depth": (400, lambda: engine.picture().depth.ravel()),
     }

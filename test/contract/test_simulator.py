@@ -133,15 +133,15 @@ def test_what_is_refused_leaves_no_trace(act: Callable[[Engine, int], None]) -> 
         if i % 100 != 3:
             return
         for wrong in (
-            lambda: engine.spawn_actor("ann", "person", "", Pose2D()),
-            lambda: engine.spawn_actor("", "elk", "", Pose2D()),
-            lambda: engine.move_actor("ann", [Pose2D(30.0, 0.5)], 1.0),
-            lambda: engine.move_actor("nobody", [Pose2D()], 1.0),
-            lambda: engine.set_door("door", 3.0),
-            lambda: engine.remove_actor("nobody"),
+            lambda: engine.population.spawn_actor("ann", "person", "", Pose2D()),
+            lambda: engine.population.spawn_actor("", "elk", "", Pose2D()),
+            lambda: engine.population.move_actor("ann", [Pose2D(30.0, 0.5)], 1.0),
+            lambda: engine.population.move_actor("nobody", [Pose2D()], 1.0),
+            lambda: engine.population.set_door("door", 3.0),
+            lambda: engine.population.remove("nobody"),
             lambda: engine.carry(Pose2D(-0.9, -1.2)),
-            lambda: engine.place_box("box", engine.pose, (0.5, 0.5, 0.5)),
-            lambda: engine.spawn_robot(engine.description),
+            lambda: engine.population.place_box("box", engine.pose, (0.5, 0.5, 0.5)),
+            lambda: engine.spawn_robot(engine.robot.description),
         ):
             with pytest.raises(PatrolError):
                 wrong()
@@ -155,12 +155,12 @@ def test_who_comes_and_goes_elsewhere_does_not_renumber_anybody_s_noise(plain: D
     def visitors(engine: Engine, i: int) -> None:
         simulator_run.act(engine, i)
         if i % 100 == 10:
-            engine.spawn_actor("", "person", "", Pose2D(-40.0, -40.0))
-            engine.spawn_actor("", "dog", "", Pose2D(-42.0, -40.0))
-            engine.roam_actor("dog_1", 1.0, 1.0)
+            engine.population.spawn_actor("", "person", "", Pose2D(-40.0, -40.0))
+            engine.population.spawn_actor("", "dog", "", Pose2D(-42.0, -40.0))
+            engine.population.roam_actor("dog_1", 1.0, 1.0)
         if i % 100 == 60:
-            engine.remove_actor("dog_1")
-            engine.remove_actor("person_1")
+            engine.population.remove("dog_1")
+            engine.population.remove("person_1")
 
     among = [name for name in SENSORS if name != "actors"]
     assert not differing({name: plain[name] for name in among}, fresh(listen=tuple(among), act=visitors))
@@ -173,7 +173,12 @@ def test_a_reset_robot_begins_as_a_new_one_does() -> None:
         engine = make_engine(5)
         record(engine, 400, ())
         engine.reset()
-        state: list[object] = [engine.pose, *engine.odometry, engine.wheels[1]]
+        state: list[object] = [
+            engine.pose,
+            engine.robot.odometry.pose,
+            engine.robot.odometry.twist,
+            engine.robot.wheels[1],
+        ]
         data = record(engine, 400)
         engine.close()
         return state, data

@@ -68,7 +68,7 @@ def drive(engine: Engine, vx: float, wz: float, seconds: float) -> None:
 def test_the_lidar_errs_as_configured(noise: float, resolution: float) -> None:
     """Mean error 0, variance that of the noise and of rounding, and no more of the tails than a bell curve has."""
     engine = engine_in(square_room(), lidar=LidarParams(noise=noise, resolution=resolution), seed=5)
-    engine.set_pose(Pose2D(0.3, -0.4, 0.7))
+    engine.carry(Pose2D(0.3, -0.4, 0.7))
     errors = []
     for _ in range(60):
         engine.step()
@@ -88,7 +88,7 @@ def test_the_lidar_errs_as_configured(noise: float, resolution: float) -> None:
 def test_without_noise_the_lidar_is_exact() -> None:
     engine = engine_in(square_room(), lidar=LidarParams(noise=0.0, resolution=0.0))
     for yaw in np.linspace(-3.0, 3.0, 7):
-        engine.set_pose(Pose2D(-0.8, 0.9, float(yaw)))
+        engine.carry(Pose2D(-0.8, 0.9, float(yaw)))
         engine.step()
         assert np.abs(engine.scan().ranges - exact_ranges(engine)).max() < 1e-6
     engine.close()
@@ -159,11 +159,11 @@ def drifts(metres: float, turns: float, seeds: int, **parts: object) -> np.ndarr
     for seed in range(seeds):
         engine = engine_in(World(), seed=seed, **parts)
         way = told_way = turned = told = 0.0
-        pose, odometry = engine.pose, engine.odometry[0]
+        pose, odometry = engine.pose, engine.robot.odometry.pose
         vx, wz = (0.35, 0.0) if metres else (0.0, 2.0)
         while way < metres or abs(turned) < turns * math.tau:
             drive(engine, vx, wz, 0.1)
-            now, told_now = engine.pose, engine.odometry[0]
+            now, told_now = engine.pose, engine.robot.odometry.pose
             way += math.hypot(now.x - pose.x, now.y - pose.y)
             told_way += math.hypot(told_now.x - odometry.x, told_now.y - odometry.y)
             turned += wrap_angle(now.yaw - pose.yaw)

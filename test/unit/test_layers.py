@@ -25,6 +25,20 @@ ROWS: list[set[str]] = [
     {"ros"},
 ]
 ROW_OF = {name: i for i, row in enumerate(ROWS) for name in row}
+# The same within a package, for its sub-packages and root modules.
+ROWS_WITHIN: dict[str, list[set[str]]] = {
+    "simulation": [
+        {"noise", "meshes"},
+        {"scene"},
+        {"sensors", "actors"},
+        {"robot", "sdf"},
+        {"physics"},
+        {"population", "render"},
+        {"scenario"},
+        {"engine"},
+        {"player"},
+    ],
+}
 SIDEWAYS = {
     ("patrol", "alerts"),  # a mission hands an incident over
     ("patrol", "sensors"),
@@ -68,8 +82,8 @@ def imports(path: Path) -> list[tuple[str, int, bool]]:
             found += [(alias.name, node.lineno, id(node) not in inside) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             names = [node.module or ""]
-            if node.module == "rosbot_patrol":
-                names = [f"rosbot_patrol.{alias.name}" for alias in node.names]
+            if node.module in ("rosbot_patrol", *(f"rosbot_patrol.{package}" for package in ROWS_WITHIN)):
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
             found += [(name, node.lineno, id(node) not in inside) for name in names]
     return found
 
@@ -91,6 +105,26 @@ def test_imports_go_down_only(path: Path) -> None:
             or (own == "ros" and other in {"msg", "srv", "action", "cfg"})
         )
         assert allowed, f"{path.relative_to(ROOT)}:{line} imports {name}: up or sideways"
+
+
+@pytest.mark.parametrize(
+    ("package", "path"),
+    [(package, path) for package in ROWS_WITHIN for path in sorted((SRC / package).rglob("*.py"))],
+    ids=lambda part: part if isinstance(part, str) else str(part.relative_to(SRC)),
+)
+def test_imports_within_a_package_go_down_only(package: str, path: Path) -> None:
+    row_of = {name: i for i, row in enumerate(ROWS_WITHIN[package]) for name in row}
+    parts = path.relative_to(SRC / package).with_suffix("").parts
+    own = parts[0]
+    if own == "__init__":
+        return
+    assert own in row_of, f"{package}.{own} has no row in this test"
+    for name, line, _ in imports(path):
+        if not name.startswith(f"rosbot_patrol.{package}."):
+            continue
+        other = name.split(".")[2]
+        is_down = other == own or row_of.get(other, 99) < row_of[own]
+        assert is_down, f"{path.relative_to(ROOT)}:{line} imports {name}: up or sideways"
 
 
 @pytest.mark.parametrize(

@@ -161,7 +161,7 @@ class ClosedLoop:
     @property
     def odom_pose(self) -> Pose2D:
         """odom_from_base."""
-        return self.engine.odometry[0]
+        return self.engine.robot.odometry.pose
 
     @property
     def map_pose(self) -> Pose2D:
@@ -204,7 +204,7 @@ class ClosedLoop:
             self._tick()
 
     def _watch_contacts(self) -> None:
-        if max(map(abs, self.engine.wheels[1])) > 0.05:
+        if max(map(abs, self.engine.robot.wheels[1])) > 0.05:
             self._moved_at = self.now
         touching = {touch.other: touch.kind for touch in self.engine.touches()}
         for name, kind in touching.items():
@@ -256,7 +256,7 @@ class ClosedLoop:
             local=LocalView(
                 now=now,
                 pose=odom,
-                velocity=self.engine.odometry[1],
+                velocity=self.engine.robot.odometry.twist,
                 costmap=Grid(local.info, local.cells.copy()),
                 local_from_plan=invert(self._map_from_odom),
             ),

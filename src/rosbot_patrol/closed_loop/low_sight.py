@@ -35,7 +35,7 @@ class LowSight:
         self._next_ranges = self._next_picture = 0.0
         self._used: dict[int, float] = {}
         wants = any(self._depth_buffers(costmap) for costmap in costmaps)
-        self._has_camera = engine.has_camera and engine.description.camera is not None
+        self._has_camera = engine.has_camera and engine.robot.description.camera is not None
         if wants and not self._has_camera:
             log.warning("a costmap wants depth pictures, and the engine has no renderer or the robot no camera")
 
@@ -55,7 +55,7 @@ class LowSight:
             self._picture(now, poses)
 
     def _hear(self, now: float, odom_from_base: Pose2D, poses: tuple[Pose2D, ...]) -> None:
-        p, mounts = self._engine.params.range, self._engine.description.ranges
+        p, mounts = self._engine.params.range, self._engine.robot.description.ranges
         distances = self._engine.ranges() if mounts else {}
         for mount in mounts:
             place, distance = to_pose2d(mount.pose), distances[mount.frame]
@@ -73,7 +73,7 @@ class LowSight:
             for buffer, params in self._depth_buffers(costmap)
             if params.max_rate == 0.0 or now - self._used.get(id(buffer), -1e9) >= 0.95 / params.max_rate
         ]
-        mount = self._engine.description.camera
+        mount = self._engine.robot.description.camera
         if not wants or mount is None:
             return
         k = self._engine.params.camera.intrinsics

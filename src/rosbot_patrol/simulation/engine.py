@@ -17,13 +17,10 @@ from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D, compose
 from rosbot_patrol.params import param
 from rosbot_patrol.scan import LaserScan, LevelScan, level_scan
-from rosbot_patrol.simulation.actors.doors import SPEED, Door, DoorPlace
-from rosbot_patrol.simulation.actors.walkers import Walker
-from rosbot_patrol.simulation.boxes import box_body
 from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.physics.world import Physics, Touch
 from rosbot_patrol.simulation.population import Population
-from rosbot_patrol.simulation.robot.battery import Battery, BatteryParams
+from rosbot_patrol.simulation.robot.battery import BatteryParams
 from rosbot_patrol.simulation.robot.description import FrameParams, RobotDescription
 from rosbot_patrol.simulation.robot.drive import DriveParams
 from rosbot_patrol.simulation.robot.equipment import Equipment
@@ -32,8 +29,7 @@ from rosbot_patrol.simulation.robot.odometry import OdometryParams
 from rosbot_patrol.simulation.scenario.fault_board import FaultBoard
 from rosbot_patrol.simulation.scenario.faults import Doorway
 from rosbot_patrol.simulation.scene.matrices import from_pose2d
-from rosbot_patrol.simulation.scene.scene import Body, SceneRenderer
-from rosbot_patrol.simulation.scene.slices import Slice
+from rosbot_patrol.simulation.scene.scene import SceneRenderer
 from rosbot_patrol.simulation.scene.ways import Ways
 from rosbot_patrol.simulation.sdf.world import World
 from rosbot_patrol.simulation.sensors.camera import Camera, CameraParams, Picture, poses_before
@@ -69,10 +65,16 @@ class EngineParams:
 class Engine:
     """A running world.
 
+    Attributes:
+        ways: bodies that stand still, and the free ways between them.
+        population: actors, doors and boxes.
+        motion_sensors: the sensors on the walls.
+        faults: the faults in force.
+
     Args:
-        world: what stands in it.
-        params: of every part.
-        sensors: motion sensors on the walls.
+        world: bodies, and the actors and doors at the start.
+        params: parameters of every part.
+        sensors: places of the motion sensors.
         doorways: places that a fault may name.
         make_renderer: builds the camera's renderer, in the thread that takes pictures.
     """
@@ -88,20 +90,20 @@ class Engine:
     ) -> None:
         self.world = world
         self.params = params or EngineParams()
-        self.sensors = tuple(sensors)
         self._physics = Physics(STEP)
         for body in world.bodies:
             self._physics.add(body)
-        self._ways = Ways(world.bodies)
-        self.population = Population(self._ways, self._physics, self.params.seed)
-        self._boxes: dict[str, Body] = {}
+        self.ways = Ways(world.bodies)
+        self.population = Population(self.ways, self._physics, self.params.seed)
         self.faults = FaultBoard(self, doorways)
         self._robot: Equipment | None = None
         self._steps = 0
-        self._motion = SensorNet(self.params.motion, self.sensors, self.faults)
+        self.motion_sensors = SensorNet(self.params.motion, sensors, self.faults.level)
         self._camera = None
         if make_renderer is not None:
-            self._camera = Camera(self.params.camera, make_renderer, world.bodies, self.params.seed)
+            self._camera = Camera(
+                self.params.camera, make_renderer, world.bodies, boxes=self.population.boxes, seed=self.params.seed
+            )
         self.population.begin(world.actors, world.doors)
 
     # Time ------------------------------------------------------------------------------------------------------------
@@ -133,12 +135,12 @@ class Engine:
         if robot is not None and self._steps % _BATTERY_EVERY == 0:
             robot.battery.step(robot.drive.load, _BATTERY_EVERY * STEP)
         if self._steps % _MOTION_EVERY == 0:
-            self._motion.update(self.now, self.population.walkers, self.population.sight)
+            self.motion_sensors.update(self.now, self.population.walkers, self.population.sight)
 
     def reset(self) -> None:
-        """Robot back to its start at rest, odometry to zero; time, actors and battery stay as they are."""
+        """Put the robot back to its start at rest and its odometry to zero; time, actors and battery stay."""
         if self._robot is not None:
-            self.set_pose(self._robot.start)
+            self.carry(self._robot.start)
             self._robot.odometry.reset(float(self._robot.turned[0]), float(self._robot.turned[1]), self.now)
             self._robot.imu.reset(self._robot.start.yaw)
 
@@ -161,19 +163,21 @@ class Engine:
         return self._robot is not None
 
     def spawn_robot(self, description: RobotDescription, pose: Pose2D = HOME) -> None:
-        """Put the robot into the world; raises WorldError where there is one, or no room for it."""
+        """Put the robot into the world; raises WorldError if there is one already, or no room for it."""
         if self._robot is not None:
             raise WorldError(f"robot '{description.name}'", f"'{self._robot.description.name}' is there already")
         if not all(map(math.isfinite, pose)):
             raise WorldError(f"robot '{description.name}'", f"{tuple(pose)} is no pose")
-        robot = Equipment(self.params, description, self.bodies, pose)
+        robot = Equipment(self.params, description, pose)
         self._physics.add_robot(robot.description, pose, self.params.drive.traction)
         self._robot = robot
 
     @property
-    def description(self) -> RobotDescription:
-        """The robot's description."""
-        return self._need_robot().description
+    def robot(self) -> Equipment:
+        """The robot's parts; raises WorldError where there is no robot."""
+        if self._robot is None:
+            raise _no_robot()
+        return self._robot
 
     def command(self, twist: Twist2D) -> None:
         """Drive at a velocity until the next command, or until the time-out."""
@@ -182,13 +186,14 @@ class Engine:
 
     def remove_robot(self) -> None:
         """Take the robot out; raises WorldError where there is none."""
-        self._need_robot()
+        if self._robot is None:
+            raise _no_robot()
         self._physics.remove_robot()
         self._robot = None
 
     def carry(self, pose: Pose2D) -> None:
-        """Carry the robot elsewhere; its odometry does not notice. Raises WorldError where there is no room for it."""
-        robot = self._need_robot()
+        """Carry the robot elsewhere without its odometry noticing; raises WorldError if there is no room for it."""
+        robot = self.robot
         name = f"robot '{robot.description.name}'"
         if not all(map(math.isfinite, pose)):
             raise WorldError(name, f"{tuple(pose)} is no pose")
@@ -198,56 +203,27 @@ class Engine:
         self._physics.set_pose(pose)
         robot.drive.stop()
 
-    set_pose = carry
-
     @property
     def pose(self) -> Pose2D:
         """True pose of the base in the world."""
         return self._physics.pose if self._robot is not None else Pose2D()
 
     @property
-    def start_pose(self) -> Pose2D:
-        """Where the robot was put when it was spawned."""
-        return self._need_robot().start
-
-    @property
     def twist(self) -> Twist2D:
         """True velocity of the base in its own frame."""
         return self._physics.twist if self._robot is not None else Twist2D()
 
-    @property
-    def odometry(self) -> tuple[Pose2D, Twist2D]:
-        """What the wheel encoders believe, every 0.05 s anew."""
-        robot = self._need_robot()
-        return robot.odometry.pose, robot.odometry.twist
-
-    @property
-    def wheels(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Angles [rad] and speeds [rad/s] of the left and the right wheels."""
-        robot = self._need_robot()
-        return (float(robot.turned[0]), float(robot.turned[1])), (robot.drive.left, robot.drive.right)
-
-    @property
-    def battery(self) -> Battery:
-        """The robot's battery."""
-        return self._need_robot().battery
-
     def touches(self) -> list[Touch]:
-        """What the robot touches, the floor apart."""
+        """Contacts of the robot, without the floor."""
         return self._physics.touches()
-
-    def _need_robot(self) -> Equipment:
-        if self._robot is None:
-            raise WorldError("simulation", "has no robot yet")
-        return self._robot
 
     # Sensors ---------------------------------------------------------------------------------------------------------
 
     def scan(self) -> LaserScan:
         """One sweep of the lidar."""
-        robot = self._need_robot()
-        scene = robot.lidar_slice.plus(self.population.cut(robot.lidar_height))
+        robot = self.robot
         frame, base_from_laser = robot.laser
+        scene = self.ways.cut(robot.lidar_height).plus(self.population.cut(robot.lidar_height))
         return measure_scan(
             self.params.lidar, scene, compose(self.pose, base_from_laser), self.now, self._noise("lidar"),
             frame=frame, twist=robot.laser_twist(self.twist), flipped=robot.is_laser_flipped,
@@ -255,12 +231,12 @@ class Engine:
 
     def level_scan(self) -> LevelScan:
         """One sweep of the lidar, laid level in base_link; raises LaserTilted where it cannot be."""
-        return level_scan(self.scan(), self._need_robot().laser_transform, "base_link")
+        return level_scan(self.scan(), self.robot.laser_transform, "base_link")
 
     def ranges(self) -> dict[str, float]:
         """Frame and distance [m] of each range sensor."""
-        robot = self._need_robot()
-        scene = robot.range_slice.plus(self.population.cut(robot.range_height))
+        robot = self.robot
+        scene = self.ways.cut(robot.range_height).plus(self.population.cut(robot.range_height))
         noise = self._noise("range")
         return {
             frame: measure_range(self.params.range, scene, compose(self.pose, place), noise)
@@ -269,14 +245,14 @@ class Engine:
 
     def imu(self) -> ImuReading:
         """One sample of the inertial unit."""
-        return self._need_robot().imu.read(self._noise("imu"))
+        return self.robot.imu.read(self._noise("imu"))
 
     def picture(self, *, colour: bool = True, depth: bool = True) -> Picture:
         """One picture of the camera; always from the same thread.
 
         Args:
-            colour: whether the colour is wanted with its noise; else it may stay as it was drawn.
-            depth: whether the depth is wanted with its limits and noise.
+            colour: add exposure and noise to the colour; without it the colour may stay as drawn.
+            depth: add limits and noise to the depth; without it the depth may stay as drawn.
 
         Raises:
             WorldError: the engine has no renderer, or the robot no camera.
@@ -286,7 +262,7 @@ class Engine:
         return self.faults.seen(lambda: self._picture(True, True))
 
     def _picture(self, colour: bool, depth: bool) -> Picture:
-        robot = self._need_robot()
+        robot = self.robot
         if self._camera is None or robot.base_from_optical is None:
             raise WorldError("simulation", "has no camera")
         *earlier, pose = (
@@ -307,25 +283,9 @@ class Engine:
         above[:3, 3] = self.pose.x, self.pose.y, height
         return self._camera.view(above, self.population, shown)
 
-    def motion(self) -> dict[int, bool]:
-        """Whether each motion sensor's output is high, by id."""
-        return self._motion.levels(self.now)
-
-    def motion_changes(self) -> list[tuple[int, bool]]:
-        """Id and level of each motion sensor whose output has changed since this was last asked."""
-        return self._motion.changes(self.now)
-
-    def restart_sensor(self, sensor: int) -> None:
-        """Switch a motion sensor off and on: it warms up anew."""
-        self._motion.restart(sensor, self.now)
-
-    def restarted_sensors(self) -> list[int]:
-        """Ids of the motion sensors that were switched off and on since this was last asked."""
-        return self._motion.restarted()
-
     def warm_up(self) -> None:
         """Take one of each measurement, so that the first that counts does not come late."""
-        robot = self._need_robot()
+        robot = self.robot
         if robot.base_from_laser is not None:
             self.scan()
         self.ranges()
@@ -335,90 +295,6 @@ class Engine:
     def _noise(self, sensor: str) -> np.random.Generator:
         return noise_of(self.params.seed, sensor, self._steps)
 
-    # What is put there -----------------------------------------------------------------------------------------------
 
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """What stands still."""
-        return (*self.world.bodies, *self._boxes.values())
-
-    def place_box(self, name: str, pose: Pose2D, size: tuple[float, float, float]) -> None:
-        """Put a box of a length, depth and height [m] on the floor; raises WorldError where the robot stands."""
-        if name in self.population or name in {b.name for b in self.bodies}:
-            raise WorldError(f"box '{name}'", "the name is taken")
-        body = box_body(name, pose, size)
-        free = self._physics.blocker() is None
-        self._physics.add(body)
-        if free and self._physics.blocker() == name:
-            self._physics.remove(name)
-            raise WorldError(f"box '{name}'", f"cannot stand at ({pose.x:.2f}, {pose.y:.2f}), the robot is there")
-        self._boxes[name] = body
-        if self._camera is not None:
-            self._camera.put(body)
-        self._cut()
-
-    def remove_box(self, name: str) -> None:
-        """Take a box away; raises WorldError where there is none of that name."""
-        if name not in self._boxes:
-            raise WorldError(f"box '{name}'", f"is not there (there: {', '.join(self._boxes) or 'none'})")
-        del self._boxes[name]
-        self._physics.remove(name)
-        if self._camera is not None:
-            self._camera.take_away(name)
-        self._cut()
-
-    def _cut(self) -> None:
-        self._ways.stand(self.bodies)
-        if self._robot is not None:
-            self._robot.cut(self.bodies)
-
-    # Who and what moves there ----------------------------------------------------------------------------------------
-
-    @property
-    def actors(self) -> tuple[Walker, ...]:
-        """Who is there."""
-        return self.population.walkers
-
-    @property
-    def doors(self) -> tuple[Door, ...]:
-        """The doors that open and close."""
-        return self.population.doors
-
-    @property
-    def slices(self) -> tuple[Slice, Slice]:
-        """The cuts through what stands still, at the height of the lidar and of the range sensors."""
-        robot = self._need_robot()
-        return robot.lidar_slice, robot.range_slice
-
-    def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D, *, posture: str = "") -> str:
-        """Place an actor; returns its name, made up where it is ""; raises WorldError as `Population` does."""
-        return self.population.spawn_actor(name, model, look, pose, posture=posture)
-
-    def move_actor(
-        self,
-        name: str,
-        path: Sequence[Pose2D],
-        speed: float,
-        loop: bool = False,
-        *,
-        pause: float = 0.0,
-        yields: bool = True,
-    ) -> None:
-        """Let an actor walk along points, or put it somewhere; raises WorldError, also for a path through a wall."""
-        self.population.move_actor(name, path, speed, loop, pause=pause, yields=yields)
-
-    def roam_actor(self, name: str, radius: float, speed: float, *, pause: float = 2.0) -> None:
-        """Let an actor wander within a radius [m] of where it is; raises WorldError."""
-        self.population.roam_actor(name, radius, speed, pause=pause)
-
-    def remove_actor(self, name: str) -> None:
-        """Take an actor or a door out; raises WorldError where there is none of that name."""
-        self.population.remove(name)
-
-    def spawn_door(self, place: DoorPlace) -> None:
-        """Hang a door, closed; raises WorldError where the name is taken."""
-        self.population.spawn_door(place)
-
-    def set_door(self, name: str, opening: float, speed: float = SPEED) -> None:
-        """Begin to open (1) or close (0) a door at a speed [rad/s], 0 at once; raises WorldError."""
-        self.population.set_door(name, opening, speed)
+def _no_robot() -> WorldError:
+    return WorldError("simulation", "has no robot yet")

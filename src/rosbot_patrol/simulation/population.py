@@ -1,4 +1,4 @@
-"""Everything in a world that moves and is not the robot: actors and doors, kept in step with the physics."""
+"""Everything in a world that comes, goes or moves and is not the robot, in step with the physics."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from rosbot_patrol.simulation.actors.doors import SPEED, Door, DoorPlace
 from rosbot_patrol.simulation.actors.walkers import Walker
 from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.physics.world import Physics
+from rosbot_patrol.simulation.scene.boxes import box_body
+from rosbot_patrol.simulation.scene.scene import Body
 from rosbot_patrol.simulation.scene.slices import Slice
 from rosbot_patrol.simulation.scene.ways import LEVELS, Ways, together
 from rosbot_patrol.simulation.sdf.world import ActorPlace
@@ -20,10 +22,10 @@ log = logging.getLogger(__name__)
 
 
 class Population:
-    """Actors and doors.
+    """Actors, doors and boxes.
 
     Args:
-        ways: where actors can walk.
+        ways: what stands still, and where actors can walk.
         physics: in which their bodies stand.
         seed: of looks and of who wanders where.
     """
@@ -34,6 +36,7 @@ class Population:
         self._seed = seed
         self._walkers: dict[str, Walker] = {}
         self._doors: dict[str, Door] = {}
+        self.boxes: dict[str, Body] = {}
 
     @property
     def walkers(self) -> tuple[Walker, ...]:
@@ -182,6 +185,36 @@ class Population:
             door.set(before, 0.0)
             self._physics.move(name, door.matrix)
             raise _robot_is_there(f"door '{name}'")
+
+    def place_box(self, name: str, pose: Pose2D, size: tuple[float, float, float]) -> None:
+        """Put a box on the floor.
+
+        Args:
+            name: unique in the world.
+            pose: its middle and direction.
+            size: length, depth and height [m].
+
+        Raises:
+            WorldError: the name is taken, or the robot stands there.
+        """
+        if name in self or name in self._ways.names:
+            raise WorldError(f"box '{name}'", "the name is taken")
+        body = box_body(name, pose, size)
+        was_free = self._physics.blocker() is None
+        self._physics.add(body)
+        if was_free and self._physics.blocker() == name:
+            self._physics.remove(name)
+            raise WorldError(f"box '{name}'", f"cannot stand at ({pose.x:.2f}, {pose.y:.2f}), the robot is there")
+        self.boxes[name] = body
+        self._ways.add(body)
+
+    def remove_box(self, name: str) -> None:
+        """Take a box away; raises WorldError where there is none of that name."""
+        if name not in self.boxes:
+            raise WorldError(f"box '{name}'", f"is not there (there: {', '.join(self.boxes) or 'none'})")
+        del self.boxes[name]
+        self._physics.remove(name)
+        self._ways.remove(name)
 
     def _step_doors(self, dt: float, robot: Pose2D | None, robot_radius: float) -> None:
         solid = [(w.pose, w.radius) for w in self._walkers.values()]

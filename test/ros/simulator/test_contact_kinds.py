@@ -24,11 +24,11 @@ MODEL = """<model name="{name}"><pose>0.6 0 0.5 0 0 0</pose><link name="link"><c
 def put(engine: Engine, kind: str) -> None:
     ahead = Pose2D(0.6, 0.0, math.pi)
     if kind == "door":
-        engine.spawn_door(plain_door("it", Pose2D(0.6, -0.4, math.pi / 2.0)))
+        engine.population.spawn_door(plain_door("it", Pose2D(0.6, -0.4, math.pi / 2.0)))
     elif kind == "object":
-        engine.place_box("it", ahead, (0.3, 0.3, 0.3))
+        engine.population.place_box("it", ahead, (0.3, 0.3, 0.3))
     elif kind in ("person", "hydrant", "cat", "dog"):
-        engine.spawn_actor("it", {"hydrant": "fire_hydrant"}.get(kind, kind), "", ahead)
+        engine.population.spawn_actor("it", {"hydrant": "fire_hydrant"}.get(kind, kind), "", ahead)
 
 
 @pytest.mark.parametrize(

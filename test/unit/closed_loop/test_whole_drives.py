@@ -67,14 +67,14 @@ def test_a_goal_in_a_wall_is_given_up_in_words(build):
 )
 def test_it_stands_for_who_never_yields_and_goes_on(build, start, way):
     loop = build(start)
-    loop.engine.spawn_actor("joe", "person", "", way[0])
-    loop.engine.move_actor("joe", way[1:], 0.9, yields=False)
+    loop.engine.population.spawn_actor("joe", "person", "", way[0])
+    loop.engine.population.move_actor("joe", way[1:], 0.9, yields=False)
     left = []
 
     def see_out():
-        if loop.engine.actors and loop.engine.actors[0].has_arrived:
+        if loop.engine.population.walkers and loop.engine.population.walkers[0].has_arrived:
             left.append(loop.now)
-            loop.engine.remove_actor("joe")
+            loop.engine.population.remove("joe")
 
     drive = loop.drive_to(GOAL, 90.0, each_step=see_out)
     assert left

@@ -35,16 +35,16 @@ def play(engine, watch, seconds, command=lambda now: Twist2D()):
         engine.step()
         if i % EVERY == 0:
             level = engine.level_scan()
-            seen = watch.see(level.scan, compose(engine.odometry[0], level.pose))
-            found.append((engine.now, seen, [(*actor.pose[:2], actor.speed) for actor in engine.actors]))
+            seen = watch.see(level.scan, compose(engine.robot.odometry.pose, level.pose))
+            found.append((engine.now, seen, [(*actor.pose[:2], actor.speed) for actor in engine.population.walkers]))
     return found
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 1.4])
 def test_one_who_walks_is_found_with_place_and_velocity(house, speed):
-    house.spawn_actor("joe", "person", "", Pose2D(3.2, -0.9, 2.5))
+    house.population.spawn_actor("joe", "person", "", Pose2D(3.2, -0.9, 2.5))
     play(house, watch := MoverWatch(), 1.0)
-    house.move_actor("joe", [Pose2D(0.8, 0.9, 0.0)], speed)
+    house.population.move_actor("joe", [Pose2D(0.8, 0.9, 0.0)], speed)
     track = play(house, watch, 2.6 / speed)
     errors, headings, misses = [], [], 0
     for k in range(10, len(track)):
@@ -74,19 +74,19 @@ def test_one_who_walks_is_found_with_place_and_velocity(house, speed):
     ids=["standing", "turning", "driving"],
 )
 def test_where_nobody_moves_nothing_is_found(house, command):
-    house.set_pose(Pose2D(0.5, 0.0, 0.2))
+    house.carry(Pose2D(0.5, 0.0, 0.2))
     found = play(house, MoverWatch(), 6.0, command)
     assert not [mover for _, movers, _ in found for mover in movers if mover.speed > 0.2 and mover.age > 0.25]
 
 
 def test_who_stops_is_forgotten_and_who_goes_on_is_found_again(house):
     watch = MoverWatch()
-    house.spawn_actor("joe", "person", "", Pose2D(3.0, 0.0, math.pi))
-    house.move_actor("joe", [Pose2D(1.8, 0.0, math.pi)], 0.9)
+    house.population.spawn_actor("joe", "person", "", Pose2D(3.0, 0.0, math.pi))
+    house.population.move_actor("joe", [Pose2D(1.8, 0.0, math.pi)], 0.9)
     assert any(movers for _, movers, _ in play(house, watch, 2.0))
     play(house, watch, 3.0)
     assert not watch.movers(house.now)
-    house.move_actor("joe", [Pose2D(2.8, 0.6, 0.0)], 0.9)
+    house.population.move_actor("joe", [Pose2D(2.8, 0.6, 0.0)], 0.9)
     assert any(movers for _, movers, _ in play(house, watch, 1.5))
 
 

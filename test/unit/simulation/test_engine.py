@@ -83,7 +83,7 @@ def test_a_wall_stops_it_and_is_told_while_the_wheels_turn_on(build) -> None:
     assert engine.pose.x == pytest.approx(0.9 - 0.1, abs=0.015)
     assert abs(engine.twist.vx) < 0.01
     assert {(t.other, t.kind) for t in engine.touches()} == {("wall", "wall")}
-    assert engine.odometry[0].x > 3.0
+    assert engine.robot.odometry.pose.x > 3.0
     drive(engine, -0.3, 0.0, 1.0)
     assert not engine.touches()
 
@@ -91,7 +91,7 @@ def test_a_wall_stops_it_and_is_told_while_the_wheels_turn_on(build) -> None:
 @pytest.mark.parametrize("yaw", [0.4, 0.9, -0.7])
 def test_it_neither_tunnels_nor_sticks_at_an_angle(build, yaw: float) -> None:
     engine = build(wall(1.0, 0.0, size=(0.05, 20.0)))
-    engine.set_pose(Pose2D(0.0, 0.0, yaw))
+    engine.carry(Pose2D(0.0, 0.0, yaw))
     drive(engine, 0.4, 0.0, 8.0)
     assert engine.pose.x < 0.98
 
@@ -99,15 +99,15 @@ def test_it_neither_tunnels_nor_sticks_at_an_angle(build, yaw: float) -> None:
 def test_odometry_drifts_a_little(build) -> None:
     engine = build()
     drive(engine, 0.2, 0.0, 25.0)
-    pose, _ = engine.odometry
+    pose = engine.robot.odometry.pose
     gap = math.hypot(pose.x - engine.pose.x, pose.y - engine.pose.y)
     assert 0.002 < gap < 0.4
-    before = engine.odometry[0].yaw
+    before = engine.robot.odometry.pose.yaw
     turned, told = 0.0, 0.0
     for _ in range(84):
         turned += drive(engine, 0.0, 0.75, 0.1)
-        told += wrap_angle(engine.odometry[0].yaw - before)
-        before = engine.odometry[0].yaw
+        told += wrap_angle(engine.robot.odometry.pose.yaw - before)
+        before = engine.robot.odometry.pose.yaw
     assert 1e-4 < abs(told - turned) < math.radians(6.0)
 
 
@@ -115,7 +115,7 @@ def test_perfect_encoders_tell_the_truth(build) -> None:
     exact = OdometryParams(radius_error=0.0, track_error=0.0, ticks_per_turn=1e6)
     engine = build(drive=NO_SLIP, encoder=exact)
     drive(engine, 0.2, 0.3, 10.0)
-    assert engine.odometry[0] == pytest.approx(tuple(engine.pose), abs=0.01)
+    assert engine.robot.odometry.pose == pytest.approx(tuple(engine.pose), abs=0.01)
 
 
 def test_the_imu_follows_the_turn_and_feels_gravity(build) -> None:
@@ -131,8 +131,8 @@ def test_the_battery_drains_faster_while_driving(build) -> None:
     idle, busy = build(), build()
     drive(idle, 0.0, 0.0, 5.0)
     drive(busy, 0.4, 0.0, 5.0)
-    assert busy.battery.charge < idle.battery.charge < 1.0
-    assert 9.0 < busy.battery.voltage < 12.6
+    assert busy.robot.battery.charge < idle.robot.battery.charge < 1.0
+    assert 9.0 < busy.robot.battery.voltage < 12.6
 
 
 def test_a_robot_in_a_wall_is_refused(build) -> None:
@@ -147,7 +147,7 @@ def test_a_pose_that_is_not_finite_is_refused(build) -> None:
     with pytest.raises(WorldError, match="is no pose"):
         engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"), Pose2D(math.nan, 0.0, 0.0))
     with pytest.raises(WorldError, match="is no pose"):
-        engine.spawn_actor("", "person", "", Pose2D(0.0, math.inf, 0.0))
+        engine.population.spawn_actor("", "person", "", Pose2D(0.0, math.inf, 0.0))
 
 
 def test_a_second_robot_is_refused(build) -> None:
@@ -157,35 +157,35 @@ def test_a_second_robot_is_refused(build) -> None:
 
 def test_a_person_walks_its_path_is_seen_and_goes(build) -> None:
     engine = build()
-    name = engine.spawn_actor("", "person", "", Pose2D(3.0, 0.0, math.pi))
-    engine.move_actor(name, [Pose2D(3.0, 1.0, 0.0)], 1.0)
+    name = engine.population.spawn_actor("", "person", "", Pose2D(3.0, 0.0, math.pi))
+    engine.population.move_actor(name, [Pose2D(3.0, 1.0, 0.0)], 1.0)
     for _ in range(round(4.0 / STEP)):
         engine.step()
-    (person,) = engine.actors
+    (person,) = engine.population.walkers
     assert person.pose[:2] == pytest.approx((3.0, 1.0), abs=0.06)
     assert not person.is_walking
     scan = engine.scan()
     hits = scan.is_hit
     assert 0 < hits.sum() < 40
     assert scan.ranges[hits].min() == pytest.approx(math.hypot(2.98, 1.0), abs=0.3)
-    engine.remove_actor(name)
+    engine.population.remove(name)
     assert np.isinf(engine.scan().ranges).all()
 
 
 def test_two_legs_are_two_groups_of_beams(build) -> None:
     engine = build()
-    engine.spawn_actor("", "person", "visitor", Pose2D(1.5, 0.0, 0.0))
+    engine.population.spawn_actor("", "person", "visitor", Pose2D(1.5, 0.0, 0.0))
     hit = np.roll(engine.scan().is_hit, 360)
     assert np.diff(hit.astype(int)).clip(0).sum() == 2
 
 
 def test_a_person_stops_before_the_robot_and_is_touched_as_a_person(build) -> None:
     engine = build()
-    name = engine.spawn_actor("", "person", "", Pose2D(2.0, 0.0, math.pi))
-    engine.move_actor(name, [Pose2D(-2.0, 0.0, 0.0)], 1.0)
+    name = engine.population.spawn_actor("", "person", "", Pose2D(2.0, 0.0, math.pi))
+    engine.population.move_actor(name, [Pose2D(-2.0, 0.0, 0.0)], 1.0)
     for _ in range(round(5.0 / STEP)):
         engine.step()
-    assert engine.actors[0].pose.x > 0.35
+    assert engine.population.walkers[0].pose.x > 0.35
     drive(engine, 0.3, 0.0, 3.0)
     assert {t.kind for t in engine.touches()} == {"person"}
 
@@ -200,32 +200,32 @@ def test_a_person_stops_before_the_robot_and_is_touched_as_a_person(build) -> No
 )
 def test_actors_that_cannot_be(build, name: str, model: str, look: str, words: str) -> None:
     with pytest.raises(WorldError, match=words):
-        build(wall(3.0, 0.0)).spawn_actor(name, model, look, Pose2D())
+        build(wall(3.0, 0.0)).population.spawn_actor(name, model, look, Pose2D())
 
 
 def test_moves_that_cannot_be(build) -> None:
     engine = build()
-    engine.spawn_actor("joe", "person", "", Pose2D(2, 0, 0))
+    engine.population.spawn_actor("joe", "person", "", Pose2D(2, 0, 0))
     with pytest.raises(WorldError, match="'jim': is not there"):
-        engine.move_actor("jim", [Pose2D()], 1.0)
+        engine.population.move_actor("jim", [Pose2D()], 1.0)
     with pytest.raises(WorldError, match="at least one point"):
-        engine.move_actor("joe", [], 1.0)
+        engine.population.move_actor("joe", [], 1.0)
     with pytest.raises(WorldError, match="at -1"):
-        engine.move_actor("joe", [Pose2D()], -1.0)
+        engine.population.move_actor("joe", [Pose2D()], -1.0)
 
 
 @pytest.mark.parametrize("yields", [True, False])
 def test_who_does_not_yield_steps_over_the_robot_and_touches_it(build, yields: bool) -> None:
     engine = build()
-    engine.spawn_actor("joe", "person", "", Pose2D(1.5, 0.0, math.pi))
-    engine.move_actor("joe", [Pose2D(-1.5, 0.0, 0.0)], 1.0, yields=yields)
+    engine.population.spawn_actor("joe", "person", "", Pose2D(1.5, 0.0, math.pi))
+    engine.population.move_actor("joe", [Pose2D(-1.5, 0.0, 0.0)], 1.0, yields=yields)
     touched = set()
     for _ in range(round(5.0 / STEP)):
         engine.step()
         touched |= {touch.other for touch in engine.touches()}
     assert engine.pose.x == pytest.approx(0.0, abs=1e-3)
     assert touched == (set() if yields else {"joe"})
-    assert (engine.actors[0].pose.x < -1.4) == (not yields)
+    assert (engine.population.walkers[0].pose.x < -1.4) == (not yields)
 
 
 def test_a_motion_sensor_sees_no_one_behind_a_wall(build) -> None:
@@ -233,12 +233,12 @@ def test_a_motion_sensor_sees_no_one_behind_a_wall(build) -> None:
 
     def fires(*bodies: Body) -> bool:
         engine = build(*bodies, sensors=(place,))
-        name = engine.spawn_actor("", "person", "", Pose2D(-1.5, 1.5, 0.0))
-        engine.move_actor(name, [Pose2D(1.5, 1.5, 0.0)], 1.0)
+        name = engine.population.spawn_actor("", "person", "", Pose2D(-1.5, 1.5, 0.0))
+        engine.population.move_actor(name, [Pose2D(1.5, 1.5, 0.0)], 1.0)
         changes = []
         for _ in range(round(3.0 / STEP)):
             engine.step()
-            changes += engine.motion_changes()
+            changes += engine.motion_sensors.changes(engine.now)
         return (4, True) in changes
 
     assert fires()
@@ -250,16 +250,16 @@ def run_house(seed: int) -> list[bytes]:
     place = SensorPlace(id=1, room=1, x=4.57, y=1.09, yaw=-2.1)
     engine = Engine(load_world(ROOT / "worlds" / "house.world"), EngineParams(seed=seed), sensors=[place])
     engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
-    name = engine.spawn_actor("", "person", "", Pose2D(2.0, 0.5, 0.0))
-    engine.move_actor(name, [Pose2D(3.0, -0.5, 0.0), Pose2D(2.0, 0.5, 0.0)], 0.8, loop=True)
+    name = engine.population.spawn_actor("", "person", "", Pose2D(2.0, 0.5, 0.0))
+    engine.population.move_actor(name, [Pose2D(3.0, -0.5, 0.0), Pose2D(2.0, 0.5, 0.0)], 0.8, loop=True)
     data = []
     for i in range(1000):
         engine.command(Twist2D(0.3, 0.0, 0.4 * math.sin(i / 100)))
         engine.step()
         if i % 20 == 0:
             data.append(engine.scan().ranges.tobytes())
-            data.append(np.array([*engine.pose, *engine.odometry[0], *engine.imu().rates]).tobytes())
-            data.append(repr((engine.ranges(), engine.motion(), engine.touches())).encode())
+            data.append(np.array([*engine.pose, *engine.robot.odometry.pose, *engine.imu().rates]).tobytes())
+            data.append(repr((engine.ranges(), engine.motion_sensors.levels(engine.now), engine.touches())).encode())
     engine.close()
     return data
 

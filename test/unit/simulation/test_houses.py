@@ -129,12 +129,12 @@ def test_a_sensor_hangs_on_a_wall_and_notices_who_walks_in_its_room(house: str, 
     engine = Engine(world_of(house), sensors=[sensor])
     walk = yaml.safe_load((ROOT / "config" / f"{house}_demo.yaml").read_text())["walks"][sensor.room]
     path = [Pose2D(*point) for point in walk["path"]]
-    name = engine.spawn_actor("", "person", "", path[0])
-    engine.move_actor(name, path[1:], walk["speed"])
+    name = engine.population.spawn_actor("", "person", "", path[0])
+    engine.population.move_actor(name, path[1:], walk["speed"])
     fired = False
     for _ in range(1600):
         engine.step()
-        fired = fired or (sensor.id, True) in engine.motion_changes()
+        fired = fired or (sensor.id, True) in engine.motion_sensors.changes(engine.now)
     engine.close()
     assert fired
 

@@ -46,14 +46,16 @@ def run(engine: Engine, seconds: float) -> None:
 
 def test_a_path_through_a_wall_is_refused_and_names_it(build) -> None:
     engine = build(block(2.0, 0.0), block(0.0, 3.0, (1.0, 1.0, 0.7), "table"))
-    engine.spawn_actor("joe", "person", "", Pose2D())
+    engine.population.spawn_actor("joe", "person", "", Pose2D())
     with pytest.raises(WorldError, match=r"'joe': cannot walk from \(1\.00, 0\.00\) to \(3\.00, 0\.00\): 'wall' is th"):
-        engine.move_actor("joe", [Pose2D(1.0, 0.0), Pose2D(3.0, 0.0)], 1.0)
-    assert engine.actors[0].pose == Pose2D()
-    engine.move_actor("joe", [Pose2D(0.0, 4.0)], 1.0)  # over the table: no wall
-    engine.move_actor("joe", [Pose2D(3.0, 0.0)], 0.0)  # put there
+        engine.population.move_actor("joe", [Pose2D(1.0, 0.0), Pose2D(3.0, 0.0)], 1.0)
+    assert engine.population.walkers[0].pose == Pose2D()
+    engine.population.move_actor("joe", [Pose2D(0.0, 4.0)], 1.0)  # over the table: no wall
+    engine.population.move_actor("joe", [Pose2D(3.0, 0.0)], 0.0)  # put there
     with pytest.raises(WorldError, match="'wall' is there"):
-        engine.move_actor("joe", [Pose2D(3.0, 1.0), Pose2D(3.0, 3.0), Pose2D(0.0, 3.0), Pose2D(0.0, 1.0)], 1.0, True)
+        engine.population.move_actor(
+            "joe", [Pose2D(3.0, 1.0), Pose2D(3.0, 3.0), Pose2D(0.0, 3.0), Pose2D(0.0, 1.0)], 1.0, True
+        )
 
 
 def test_an_actor_whom_a_world_sends_through_a_wall_goes_with_a_warning(build, caplog) -> None:
@@ -62,18 +64,18 @@ def test_an_actor_whom_a_world_sends_through_a_wall_goes_with_a_warning(build, c
         engine = build(block(2.0, 0.0), actors=(walker,))
     assert "'wall' is there; it walks there all the same" in caplog.text
     run(engine, 6.0)
-    assert engine.actors[0].pose.x > 3.9
+    assert engine.population.walkers[0].pose.x > 3.9
 
 
 def test_one_who_wanders_meets_neither_walls_nor_furniture(build) -> None:
     table = block(0.0, 1.5, (1.0, 0.8, 0.7), "table")
     engine = build(block(1.5, 0.0), table, block(-1.0, -1.0, (0.6, 0.6, 0.1), "box"))
-    engine.spawn_actor("tom", "cat", "tabby", Pose2D())
-    engine.roam_actor("tom", 2.5, 0.8, pause=0.2)
+    engine.population.spawn_actor("tom", "cat", "tabby", Pose2D())
+    engine.population.roam_actor("tom", 2.5, 0.8, pause=0.2)
     seen = []
     for _ in range(120):
         run(engine, 0.5)
-        seen.append(engine.actors[0].pose)
+        seen.append(engine.population.walkers[0].pose)
     assert max(math.hypot(p.x, p.y) for p in seen) > 1.2
     assert all(p.x < 1.45 for p in seen)
     assert not any(abs(p.x) < 0.5 and 1.1 < p.y < 1.9 for p in seen)
@@ -81,11 +83,11 @@ def test_one_who_wanders_meets_neither_walls_nor_furniture(build) -> None:
 
 def test_one_who_wanders_goes_round_who_stands_there(build) -> None:
     engine = build()
-    engine.spawn_actor("joe", "person", "visitor", Pose2D(0.8, 0.0))
-    engine.spawn_actor("ann", "person", "woman", Pose2D(-0.8, 0.0))
-    engine.spawn_actor("rex", "dog", "terrier", Pose2D())
-    engine.roam_actor("rex", 1.6, 0.8, pause=0.1)
-    rex, gaps, xs = engine.actors[2], [], []
+    engine.population.spawn_actor("joe", "person", "visitor", Pose2D(0.8, 0.0))
+    engine.population.spawn_actor("ann", "person", "woman", Pose2D(-0.8, 0.0))
+    engine.population.spawn_actor("rex", "dog", "terrier", Pose2D())
+    engine.population.roam_actor("rex", 1.6, 0.8, pause=0.1)
+    rex, gaps, xs = engine.population.walkers[2], [], []
     for _ in range(600):
         run(engine, 0.1)
         gaps += [math.hypot(rex.pose.x - x, rex.pose.y) for x in (0.8, -0.8)]
@@ -98,16 +100,16 @@ def test_who_wanders_depends_on_seed_and_name_alone(build) -> None:
     def track(seed: int, *others: str) -> list[Pose2D]:
         engine = build(seed=seed)
         for name in others:
-            engine.spawn_actor(name, "person", "", Pose2D(9.0, 9.0))
-            engine.roam_actor(name, 1.0, 1.0)
-        engine.spawn_actor("rex", "dog", "", Pose2D())
-        engine.roam_actor("rex", 2.0, 1.0)
+            engine.population.spawn_actor(name, "person", "", Pose2D(9.0, 9.0))
+            engine.population.roam_actor(name, 1.0, 1.0)
+        engine.population.spawn_actor("rex", "dog", "", Pose2D())
+        engine.population.roam_actor("rex", 2.0, 1.0)
         if others:
-            engine.remove_actor(others[0])
+            engine.population.remove(others[0])
         poses = []
         for _ in range(40):
             run(engine, 0.25)
-            poses.append(engine.actors[-1].pose)
+            poses.append(engine.population.walkers[-1].pose)
         return poses
 
     assert track(1) == track(1, "ann", "bob")
@@ -116,18 +118,18 @@ def test_who_wanders_depends_on_seed_and_name_alone(build) -> None:
 
 def test_looks_depend_on_seed_and_name_alone(build) -> None:
     first, second = build(), build()
-    second.spawn_actor("", "person", "", Pose2D(3.0, 0.0))
-    second.remove_actor("person_1")
+    second.population.spawn_actor("", "person", "", Pose2D(3.0, 0.0))
+    second.population.remove("person_1")
     for engine in (first, second):
-        engine.spawn_actor("joe", "person", "", Pose2D())
-    assert first.actors[0].body.visuals[0].material == second.actors[0].body.visuals[0].material
+        engine.population.spawn_actor("joe", "person", "", Pose2D())
+    assert first.population.walkers[0].body.visuals[0].material == second.population.walkers[0].body.visuals[0].material
 
 
 def test_names_are_made_up_and_unique(build) -> None:
     engine = build(block(5.0, 0.0, name="cat_2"))
-    assert [engine.spawn_actor("", "cat", "", Pose2D()) for _ in range(2)] == ["cat_1", "cat_3"]
-    engine.remove_actor("cat_1")
-    assert engine.spawn_actor("", "cat", "", Pose2D()) == "cat_1"
+    assert [engine.population.spawn_actor("", "cat", "", Pose2D()) for _ in range(2)] == ["cat_1", "cat_3"]
+    engine.population.remove("cat_1")
+    assert engine.population.spawn_actor("", "cat", "", Pose2D()) == "cat_1"
 
 
 def test_ways_are_as_wide_as_who_goes() -> None:

@@ -47,10 +47,12 @@ def test_a_sensor_hangs_on_a_wall_and_notices_who_crosses_its_room(sensor: Senso
     x, y = ROOMS[sensor.room]
     across = math.atan2(y - sensor.y, x - sensor.x) + math.pi / 2
     engine = Engine(WORLD, sensors=[sensor])
-    name = engine.spawn_actor("", "person", "", Pose2D(x - 0.6 * math.cos(across), y - 0.6 * math.sin(across), 0.0))
-    engine.move_actor(name, [Pose2D(x + 0.6 * math.cos(across), y + 0.6 * math.sin(across), 0.0)], 0.8)
+    name = engine.population.spawn_actor(
+        "", "person", "", Pose2D(x - 0.6 * math.cos(across), y - 0.6 * math.sin(across), 0.0)
+    )
+    engine.population.move_actor(name, [Pose2D(x + 0.6 * math.cos(across), y + 0.6 * math.sin(across), 0.0)], 0.8)
     for _ in range(600):
         engine.step()
-    fired = (sensor.id, True) in engine.motion_changes()
+    fired = (sensor.id, True) in engine.motion_sensors.changes(engine.now)
     engine.close()
     assert fired

@@ -42,7 +42,7 @@ class DoorServices:
         sizes = {"width": request.width or _WIDTH, "height": request.height or _HEIGHT}
         try:
             place = plain_door(request.name, hinge, **sizes, swing=request.swing or SWING)
-            self._ask(lambda: self._engine.spawn_door(place))
+            self._ask(lambda: self._engine.population.spawn_door(place))
         except PatrolError as err:
             return SpawnDoorResponse(success=False, message=str(err))
         rospy.loginfo("door '%s' hangs at (%.2f, %.2f)", request.name, hinge.x, hinge.y)
@@ -51,7 +51,7 @@ class DoorServices:
     def _set(self, request: SetDoorRequest) -> SetDoorResponse:
         speed = 0.0 if request.at_once else request.speed or SPEED
         try:
-            self._ask(lambda: self._engine.set_door(request.name, request.opening, speed))
+            self._ask(lambda: self._engine.population.set_door(request.name, request.opening, speed))
         except PatrolError as err:
             return SetDoorResponse(success=False, message=str(err))
         rospy.loginfo("door '%s' goes to %.0f %% open", request.name, 100.0 * request.opening)

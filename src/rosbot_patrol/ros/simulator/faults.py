@@ -58,7 +58,7 @@ class FaultServices:
 
     def follow(self) -> None:
         """Tell what has changed, and hand on what befalls the sensors' links; the simulation's thread calls it."""
-        for sensor in self._engine.restarted_sensors():
+        for sensor in self._engine.motion_sensors.restarted():
             self._clients[sensor].reboot()
         if self._engine.faults.changes == self._told:
             return

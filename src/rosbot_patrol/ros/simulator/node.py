@@ -200,7 +200,7 @@ class Simulator:
         self._tick += 1
         self._outputs.publish(self._tick)
         self._faults.follow()
-        for sensor, is_high in self._engine.motion_changes():
+        for sensor, is_high in self._engine.motion_sensors.changes(self._engine.now):
             self._clients[sensor].set_motion(is_high)
 
     def _step_ticks(self, ticks: int) -> None:
@@ -228,7 +228,7 @@ class Simulator:
         values = {
             "real-time factor": f"{factor:.2f}",
             "simulated time": f"{self._engine.now:.1f}",
-            "actors": len(self._engine.actors),
+            "actors": len(self._engine.population.walkers),
             "motion sensors linked": sum(c.connected for c in self._clients.values()),
         }
         self._health.set("", WARN if slow else OK, text, values)

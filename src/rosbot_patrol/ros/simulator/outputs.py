@@ -70,7 +70,7 @@ class Outputs:
         self._scan = publisher("scan", LaserScan, queue_size=1)
         self._imu = publisher("rosbot/imu", Imu, queue_size=1)
         self._ranges: dict[str, rospy.Publisher] = {}
-        for frame in [m.frame for m in engine.description.ranges] if engine.has_robot else _RANGE_FRAMES:
+        for frame in [m.frame for m in engine.robot.description.ranges] if engine.has_robot else _RANGE_FRAMES:
             self._range_publisher(frame)
         self._joints = publisher("joint_states", JointState, queue_size=1)
         self._battery = publisher("battery", BatteryState, queue_size=1)
@@ -115,21 +115,22 @@ class Outputs:
 
     def _odometry_now(self) -> tuple[Pose2D, Twist2D]:
         if not self._exact:
-            return self._engine.odometry
+            odometry = self._engine.robot.odometry
+            return odometry.pose, odometry.twist
         if self._odom_start is None:
-            self._odom_start = self._engine.start_pose
+            self._odom_start = self._engine.robot.start
         return compose(invert(self._odom_start), self._engine.pose), self._engine.twist
 
     def _send_odometry(self, now: float) -> None:
         pose, twist = self._odometry_now()
-        base = self._engine.description.base
+        base = self._engine.robot.description.base
         self._tf.publish(TFMessage([transform_to_msg(pose, "odom", base, now)]))
         if self._odom.get_num_connections():
             self._odom.publish(messages.odometry_msg(pose, twist, now, "odom", child=base, exact=self._exact))
 
     def _send_truth(self, now: float) -> None:
         if self._truth.get_num_connections():
-            robot = self._engine.description
+            robot = self._engine.robot.description
             self._truth.publish(
                 messages.odometry_msg(
                     self._engine.pose, self._engine.twist, now, "map", z=robot.base_height, child=robot.base, exact=True
@@ -138,7 +139,7 @@ class Outputs:
 
     def _send_actors(self, now: float) -> None:
         if self._actors.get_num_connections():
-            actors = self._engine.actors
+            actors = self._engine.population.walkers
             self._actors.publish(TFMessage([transform_to_msg(a.pose, "map", a.name, now) for a in actors]))
 
     def _send_contacts(self, now: float) -> None:
@@ -146,11 +147,11 @@ class Outputs:
             return
         touches = self._engine.touches()
         if touches or self._touching:
-            self._contacts.publish(messages.contacts_msg(touches, now, self._engine.description.base))
+            self._contacts.publish(messages.contacts_msg(touches, now, self._engine.robot.description.base))
         self._touching = bool(touches)
 
     def _send_scan(self, now: float) -> None:
-        if self._engine.description.laser is None or not self._scan.get_num_connections():
+        if self._engine.robot.description.laser is None or not self._scan.get_num_connections():
             return
         if self._engine.faults.is_silent("lidar"):
             return
@@ -161,7 +162,7 @@ class Outputs:
         self._scan.publish(message)
 
     def _send_imu(self, now: float) -> None:
-        mount = self._engine.description.imu
+        mount = self._engine.robot.description.imu
         if mount is not None and self._imu.get_num_connections():
             self._imu.publish(messages.imu_msg(self._engine.imu(), self._engine.params.imu, now, mount.frame))
 
@@ -175,7 +176,7 @@ class Outputs:
             self._ranges[frame].publish(message)
 
     def _range_frames(self) -> list[str]:
-        return [mount.frame for mount in self._engine.description.ranges]
+        return [mount.frame for mount in self._engine.robot.description.ranges]
 
     def _range_publisher(self, frame: str) -> rospy.Publisher:
         if frame not in self._ranges:
@@ -185,16 +186,16 @@ class Outputs:
 
     def _send_joints(self, now: float) -> None:
         if self._joints.get_num_connections():
-            angles, speeds = self._engine.wheels
-            self._joints.publish(messages.joints_msg(self._engine.description, angles, speeds, now))
+            angles, speeds = self._engine.robot.wheels
+            self._joints.publish(messages.joints_msg(self._engine.robot.description, angles, speeds, now))
 
     def _send_battery(self, now: float) -> None:
         if self._battery.get_num_connections():
-            base = self._engine.description.base
-            self._battery.publish(messages.battery_msg(self._engine.battery, now, base))
+            base = self._engine.robot.description.base
+            self._battery.publish(messages.battery_msg(self._engine.robot.battery, now, base))
 
     def _send_pictures(self, now: float) -> None:
-        mount = self._engine.description.camera
+        mount = self._engine.robot.description.camera
         if mount is None or self._engine.faults.is_silent("camera"):
             return
         camera, frame = self._engine.params.camera.intrinsics, mount.frame

@@ -120,10 +120,10 @@ class Requests:
 
     def _put(self, name: str, pose: Pose2D) -> None:
         engine = self._engine
-        if not name or (engine.has_robot and name == engine.description.name):
+        if not name or (engine.has_robot and name == engine.robot.description.name):
             engine.carry(pose)
         else:
-            engine.move_actor(name, [pose], 0.0)
+            engine.population.move_actor(name, [pose], 0.0)
 
     def _remove_robot(self, _: object) -> TriggerResponse:
         try:
@@ -136,7 +136,7 @@ class Requests:
     def _spawn_actor(self, request: SpawnActorRequest) -> SpawnActorResponse:
         try:
             name = self.ask(
-                lambda: self._engine.spawn_actor(
+                lambda: self._engine.population.spawn_actor(
                     request.name, request.model, request.look, _pose(request.pose), posture=request.posture
                 )
             )
@@ -156,14 +156,14 @@ class Requests:
         if request.roam:
             if request.path:
                 raise WorldError(f"actor '{request.name}'", "walks along a path or wanders, not both")
-            self._engine.roam_actor(request.name, request.roam, request.speed, pause=request.pause)
+            self._engine.population.roam_actor(request.name, request.roam, request.speed, pause=request.pause)
             return
         path = [_pose(p) for p in request.path]
-        self._engine.move_actor(request.name, path, request.speed, request.loop, pause=request.pause)
+        self._engine.population.move_actor(request.name, path, request.speed, request.loop, pause=request.pause)
 
     def _remove_actor(self, request: RemoveActorRequest) -> RemoveActorResponse:
         try:
-            self.ask(lambda: self._engine.remove_actor(request.name))
+            self.ask(lambda: self._engine.population.remove(request.name))
         except PatrolError as err:
             return RemoveActorResponse(success=False, message=str(err))
         rospy.loginfo("'%s' is gone", request.name)

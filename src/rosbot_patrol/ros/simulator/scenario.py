@@ -13,8 +13,8 @@ from std_msgs.msg import String
 from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.rosserial.device.tcp_client import EspClient
 from rosbot_patrol.simulation.engine import Engine
+from rosbot_patrol.simulation.player import ScenarioPlayer
 from rosbot_patrol.simulation.scenario.file import PLAYED, Scenario
-from rosbot_patrol.simulation.scenario.player import ScenarioPlayer
 
 log = logging.getLogger(__name__)
 

@@ -176,15 +176,6 @@ class Door:
         )
 
 
-def planar_radius(body: Body) -> float:
-    """Of the upright cylinder about a body's origin that holds its collision shapes [m]."""
-    radius = 0.0
-    for collision in body.collisions:
-        corners = mesh_of(collision.shape).positions @ collision.pose[:3, :3].T + collision.pose[:3, 3]
-        radius = max(radius, float(np.hypot(corners[:, 0], corners[:, 1]).max()))
-    return radius
-
-
 def _check_swing(name: str, swing: float) -> None:
     if not 0.05 <= abs(swing) <= math.pi:
         raise WorldError(f"door '{name}'", f"swings by {swing:.3f} rad, expected 0.05 to 3.14 to either side")

@@ -22,9 +22,9 @@ from rosbot_patrol.simulation.actors.people import (
 from rosbot_patrol.simulation.actors.pets import PETS, PetLook, draw_pet, legs_at, pet_body, pet_named, pet_pose_parts
 from rosbot_patrol.simulation.actors.posters import PosterFigure
 from rosbot_patrol.simulation.scene.matrices import Matrix
+from rosbot_patrol.simulation.scene.raycast_kernels import NO_SEGMENTS
 from rosbot_patrol.simulation.scene.scene import Body
 from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
-from rosbot_patrol.simulation.sensors.raycast_kernels import NO_SEGMENTS
 
 MODELS = ("person", "fire_hydrant", *PETS, "poster")
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Transform, Twist2D
-from rosbot_patrol.simulation.actors.doors import planar_radius
 from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.robot.battery import Battery, BatteryParams
 from rosbot_patrol.simulation.robot.description import FrameParams, RobotDescription
@@ -19,8 +17,7 @@ from rosbot_patrol.simulation.robot.drive import Drive, DriveParams
 from rosbot_patrol.simulation.robot.imu import Imu, ImuParams
 from rosbot_patrol.simulation.robot.odometry import EncoderOdometry, OdometryParams
 from rosbot_patrol.simulation.scene.matrices import Matrix, to_pose2d, to_quaternion
-from rosbot_patrol.simulation.scene.scene import Body
-from rosbot_patrol.simulation.scene.slices import EMPTY, slice_bodies
+from rosbot_patrol.simulation.scene.shapes import planar_radius
 from rosbot_patrol.simulation.sensors.lidar import LidarParams
 
 log = logging.getLogger(__name__)
@@ -64,16 +61,13 @@ class Equipment:
     Args:
         params: of the parts.
         description: the robot.
-        bodies: what stands still.
         pose: where it starts.
 
     Raises:
         WorldError: a wheel or sensor that the parameters name is not there, or no wheel tells its radius.
     """
 
-    def __init__(
-        self, params: EquipmentParams, description: RobotDescription, bodies: Sequence[Body], pose: Pose2D
-    ) -> None:
+    def __init__(self, params: EquipmentParams, description: RobotDescription, pose: Pose2D) -> None:
         p = params
         robot = description.fitted(p.drive.left_joints, p.drive.right_joints, p.frames)
         self.description = robot
@@ -96,17 +90,16 @@ class Equipment:
         heights = [m.pose[2, 3] for m in robot.ranges]
         self.range_height = robot.base_height + float(np.mean(heights)) if heights else 0.05
         self.base_from_optical: Matrix | None = None if robot.camera is None else robot.camera.pose
-        self.cut(bodies)
         self.imu.reset(pose.yaw)
         sensors = {"lidar": robot.laser, "camera": robot.camera, "inertial unit": robot.imu}
         missing = [name for name, mount in sensors.items() if mount is None]
         if missing:
             log.info("robot '%s' has no %s: nothing is sent of it", robot.name, " and no ".join(missing))
 
-    def cut(self, bodies: Sequence[Body]) -> None:
-        """Take the cuts through what stands still."""
-        self.lidar_slice = slice_bodies(bodies, self.lidar_height) if self.base_from_laser else EMPTY
-        self.range_slice = slice_bodies(bodies, self.range_height) if self.base_from_ranges else EMPTY
+    @property
+    def wheels(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Angles [rad] and speeds [rad/s] of the left and the right wheels."""
+        return (float(self.turned[0]), float(self.turned[1])), (self.drive.left, self.drive.right)
 
     @property
     def laser(self) -> tuple[str, Pose2D]:

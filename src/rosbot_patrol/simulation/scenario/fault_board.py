@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
@@ -13,6 +13,7 @@ import numpy as np
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, Twist2D
 from rosbot_patrol.params import unknown_name
+from rosbot_patrol.simulation.population import Population
 from rosbot_patrol.simulation.scenario.faults import (
     ALL_SENSORS,
     CameraBlack,
@@ -33,7 +34,7 @@ from rosbot_patrol.simulation.scenario.faults import (
     WheelStuck,
 )
 from rosbot_patrol.simulation.sensors.camera import Picture
-from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
+from rosbot_patrol.simulation.sensors.sensor_net import SensorNet
 
 log = logging.getLogger(__name__)
 
@@ -47,20 +48,15 @@ class Site(Protocol):
     """What a fault may change beyond readings: the engine."""
 
     @property
-    def sensors(self) -> Sequence[SensorPlace]:
+    def population(self) -> Population:
+        """What comes and goes there."""
+
+    @property
+    def motion_sensors(self) -> SensorNet:
         """The motion sensors."""
 
     def carry(self, pose: Pose2D) -> None:
         """Put the robot elsewhere; raises WorldError."""
-
-    def place_box(self, name: str, pose: Pose2D, size: tuple[float, float, float]) -> None:
-        """Put a box on the floor; raises WorldError."""
-
-    def remove_box(self, name: str) -> None:
-        """Take a box away."""
-
-    def restart_sensor(self, sensor: int) -> None:
-        """Switch a motion sensor off and on."""
 
 
 @dataclass
@@ -134,7 +130,7 @@ class FaultBoard:
                 self._end(name, now)
             elif now >= entry.again - _CLOSE and isinstance(entry.fault, MotionRebooting):
                 entry.again += entry.fault.every
-                self._site.restart_sensor(entry.fault.target)
+                self._site.motion_sensors.restart(entry.fault.target, now)
         self._plan()
 
     # What they do ----------------------------------------------------------------------------------------------------
@@ -200,7 +196,7 @@ class FaultBoard:
     def _end(self, name: str, now: float) -> None:
         fault = self._in_force.pop(name).fault
         if isinstance(fault, DoorwayBlocked):
-            self._site.remove_box(fault.name)
+            self._site.population.remove_box(fault.name)
         self.changes += 1
         self._plan()
         log.info("fault ends at %.2f s: %s", now, fault)
@@ -209,10 +205,10 @@ class FaultBoard:
         if isinstance(fault, RobotCarried):
             self._site.carry(fault.pose)
         elif isinstance(fault, MotionRebooting):
-            self._site.restart_sensor(fault.target)
+            self._site.motion_sensors.restart(fault.target, now)
         elif isinstance(fault, DoorwayBlocked) and fault.x is not None and fault.y is not None:
             size = (fault.width or 0.9, fault.depth, fault.height)
-            self._site.place_box(fault.name, Pose2D(fault.x, fault.y, fault.yaw or 0.0), size)
+            self._site.population.place_box(fault.name, Pose2D(fault.x, fault.y, fault.yaw or 0.0), size)
 
     def _located(self, fault: Fault) -> Fault:
         if not isinstance(fault, DoorwayBlocked) or not fault.target or fault.x is not None:
@@ -225,7 +221,7 @@ class FaultBoard:
         return replace(fault, x=door.x, y=door.y, yaw=yaw, width=fault.width or door.width)
 
     def _check_sensor(self, fault: SensorFault | LinkPoor) -> None:
-        ids = [place.id for place in self._site.sensors]
+        ids = [place.id for place in self._site.motion_sensors.places]
         if fault.target not in ids and fault.target != ALL_SENSORS:
             there = ", ".join(map(str, ids)) or "none"
             raise WorldError(f"fault '{fault.name}'", f"there is no motion sensor {fault.target} (there: {there})")

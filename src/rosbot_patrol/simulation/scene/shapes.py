@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.meshes.files import load_mesh
-from rosbot_patrol.simulation.scene.scene import Shape
+from rosbot_patrol.simulation.scene.scene import Body, Shape
 
 _SIDES = 20
 _RINGS = 12
@@ -267,3 +267,12 @@ def _free_mesh(shape: Shape) -> Mesh:
 
 def _split(quads: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def planar_radius(body: Body) -> float:
+    """Radius of the upright cylinder about a body's origin that holds its collision shapes [m]."""
+    radius = 0.0
+    for collision in body.collisions:
+        corners = mesh_of(collision.shape).positions @ collision.pose[:3, :3].T + collision.pose[:3, 3]
+        radius = max(radius, float(np.hypot(corners[:, 0], corners[:, 1]).max()))
+    return radius

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.simulation.actors.doors import Door
 from rosbot_patrol.simulation.scene.matrices import Matrix
-from rosbot_patrol.simulation.scene.scene import Body
+from rosbot_patrol.simulation.scene.scene import Body, Mover
 from rosbot_patrol.simulation.scene.shapes import triangles_of
 from rosbot_patrol.simulation.scene.sight_kernels import meets
 
@@ -45,7 +44,7 @@ class Sight:
         self._still = Obstruction(bodies)
         self._leaves: dict[str, tuple[Body, Obstruction]] = {}
 
-    def share(self, eye: Sequence[float], points: Sequence[Sequence[float]], doors: Iterable[Door]) -> float:
+    def share(self, eye: Sequence[float], points: Sequence[Sequence[float]], doors: Iterable[Mover]) -> float:
         """How many of some points are seen, 0 none to 1 all of them.
 
         Args:
@@ -61,7 +60,7 @@ class Sight:
                 seen += 1
         return seen / len(points) if points else 0.0
 
-    def _hidden_by(self, door: Door, eye: Point, point: Point) -> bool:
+    def _hidden_by(self, door: Mover, eye: Point, point: Point) -> bool:
         if door.name not in self._leaves or self._leaves[door.name][0] is not door.body:
             leaf = Body(name=door.name, collisions=door.body.collisions)
             self._leaves[door.name] = (door.body, Obstruction([leaf]))

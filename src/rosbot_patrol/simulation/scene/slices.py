@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.simulation.scene import raycast_kernels as kernels
 from rosbot_patrol.simulation.scene.matrices import Matrix, is_upright
 from rosbot_patrol.simulation.scene.scene import Body, Shape
 from rosbot_patrol.simulation.scene.shapes import triangles_of
-from rosbot_patrol.simulation.sensors import raycast_kernels as kernels
 
 Array = NDArray[np.float64]
 

@@ -26,10 +26,22 @@ class Ways:
     """
 
     def __init__(self, bodies: Sequence[Body]) -> None:
-        self.stand(bodies)
+        self._set(bodies)
 
-    def stand(self, bodies: Sequence[Body]) -> None:
-        """Take what stands there anew."""
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """What stands there."""
+        return self._bodies
+
+    def add(self, body: Body) -> None:
+        """Let a further body stand there."""
+        self._set((*self._bodies, body))
+
+    def remove(self, name: str) -> None:
+        """Take the body of that name away."""
+        self._set([body for body in self._bodies if body.name != name])
+
+    def _set(self, bodies: Sequence[Body]) -> None:
         self._bodies = tuple(bodies)
         self._cuts: dict[float, Slice] = {}
         self.sight = Sight(bodies)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -69,18 +69,19 @@ class Camera:
     Args:
         params: optics and noise.
         make_renderer: builds the renderer, in the thread that takes pictures.
-        bodies: what stands still.
+        bodies: what always stands there.
+        boxes: further bodies by name, as they come and go in the simulation's thread.
         seed: of the noise.
     """
 
     params: CameraParams
     make_renderer: Callable[[], SceneRenderer]
     bodies: Iterable[Body]
+    boxes: Mapping[str, Body] = field(default_factory=dict)
     seed: int = 0
     _renderer: SceneRenderer | None = None
     _shown: dict[str, Mover] = field(default_factory=dict)
-    _put: dict[str, Body] = field(default_factory=dict)
-    _put_shown: dict[str, Body] = field(default_factory=dict)
+    _boxes_shown: dict[str, Body] = field(default_factory=dict)
     _bank: list[NDArray[np.int8]] = field(default_factory=list)
     _depth_bank: list[NDArray[np.float32]] = field(default_factory=list)
 
@@ -136,14 +137,6 @@ class Camera:
             if robot is not None:
                 self.renderer.remove(_ROBOT)
 
-    def put(self, body: Body) -> None:
-        """Show a further body that stands still; from any thread, as of the next picture."""
-        self._put[body.name] = body
-
-    def take_away(self, name: str) -> None:
-        """Show a body that was `put` there no longer."""
-        self._put.pop(name, None)
-
     def close(self) -> None:
         """Give the renderer back."""
         if self._renderer is not None:
@@ -152,7 +145,7 @@ class Camera:
 
     def _show(self, walkers: list[Mover]) -> None:
         renderer = self.renderer
-        self._show_put()
+        self._show_boxes()
         present = {w.name: w for w in walkers}
         for name in [n for n, w in self._shown.items() if present.get(n) is not w]:
             renderer.remove(name)
@@ -166,14 +159,14 @@ class Camera:
             if parts is not None:
                 renderer.pose_visuals(name, parts)
 
-    def _show_put(self) -> None:
-        wanted = dict(self._put)
-        for name in [n for n, body in self._put_shown.items() if wanted.get(n) is not body]:
+    def _show_boxes(self) -> None:
+        wanted = dict(self.boxes)
+        for name in [n for n, body in self._boxes_shown.items() if wanted.get(n) is not body]:
             self.renderer.remove(name)
-            del self._put_shown[name]
-        for name in wanted.keys() - self._put_shown.keys():
+            del self._boxes_shown[name]
+        for name in wanted.keys() - self._boxes_shown.keys():
             self.renderer.add(wanted[name])
-            self._put_shown[name] = wanted[name]
+            self._boxes_shown[name] = wanted[name]
 
     def _fill_banks(self) -> None:
         p = self.params

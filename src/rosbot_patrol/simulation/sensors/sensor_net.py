@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from typing import Protocol
 
-from rosbot_patrol.simulation.actors.walkers import Walker
-from rosbot_patrol.simulation.scenario.fault_board import FaultBoard
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation.sensors.motion_sensors import (
     MotionSensor,
     MotionSensorParams,
@@ -21,32 +21,58 @@ Sight = Callable[[Point, Sequence[Point]], float]
 _OFF_THE_WALL = 0.1  # [m]
 
 
+class WarmBody(Protocol):
+    """Somebody whom a motion sensor may notice."""
+
+    @property
+    def name(self) -> str:
+        """Unique in the world."""
+
+    @property
+    def pose(self) -> Pose2D:
+        """Where it stands."""
+
+    @property
+    def is_warm(self) -> bool:
+        """Whether a motion sensor can notice it at all."""
+
+    @property
+    def warmth(self) -> float:
+        """Reach of a sensor for it, as a share of the reach for a person."""
+
+    @property
+    def warm_heights(self) -> Sequence[float]:
+        """Heights of the points that stand for its warm surface [m]."""
+
+
 class SensorNet:
-    """All of them.
+    """All motion sensors of a house.
 
     Args:
-        params: of each.
+        params: of each sensor.
         places: where they hang.
-        faults: what is broken.
+        level: the output of a sensor with its faults, from its id, its own output and the time [s].
     """
 
-    def __init__(self, params: MotionSensorParams, places: Sequence[SensorPlace], faults: FaultBoard) -> None:
+    def __init__(
+        self, params: MotionSensorParams, places: Sequence[SensorPlace], level: Callable[[int, bool, float], bool]
+    ) -> None:
+        self.places = tuple(places)
         self._params = params
-        self._places = tuple(places)
-        self._faults = faults
+        self._level = level
         self._sensors = {p.id: MotionSensor(params) for p in places}
         self._told: dict[int, bool] = {}
         self._restarted: list[int] = []
 
-    def update(self, now: float, walkers: Iterable[Walker], sight: Sight) -> None:
+    def update(self, now: float, bodies: Iterable[WarmBody], sight: Sight) -> None:
         """Let each of them look; `sight` tells what share of some points (x, y, z) is seen from another [m]."""
-        warm = [w for w in walkers if w.is_warm]
-        for place in self._places:
+        warm = [body for body in bodies if body.is_warm]
+        for place in self.places:
             self._sensors[place.id].update(now, self._seen_by(place, warm, sight))
 
     def levels(self, now: float) -> dict[int, bool]:
         """Whether each one's output is high, by id."""
-        return {n: self._faults.level(n, s.is_high, now) for n, s in self._sensors.items()}
+        return {n: self._level(n, s.is_high, now) for n, s in self._sensors.items()}
 
     def changes(self, now: float) -> list[tuple[int, bool]]:
         """Id and level of each one whose output has changed since this was last asked."""
@@ -65,17 +91,17 @@ class SensorNet:
         restarted, self._restarted = self._restarted, []
         return restarted
 
-    def _seen_by(self, place: SensorPlace, warm: Iterable[Walker], sight: Sight) -> list[tuple[str, float]]:
+    def _seen_by(self, place: SensorPlace, warm: Iterable[WarmBody], sight: Sight) -> list[tuple[str, float]]:
         seen = []
-        for walker in warm:
-            x, y, _ = walker.pose
-            bearing = bearing_in_cone(self._params, place, walker.pose, walker.warmth)
+        for body in warm:
+            x, y, _ = body.pose
+            bearing = bearing_in_cone(self._params, place, body.pose, body.warmth)
             if bearing is None:
                 continue
             eye = (place.x + _OFF_THE_WALL * math.cos(bearing), place.y + _OFF_THE_WALL * math.sin(bearing), place.z)
-            share = sight(eye, [(x, y, height) for height in walker.warm_heights])
+            share = sight(eye, [(x, y, height) for height in body.warm_heights])
             # What reaches the lens goes with the surface in sight over the square of the distance.
-            part = walker.warmth * math.sqrt(share)
-            if share > 0.0 and bearing_in_cone(self._params, place, walker.pose, part) is not None:
-                seen.append((walker.name, bearing))
+            part = body.warmth * math.sqrt(share)
+            if share > 0.0 and bearing_in_cone(self._params, place, body.pose, part) is not None:
+                seen.append((body.name, bearing))
         return seen

@@ -50,7 +50,7 @@ def build() -> Iterator[object]:
         engine = Engine(world or World(bodies=WALLS), params, sensors=sensors)
         engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
         if world is None:
-            engine.spawn_door(DOOR)
+            engine.population.spawn_door(DOOR)
         engines.append(engine)
         return engine
 
@@ -129,14 +129,14 @@ def test_the_lidar_meets_the_leaf_where_it_stands(build, crowd: int) -> None:
     cube = Collision(shape=Shape(kind="box", size=(0.3, 0.3, 1.0)))
     far = (Body(name=f"box_{i}", pose=pose, collisions=(cube,)) for i, pose in enumerate(boxes))
     engine = build(world=World(bodies=(*WALLS, *far)))
-    engine.spawn_door(DOOR)
+    engine.population.spawn_door(DOOR)
     assert ahead(engine) == pytest.approx(2.0 - 0.02, abs=0.012)
-    engine.set_door("door", 1.0)
+    engine.population.set_door("door", 1.0)
     run(engine, 1.0)
-    half = engine.doors[0].angle
+    half = engine.population.doors[0].angle
     assert half == pytest.approx(-0.8, abs=0.01)
     run(engine, 1.5)
-    assert engine.doors[0].opening == 1.0
+    assert engine.population.doors[0].opening == 1.0
     assert ahead(engine) == math.inf
 
 
@@ -145,49 +145,49 @@ def test_the_robot_meets_a_closed_door_as_a_door_and_passes_an_open_one(build) -
     run(engine, 8.0, Twist2D(0.4, 0.0, 0.0))
     assert engine.pose.x == pytest.approx(1.98 - 0.10, abs=0.01)
     assert {(t.other, t.kind) for t in engine.touches()} == {("door", "door")}
-    engine.set_pose(Pose2D())
-    engine.set_door("door", 1.0, 0.0)
+    engine.carry(Pose2D())
+    engine.population.set_door("door", 1.0, 0.0)
     run(engine, 8.0, Twist2D(0.4, 0.0, 0.0))
     assert engine.pose.x > 2.5
 
 
 def test_a_leaf_stops_before_the_robot_and_does_not_push_it(build) -> None:
     engine = build()
-    engine.set_door("door", 1.0, 0.0)
-    engine.set_pose(Pose2D(2.0, 0.2, 0.0))
-    engine.set_door("door", 0.0)
+    engine.population.set_door("door", 1.0, 0.0)
+    engine.carry(Pose2D(2.0, 0.2, 0.0))
+    engine.population.set_door("door", 0.0)
     run(engine, 4.0)
-    door = engine.doors[0]
+    door = engine.population.doors[0]
     assert door.is_held_up
     assert 0.1 < door.opening < 0.9
     assert engine.pose == pytest.approx((2.0, 0.2, 0.0), abs=1e-3)
     assert not engine.touches()
-    engine.set_pose(Pose2D())
+    engine.carry(Pose2D())
     run(engine, 3.0)
     assert door.opening == 0.0
 
 
 def test_a_person_waits_before_a_closed_door_and_walks_on_when_it_opens(build) -> None:
     engine = build()
-    name = engine.spawn_actor("", "person", "visitor", Pose2D(1.0, 0.0, 0.0))
-    engine.move_actor(name, [Pose2D(4.0, 0.0)], 1.0)
+    name = engine.population.spawn_actor("", "person", "visitor", Pose2D(1.0, 0.0, 0.0))
+    engine.population.move_actor(name, [Pose2D(4.0, 0.0)], 1.0)
     run(engine, 3.0)
-    assert 1.6 < engine.actors[0].pose.x < 1.8
-    assert not engine.actors[0].is_walking
-    engine.set_door("door", 1.0)
+    assert 1.6 < engine.population.walkers[0].pose.x < 1.8
+    assert not engine.population.walkers[0].is_walking
+    engine.population.set_door("door", 1.0)
     run(engine, 7.0)
-    assert engine.actors[0].pose.x == pytest.approx(4.0, abs=0.06)
+    assert engine.population.walkers[0].pose.x == pytest.approx(4.0, abs=0.06)
 
 
 def test_a_closed_door_hides_people_from_a_motion_sensor(build) -> None:
     def fires(opening: float) -> bool:
         engine = build(sensors=(SensorPlace(id=1, room=1, x=0.0, y=0.0, yaw=0.0),))
-        engine.set_pose(Pose2D(-3.0, 0.0, 0.0))
-        engine.set_door("door", opening, 0.0)
-        engine.spawn_actor("p", "person", "visitor", Pose2D(3.6, -0.6, math.pi / 2.0))
-        engine.move_actor("p", [Pose2D(3.6, 0.6, math.pi / 2.0)], 1.0)
+        engine.carry(Pose2D(-3.0, 0.0, 0.0))
+        engine.population.set_door("door", opening, 0.0)
+        engine.population.spawn_actor("p", "person", "visitor", Pose2D(3.6, -0.6, math.pi / 2.0))
+        engine.population.move_actor("p", [Pose2D(3.6, 0.6, math.pi / 2.0)], 1.0)
         run(engine, 2.5)
-        return engine.motion()[1]
+        return engine.motion_sensors.levels(engine.now)[1]
 
     assert fires(1.0)
     assert not fires(0.0)
@@ -203,9 +203,9 @@ def test_a_door_of_a_world_is_hung_on_its_joint(build, tmp_path: Path) -> None:
     assert place.swing == -1.2
     engine = build(world=world)
     assert ahead(engine) == pytest.approx(1.98, abs=0.012)
-    engine.set_door("front_door/leaf", 1.0, 0.0)
+    engine.population.set_door("front_door/leaf", 1.0, 0.0)
     assert ahead(engine) == math.inf
-    leaf = engine.doors[0]
+    leaf = engine.population.doors[0]
     assert leaf.distance_to(2.0 + math.sin(1.2), -0.5 + math.cos(1.2)) < 0.03
 
 
@@ -226,28 +226,28 @@ def test_a_door_without_an_upright_hinge_stands_fast(tmp_path: Path) -> None:
 def test_a_door_is_taken_out_and_its_name_is_free_again(build) -> None:
     engine = build()
     with pytest.raises(WorldError, match="the name is taken"):
-        engine.spawn_actor("door", "person", "", Pose2D(1.0, 1.0))
-    engine.remove_actor("door")
+        engine.population.spawn_actor("door", "person", "", Pose2D(1.0, 1.0))
+    engine.population.remove("door")
     assert ahead(engine) == math.inf
-    engine.spawn_actor("door", "person", "", Pose2D(1.0, 1.0))
+    engine.population.spawn_actor("door", "person", "", Pose2D(1.0, 1.0))
 
 
 def test_neither_a_door_nor_an_actor_is_put_where_the_robot_stands(build) -> None:
     engine = build()
-    engine.set_door("door", 1.0, 0.0)
-    engine.set_pose(Pose2D(2.0, 0.1, 0.0))
-    engine.spawn_actor("p", "person", "", Pose2D(4.0, 0.0))
+    engine.population.set_door("door", 1.0, 0.0)
+    engine.carry(Pose2D(2.0, 0.1, 0.0))
+    engine.population.spawn_actor("p", "person", "", Pose2D(4.0, 0.0))
     for call in (
-        lambda: engine.set_door("door", 0.0, 0.0),
-        lambda: engine.spawn_door(plain_door("second", Pose2D(1.6, 0.1, 0.0))),
-        lambda: engine.spawn_actor("q", "dog", "", Pose2D(2.1, 0.0)),
-        lambda: engine.move_actor("p", [Pose2D(2.0, 0.05)], 0.0),
+        lambda: engine.population.set_door("door", 0.0, 0.0),
+        lambda: engine.population.spawn_door(plain_door("second", Pose2D(1.6, 0.1, 0.0))),
+        lambda: engine.population.spawn_actor("q", "dog", "", Pose2D(2.1, 0.0)),
+        lambda: engine.population.move_actor("p", [Pose2D(2.0, 0.05)], 0.0),
     ):
         with pytest.raises(WorldError, match="cannot stand where the robot is"):
             call()
-    assert [a.name for a in engine.actors] == ["p"]
-    assert engine.actors[0].pose == Pose2D(4.0, 0.0)
-    assert [d.opening for d in engine.doors] == [1.0]
+    assert [a.name for a in engine.population.walkers] == ["p"]
+    assert engine.population.walkers[0].pose == Pose2D(4.0, 0.0)
+    assert [d.opening for d in engine.population.doors] == [1.0]
     run(engine, 0.5)
     assert engine.pose == pytest.approx((2.0, 0.1, 0.0), abs=1e-6)
 
@@ -255,15 +255,18 @@ def test_neither_a_door_nor_an_actor_is_put_where_the_robot_stands(build) -> Non
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda e: e.set_door("gate", 1.0), r"door 'gate': is not there \(there: door\)"),
-        (lambda e: e.set_door("door", 1.5), "opens from 0 to 1, not to 1.5"),
-        (lambda e: e.set_door("door", math.nan), "opens from 0 to 1, not to nan"),
-        (lambda e: e.set_door("door", 1.0, -1.0), "cannot move at -1.0 rad/s"),
-        (lambda e: e.spawn_door(plain_door("door", Pose2D())), "the name is taken"),
-        (lambda e: e.spawn_door(plain_door("", Pose2D())), "has no name"),
-        (lambda e: e.spawn_door(plain_door("d", Pose2D(), width=-1.0)), "cannot be -1.0 m wide"),
-        (lambda e: e.spawn_door(plain_door("d", Pose2D(math.nan))), "cannot be"),
-        (lambda e: e.spawn_door(plain_door("d", Pose2D(), swing=0.0)), "swings by 0.000 rad, expected 0.05 to 3.14"),
+        (lambda e: e.population.set_door("gate", 1.0), r"door 'gate': is not there \(there: door\)"),
+        (lambda e: e.population.set_door("door", 1.5), "opens from 0 to 1, not to 1.5"),
+        (lambda e: e.population.set_door("door", math.nan), "opens from 0 to 1, not to nan"),
+        (lambda e: e.population.set_door("door", 1.0, -1.0), "cannot move at -1.0 rad/s"),
+        (lambda e: e.population.spawn_door(plain_door("door", Pose2D())), "the name is taken"),
+        (lambda e: e.population.spawn_door(plain_door("", Pose2D())), "has no name"),
+        (lambda e: e.population.spawn_door(plain_door("d", Pose2D(), width=-1.0)), "cannot be -1.0 m wide"),
+        (lambda e: e.population.spawn_door(plain_door("d", Pose2D(math.nan))), "cannot be"),
+        (
+            lambda e: e.population.spawn_door(plain_door("d", Pose2D(), swing=0.0)),
+            "swings by 0.000 rad, expected 0.05 to 3.14",
+        ),
     ],
 )
 def test_doors_that_cannot_be(build, call, words: str) -> None:

@@ -112,7 +112,7 @@ def test_furs_are_drawn_from_the_seed() -> None:
 @pytest.mark.parametrize("model", ["cat", "dog"])
 def test_the_robot_meets_a_pet_by_lidar_range_and_bumper(build, model: str) -> None:
     engine = build()
-    engine.spawn_actor("pet", model, "", Pose2D(0.8, 0.0, math.pi))  # across, the robot fits under a dog
+    engine.population.spawn_actor("pet", model, "", Pose2D(0.8, 0.0, math.pi))  # across, the robot fits under a dog
     hits = engine.scan().ranges[engine.scan().is_hit]
     assert hits.min() == pytest.approx(0.6, abs=0.2)
     for _ in range(round(4.0 / STEP)):
@@ -126,11 +126,11 @@ def test_the_robot_meets_a_pet_by_lidar_range_and_bumper(build, model: str) -> N
                                                     ("cat", 4.5, False), ("person", 6.5, True)])  # fmt: skip
 def test_a_motion_sensor_notices_pets_nearer_than_people(build, model: str, far: float, seen: bool) -> None:
     engine = build(sensors=(SensorPlace(id=3, room=3, x=0.0, y=0.0, yaw=0.0),))
-    engine.set_pose(Pose2D(-3.0, 0.0, 0.0))
-    engine.spawn_actor("it", model, "", Pose2D(far, -0.8, math.pi / 2.0))
-    engine.move_actor("it", [Pose2D(far, 0.8, 0.0)], 1.0)
+    engine.carry(Pose2D(-3.0, 0.0, 0.0))
+    engine.population.spawn_actor("it", model, "", Pose2D(far, -0.8, math.pi / 2.0))
+    engine.population.move_actor("it", [Pose2D(far, 0.8, 0.0)], 1.0)
     fired = False
     for _ in range(round(3.0 / STEP)):
         engine.step()
-        fired = fired or engine.motion()[3]
+        fired = fired or engine.motion_sensors.levels(engine.now)[3]
     assert fired == seen

@@ -98,7 +98,7 @@ def test_what_is_far_from_the_start_stops_it_too(engine: Engine) -> None:
     engine.close()
     other = Engine(World(bodies=(far,)))
     other.spawn_robot(load_robot(ROBOT))
-    other.set_pose(Pose2D(0.0, 37.0, math.pi / 2))
+    other.carry(Pose2D(0.0, 37.0, math.pi / 2))
     for _ in range(2000):
         other.command(Twist2D(0.5, 0.0, 0.0))
         other.step()
@@ -163,7 +163,7 @@ def test_a_body_of_many_boxes_and_a_mesh_stops_the_robot_with_each_of_them() -> 
     engine.spawn_robot(load_robot(ROBOT))
     reached = []
     for start in (Pose2D(), Pose2D(2.0, 29 * 0.3, 0.0)):
-        engine.set_pose(start)
+        engine.carry(start)
         for _ in range(800):
             engine.command(Twist2D(0.4, 0.0, 0.0))
             engine.step()

@@ -94,13 +94,13 @@ def test_the_robot_on_two_wheels_drives_as_told_sees_and_is_stopped_by_a_wall() 
     engine.spawn_robot(load_robot(TWO_WHEELER))
     drive(engine, 0.2, 0.0, 3.0)
     assert engine.pose.x == pytest.approx(0.585, abs=0.005)  # less the start
-    assert engine.odometry[0] == pytest.approx(engine.pose, abs=0.005)
-    assert engine.wheels[0] == pytest.approx((engine.pose.x / 0.033,) * 2, rel=0.02)
+    assert engine.robot.odometry.pose == pytest.approx(engine.pose, abs=0.005)
+    assert engine.robot.wheels[0] == pytest.approx((engine.pose.x / 0.033,) * 2, rel=0.02)
     assert engine.scan().ranges[360] == pytest.approx(1.5 - engine.pose.x + 0.032, abs=0.05)
     assert engine.ranges() == {}
     drive(engine, 0.0, 0.5, math.tau / 0.5)
     assert engine.pose.yaw == pytest.approx(-0.07, abs=0.03)  # less the start
-    engine.set_pose(Pose2D(0.6, 0.0, 0.0))
+    engine.carry(Pose2D(0.6, 0.0, 0.0))
     drive(engine, 0.3, 0.0, 6.0)
     assert engine.pose.x == pytest.approx(1.5 - 0.08, abs=0.015)  # the round body, 0.1 about 0.02 behind the axle
     assert {t.other for t in engine.touches()} == {"wall"}

@@ -140,28 +140,28 @@ def test_wheels_that_slip_turn_and_the_odometry_believes_them(engine: Engine) ->
     begin(engine, "odometry_slip", factor=0.25)
     drive(engine, 0.2, 5.0)
     assert engine.pose.x == pytest.approx(0.25, abs=0.02)
-    assert engine.odometry[0].x == pytest.approx(1.0, abs=0.03)
+    assert engine.robot.odometry.pose.x == pytest.approx(1.0, abs=0.03)
 
 
 @pytest.mark.parametrize(("side", "turn"), [("left", 1.0), ("right", -1.0)])
 def test_a_stuck_wheel_makes_it_drive_in_a_circle_about_it(engine: Engine, side: str, turn: float) -> None:
     begin(engine, "wheel_stuck", target=side)
     drive(engine, 0.1, 3.0)
-    assert engine.wheels[0][0 if side == "left" else 1] == 0.0
+    assert engine.robot.wheels[0][0 if side == "left" else 1] == 0.0
     assert engine.pose.yaw == pytest.approx(turn * 0.1 / 0.2 * 3.0, abs=0.1)
 
 
 def test_a_stuck_and_a_flapping_motion_sensor(engine: Engine) -> None:
     begin(engine, "motion_stuck", target=5, duration=2.0)
-    assert engine.motion_changes() == [(5, True)]
+    assert engine.motion_sensors.changes(engine.now) == [(5, True)]
     wait(engine, 1.9)
-    assert engine.motion_changes() == []
+    assert engine.motion_sensors.changes(engine.now) == []
     wait(engine, 0.2)
-    assert engine.motion_changes() == [(5, False)]
+    assert engine.motion_sensors.changes(engine.now) == [(5, False)]
     begin(engine, "motion_flapping", target=5, period=2.0)
     edges = []
     for _ in range(round(7.9 / STEP)):
-        edges += [(round(engine.now, 2), level) for _, level in engine.motion_changes()]
+        edges += [(round(engine.now, 2), level) for _, level in engine.motion_sensors.changes(engine.now)]
         engine.step()
     assert [level for _, level in edges] == [True, False] * 4
     assert np.diff([at for at, _ in edges]) == pytest.approx(1.0)
@@ -169,18 +169,18 @@ def test_a_stuck_and_a_flapping_motion_sensor(engine: Engine) -> None:
 
 def test_a_sensor_that_reboots_is_blind_while_it_warms_up(engine: Engine) -> None:
     begin(engine, "motion_rebooting", target=5)
-    assert engine.restarted_sensors() == [5]
-    assert engine.restarted_sensors() == []
-    engine.spawn_actor("bob", "person", "", Pose2D(3.0, 1.0, 0.0))
-    engine.move_actor("bob", [Pose2D(3.0, 5.0, 0.0), Pose2D(3.0, 1.0, 0.0)], 1.0, True)
+    assert engine.motion_sensors.restarted() == [5]
+    assert engine.motion_sensors.restarted() == []
+    engine.population.spawn_actor("bob", "person", "", Pose2D(3.0, 1.0, 0.0))
+    engine.population.move_actor("bob", [Pose2D(3.0, 5.0, 0.0), Pose2D(3.0, 1.0, 0.0)], 1.0, True)
     rises = []
     for _ in range(round(12.0 / STEP)):
         engine.step()
-        rises += [engine.now for _, level in engine.motion_changes() if level]
+        rises += [engine.now for _, level in engine.motion_sensors.changes(engine.now) if level]
     assert 10.0 <= rises[0] < 13.0
     begin(engine, "motion_rebooting", target=5, every=1.0, duration=3.5)
     wait(engine, 4.0)
-    assert engine.restarted_sensors() == [5] * 4
+    assert engine.motion_sensors.restarted() == [5] * 4
 
 
 def test_what_is_wrong_with_a_link(engine: Engine) -> None:
@@ -222,11 +222,11 @@ def test_no_box_where_the_robot_stands(engine: Engine) -> None:
 
 def test_a_carried_robot_is_elsewhere_and_its_odometry_knows_nothing(engine: Engine) -> None:
     drive(engine, 0.2, 1.0)
-    believed = engine.odometry[0]
+    believed = engine.robot.odometry.pose
     begin(engine, "robot_carried", x=3.0, y=1.0, yaw=1.0)
     engine.step()
     assert engine.pose == pytest.approx((3.0, 1.0, 1.0), abs=1e-6)
-    assert engine.odometry[0] == believed
+    assert engine.robot.odometry.pose == believed
     with pytest.raises(WorldError, match="'wall' is there"):
         begin(engine, "robot_carried", x=-2.0, y=0.0)
     assert engine.pose == pytest.approx((3.0, 1.0, 1.0), abs=1e-6)

@@ -90,24 +90,24 @@ def test_a_door_hides_while_it_is_closed() -> None:
 def test_low_furniture_hides_pets_and_not_people(build, height: float, model: str, fires: bool) -> None:
     things = (block(0.0, 2.6, height / 2.0, (6.0, 0.4, height)),) if height else ()
     engine = build(*things, sensors=(PLACE,))
-    name = engine.spawn_actor("", model, "", Pose2D(-1.2, 2.2, 0.0))
-    engine.move_actor(name, [Pose2D(1.2, 2.2, 0.0)], 0.8)
+    name = engine.population.spawn_actor("", model, "", Pose2D(-1.2, 2.2, 0.0))
+    engine.population.move_actor(name, [Pose2D(1.2, 2.2, 0.0)], 0.8)
     changes = []
     for _ in range(round(3.5 / STEP)):
         engine.step()
-        changes += engine.motion_changes()
+        changes += engine.motion_sensors.changes(engine.now)
     assert ((4, True) in changes) == fires
 
 
 def test_half_in_sight_is_noticed_less_far(build) -> None:
     def fires(y: float) -> bool:
         engine = build(block(0.0, y + 0.4, 0.55, (12.0, 0.2, 1.1)), sensors=(PLACE,), robot=False)
-        name = engine.spawn_actor("", "person", "", Pose2D(-1.0, y, 0.0))
-        engine.move_actor(name, [Pose2D(1.0, y, 0.0)], 0.8)
+        name = engine.population.spawn_actor("", "person", "", Pose2D(-1.0, y, 0.0))
+        engine.population.move_actor(name, [Pose2D(1.0, y, 0.0)], 0.8)
         changes = []
         for _ in range(round(3.0 / STEP)):
             engine.step()
-            changes += engine.motion_changes()
+            changes += engine.motion_sensors.changes(engine.now)
         return (4, True) in changes
 
     assert fires(1.5)

@@ -488,9 +488,9 @@ def test_a_leaf_may_be_a_mesh(tmp_path: Path) -> None:
     begin = text.index("<collision name='c'><pose>0 -0.4")
     text = text[:begin] + leaf + text[text.index("</link>", begin) :]
     engine = Engine(read(tmp_path, sdf(text)))
-    engine.set_door("side_door/door", 1.0, 0.0)
+    engine.population.set_door("side_door/door", 1.0, 0.0)
     engine.step()
-    assert engine.doors[0].opening == 1.0
+    assert engine.population.doors[0].opening == 1.0
     engine.close()
 
 

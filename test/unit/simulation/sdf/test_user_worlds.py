@@ -159,7 +159,7 @@ def test_an_actor_walks_its_waypoints() -> None:
     engine = Engine(world("frames"))
     for _ in range(400):
         engine.step()
-    assert engine.actors[0].pose.x > -0.5
+    assert engine.population.walkers[0].pose.x > -0.5
     engine.close()
 
 

@@ -54,8 +54,8 @@ class ScenarioPlayer:
         self._events: dict[str, float] = {}
         engine.faults.doorways.update(scenario.doorways)
         for door in scenario.doors:
-            engine.spawn_door(door.place)
-            engine.set_door(door.name, door.opening, 0.0)
+            engine.population.spawn_door(door.place)
+            engine.population.set_door(door.name, door.opening, 0.0)
         self._check()
         self._waiting = self._acts()
         self._next = -math.inf
@@ -100,12 +100,12 @@ class ScenarioPlayer:
             acts.append(_act(actor, text, partial(self._enter, actor)))
             if actor.stays:
                 gone = replace(actor, at=actor.at + actor.stays)
-                acts.append(_act(gone, f"{actor.name} is gone", partial(engine.remove_actor, actor.name)))
+                acts.append(_act(gone, f"{actor.name} is gone", partial(engine.population.remove, actor.name)))
         for walk in s.walks:
             acts.append(_act(walk, f"{walk.actor} walks on", partial(self._walk, walk.actor, walk)))
         for move in s.door_moves:
             text = f"the door {move.door} {'opens' if move.opening else 'closes'}"
-            acts.append(_act(move, text, partial(engine.set_door, move.door, move.opening, move.speed)))
+            acts.append(_act(move, text, partial(engine.population.set_door, move.door, move.opening, move.speed)))
         for fault in s.faults:
             lasts = f" for {fault.duration:g} s" if fault.duration else ""
             acts.append(_act(fault, f"fault: {fault}{lasts}", partial(self._break, fault)))
@@ -118,24 +118,26 @@ class ScenarioPlayer:
         self._engine.faults.begin(fault, self._engine.now)
 
     def _enter(self, actor: ActorEntry) -> None:
-        self._engine.spawn_actor(actor.name, actor.model, actor.look, pose_of(actor.start), posture=actor.posture)
+        self._engine.population.spawn_actor(
+            actor.name, actor.model, actor.look, pose_of(actor.start), posture=actor.posture
+        )
         self._walk(actor.name, actor)
 
     def _walk(self, name: str, way: Way) -> None:
         if way.roam:
-            self._engine.roam_actor(name, way.roam, way.speed, pause=way.pause)
+            self._engine.population.roam_actor(name, way.roam, way.speed, pause=way.pause)
         elif way.path:
             path = [pose_of(p) for p in way.path]
-            self._engine.move_actor(name, path, way.speed, way.loop, pause=way.pause, yields=way.yields)
+            self._engine.population.move_actor(name, path, way.speed, way.loop, pause=way.pause, yields=way.yields)
 
     def _check(self) -> None:
         """That what is named is there."""
         s, engine = self._scenario, self._engine
-        actors = [*(a.name for a in s.actors), *(a.name for a in engine.actors)]
+        actors = [*(a.name for a in s.actors), *(a.name for a in engine.population.walkers)]
         for i, walk in enumerate(s.walks):
             self._known(f"walks[{i}]/actor", walk.actor, actors)
         for i, move in enumerate(s.door_moves):
-            self._known(f"door_moves[{i}]/door", move.door, [d.name for d in engine.doors])
+            self._known(f"door_moves[{i}]/door", move.door, [d.name for d in engine.population.doors])
         for i, trigger in enumerate(s.triggers):
             self._sensor(f"triggers[{i}]/sensor", trigger.sensor)
         for i, fault in enumerate(s.faults):
@@ -153,7 +155,7 @@ class ScenarioPlayer:
             raise ParamError(f"{self._scenario.file}: {key}", problem)
 
     def _sensor(self, key: str, sensor: int) -> None:
-        ids = [place.id for place in self._engine.sensors]
+        ids = [place.id for place in self._engine.motion_sensors.places]
         if sensor not in ids:
             there = ", ".join(map(str, ids)) or "none"
             raise ParamError(f"{self._scenario.file}: {key}", f"there is no motion sensor {sensor} (there: {there})")

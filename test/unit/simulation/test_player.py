@@ -11,13 +11,13 @@ import pytest
 
 from rosbot_patrol.errors import ParamError, WorldError
 from rosbot_patrol.simulation.engine import STEP, Engine, EngineParams
+from rosbot_patrol.simulation.player import ScenarioPlayer
 from rosbot_patrol.simulation.robot.description import load_robot
 from rosbot_patrol.simulation.scenario.file import Expect, Outcome, disappointments, read_scenario
-from rosbot_patrol.simulation.scenario.player import ScenarioPlayer
 from rosbot_patrol.simulation.sdf.world import World
 from rosbot_patrol.simulation.sensors.motion_sensors import SensorPlace
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[3]
 SENSORS = [SensorPlace(id=5, room=5, x=3.0, y=3.0, yaw=0.0)]
 
 PLAY = """
@@ -70,7 +70,7 @@ def play(player: ScenarioPlayer, engine: Engine, until: float) -> None:
 
 
 def names(engine: Engine) -> set[str]:
-    return {a.name for a in engine.actors}
+    return {a.name for a in engine.population.walkers}
 
 
 def test_everything_happens_at_its_time(write, engine: Engine) -> None:
@@ -95,7 +95,7 @@ def test_everything_happens_at_its_time(write, engine: Engine) -> None:
     play(player, engine, 9.0)
     assert names(engine) == {"rex", "hydrant"}
     assert [fault.kind for fault, _ in engine.faults.active] == ["lidar_silent"]
-    assert engine.doors[0].opening == pytest.approx(1.0, abs=0.01)
+    assert engine.population.doors[0].opening == pytest.approx(1.0, abs=0.01)
     assert calls == pytest.approx([5.25])
     assert not player.waiting
     expected = {
@@ -120,7 +120,7 @@ def test_two_plays_with_one_seed_are_the_same_bit_for_bit(write) -> None:
         player = ScenarioPlayer(read_scenario(write(PLAY)), engine, lambda _: None, lambda _: None)
         player.event("on_guard")
         play(player, engine, 3.0)
-        seen = [engine.scan().ranges.tobytes(), *(tuple(a.pose) for a in engine.actors)]
+        seen = [engine.scan().ranges.tobytes(), *(tuple(a.pose) for a in engine.population.walkers)]
         engine.close()
         return seen
 
