@@ -11,6 +11,8 @@ from typing import Any
 
 from rosbot_patrol.errors import StateError
 
+DISK_FULL = frozenset((errno.ENOSPC, errno.EDQUOT))  # errno of an OSError: no room on the disk, or in the user's quota
+
 
 def write_atomic(path: Path, data: bytes) -> None:
     """Write a file so that a crash or power cut leaves the old one or the new one, never a part.

@@ -10,7 +10,7 @@ import pytest
 from certificate import make_certificate
 from post import Time, channel, deliver_all, notice, postman
 
-from rosbot_patrol.alerts.channels.channel import DeliveryError
+from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
 from rosbot_patrol.alerts.post.notice import Notice
@@ -101,20 +101,21 @@ def test_starttls_and_login_and_the_mail_reads_back(start, certificate, told):
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "cause", "said"),
     [
-        ({"password": "wrong"}, "refused the login: 535"),
-        ({"user": "", "password": ""}, "refused the mail: 530"),
-        ({"ca_file": ""}, "its TLS certificate is not to be trusted: self-signed certificate"),
-        ({"host": "127.0.0.1"}, "its TLS certificate is not to be trusted: IP address mismatch"),
-        ({"security": "tls"}, "it does not speak TLS as it should"),
+        ({"password": "wrong"}, FailureCause.LOGIN, "refused the login: 535"),
+        ({"user": "", "password": ""}, FailureCause.OTHER, "refused the mail: 530"),
+        ({"ca_file": ""}, FailureCause.CERTIFICATE, "its TLS certificate is not to be trusted: self-signed"),
+        ({"host": "127.0.0.1"}, FailureCause.CERTIFICATE, "its TLS certificate is not to be trusted: IP address mis"),
+        ({"security": "tls"}, FailureCause.NO_TLS, "it does not speak TLS as it should"),
     ],
 )
-def test_what_goes_wrong_is_said_in_words(start, certificate, told, given, said):
+def test_what_goes_wrong_is_said_in_words(start, certificate, told, given, cause, said):
     server = start()
     with pytest.raises(DeliveryError, match=said) as caught:
         transport(server.port, certificate, **given).send(told)
     assert not caught.value.permanent or "530" in said
+    assert caught.value.cause is cause
     assert server.mails == []
     assert "geheäm" not in str(caught.value)
 

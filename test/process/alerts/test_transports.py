@@ -6,7 +6,7 @@ from email.policy import default
 import pytest
 from smtp_server import SmtpServer
 
-from rosbot_patrol.alerts.channels.channel import DeliveryError
+from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer as Server
 from rosbot_patrol.alerts.channels.smtp import SmtpTransport
@@ -66,8 +66,12 @@ def test_a_mail_that_was_taken_counts_whatever_comes_after(told, envelope, bye):
 
 def test_a_silent_server_costs_no_more_than_the_time_out(told, envelope):
     began = time.monotonic()
-    with SmtpServer(silent=True) as server, pytest.raises(DeliveryError, match="cannot be used: no answer within"):
+    with (
+        SmtpServer(silent=True) as server,
+        pytest.raises(DeliveryError, match="cannot be used: no answer within") as caught,
+    ):
         smtp(server, envelope).send(told)
+    assert caught.value.cause is FailureCause.NO_ANSWER
     assert time.monotonic() - began < 3.0
 
 
@@ -82,8 +86,9 @@ def test_no_server(told, envelope):
 
 def test_starttls_that_is_not_offered_is_no_clear_text(told, envelope):
     with SmtpServer() as server:
-        with pytest.raises(DeliveryError):
+        with pytest.raises(DeliveryError) as caught:
             smtp(server, envelope, security="starttls").send(told)
+        assert caught.value.cause is FailureCause.NO_STARTTLS
         assert "MAIL" not in server.verbs
 
 

@@ -10,7 +10,7 @@ import pytest
 from certificate import make_certificate
 from post import notice
 
-from rosbot_patrol.alerts.channels.channel import DeliveryError
+from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport, check_url, sign
 
 WALL = 1_790_000_000.5
@@ -158,10 +158,29 @@ def test_https_trusts_the_certificate_that_is_named_and_no_other(web, tmp_path):
 def test_nobody_there_and_no_such_name():
     with socket.create_server(("localhost", 0)) as free:
         url = f"http://localhost:{free.getsockname()[1]}/"
-    with pytest.raises(DeliveryError, match="nothing listens there"):
+    with pytest.raises(DeliveryError, match="nothing listens there") as caught:
         hook(url).send(notice("a"))
-    with pytest.raises(DeliveryError, match=r"the name 'no.such.host.invalid' cannot be found"):
+    assert caught.value.cause is FailureCause.CONNECTION_REFUSED
+    with pytest.raises(DeliveryError, match=r"the name 'no.such.host.invalid' cannot be found") as caught:
         hook("http://no.such.host.invalid/").send(notice("a"))
+    assert caught.value.cause is FailureCause.UNKNOWN_HOST
+
+
+@pytest.mark.parametrize(
+    ("status", "cause"),
+    [
+        (308, FailureCause.REDIRECT),
+        (401, FailureCause.UNAUTHORIZED),
+        (403, FailureCause.FORBIDDEN),
+        (404, FailureCause.NOT_FOUND),
+        (418, FailureCause.OTHER),
+    ],
+)
+def test_the_status_tells_the_cause(web, status, cause):
+    web.reply = (status, {}, b"")
+    with pytest.raises(DeliveryError) as caught:
+        hook(web.url).send(notice("i-1"))
+    assert caught.value.cause is cause
 
 
 @pytest.mark.parametrize("drip", [b"", b"H"])

@@ -65,6 +65,19 @@ def test_a_test_notice_goes_through_each_channel_and_failures_are_explained(noti
         notify("--test", "--channel", "dsk", channels=channels)
 
 
+@pytest.mark.parametrize(
+    ("replies", "advice"),
+    [
+        ({"RCPT": "550 5.1.1 unknown to the DNS here"}, "Look at the recipient's address."),
+        ({"MAIL": "550 STARTTLS is not what I want"}, None),
+    ],
+)
+def test_what_a_server_writes_does_not_choose_the_advice(notify, replies, advice):
+    with SmtpServer(replies=replies) as server:
+        said = notify("--test", channels={"office": {"type": "smtp", "to": "a@b.org", "port": server.port}})[1]
+    assert said.splitlines()[-1].startswith("office: NOT taken" if advice is None else f"office: {advice}")
+
+
 def test_it_uses_what_the_nodes_were_started_with(notify, outbox, tmp_path):
     mail = MailParams(transport="maildir", maildir=str(tmp_path / "house"))
     write_settings(outbox.folder, Settings(who="/patrolling_node", pid=1, wall=1.0, mail=mail))

@@ -3,12 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Protocol
 
 from rosbot_patrol.alerts.post.channel_queue import Pace
 from rosbot_patrol.alerts.post.notice import Notice
 from rosbot_patrol.alerts.post.outbox import Waiting
 from rosbot_patrol.errors import AlertError
+
+
+class FailureCause(Enum):
+    """Why a transport did not take a notice, as far as somebody can do something about it."""
+
+    UNKNOWN_HOST = "unknown host"
+    CONNECTION_REFUSED = "connection refused"
+    CERTIFICATE = "certificate not trusted"
+    NO_TLS = "no TLS"
+    NO_STARTTLS = "no STARTTLS"
+    LOGIN = "login refused"
+    NO_ANSWER = "no answer"
+    RECIPIENT = "recipient refused"
+    REDIRECT = "redirect"
+    UNAUTHORIZED = "unauthorized"
+    FORBIDDEN = "forbidden"
+    NOT_FOUND = "not found"
+    OTHER = "other"
 
 
 class DeliveryError(AlertError):
@@ -20,6 +39,7 @@ class DeliveryError(AlertError):
         answered: the other side was there and did not want it now: it may be this notice's fault after all.
         delay: that the other side asked for [s].
         of_recipient: with `permanent`: it is the recipient's fault, whatever the notice is.
+        cause: what kind of failure it is.
     """
 
     def __init__(
@@ -30,10 +50,11 @@ class DeliveryError(AlertError):
         answered: bool = False,
         delay: float | None = None,
         of_recipient: bool = False,
+        cause: FailureCause = FailureCause.OTHER,
     ) -> None:
         super().__init__(problem)
         self.permanent, self.answered, self.delay = permanent, answered, delay
-        self.of_recipient = of_recipient
+        self.of_recipient, self.cause = of_recipient, cause
 
 
 class Transport(Protocol):

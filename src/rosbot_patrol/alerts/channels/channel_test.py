@@ -1,4 +1,4 @@
-"""Trying a channel: a real notice that says that it is a test, and what became of it in plain words."""
+"""Channel test: a real notice that says that it is a test, and its outcome in plain words."""
 
 from __future__ import annotations
 
@@ -9,40 +9,56 @@ from dataclasses import dataclass
 
 from PIL import Image, ImageDraw
 
-from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
+from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError, FailureCause
 from rosbot_patrol.alerts.post.notice import Notice
 
-_WHAT_TO_DO = {
-    "DNS": "Look at the host's name in the configuration, and whether this machine has a network and a name server.",
-    "Connection refused": "Look at host and port, and whether the server runs.",
-    "TLS certificate": "Look at the host's name, or name the certificate that signed the server's as ca_file.",
-    "does not speak TLS": "Look at port and security: tls is usual on 465, starttls on 587 and 25.",
-    "STARTTLS": "The server offers no encryption on this port: try security: tls with port 465, or another server.",
-    "refused the login": "Look at user and password; many providers want a password for applications.",
-    "no answer within": "A firewall or a wrong port keeps silent like this; providers often block port 25, try 587.",
-    "refused the recipient": "Look at the recipient's address.",
-    "redirects are not followed": "Name the address that the server redirects to.",
-    "answered 401": "The address wants a token, or another one: token_file.",
-    "answered 403": "The server does not take the signature or the token: look at secret_file and token_file.",
-    "answered 404": "Look at the path of the url.",
+_ADVICE = {
+    FailureCause.UNKNOWN_HOST: (
+        "Look at the host's name in the configuration, and whether this machine has a network and a name server."
+    ),
+    FailureCause.CONNECTION_REFUSED: "Look at host and port, and whether the server runs.",
+    FailureCause.CERTIFICATE: "Look at the host's name, or name the certificate that signed the server's as ca_file.",
+    FailureCause.NO_TLS: "Look at port and security: tls is usual on 465, starttls on 587 and 25.",
+    FailureCause.NO_STARTTLS: (
+        "The server offers no encryption on this port: try security: tls with port 465, or another server."
+    ),
+    FailureCause.LOGIN: "Look at user and password; many providers want a password for applications.",
+    FailureCause.NO_ANSWER: (
+        "A firewall or a wrong port keeps silent like this; providers often block port 25, try 587."
+    ),
+    FailureCause.RECIPIENT: "Look at the recipient's address.",
+    FailureCause.REDIRECT: "Name the address that the server redirects to.",
+    FailureCause.UNAUTHORIZED: "The address wants a token, or another one: token_file.",
+    FailureCause.FORBIDDEN: "The server does not take the signature or the token: look at secret_file and token_file.",
+    FailureCause.NOT_FOUND: "Look at the path of the url.",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """What became of a test notice on one channel."""
+    """Outcome of a test notice on one channel.
+
+    Attributes:
+        channel: name.
+        text: the place of the notice, or why it was not taken.
+        seconds: duration of the attempt [s].
+        cause: kind of failure; None if the notice was taken.
+    """
 
     channel: str
-    is_taken: bool
     text: str
     seconds: float
+    cause: FailureCause | None = None
+
+    @property
+    def is_taken(self) -> bool:
+        """Whether the channel took the notice."""
+        return self.cause is None
 
     @property
     def advice(self) -> str:
         """What to look at, "" where there is nothing to say."""
-        if self.is_taken:
-            return ""
-        return next((advice for words, advice in _WHAT_TO_DO.items() if words in self.text), "")
+        return _ADVICE.get(self.cause, "") if self.cause else ""
 
 
 def try_channel(channel: Channel, notice: Notice, clock: Callable[[], float] = time.monotonic) -> Trial:
@@ -51,8 +67,8 @@ def try_channel(channel: Channel, notice: Notice, clock: Callable[[], float] = t
     try:
         where = channel.transport.send(notice)
     except DeliveryError as err:
-        return Trial(channel=channel.name, is_taken=False, text=str(err), seconds=clock() - began)
-    return Trial(channel=channel.name, is_taken=True, text=where, seconds=clock() - began)
+        return Trial(channel=channel.name, text=str(err), seconds=clock() - began, cause=err.cause)
+    return Trial(channel=channel.name, text=where, seconds=clock() - began)
 
 
 def trial_notice(wall: float, host: str) -> Notice:

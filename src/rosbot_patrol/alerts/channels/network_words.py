@@ -1,4 +1,4 @@
-"""What went wrong on the way to a server, in words that say what to look at."""
+"""Network failures: their cause, a clause that says what to look at, and a limit on the whole exchange."""
 
 from __future__ import annotations
 
@@ -12,11 +12,19 @@ import threading
 from collections.abc import Callable
 from types import TracebackType
 
+from rosbot_patrol.alerts.channels.channel import FailureCause
+
 WHOLE_EXCHANGE = 4.0  # a whole exchange may take so many times the time-out of one answer
 
 
-def explain(err: BaseException, where: str, timeout: float, *, mask: Callable[[str], str] = str) -> str:
-    """One clause, without a full stop.
+class StarttlsMissing(smtplib.SMTPNotSupportedError):
+    """The server does not offer STARTTLS, which the configuration demands."""
+
+
+def explain(
+    err: BaseException, where: str, timeout: float, *, mask: Callable[[str], str] = str
+) -> tuple[FailureCause, str]:
+    """Cause of a network failure, and one clause about it, without a full stop.
 
     Args:
         err: what was raised.
@@ -26,20 +34,24 @@ def explain(err: BaseException, where: str, timeout: float, *, mask: Callable[[s
     """
     host = where.rpartition(":")[0]
     if isinstance(err, socket.gaierror):
-        return f"the name '{host}' cannot be found (DNS: {err.strerror}); is it right, and is the network up?"
+        text = f"the name '{host}' cannot be found (DNS: {err.strerror}); is it right, and is the network up?"
+        return FailureCause.UNKNOWN_HOST, text
     if isinstance(err, ssl.SSLCertVerificationError):
-        return f"its TLS certificate is not to be trusted: {err.verify_message}"
+        return FailureCause.CERTIFICATE, f"its TLS certificate is not to be trusted: {err.verify_message}"
     if isinstance(err, TimeoutError) or isinstance(err.__context__, TimeoutError):  # smtplib says "closed"
-        return f"no answer within {timeout:g} s"
+        return FailureCause.NO_ANSWER, f"no answer within {timeout:g} s"
     if isinstance(err, ssl.SSLError):
-        return f"it does not speak TLS as it should ({err.reason or mask(str(err))}); is that its TLS port?"
+        said = err.reason or mask(str(err))
+        return FailureCause.NO_TLS, f"it does not speak TLS as it should ({said}); is that its TLS port?"
     if isinstance(err, ConnectionRefusedError):
-        return f"[Errno {errno.ECONNREFUSED}] Connection refused: nothing listens there"
+        text = f"[Errno {errno.ECONNREFUSED}] Connection refused: nothing listens there"
+        return FailureCause.CONNECTION_REFUSED, text
     if isinstance(err, smtplib.SMTPNotSupportedError):
-        return f"it does not offer what is asked for: {_tidy(err, mask)}"
+        cause = FailureCause.NO_STARTTLS if isinstance(err, StarttlsMissing) else FailureCause.OTHER
+        return cause, f"it does not offer what is asked for: {_tidy(err, mask)}"
     if isinstance(err, (smtplib.SMTPServerDisconnected, http.client.RemoteDisconnected, ConnectionResetError)):
-        return f"it closed the connection ({_tidy(err, mask)})"
-    return _tidy(err, mask)
+        return FailureCause.OTHER, f"it closed the connection ({_tidy(err, mask)})"
+    return FailureCause.OTHER, _tidy(err, mask)
 
 
 def is_loopback(host: str) -> bool:

@@ -6,7 +6,7 @@ import os
 import subprocess
 from email.policy import SMTP
 
-from rosbot_patrol.alerts.channels.channel import DeliveryError
+from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import Envelope, build_mail
 from rosbot_patrol.alerts.post.notice import Notice
 
@@ -47,10 +47,12 @@ class SendmailTransport:
             raise DeliveryError(f"{self.program} cannot be run: {err.strerror}") from err
         if done.returncode != 0:
             said = " ".join(done.stderr.decode("utf-8", "replace").split())[-300:] or "without a word"
+            of_recipient = done.returncode in _OF_RECIPIENT
             raise DeliveryError(
                 f"{self.program} ended with {done.returncode}: {said}",
                 permanent=done.returncode in _PERMANENT_EXITS,
-                of_recipient=done.returncode in _OF_RECIPIENT,
+                of_recipient=of_recipient,
+                cause=FailureCause.RECIPIENT if of_recipient else FailureCause.OTHER,
             )
         return self._to
 

@@ -8,10 +8,10 @@ import socket
 import ssl
 from dataclasses import dataclass
 
-from rosbot_patrol.alerts.channels.channel import DeliveryError
+from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import Envelope, build_mail
 from rosbot_patrol.alerts.channels.masking import Mask
-from rosbot_patrol.alerts.channels.network_words import WHOLE_EXCHANGE, Deadline, explain
+from rosbot_patrol.alerts.channels.network_words import WHOLE_EXCHANGE, Deadline, StarttlsMissing, explain
 from rosbot_patrol.alerts.post.notice import Notice
 
 
@@ -63,17 +63,19 @@ class SmtpTransport:
         except smtplib.SMTPRecipientsRefused as err:
             code, text = err.recipients[self._to]
             problem = f"{self._where} refused the recipient {self._to}: {self._said(code, text)}"
-            raise DeliveryError(problem, permanent=code >= 500, answered=True, of_recipient=True) from err
+            raise DeliveryError(
+                problem, permanent=code >= 500, answered=True, of_recipient=True, cause=FailureCause.RECIPIENT
+            ) from err
         except smtplib.SMTPAuthenticationError as err:
             said = self._said(err.smtp_code, err.smtp_error)
-            raise DeliveryError(f"{self._where} refused the login: {said}") from err
+            raise DeliveryError(f"{self._where} refused the login: {said}", cause=FailureCause.LOGIN) from err
         except (smtplib.SMTPSenderRefused, smtplib.SMTPDataError) as err:
             said = self._said(err.smtp_code, err.smtp_error)
             permanent = err.smtp_code >= 500
             raise DeliveryError(f"{self._where} refused the mail: {said}", permanent=permanent, answered=True) from err
         except (OSError, smtplib.SMTPException, ValueError) as err:
-            problem = explain(err, self._where, self._server.timeout, mask=self._mask)
-            raise DeliveryError(f"the mail server {self._where} cannot be used: {problem}") from err
+            cause, problem = explain(err, self._where, self._server.timeout, mask=self._mask)
+            raise DeliveryError(f"the mail server {self._where} cannot be used: {problem}", cause=cause) from err
         return self._to
 
     def _said(self, code: int, text: bytes | str) -> str:
@@ -105,7 +107,10 @@ class SmtpTransport:
         if code != 220:
             raise smtplib.SMTPConnectError(code, text)
         server.ehlo_or_helo_if_needed()
-        if s.security == "starttls" or (s.security == "auto" and server.has_extn("starttls")):
+        has_starttls = server.has_extn("starttls")
+        if s.security == "starttls" and not has_starttls:
+            raise StarttlsMissing("STARTTLS extension not supported by server.")
+        if s.security in ("starttls", "auto") and has_starttls:
             server.starttls(context=self._context() if s.security == "starttls" else _any_certificate())
             server.ehlo_or_helo_if_needed()
         if s.user:

@@ -23,7 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-from rosbot_patrol.alerts.channels.channel import DeliveryError
+from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import plain_text
 from rosbot_patrol.alerts.channels.masking import Mask, masked_url, url_secrets
 from rosbot_patrol.alerts.channels.network_words import WHOLE_EXCHANGE, Deadline, explain
@@ -35,6 +35,7 @@ log = logging.getLogger(__name__)
 
 SHOWN = 300  # [characters] of an answer
 _THIS_NOTICES_FAULT = {400, 409, 411, 413, 415, 422, 431}
+_CAUSES = {401: FailureCause.UNAUTHORIZED, 403: FailureCause.FORBIDDEN, 404: FailureCause.NOT_FOUND}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,8 +108,8 @@ class WebhookTransport:
         try:
             status, reason, said, pause = self._post(notice.id, body)
         except (OSError, http.client.HTTPException, ValueError) as err:
-            problem = explain(err, self._where, self._address.timeout, mask=self._mask)
-            raise DeliveryError(f"{self.describe()} cannot be used: {problem}") from None
+            cause, problem = explain(err, self._where, self._address.timeout, mask=self._mask)
+            raise DeliveryError(f"{self.describe()} cannot be used: {problem}", cause=cause) from None
         answer = " ".join(f"{status} {reason} {said}".split())
         if 200 <= status < 300:
             return f"{self.describe()} ({status} {reason})".replace(" )", ")")
@@ -123,6 +124,7 @@ class WebhookTransport:
             permanent=status in _THIS_NOTICES_FAULT and not is_for_now,
             answered=status >= 500 or is_for_now,
             delay=delay,
+            cause=_CAUSES.get(status, FailureCause.REDIRECT if 300 <= status < 400 else FailureCause.OTHER),
         )
 
     def _delay(self, pause: str) -> float | None:

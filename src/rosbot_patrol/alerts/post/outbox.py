@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rosbot_patrol.alerts.post.notice import LaterFormat, Notice
-from rosbot_patrol.files import sync_folder, write_atomic
+from rosbot_patrol.files import DISK_FULL, sync_folder, write_atomic
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +29,6 @@ _NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.notice")
 _BROKEN = re.compile(r"\d{12}-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|(?P<set_aside>broken))")
 _SCRATCH = re.compile(r"\..*\.(?P<pid>\d+)\.tmp")
 _BAD_FILE = (errno.EIO, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EBADMSG, errno.ELOOP)  # holds up no other
-DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 RESERVE = 2 << 20  # [bytes]
 _PROBE = 4096  # [bytes]: an empty file finds its place on a full disk
 

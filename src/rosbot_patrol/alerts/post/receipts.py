@@ -8,6 +8,7 @@ Only the process that delivers writes it; others read it along. A line that a cr
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
@@ -101,7 +102,7 @@ class Receipts:
             written = os.write(handle, b"\n" + line if cut else line)  # a cut line stays, and is read as none
             if written != len(line) + cut:
                 os.ftruncate(handle, size)
-                raise OSError(28, "No space left on device", str(self.path))
+                raise OSError(errno.ENOSPC, "No space left on device", str(self.path))
             os.fsync(handle)
         finally:
             os.close(handle)

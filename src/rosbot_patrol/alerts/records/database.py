@@ -18,6 +18,7 @@ Functions that write rows are called within a transaction.
 
 from __future__ import annotations
 
+import errno
 import json
 import sqlite3
 from collections.abc import Iterator, Mapping
@@ -36,6 +37,7 @@ from rosbot_patrol.alerts.records.incident import (
     incident_to_plain,
 )
 from rosbot_patrol.errors import StoreError
+from rosbot_patrol.files import DISK_FULL
 
 VERSION = 2
 APPLICATION_ID = 0x52504149  # "RPAI"
@@ -194,7 +196,8 @@ def errors_of(path: Path) -> Iterator[None]:
         )
         raise StoreError(path, str(err), is_full=name.startswith("SQLITE_FULL"), is_corrupt=is_corrupt) from err
     except OSError as err:
-        raise StoreError(path, f"{err.strerror or err}", is_full=err.errno in (27, 28, 122)) from err
+        is_full = err.errno in DISK_FULL or err.errno == errno.EFBIG  # the file may not grow: less in it helps, too
+        raise StoreError(path, f"{err.strerror or err}", is_full=is_full) from err
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 
 from rosbot_patrol.alerts.records.database import errors_of
@@ -45,12 +46,35 @@ class RetentionParams:
     )
 
 
+class PruneReason(Enum):
+    """Why incidents were removed."""
+
+    AGE = "age"
+    BUDGET = "budget"  # all incidents together take more room than they may
+    DISK_LOW = "disk low"
+    DISK_FULL = "disk full"
+
+    @property
+    def is_of_disk(self) -> bool:
+        """Whether the disk lacks room, so that the owner has to look after it."""
+        return self in (PruneReason.DISK_LOW, PruneReason.DISK_FULL)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Pruned:
-    """What went: ids in order, their bytes, why; `is_done`: nothing more has to go."""
+    """Removed incidents.
+
+    Attributes:
+        ids: in order of removal.
+        bytes: size of their files and rows [bytes].
+        reason: None if nothing had to go.
+        why: the reason for people.
+        is_done: nothing more has to go.
+    """
 
     ids: tuple[str, ...] = ()
     bytes: int = 0
+    reason: PruneReason | None = None
     why: str = ""
     is_done: bool = True
 
@@ -72,25 +96,28 @@ def prune(store: IncidentStore, params: RetentionParams, *, wall: float) -> Prun
     Raises:
         StoreError: the disk does not take it.
     """
-    found = _remove(store, _expired(store, params, wall), AT_ONCE, wall, "they are older than they are kept")
+    expired = _Cut(PruneReason.AGE, "they are older than they are kept")
+    found = _remove(store, _expired(store, params, wall), AT_ONCE, expired, wall)
     if found.ids:
         return found
     over = used_bytes(store) - params.keep_mb * MB
     if over > 0.0:
-        return _remove(store, _oldest(store, _ORDER), AT_ONCE, wall, f"all take more than {params.keep_mb:g} MB", over)
+        cut = _Cut(PruneReason.BUDGET, f"all take more than {params.keep_mb:g} MB", wanted=over)
+        return _remove(store, _oldest(store, _ORDER), AT_ONCE, cut, wall)
     lacking = params.keep_free_mb * MB - free_bytes(store.state_dir)
     if lacking > 0.0:
         why = f"less than {params.keep_free_mb:g} MB were free on the disk"
-        return _remove(store, _oldest(store, _ORDER[:2]), AT_ONCE, wall, why, lacking)
+        cut = _Cut(PruneReason.DISK_LOW, why, wanted=lacking)
+        return _remove(store, _oldest(store, _ORDER[:2]), AT_ONCE, cut, wall)
     return Pruned()
 
 
 def make_room(store: IncidentStore, *, wall: float, wanted: float = 10.0 * MB) -> Pruned:
     """Remove the oldest incidents but confirmed ones, because the disk takes nothing more. Raises StoreError."""
     release_reserve(store.state_dir)
-    why = "the disk is full"
+    cut = _Cut(PruneReason.DISK_FULL, "the disk is full", wanted=wanted)
     try:
-        return _remove(store, _oldest(store, _ORDER[:2]), 20, wall, why, wanted)
+        return _remove(store, _oldest(store, _ORDER[:2]), 20, cut, wall)
     finally:
         with suppress(StoreError):  # the disk is full, which is why we are here
             keep_reserve(store.state_dir)
@@ -132,21 +159,27 @@ def free_bytes(folder: Path) -> int:
         return shutil.disk_usage(folder).free
 
 
-def _remove(
-    store: IncidentStore, victims: Iterator[tuple[str, int]], most: int, wall: float, why: str, wanted: float = 0.0
-) -> Pruned:
+@dataclass(frozen=True)
+class _Cut:
+    """Why incidents go, and how many bytes of room are wanted; 0: all of them go."""
+
+    reason: PruneReason
+    why: str
+    wanted: float = 0.0
+
+
+def _remove(store: IncidentStore, victims: Iterator[tuple[str, int]], most: int, cut: _Cut, wall: float) -> Pruned:
     ids: list[str] = []
     freed = 0
     for incident_id, size in victims:
-        if len(ids) == most or (wanted and freed >= wanted):
+        if len(ids) == most or (cut.wanted and freed >= cut.wanted):
             break
-        store.remove(incident_id, wall=wall, why=why)
+        store.remove(incident_id, wall=wall, why=cut.why)
         ids.append(incident_id)
         freed += size
     if ids:
         store.settle()
-    is_done = len(ids) < most
-    return Pruned(ids=tuple(ids), bytes=freed, why=why, is_done=is_done)
+    return Pruned(ids=tuple(ids), bytes=freed, reason=cut.reason, why=cut.why, is_done=len(ids) < most)
 
 
 def _expired(store: IncidentStore, params: RetentionParams, wall: float) -> Iterator[tuple[str, int]]:

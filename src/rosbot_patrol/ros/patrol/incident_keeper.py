@@ -23,7 +23,7 @@ from rosbot_patrol.alerts.records.files import REPORT, NewFile
 from rosbot_patrol.alerts.records.incident import Event, Incident
 from rosbot_patrol.alerts.records.query import Query, find_incidents
 from rosbot_patrol.alerts.records.repair import close_abandoned, repair
-from rosbot_patrol.alerts.records.retention import RetentionParams, keep_reserve, make_room, prune
+from rosbot_patrol.alerts.records.retention import Pruned, RetentionParams, keep_reserve, make_room, prune
 from rosbot_patrol.alerts.records.salvage import open_store
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.report.page import write_report
@@ -324,10 +324,14 @@ class IncidentKeeper:
         if done.ids:
             log.warning("incidents: %s", done.sentence)
         self._tidy_at = 0.0 if not done.is_done else time.monotonic() + _TIDY
-        self._tell_well(done.sentence if done.ids else "")
+        self._tell_well(done)
 
-    def _tell_well(self, more: str = "") -> None:
-        self._health.set("incidents", WARN if "disk" in more else OK, more or "incidents are kept")
+    def _tell_well(self, done: Pruned | None = None) -> None:
+        if done is None or not done.ids:
+            self._health.set("incidents", OK, "incidents are kept")
+            return
+        is_of_disk = done.reason is not None and done.reason.is_of_disk
+        self._health.set("incidents", WARN if is_of_disk else OK, done.sentence)
 
     def _trouble(self, err: StoreError) -> float:
         self._complain(err)

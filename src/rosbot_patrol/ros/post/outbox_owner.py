@@ -26,10 +26,11 @@ from rosbot_patrol.alerts.post.damaged import replacement
 from rosbot_patrol.alerts.post.disk_watch import DiskWatch
 from rosbot_patrol.alerts.post.dispatcher import Delivery, Postman
 from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import DISK_FULL, Outbox
+from rosbot_patrol.alerts.post.outbox import Outbox
 from rosbot_patrol.alerts.post.receipts import Receipt
 from rosbot_patrol.alerts.post.settings_file import Settings, write_settings
 from rosbot_patrol.alerts.post.spare_post import SparePost
+from rosbot_patrol.files import DISK_FULL
 from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.ros.post.health import PostHealth
 from rosbot_patrol.ros.runtime.diagnostics import Health

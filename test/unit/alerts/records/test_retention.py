@@ -2,7 +2,7 @@ import pytest
 
 from rosbot_patrol.alerts.records import retention
 from rosbot_patrol.alerts.records.files import NewFile
-from rosbot_patrol.alerts.records.retention import DAY, MB, RetentionParams, make_room, prune
+from rosbot_patrol.alerts.records.retention import DAY, MB, PruneReason, RetentionParams, make_room, prune
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.records.verify import verify
 
@@ -53,7 +53,10 @@ def test_by_size_the_oldest_clear_ones_go_first_and_confirmed_ones_last(house, m
         done = prune(house, RetentionParams(keep_days=1e6, keep_clear_days=1e6, keep_mb=10.0), wall=NOW)
         assert done.ids == ()
         params = RetentionParams(keep_days=1e6, keep_clear_days=1e6, keep_mb=store_mb)
-        assert len(prune(house, params, wall=NOW).ids) == gone
+        done = prune(house, params, wall=NOW)
+        assert len(done.ids) == gone
+        assert done.reason is PruneReason.BUDGET
+        assert not done.reason.is_of_disk
     rest = [row["id"] for row in house.connection.execute("SELECT id FROM incidents WHERE closed NOT NULL")]
     assert sorted(rest) == ["confirmed20", "confirmed40"]
 
@@ -67,6 +70,8 @@ def test_a_disk_that_fills_takes_clear_ones_then_others_and_never_confirmed_ones
     done = prune(house, params, wall=NOW)
     assert done.ids == ("clear400",)
     assert "less than 200 MB were free" in done.sentence
+    assert done.reason is PruneReason.DISK_LOW
+    assert done.reason.is_of_disk
     monkeypatch.setattr(retention, "free_bytes", lambda _: 0)
     order = ["clear40", "clear20", "unreachable400", "unreachable40", "unreachable20"]
     assert prune_all(house, keep_days=1e6, keep_clear_days=1e6) == order
