@@ -32,8 +32,8 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import Process, free_port, wait_for
 
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.texts import incident_notice
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.detection.darknet.cfg import read_cfg
 from rosbot_patrol.detection.darknet.random_weights import random_weights

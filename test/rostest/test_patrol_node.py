@@ -15,8 +15,8 @@ import pytest
 from patrol_house import ROOT, stop, wait_until
 from ros_processes import free_port
 
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 rospy = pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 

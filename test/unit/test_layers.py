@@ -25,8 +25,9 @@ ROWS: list[set[str]] = [
     {"ros"},
 ]
 ROW_OF = {name: i for i, row in enumerate(ROWS) for name in row}
-# The same within a package, for its sub-packages and root modules.
-ROWS_WITHIN: dict[str, list[set[str]]] = {
+# The same inside a package, for its sub-packages and modules.
+ROWS_INSIDE: dict[str, list[set[str]]] = {
+    "alerts": [{"safe_text", "records"}, {"pictures", "report"}, {"outbox"}, {"channels"}, {"dispatch"}],
     "simulation": [
         {"noise", "meshes"},
         {"scene"},
@@ -37,6 +38,14 @@ ROWS_WITHIN: dict[str, list[set[str]]] = {
         {"scenario"},
         {"engine"},
         {"player"},
+    ],
+    "rosserial": [{"protocol"}, {"server", "device"}],
+    "ros": [
+        {"runtime", "messages"},
+        {"amcl", "maps", "move_base", "drive", "detector", "bridge", "post", "simulator", "campaign"},
+        {"patrol", "sensors"},
+        {"gmapping"},
+        {"tools"},
     ],
 }
 SIDEWAYS = {
@@ -56,6 +65,9 @@ ROS_MODULES = {
     "rosbag",
     "message_filters",
 }
+
+
+_INSIDE = {f"rosbot_patrol.{path.name}" for path in SRC.iterdir() if path.is_dir()}
 
 
 def modules() -> list[Path]:
@@ -82,7 +94,7 @@ def imports(path: Path) -> list[tuple[str, int, bool]]:
             found += [(alias.name, node.lineno, id(node) not in inside) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             names = [node.module or ""]
-            if node.module in ("rosbot_patrol", *(f"rosbot_patrol.{package}" for package in ROWS_WITHIN)):
+            if node.module == "rosbot_patrol" or node.module in _INSIDE:
                 names = [f"{node.module}.{alias.name}" for alias in node.names]
             found += [(name, node.lineno, id(node) not in inside) for name in names]
     return found
@@ -107,24 +119,47 @@ def test_imports_go_down_only(path: Path) -> None:
         assert allowed, f"{path.relative_to(ROOT)}:{line} imports {name}: up or sideways"
 
 
-@pytest.mark.parametrize(
-    ("package", "path"),
-    [(package, path) for package in ROWS_WITHIN for path in sorted((SRC / package).rglob("*.py"))],
-    ids=lambda part: part if isinstance(part, str) else str(part.relative_to(SRC)),
-)
-def test_imports_within_a_package_go_down_only(package: str, path: Path) -> None:
-    row_of = {name: i for i, row in enumerate(ROWS_WITHIN[package]) for name in row}
-    parts = path.relative_to(SRC / package).with_suffix("").parts
-    own = parts[0]
-    if own == "__init__":
-        return
-    assert own in row_of, f"{package}.{own} has no row in this test"
-    for name, line, _ in imports(path):
-        if not name.startswith(f"rosbot_patrol.{package}."):
+def test_no_circle_inside_a_package() -> None:
+    """Among the sub-packages and modules of a package, whatever rows it has or not."""
+    ways: dict[str, set[str]] = {}
+    for path in modules():
+        own = _part(path.relative_to(SRC).with_suffix("").parts)
+        for name, _, _ in imports(path):
+            other = _part(tuple(name.split(".")[1:])) if name.startswith("rosbot_patrol.") else ""
+            if other != own and other.split("/")[0] == own.split("/")[0]:
+                ways.setdefault(own, set()).add(other)
+    for part in ways:
+        assert part not in _reached_from(part, ways), f"{part} imports what imports it"
+
+
+def _part(dotted: tuple[str, ...]) -> str:
+    return "/".join(dotted[:2])
+
+
+def _reached_from(part: str, ways: dict[str, set[str]]) -> set[str]:
+    found: set[str] = set()
+    rest = list(ways.get(part, ()))
+    while rest:
+        if (here := rest.pop()) not in found:
+            found.add(here)
+            rest += ways.get(here, ())
+    return found
+
+
+@pytest.mark.parametrize("package", ROWS_INSIDE)
+def test_imports_inside_a_package_go_down_only(package: str) -> None:
+    row_of = {name: i for i, row in enumerate(ROWS_INSIDE[package]) for name in row}
+    for path in sorted((SRC / package).rglob("*.py")):
+        own = path.relative_to(SRC / package).parts[0].removesuffix(".py")
+        if own == "__init__":
             continue
-        other = name.split(".")[2]
-        is_down = other == own or row_of.get(other, 99) < row_of[own]
-        assert is_down, f"{path.relative_to(ROOT)}:{line} imports {name}: up or sideways"
+        assert own in row_of, f"{package}/{own} has no row in this test"
+        for name, line, _ in imports(path):
+            if not name.startswith(f"rosbot_patrol.{package}."):
+                continue
+            other = name.split(".")[2]
+            allowed = other == own or row_of.get(other, 99) < row_of[own]
+            assert allowed, f"{path.relative_to(ROOT)}:{line} imports {name}: up or sideways"
 
 
 @pytest.mark.parametrize(

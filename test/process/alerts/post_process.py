@@ -5,14 +5,13 @@ import sys
 import time
 from pathlib import Path
 
-from rosbot_patrol.alerts.channels.channel import Channel
+from rosbot_patrol.alerts.channels.channel import Channel, Pace
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
-from rosbot_patrol.alerts.post.channel_queue import Pace
-from rosbot_patrol.alerts.post.dispatcher import Postman
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 ENVELOPE = make_envelope("owner@example.org", "robot@example.org")
 STALE = 3.0  # [s] without a sign of life

@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 
 def make(name, **given):
@@ -23,11 +23,11 @@ def ids(outbox):
 FULL = """
 import logging, sys
 from pathlib import Path
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 place = Path(sys.argv[1])
 box = Outbox(place / "outbox")
-import rosbot_patrol.alerts.post.outbox as module
+import rosbot_patrol.alerts.outbox.outbox as module
 module.RESERVE = 300_000
 box.tidy()
 with (place / "filler").open("wb", buffering=0) as file:
@@ -68,8 +68,8 @@ def test_a_really_full_disk(tmp_path):
 KILLED = """
 import os, sys
 from pathlib import Path
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 if sys.argv[2] == "write":
     os.fsync = lambda handle: os._exit(9)
 box = Outbox(Path(sys.argv[1]))

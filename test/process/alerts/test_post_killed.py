@@ -19,8 +19,8 @@ pytest.importorskip("aiosmtpd.smtp", reason="needs python3-aiosmtpd")
 from post_process import ENVELOPE, STALE
 from real_smtp import RealSmtp
 
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 PROGRAM = str(Path(__file__).resolve().with_name("post_process.py"))
 

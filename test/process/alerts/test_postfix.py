@@ -13,9 +13,9 @@ from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
-from rosbot_patrol.alerts.post.dispatcher import Postman
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")
 USER = "nobody"  # is there on every Debian, and may receive mail

@@ -7,8 +7,8 @@ from post import Time, deliver_all, notice
 from smtp_server import SmtpServer
 
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
-from rosbot_patrol.alerts.post.dispatcher import Postman
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 A, B, C = "a@example.org", "b@example.org", "c@example.org"
 LATER, NEVER, GOOD = "451 4.3.0 try later", "550 5.1.1 no such user", "250 ok"

@@ -5,7 +5,7 @@ import subprocess
 import pytest
 from post import Box, channel, deliver_all, notice, postman, send_all, settle, spare
 
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from post import Time, channel, deliver_all, notice, postman
 from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 smtpd = pytest.importorskip("aiosmtpd.smtp", reason="needs python3-aiosmtpd")
 from real_smtp import RealSmtp  # noqa: E402

@@ -10,7 +10,7 @@ from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer as Server
 from rosbot_patrol.alerts.channels.smtp import SmtpTransport
-from rosbot_patrol.alerts.post.texts import incident_notice
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice
 
 
 @pytest.fixture

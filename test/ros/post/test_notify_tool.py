@@ -8,10 +8,10 @@ import pytest
 from smtp_server import SmtpServer
 
 from rosbot_patrol.alerts.channels.config import MailParams
-from rosbot_patrol.alerts.post.file_lock import FileLock
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.settings_file import Settings, write_settings
+from rosbot_patrol.alerts.dispatch.file_lock import FileLock
+from rosbot_patrol.alerts.dispatch.settings_file import Settings, write_settings
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.ros.post import notify as notify_tool
 

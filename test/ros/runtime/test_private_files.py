@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.alerts.post.dispatcher import Postman
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.alerts.records.files import NewFile
 from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.alerts.records.store import IncidentStore

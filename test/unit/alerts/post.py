@@ -2,13 +2,12 @@
 
 from pathlib import Path
 
-from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
-from rosbot_patrol.alerts.post.channel_queue import Pace
-from rosbot_patrol.alerts.post.dispatcher import Clocks, Postman
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.receipts import Receipts
-from rosbot_patrol.alerts.post.spare_post import SparePost
+from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError, Pace
+from rosbot_patrol.alerts.dispatch.dispatcher import Clocks, Postman
+from rosbot_patrol.alerts.dispatch.spare_post import SparePost
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
+from rosbot_patrol.alerts.outbox.receipts import Receipts
 
 
 class Time:

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
-from rosbot_patrol.alerts.post.channel_queue import Pace
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Waiting
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Waiting
 from rosbot_patrol.errors import AlertError
 
 
@@ -67,6 +66,22 @@ class Transport(Protocol):
 
     def send(self, notice: Notice) -> str:
         """Deliver; returns the place (a file, the addresses, an answer). Never hangs. Raises DeliveryError."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pace:
+    """How fast a channel goes.
+
+    Attributes:
+        interval: least time between two messages [s].
+        first_delay: after the first failure [s]; doubles with each to at most max_delay.
+        jitter: part of a delay that is left to chance, so that robots do not come all at once.
+    """
+
+    interval: float = 10.0
+    first_delay: float = 5.0
+    max_delay: float = 900.0
+    jitter: float = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from PIL import Image, ImageDraw
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError, FailureCause
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 _ADVICE = {
     FailureCause.UNKNOWN_HOST: (

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import urlsplit
 
-from rosbot_patrol.alerts.channels.channel import Channel, Transport
+from rosbot_patrol.alerts.channels.channel import Channel, Pace, Transport
 from rosbot_patrol.alerts.channels.mail import Envelope, make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
 from rosbot_patrol.alerts.channels.network_words import is_loopback
@@ -26,7 +26,6 @@ from rosbot_patrol.alerts.channels.secrets_on_disk import read_secret, refuse_se
 from rosbot_patrol.alerts.channels.sendmail import SENDMAILS, SendmailTransport, find_sendmail
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
 from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport, check_url
-from rosbot_patrol.alerts.post.channel_queue import Pace
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import load_strict, param, unknown_name
 from rosbot_patrol.yaml_files import read_mapping

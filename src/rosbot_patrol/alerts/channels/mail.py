@@ -15,7 +15,8 @@ from email.policy import SMTP
 from email.utils import formatdate, getaddresses
 
 from rosbot_patrol.alerts.channels.mail_html import html_page
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.safe_text import one_line, token
 from rosbot_patrol.errors import ParamError
 
 _POLICY = SMTP.clone(cte_type="7bit")  # for servers that do not know 8BITMIME
@@ -168,16 +169,6 @@ def _empty_mail(subject: str, mail_id: str, wall: float, envelope: Envelope) -> 
     mail["Message-ID"] = f"<{token(mail_id)}@{envelope.sender.domain or 'localhost'}>"
     mail["Auto-Submitted"] = "auto-generated"
     return mail
-
-
-def token(text: str) -> str:
-    """The text as something that a header or a file's name may hold."""
-    return re.sub(r"[^A-Za-z0-9.+-]", "_", text).strip(".") or "none"
-
-
-def one_line(text: str) -> str:
-    """The text without line breaks and control characters."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _lines(text: str) -> list[str]:

@@ -6,7 +6,7 @@ import time
 from html import escape
 from string import Template
 
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 _PAGE = Template("""\
 <!DOCTYPE html>

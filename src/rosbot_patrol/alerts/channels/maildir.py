@@ -8,8 +8,9 @@ from email.policy import SMTP
 from pathlib import Path
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
-from rosbot_patrol.alerts.channels.mail import Envelope, build_mail, token
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.channels.mail import Envelope, build_mail
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.safe_text import token
 from rosbot_patrol.files import sync_folder
 
 

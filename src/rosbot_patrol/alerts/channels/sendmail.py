@@ -8,7 +8,7 @@ from email.policy import SMTP
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import Envelope, build_mail
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 SENDMAILS = ("/usr/sbin/sendmail", "/usr/lib/sendmail")
 _OF_RECIPIENT = {67, 68}  # sysexits.h: no such user, no such host

@@ -12,7 +12,7 @@ from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import Envelope, build_mail
 from rosbot_patrol.alerts.channels.masking import Mask
 from rosbot_patrol.alerts.channels.network_words import WHOLE_EXCHANGE, Deadline, StarttlsMissing, explain
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,13 +23,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
+from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause, Pace
 from rosbot_patrol.alerts.channels.mail import plain_text
 from rosbot_patrol.alerts.channels.masking import Mask, masked_url, url_secrets
 from rosbot_patrol.alerts.channels.network_words import WHOLE_EXCHANGE, Deadline, explain
 from rosbot_patrol.alerts.channels.retry_after import parse_retry_after
-from rosbot_patrol.alerts.post.channel_queue import Pace
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 log = logging.getLogger(__name__)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 
-from rosbot_patrol.alerts.channels.mail import one_line
+from rosbot_patrol.alerts.safe_text import one_line
 
 DISARMED = "disarmed"
 MODES = ("armed_away", "armed_home", "night", DISARMED)

@@ -12,17 +12,17 @@ from functools import partial
 
 import rospy
 
-from rosbot_patrol.alerts.channels.mail import one_line, token
+from rosbot_patrol.alerts.dispatch.dispatcher import Delivery
+from rosbot_patrol.alerts.outbox.damaged_notices import replacement
+from rosbot_patrol.alerts.outbox.delayed_notices import HeldNotices
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
+from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox, to_jpeg
-from rosbot_patrol.alerts.post.damaged import replacement
-from rosbot_patrol.alerts.post.delayed_notices import HeldNotices
-from rosbot_patrol.alerts.post.dispatcher import Delivery
-from rosbot_patrol.alerts.post.notice import Notice as PostNotice
-from rosbot_patrol.alerts.post.texts import incident_notice, verdict_notice
 from rosbot_patrol.alerts.records.database import FOLDER
 from rosbot_patrol.alerts.records.files import NewFile
 from rosbot_patrol.alerts.records.incident import Event, Incident
 from rosbot_patrol.alerts.records.store import recall_incident
+from rosbot_patrol.alerts.safe_text import one_line, token
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.calls.ignored_log import IgnoredLog

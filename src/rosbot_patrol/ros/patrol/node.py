@@ -25,12 +25,12 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.alerts.channels.config import MailParams
-from rosbot_patrol.alerts.channels.mail import one_line
+from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
 from rosbot_patrol.alerts.pictures.album import Sighting
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
-from rosbot_patrol.alerts.post.notice import Notice as PostNotice
 from rosbot_patrol.alerts.records.retention import RetentionParams
+from rosbot_patrol.alerts.safe_text import one_line
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.calls.journal import Journal

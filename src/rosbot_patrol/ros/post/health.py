@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from rosbot_patrol.alerts.channels.config import MailParams
-from rosbot_patrol.alerts.post.dispatcher import ChannelStatus, Postman
-from rosbot_patrol.alerts.post.settings_file import differences, state_of
+from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Postman
+from rosbot_patrol.alerts.dispatch.settings_file import differences, state_of
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 

@@ -26,9 +26,9 @@ from rosgraph.names import get_ros_namespace
 from rosbot_patrol.alerts.channels.channel import Channel
 from rosbot_patrol.alerts.channels.channel_test import trial_notice, try_channel
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, load_channels, make_channels
-from rosbot_patrol.alerts.post.dispatcher import Postman
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.settings_file import read_settings, state_of
+from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.dispatch.settings_file import read_settings, state_of
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import unknown_name
@@ -43,7 +43,7 @@ def main() -> None:
     """Run the program."""
     use_private_umask()
     arguments = [a for a in sys.argv[1:] if not a.startswith("__") and ":=" not in a]
-    logging.getLogger("rosbot_patrol.alerts.post.dispatcher").disabled = True  # what it says is printed
+    logging.getLogger("rosbot_patrol.alerts.dispatch.dispatcher").disabled = True  # what it says is printed
     try:
         sys.exit(run(arguments))
     except (ParamError, OSError) as err:

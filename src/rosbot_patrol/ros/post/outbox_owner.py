@@ -22,14 +22,14 @@ import rospy
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
 from rosbot_patrol.alerts.channels.network_state import network_mark
 from rosbot_patrol.alerts.channels.secrets_on_disk import refuse_secrets
-from rosbot_patrol.alerts.post.damaged import replacement
-from rosbot_patrol.alerts.post.disk_watch import DiskWatch
-from rosbot_patrol.alerts.post.dispatcher import Delivery, Postman
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.receipts import Receipt
-from rosbot_patrol.alerts.post.settings_file import Settings, write_settings
-from rosbot_patrol.alerts.post.spare_post import SparePost
+from rosbot_patrol.alerts.dispatch.dispatcher import Delivery, Postman
+from rosbot_patrol.alerts.dispatch.settings_file import Settings, write_settings
+from rosbot_patrol.alerts.dispatch.spare_post import SparePost
+from rosbot_patrol.alerts.outbox.damaged_notices import replacement
+from rosbot_patrol.alerts.outbox.disk_watch import DiskWatch
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
+from rosbot_patrol.alerts.outbox.receipts import Receipt
 from rosbot_patrol.files import DISK_FULL
 from rosbot_patrol.patrol.calls.repeats import Repeats
 from rosbot_patrol.ros.post.health import PostHealth

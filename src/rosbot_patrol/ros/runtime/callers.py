@@ -7,7 +7,7 @@ from typing import Any
 
 import rospy
 
-from rosbot_patrol.alerts.channels.mail import one_line
+from rosbot_patrol.alerts.safe_text import one_line
 
 log = logging.getLogger(__name__)
 

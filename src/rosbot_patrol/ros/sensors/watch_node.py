@@ -23,7 +23,7 @@ import rospy
 from std_msgs.msg import Empty
 
 from rosbot_patrol.alerts.channels.config import MailParams
-from rosbot_patrol.alerts.post.notice import Notice as PostNotice
+from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StateError
 from rosbot_patrol.files import read_json, write_json

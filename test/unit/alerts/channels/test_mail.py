@@ -4,7 +4,7 @@ from email.policy import SMTP, default
 import pytest
 
 from rosbot_patrol.alerts.channels.mail import build_mail, make_envelope
-from rosbot_patrol.alerts.post.texts import incident_notice, verdict_notice
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
 from rosbot_patrol.errors import ParamError
 
 JPEG = b"\xff\xd8\xff\xe0 picture \x00\x01\n.\nFrom \r\n\xff\xd9"

@@ -6,7 +6,7 @@ import pytest
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
-from rosbot_patrol.alerts.post.texts import incident_notice
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice
 
 
 @pytest.fixture

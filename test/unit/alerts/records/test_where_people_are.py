@@ -8,9 +8,9 @@ import pytest
 from rosbot_patrol.alerts.channels.mail import build_mail
 from rosbot_patrol.alerts.channels.mail_html import html_page
 from rosbot_patrol.alerts.channels.webhook import document
-from rosbot_patrol.alerts.post.digest import merge
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.texts import incident_notice
+from rosbot_patrol.alerts.outbox.digest import merge
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.records.incident import NO_ROOM, incident_from_plain, incident_to_plain
 from rosbot_patrol.alerts.records.query import Query, find_incidents
 from rosbot_patrol.alerts.records.store import IncidentStore

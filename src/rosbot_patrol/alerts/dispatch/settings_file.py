@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.alerts.channels.config import MailParams
-from rosbot_patrol.alerts.channels.mail import token
+from rosbot_patrol.alerts.safe_text import token
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.params import load

@@ -18,14 +18,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
-from rosbot_patrol.alerts.channels.mail import token
-from rosbot_patrol.alerts.post.channel_queue import Lane
-from rosbot_patrol.alerts.post.digest import merge
-from rosbot_patrol.alerts.post.file_lock import STALE, FileLock, NoLock
-from rosbot_patrol.alerts.post.memory_outbox import MemoryOutbox
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox, Waiting
-from rosbot_patrol.alerts.post.receipts import Receipt, Receipts
+from rosbot_patrol.alerts.dispatch.channel_queue import Lane
+from rosbot_patrol.alerts.dispatch.file_lock import STALE, FileLock, NoLock
+from rosbot_patrol.alerts.outbox.digest import merge
+from rosbot_patrol.alerts.outbox.memory_outbox import MemoryOutbox
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox, Waiting
+from rosbot_patrol.alerts.outbox.receipts import Receipt, Receipts
+from rosbot_patrol.alerts.safe_text import token
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import write_atomic
 

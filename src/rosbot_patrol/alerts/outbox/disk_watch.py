@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 PATIENCE = 10.0  # [s] without a success until the owner is told: a disk that is full for a moment is none of theirs
 

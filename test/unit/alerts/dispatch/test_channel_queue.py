@@ -2,8 +2,9 @@ import random
 
 import pytest
 
-from rosbot_patrol.alerts.post.channel_queue import Lane, Pace
-from rosbot_patrol.alerts.post.outbox import Waiting
+from rosbot_patrol.alerts.channels.channel import Pace
+from rosbot_patrol.alerts.dispatch.channel_queue import Lane
+from rosbot_patrol.alerts.outbox.outbox import Waiting
 
 
 def entries(*names):

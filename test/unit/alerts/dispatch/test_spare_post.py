@@ -9,8 +9,8 @@ from post import Box, Time, channel, deliver_all, notice, postman, send_all, set
 
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.receipts import Receipts
+from rosbot_patrol.alerts.outbox.outbox import Outbox
+from rosbot_patrol.alerts.outbox.receipts import Receipts
 
 
 def test_it_leaves_by_every_channel_at_once(tmp_path):

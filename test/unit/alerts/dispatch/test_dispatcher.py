@@ -6,8 +6,8 @@ from post import Box, Time, channel, deliver_all, notice, postman
 
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
-from rosbot_patrol.alerts.post.dispatcher import STATUS
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.dispatch.dispatcher import STATUS
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@ import os
 
 import pytest
 
-from rosbot_patrol.alerts.post import outbox as outbox_module
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
+from rosbot_patrol.alerts.outbox import outbox as outbox_module
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 
 def make(name, **given):

@@ -2,7 +2,7 @@ import os
 
 import pytest
 
-from rosbot_patrol.alerts.post.receipts import Receipt, Receipts
+from rosbot_patrol.alerts.outbox.receipts import Receipt, Receipts
 
 
 def receipt(*ids, channel="mail", wall=5.0):

@@ -7,10 +7,10 @@ from contextlib import suppress
 import pytest
 from post import Box, Time, channel, deliver_all, postman
 
-from rosbot_patrol.alerts.post.damaged import replacement
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.texts import incident_notice, verdict_notice
+from rosbot_patrol.alerts.outbox.damaged_notices import replacement
+from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.alerts.records.files import NewFile
 from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.alerts.records.store import IncidentStore

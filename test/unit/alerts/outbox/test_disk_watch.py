@@ -1,6 +1,6 @@
 import errno
 
-from rosbot_patrol.alerts.post.disk_watch import PATIENCE, DiskWatch
+from rosbot_patrol.alerts.outbox.disk_watch import PATIENCE, DiskWatch
 
 READ_ONLY = OSError(errno.EROFS, "Read-only file system")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from rosbot_patrol.alerts.channels.mail import one_line, token
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.records.incident import Incident, Place
+from rosbot_patrol.alerts.safe_text import one_line, token
 from rosbot_patrol.counts import count_of
 
 SUBJECT = "rosbot patrol node"

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from rosbot_patrol.alerts.channels.channel import Channel
-from rosbot_patrol.alerts.post.dispatcher import ChannelStatus, Clocks, Delivery, Postman
-from rosbot_patrol.alerts.post.memory_outbox import MemoryOutbox
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.outbox import Outbox
-from rosbot_patrol.alerts.post.receipts import Receipt, Receipts
+from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Clocks, Delivery, Postman
+from rosbot_patrol.alerts.outbox.memory_outbox import MemoryOutbox
+from rosbot_patrol.alerts.outbox.notice import Notice
+from rosbot_patrol.alerts.outbox.outbox import Outbox
+from rosbot_patrol.alerts.outbox.receipts import Receipt, Receipts
 
 
 class SparePost:

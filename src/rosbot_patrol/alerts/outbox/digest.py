@@ -6,7 +6,7 @@ import hashlib
 import time
 from collections.abc import Sequence
 
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 WHOLE = 10  # up to so many are told in full
 LISTED = 300

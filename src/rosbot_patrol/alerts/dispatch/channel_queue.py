@@ -14,28 +14,13 @@ import random
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rosbot_patrol.alerts.post.outbox import Waiting
+from rosbot_patrol.alerts.channels.channel import Pace
+from rosbot_patrol.alerts.outbox.outbox import Waiting
 
 DIGEST_FROM = 3  # so many that are not urgent become one message
 DIGEST_MOST = 500
 DOUBTFUL = 6  # so many times not wanted, though the other side was there
 RARELY = (900.0, 21600.0)  # first and longest pause for a notice that was refused [s]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pace:
-    """How fast a channel goes.
-
-    Attributes:
-        interval: least time between two messages [s].
-        first_delay: after the first failure [s]; doubles with each to at most max_delay.
-        jitter: part of a delay that is left to chance, so that robots do not come all at once.
-    """
-
-    interval: float = 10.0
-    first_delay: float = 5.0
-    max_delay: float = 900.0
-    jitter: float = 0.2
 
 
 @dataclass

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from rosbot_patrol.alerts.channels.mail import token
-from rosbot_patrol.alerts.post.notice import Notice
-from rosbot_patrol.alerts.post.texts import SUBJECT, incident_notice, verdict_notice
+from rosbot_patrol.alerts.outbox.incident_notices import SUBJECT, incident_notice, verdict_notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.records.incident import Incident
 from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.safe_text import token
 from rosbot_patrol.errors import StoreError
 
 _INCIDENT = re.compile(r"\d{8}T\d{6}Z-\d+(-\d+)?")  # ids of missions, which only notices of intruders have

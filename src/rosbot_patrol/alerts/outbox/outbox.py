@@ -1,10 +1,10 @@
 """The spool of notices: a folder in which any process puts, and from which one delivers.
 
-    outbox/000000000012-ID.notice   waits (alerts/post/notice.py), written whole and synced before `put` returns
-    outbox/taken.jsonl              which channel took what (alerts/post/receipts.py)
+    outbox/000000000012-ID.notice   waits (alerts/outbox/notice.py), written whole and synced before `put` returns
+    outbox/taken.jsonl              which channel took what (alerts/outbox/receipts.py)
     outbox/sent/                    the last that every channel took
     outbox/reserve                  room for some notices where the disk is full
-    outbox/lock                     held by the process that delivers (alerts/post/dispatcher.py)
+    outbox/lock                     held by the process that delivers (alerts/dispatch/dispatcher.py)
 
 Numbers give the order; two processes that put at the same moment may take the same number, their ids then decide.
 """
@@ -20,7 +20,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rosbot_patrol.alerts.post.notice import LaterFormat, Notice
+from rosbot_patrol.alerts.outbox.notice import LaterFormat, Notice
 from rosbot_patrol.files import DISK_FULL, sync_folder, write_atomic
 
 log = logging.getLogger(__name__)

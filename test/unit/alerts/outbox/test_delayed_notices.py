@@ -2,8 +2,8 @@
 
 import json
 
-from rosbot_patrol.alerts.post.delayed_notices import HeldNotices
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.delayed_notices import HeldNotices
+from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.patrol.calls.ignored_log import MOST, IgnoredLog
 from rosbot_patrol.patrol.records.commands import Ignored
 

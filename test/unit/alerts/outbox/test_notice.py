@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from rosbot_patrol.alerts.post.notice import Notice
+from rosbot_patrol.alerts.outbox.notice import Notice
 
 
 def make(**given):
