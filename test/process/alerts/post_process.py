@@ -9,7 +9,7 @@ from rosbot_patrol.alerts.channels.channel import Channel, Pace
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
-from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 
@@ -33,15 +33,15 @@ def deliver(folder, maildir, port):
         Channel(name="disk", transport=MaildirTransport(Path(maildir), ENVELOPE), pace=pace),
         Channel(name="mail", transport=SmtpTransport(SmtpServer(host="localhost", port=port), ENVELOPE), pace=pace),
     ]
-    postman = Postman(Outbox(folder), channels, stale_after=STALE)
-    while not postman.take_over():
+    dispatcher = Dispatcher(Outbox(folder), channels, stale_after=STALE)
+    while not dispatcher.take_over():
         time.sleep(0.01)
     print("delivers", flush=True)
     while True:
-        while not postman.take_over():
+        while not dispatcher.take_over():
             time.sleep(0.01)
-        postman.refresh()
-        if not any(postman.deliver(name) for name in postman.channels):
+        dispatcher.refresh()
+        if not any(dispatcher.deliver(name) for name in dispatcher.channels):
             time.sleep(0.005)
 
 

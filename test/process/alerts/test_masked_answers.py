@@ -9,7 +9,7 @@ import threading
 from urllib.parse import quote, unquote
 
 import pytest
-from post import channel, deliver_all, notice, postman
+from post import channel, deliver_all, dispatcher, notice
 from smtp_server import SmtpServer
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
@@ -101,7 +101,7 @@ def test_nothing_that_is_written_or_logged_holds_the_address(web, tmp_path, capl
     caplog.set_level(logging.DEBUG)
     web.words = ECHOES["as it came"]
     hook = WebhookTransport(WebAddress(url=web.url, name="phone", timeout=2.0))
-    post = postman(tmp_path, channel("phone", hook), channel("other", hook))
+    post = dispatcher(tmp_path, channel("phone", hook), channel("other", hook))
     post.outbox.put(notice("n1"))
     post.take_over()
     done = deliver_all(post)

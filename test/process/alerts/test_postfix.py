@@ -13,7 +13,7 @@ from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
-from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 
@@ -109,7 +109,7 @@ def test_one_of_two_users_that_is_not_there_costs_the_other_nothing(postfix, tmp
         smtp_port=postfix.port,
         mail_interval=0.0,
     )
-    post = Postman(Outbox(tmp_path), make_channels(params, Surroundings(home=tmp_path, environ={})))
+    post = Dispatcher(Outbox(tmp_path), make_channels(params, Surroundings(home=tmp_path, environ={})))
     post.outbox.put(told("two-users"))
     assert post.take_over()
     for name in post.channels:

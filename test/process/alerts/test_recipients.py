@@ -7,7 +7,7 @@ from post import Time, deliver_all, notice
 from smtp_server import SmtpServer
 
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
-from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 A, B, C = "a@example.org", "b@example.org", "c@example.org"
@@ -34,7 +34,7 @@ class House:
     def start(self):
         around = Surroundings(home=self.folder, environ={}, host="robot")
         channels = make_channels(self.params, around)
-        self.post = Postman(Outbox(self.folder / "outbox"), channels, clocks=self.time.clocks, seed=1, who="test")
+        self.post = Dispatcher(Outbox(self.folder / "outbox"), channels, clocks=self.time.clocks, seed=1, who="test")
         assert self.post.take_over()
 
     def restart(self):

@@ -3,7 +3,7 @@
 import subprocess
 
 import pytest
-from post import Box, channel, deliver_all, notice, postman, send_all, settle, spare
+from post import Box, channel, deliver_all, dispatcher, notice, send_all, settle, spare
 
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 
@@ -25,12 +25,12 @@ def read_only(folder, way="ro"):
 def test_a_disk_that_becomes_read_only_still_gives_what_waits_on_it_once(disk, tmp_path):
     """Who has the lock delivers; who starts then takes the lock for reading; nobody else does."""
     mail, box = Box(), disk / "outbox"
-    first = postman(box, channel("mail", mail))
+    first = dispatcher(box, channel("mail", mail))
     first.outbox.put(notice("a"))
     first.take_over()
     first.hand_over()
     read_only(disk)
-    later, other = (postman(box, channel("mail", mail)) for _ in range(2))
+    later, other = (dispatcher(box, channel("mail", mail)) for _ in range(2))
     assert later.take_over()
     assert not other.take_over()
     assert later.deliver("mail").delivered
@@ -45,7 +45,7 @@ def test_a_disk_that_becomes_read_only_still_gives_what_waits_on_it_once(disk, t
 
 def test_a_notice_on_a_read_only_disk_is_not_sent_again_when_it_is_looked_at_again(disk):
     mail, box = Box(), disk / "outbox"
-    post = postman(box, channel("mail", mail))
+    post = dispatcher(box, channel("mail", mail))
     for name in ("a", "b", "c"):
         post.outbox.put(notice(name))
     post.take_over()

@@ -8,7 +8,7 @@ from email.policy import default
 
 import pytest
 from certificate import make_certificate
-from post import Time, channel, deliver_all, notice, postman
+from post import Time, channel, deliver_all, dispatcher, notice
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError, FailureCause
 from rosbot_patrol.alerts.channels.mail import make_envelope
@@ -132,7 +132,7 @@ def test_tls_from_the_first_byte(certificate, told):
 def test_a_server_that_stops_and_starts_gets_all_in_order_once(start, certificate, tmp_path):
     """The hour of test_dispatcher.py against a real server; the clock is the test's."""
     clock, first = Time(), start()
-    post = postman(tmp_path, channel("mail", transport(first.port, certificate)), time=clock)
+    post = dispatcher(tmp_path, channel("mail", transport(first.port, certificate)), time=clock)
     post.take_over()
     names = [f"n{i}" for i in range(6)]
     post.outbox.put(notice(names[0]))

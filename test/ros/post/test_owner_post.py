@@ -81,7 +81,7 @@ def make(tmp_path, monkeypatch):
     def build(folder=tmp_path / "state"):
         house = House(folder, boxes)
         house.post.clock = clock
-        for part in (house.post._postman, house.post._spare._postman):
+        for part in (house.post._dispatcher, house.post._spare._dispatcher):
             part._clocks = Clocks(now=clock.monotonic, wall=clock.time)
         return house
 
@@ -90,7 +90,7 @@ def make(tmp_path, monkeypatch):
 
 def nudge(house):
     house.post._spare.nudge()
-    house.post._postman.nudge()
+    house.post._dispatcher.nudge()
 
 
 ONCE = {"mail": ["a"], "phone": ["a"]}

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` first")
 
-from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.alerts.records.files import NewFile
@@ -46,7 +46,7 @@ OURS = (
 def write_all(folder):
     """As patrol and watch do."""
     outbox = Outbox(folder / "outbox")
-    post = Postman(outbox, [])
+    post = Dispatcher(outbox, [])
     outbox.put(Notice(id="a", wall=1.0, kind="fault", subject="s", text="t"))
     post.take_over()
     post.write_status()

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError, Pace
-from rosbot_patrol.alerts.dispatch.dispatcher import Clocks, Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import Clocks, Dispatcher
 from rosbot_patrol.alerts.dispatch.spare_post import SparePost
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox
@@ -61,9 +61,9 @@ def channel(name, transport, *, kinds=(), interval=0.0, first_delay=5.0):
     return Channel(name=name, transport=transport, kinds=kinds, pace=pace)
 
 
-def postman(folder: Path, *channels, time=None, **given):
+def dispatcher(folder: Path, *channels, time=None, **given):
     time = time or Time()
-    return Postman(Outbox(folder), channels, clocks=time.clocks, seed=1, who="test", **given)
+    return Dispatcher(Outbox(folder), channels, clocks=time.clocks, seed=1, who="test", **given)
 
 
 def deliver_all(post, *, look=True):

@@ -35,7 +35,7 @@ _ADVICE = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial:
+class ChannelTest:
     """Outcome of a test notice on one channel.
 
     Attributes:
@@ -61,17 +61,17 @@ class Trial:
         return _ADVICE.get(self.cause, "") if self.cause else ""
 
 
-def try_channel(channel: Channel, notice: Notice, clock: Callable[[], float] = time.monotonic) -> Trial:
+def try_channel(channel: Channel, notice: Notice, clock: Callable[[], float] = time.monotonic) -> ChannelTest:
     """Send a notice through a channel, past the outbox."""
     began = clock()
     try:
         where = channel.transport.send(notice)
     except DeliveryError as err:
-        return Trial(channel=channel.name, text=str(err), seconds=clock() - began, cause=err.cause)
-    return Trial(channel=channel.name, text=where, seconds=clock() - began)
+        return ChannelTest(channel=channel.name, text=str(err), seconds=clock() - began, cause=err.cause)
+    return ChannelTest(channel=channel.name, text=where, seconds=clock() - began)
 
 
-def trial_notice(wall: float, host: str) -> Notice:
+def make_test_notice(wall: float, host: str) -> Notice:
     """A notice that says that it is a test."""
     stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(wall))
     return Notice(

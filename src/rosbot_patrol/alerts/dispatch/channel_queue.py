@@ -31,7 +31,7 @@ class _Refusal:
     is_final: bool = False  # the other side said so; else it is our guess
 
 
-class Lane:
+class ChannelQueue:
     """What one channel has still to take.
 
     Args:

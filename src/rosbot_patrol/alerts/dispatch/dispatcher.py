@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
-from rosbot_patrol.alerts.dispatch.channel_queue import Lane
+from rosbot_patrol.alerts.dispatch.channel_queue import ChannelQueue
 from rosbot_patrol.alerts.dispatch.file_lock import STALE, FileLock, NoLock
 from rosbot_patrol.alerts.outbox.digest import merge
 from rosbot_patrol.alerts.outbox.memory_outbox import MemoryOutbox
@@ -80,7 +80,7 @@ class Clocks:
     wall: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_REALTIME)
 
 
-class Postman:
+class Dispatcher:
     """Owns the channels, and, where it holds the lock, the deliveries.
 
     Args:
@@ -114,7 +114,7 @@ class Postman:
             self.lock = FileLock(outbox.folder / "lock", who, stale_after=stale_after, clock=self._clocks.now)
         self._rng = random.Random(seed)
         self._down_after, self._stale_after = down_after, stale_after
-        self._lanes: dict[str, Lane] = {}
+        self._queues: dict[str, ChannelQueue] = {}
         self._unwritten: list[Receipt] = []
         self._waiting: list[Waiting] = []
         self._guard = threading.RLock()
@@ -122,13 +122,13 @@ class Postman:
     @property
     def is_delivering(self) -> bool:
         """Whether this process is the one that delivers."""
-        return self.lock.is_held and bool(self._lanes)
+        return self.lock.is_held and bool(self._queues)
 
     @property
     def has_trouble(self) -> bool:
         """Whether a channel does not take what it should."""
         with self._guard:
-            return any(lane.down_since is not None for lane in self._lanes.values())
+            return any(queue.down_since is not None for queue in self._queues.values())
 
     def take_over(self) -> bool:
         """Become the one that delivers, where nobody is, or who is hangs; else say that this one lives.
@@ -150,7 +150,7 @@ class Postman:
             now, wall = self._clocks.now(), self._clocks.wall()
             for name, channel in self.channels.items():
                 ago = max(wall - self.receipts.last.get(name, float("-inf")), 0.0)
-                self._lanes[name] = Lane(channel.pace, self._rng, last=now - ago)
+                self._queues[name] = ChannelQueue(channel.pace, self._rng, last=now - ago)
             self.refresh()
             self.receipts.compact(entry.id for entry in self._waiting)
             return True
@@ -158,7 +158,7 @@ class Postman:
     def hand_over(self) -> None:
         """Stop delivering; another process may."""
         with self._guard:
-            self._lanes.clear()
+            self._queues.clear()
             self.lock.release()
 
     def refresh(self) -> None:
@@ -167,11 +167,11 @@ class Postman:
             before = {entry.name for entry in self._waiting}
             self._waiting = self.outbox.waiting()
             self._read_receipts()  # after the look at the folder: another program writes receipts before the notice
-            for name, lane in self._lanes.items():
+            for name, queue in self._queues.items():
                 self._offer(name)
                 if any(entry.name not in before for entry in self._waiting):
-                    lane.nudge(self._clocks.now())
-            self._write_receipts()  # the lanes first: they need no disk that takes anything
+                    queue.nudge(self._clocks.now())
+            self._write_receipts()  # the queues first: they need no disk that takes anything
             self._settle_refusals()
             self._finish()
             self.outbox.tidy()
@@ -180,16 +180,16 @@ class Postman:
         """Notices went to a channel past this object: it sends them there no more."""
         with self._guard:
             self.receipts.note(receipt)
-            if lane := self._lanes.get(receipt.channel):
-                lane.offer(e for e in self._waiting if self._is_open(e, receipt.channel))
+            if queue := self._queues.get(receipt.channel):
+                queue.offer(e for e in self._waiting if self._is_open(e, receipt.channel))
 
     def deliver(self, name: str) -> Delivery | None:
         """Send what is due on a channel, None where nothing is; waits for the transport. Raises OSError."""
         with self._guard:
             self._mind_the_lock()
-            lane = self._lanes.get(name)
-            batch = lane.due(self._clocks.now()) if lane else []
-            if not lane or not batch:
+            queue = self._queues.get(name)
+            batch = queue.due(self._clocks.now()) if queue else []
+            if not queue or not batch:
                 return None
             notice = self._compose(batch)
         if notice is None:
@@ -201,7 +201,7 @@ class Postman:
             where = _send(channel, notice)
         except DeliveryError as err:
             with self._guard:
-                put_off = lane.failed(
+                put_off = queue.failed(
                     batch,
                     self._clocks.now(),
                     str(err),
@@ -222,7 +222,7 @@ class Postman:
                 text=text,
             )
         with self._guard:
-            self._cross_out(channel, lane, batch, where)
+            self._cross_out(channel, queue, batch, where)
         text = f"{_told(batch)} delivered by {channel.transport.name}: {where}"
         log.info("%s", text)
         return Delivery(channel=name, transport=channel.transport.name, ids=ids, delivered=True, where=where, text=text)
@@ -230,31 +230,31 @@ class Postman:
     def pause(self, name: str, most: float = 60.0) -> float:
         """How long until `deliver` may have something to do [s]."""
         with self._guard:
-            lane = self._lanes.get(name)
-            wait = lane.wait(self._clocks.now()) if lane else None
+            queue = self._queues.get(name)
+            wait = queue.wait(self._clocks.now()) if queue else None
         return most if wait is None else min(wait + 0.01, most)
 
     def nudge(self, *, all_: bool = False) -> None:
         """Try again at once: the network came back; `all_`: somebody asks for it, refused ones too."""
         with self._guard:
-            for lane in self._lanes.values():
-                lane.nudge(self._clocks.now(), all_=all_)
+            for queue in self._queues.values():
+                queue.nudge(self._clocks.now(), all_=all_)
 
     def statuses(self) -> list[ChannelStatus]:
         """How the channels do; only where this process delivers."""
         with self._guard:
-            return [self._status(name, lane) for name, lane in self._lanes.items()]
+            return [self._status(name, queue) for name, queue in self._queues.items()]
 
     def tell_faults(self) -> None:
         """Tell of a channel that is down for long, or refuses a notice for good, on the others. Raises OSError."""
         with self._guard:
-            for name, lane in self._lanes.items():
+            for name, queue in self._queues.items():
                 others = self._others(name)
                 if not others:
                     continue
-                if lane.oldest is not None and self._is_down(name):
-                    self._tell_down(name, lane, lane.oldest, others)
-                for entry, error in lane.refused:
+                if queue.oldest is not None and self._is_down(name):
+                    self._tell_down(name, queue, queue.oldest, others)
+                for entry, error in queue.refused:
                     self._tell_refused(name, entry, error, others)
 
     def write_status(self) -> None:
@@ -289,7 +289,7 @@ class Postman:
         return channel.takes(entry) and channel.names.isdisjoint(self.receipts.done(entry.id))
 
     def _offer(self, name: str) -> None:
-        self._lanes[name].offer(e for e in self._waiting if self._is_open(e, name))
+        self._queues[name].offer(e for e in self._waiting if self._is_open(e, name))
 
     def _what_next(self, name: str, ids: tuple[str, ...], put_off: float, err: DeliveryError) -> str:
         try:
@@ -306,10 +306,10 @@ class Postman:
         """Ask no recipient again for what it refused for good while another of the same channel took it."""
         if self._unwritten:  # the disk takes nothing: first what is known already
             return
-        for name, lane in self._lanes.items():
+        for name, queue in self._queues.items():
             channel = self.channels[name]
             beside = {other.name for other in self.channels.values() if other.is_beside(channel)}
-            for entry, error in lane.refused_for_good:
+            for entry, error in queue.refused_for_good:
                 if beside.isdisjoint(self.receipts.taken.get(entry.id, ())):
                     continue
                 if others := self._others(name):
@@ -323,12 +323,12 @@ class Postman:
         """Channels that can tell of a fault: those that take something at the moment."""
         return tuple(
             other
-            for other in self._lanes
+            for other in self._queues
             if other != name and not self._is_down(other) and not self._is_refusing_recipient(other)
         )
 
     def _is_refusing_recipient(self, name: str) -> bool:
-        refuses = name in self.receipts.refusals or bool(self._lanes[name].refused_for_good)
+        refuses = name in self.receipts.refusals or bool(self._queues[name].refused_for_good)
         return bool(self.channels[name].group) and refuses
 
     def _finish(self) -> None:
@@ -349,9 +349,9 @@ class Postman:
             return None
         return notices[0] if len(notices) == 1 else merge(notices)
 
-    def _cross_out(self, channel: Channel, lane: Lane, batch: list[Waiting], where: str) -> None:
+    def _cross_out(self, channel: Channel, queue: ChannelQueue, batch: list[Waiting], where: str) -> None:
         receipt = self._receipt(channel, batch, where=where)
-        lane.delivered(batch, self._clocks.now())
+        queue.delivered(batch, self._clocks.now())
         self.receipts.note(receipt)
         self._unwritten.append(receipt)
         try:
@@ -376,30 +376,30 @@ class Postman:
             self.receipts.add(self._unwritten[0])
             self._unwritten.pop(0)
 
-    def _status(self, name: str, lane: Lane) -> ChannelStatus:
-        now, oldest = self._clocks.now(), lane.oldest
+    def _status(self, name: str, queue: ChannelQueue) -> ChannelStatus:
+        now, oldest = self._clocks.now(), queue.oldest
         return ChannelStatus(
             name=name,
             describe=self.channels[name].transport.describe(),
-            waiting=len(lane),
+            waiting=len(queue),
             since=oldest.wall if oldest else None,
-            refused=len(lane.refused),
-            down_for=None if lane.down_since is None else now - lane.down_since,
-            error=lane.error or (lane.refused[0][1] if lane.refused else ""),
-            next_try=lane.wait(now),
+            refused=len(queue.refused),
+            down_for=None if queue.down_since is None else now - queue.down_since,
+            error=queue.error or (queue.refused[0][1] if queue.refused else ""),
+            next_try=queue.wait(now),
             refusal=self.receipts.refusals.get(name, ""),
         )
 
     def _is_down(self, name: str) -> bool:
-        since = self._lanes[name].down_since
+        since = self._queues[name].down_since
         return since is not None and self._clocks.now() - since >= self._down_after
 
-    def _tell_down(self, name: str, lane: Lane, oldest: Waiting, others: tuple[str, ...]) -> None:
+    def _tell_down(self, name: str, queue: ChannelQueue, oldest: Waiting, others: tuple[str, ...]) -> None:
         when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(oldest.wall))
         text = (
-            f"The channel '{name}' ({self.channels[name].transport.describe()}) takes nothing: {lane.error}\n\n"
-            f"{count_of(len(lane), 'notice waits', 'notices wait')} for it, the oldest of {when}. "
-            f"{'It is' if len(lane) == 1 else 'They are'} kept and tried on."
+            f"The channel '{name}' ({self.channels[name].transport.describe()}) takes nothing: {queue.error}\n\n"
+            f"{count_of(len(queue), 'notice waits', 'notices wait')} for it, the oldest of {when}. "
+            f"{'It is' if len(queue) == 1 else 'They are'} kept and tried on."
         )
         self._tell(f"{oldest.id[:90]}-down-{_mark(name)}", f"the channel '{name}' is down", text, others)
 

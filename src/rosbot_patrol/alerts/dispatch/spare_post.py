@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from rosbot_patrol.alerts.channels.channel import Channel
-from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Clocks, Delivery, Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Clocks, Delivery, Dispatcher
 from rosbot_patrol.alerts.outbox.memory_outbox import MemoryOutbox
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox
@@ -30,8 +30,8 @@ class SparePost:
 
     def __init__(self, channels: Sequence[Channel], *, clocks: Clocks | None = None, seed: int | None = None) -> None:
         self._box = MemoryOutbox()
-        self._postman = Postman(self._box, channels, clocks=clocks, seed=seed)
-        self._postman.take_over()
+        self._dispatcher = Dispatcher(self._box, channels, clocks=clocks, seed=seed)
+        self._dispatcher.take_over()
         self._sending = {channel.name: threading.Lock() for channel in channels}
 
     def __len__(self) -> int:
@@ -49,21 +49,21 @@ class SparePost:
     def put(self, notice: Notice) -> bool:
         """Take a notice; returns False where it is here already."""
         is_new = self._box.put(notice)
-        self._postman.refresh()
+        self._dispatcher.refresh()
         return is_new
 
     def deliver(self, name: str) -> Delivery | None:
         """Send what is due on a channel, None where nothing is; waits for the transport."""
         with self._sending[name]:
-            return self._postman.deliver(name)
+            return self._dispatcher.deliver(name)
 
     def learn(self, receipt: Receipt) -> None:
         """A channel took something from the disk."""
-        self._postman.learn(receipt)
+        self._dispatcher.learn(receipt)
 
     def pause(self, name: str) -> float:
         """How long until `deliver` may have something to do [s]."""
-        return self._postman.pause(name)
+        return self._dispatcher.pause(name)
 
     def settle(self, outbox: Outbox, receipts: Receipts) -> bool:
         """Bring everything to the disk; returns whether nothing is left here.
@@ -82,24 +82,24 @@ class SparePost:
             for notice in self._box.all():
                 outbox.put(notice)
                 self._box.forget(notice.id)
-            self._postman.refresh()
+            self._dispatcher.refresh()
         return not len(self._box)
 
     def write_receipts(self, receipts: Receipts) -> None:
         """Write down what channels took from here. Raises OSError."""
-        added = self._postman.receipts.added
+        added = self._dispatcher.receipts.added
         while added:
             receipts.add(added[0])
             added.pop(0)
 
     def statuses(self) -> list[ChannelStatus]:
         """How the channels do with what they have still to take."""
-        return [status for status in self._postman.statuses() if status.waiting]
+        return [status for status in self._dispatcher.statuses() if status.waiting]
 
     def nudge(self) -> None:
         """The network came back."""
-        self._postman.nudge()
+        self._dispatcher.nudge()
 
     def tell_faults(self) -> None:
         """Tell of a channel that is down for long on the others."""
-        self._postman.tell_faults()
+        self._dispatcher.tell_faults()

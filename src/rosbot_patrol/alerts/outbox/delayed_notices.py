@@ -8,7 +8,7 @@ from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.files import write_atomic
 
 
-class HeldNotices:
+class DelayedNotices:
     """A folder of them, and those of this run in memory, too: a disk that takes nothing loses none.
 
     Args:

@@ -53,7 +53,7 @@ class Waiting:
 
 
 def waiting_of(name: str, notice: Notice) -> Waiting:
-    """What a lane has to know of a notice in the file of this name."""
+    """What a queue has to know of a notice in the file of this name."""
     return Waiting(
         name=name,
         id=notice.id,

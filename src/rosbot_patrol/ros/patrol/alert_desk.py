@@ -14,7 +14,7 @@ import rospy
 
 from rosbot_patrol.alerts.dispatch.dispatcher import Delivery
 from rosbot_patrol.alerts.outbox.damaged_notices import replacement
-from rosbot_patrol.alerts.outbox.delayed_notices import HeldNotices
+from rosbot_patrol.alerts.outbox.delayed_notices import DelayedNotices
 from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
 from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox, to_jpeg
@@ -58,7 +58,7 @@ class AlertDesk:
         health: Health,
     ) -> None:
         self._post, self._pictures, self._keeper, self._health = post, pictures, keeper, health
-        self._held = HeldNotices(keeper.state_dir / "held")
+        self._delayed = DelayedNotices(keeper.state_dir / "held")
         self._ignored = IgnoredLog(keeper.state_dir / "ignored.jsonl")
         self._jobs: deque[Callable[[], None]] = deque()
         self._unwritten: list[Callable[[], None]] = []
@@ -85,7 +85,7 @@ class AlertDesk:
     def is_held(self, incident: str) -> bool:
         """Whether the notice of this incident waits for the entry delay."""
         try:
-            return self._held.has(token(incident))
+            return self._delayed.has(token(incident))
         except OSError as err:
             log.error("the notice about %s cannot be looked for: %s", incident, err)
             return False
@@ -93,7 +93,7 @@ class AlertDesk:
     def told(self, incident: str) -> PostNotice | None:
         """The notice of an incident from before the program's start, None where there is none."""
         try:
-            return self._held.get(token(incident)) or self._post.find(token(incident))
+            return self._delayed.get(token(incident)) or self._post.find(token(incident))
         except (OSError, ValueError) as err:
             log.error("the notice about %s cannot be read: %s", incident, err)
             return None
@@ -218,7 +218,7 @@ class AlertDesk:
         if self._post.has(incident.id) or self.is_held(incident.id):  # the program was killed after it was written
             return
         picture, note = self._picture(notice)
-        place = str(self._held.folder) if notice.is_held else self._post.place
+        place = str(self._delayed.folder) if notice.is_held else self._post.place
         with self._telling:
             self._told[incident.id] = incident
             is_on_disk = (self._hold if notice.is_held else self._post.put)(
@@ -236,10 +236,10 @@ class AlertDesk:
     def _hold(self, notice: PostNotice) -> bool:
         """Keep a notice for the entry delay; whether it is on the disk."""
         try:
-            self._held.put(notice)
+            self._delayed.put(notice)
         except OSError as err:
-            log.error("the notice %s cannot be written to %s: %s; trying on", notice.id, self._held.folder, err)
-            self.write_later(self._held.save)
+            log.error("the notice %s cannot be written to %s: %s; trying on", notice.id, self._delayed.folder, err)
+            self.write_later(self._delayed.save)
             return False
         return True
 
@@ -247,17 +247,17 @@ class AlertDesk:
         """Send a notice that waited, or drop it."""
         notice_id = token(release.mission)
         try:
-            notice = self._held.get(notice_id)
+            notice = self._delayed.get(notice_id)
         except (OSError, ValueError) as err:
             log.error("the notice about %s that waited cannot be used: %s", release.mission, err)
             notice = replacement(self._keeper.state_dir, notice_id, time.time())
         if notice is not None and not release.is_dropped:
             self._post.put(notice)
         try:
-            self._held.remove(notice_id)
+            self._delayed.remove(notice_id)
         except OSError as err:
             log.error("the notice about %s that waited cannot be removed: %s; trying on", release.mission, err)
-            self.write_later(partial(self._held.remove, notice_id))
+            self.write_later(partial(self._delayed.remove, notice_id))
         text = f"the notice is {'dropped' if release.is_dropped else 'sent'}: {release.why}"
         log.warning("%s (%s)", text, release.mission)
         event = Event(wall=time.time(), kind="notice", text=text)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rosbot_patrol.alerts.channels.config import MailParams
-from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Dispatcher
 from rosbot_patrol.alerts.dispatch.settings_file import differences, state_of
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
@@ -22,12 +22,12 @@ class PostHealth:
 
     Args:
         who: this program; mail: what it was told.
-        postman: that delivers, or waits for its turn.
+        dispatcher: that delivers, or waits for its turn.
         health: where to say it.
     """
 
-    def __init__(self, who: str, mail: MailParams, postman: Postman, health: Health) -> None:
-        self._who, self._mail, self._postman, self._health = who, mail, postman, health
+    def __init__(self, who: str, mail: MailParams, dispatcher: Dispatcher, health: Health) -> None:
+        self._who, self._mail, self._dispatcher, self._health = who, mail, dispatcher, health
         self._parts: set[str] = set()
         self._spare_parts: set[str] = set()
         self._differ = ""
@@ -39,8 +39,8 @@ class PostHealth:
         """Say how it is now. Raises OSError."""
         if time.monotonic() - self._compared >= COMPARE:
             self._compared = time.monotonic()
-            self._differ = "; ".join(differences(self._postman.outbox.folder, self._who, self._mail))
-        if self._postman.is_delivering:
+            self._differ = "; ".join(differences(self._dispatcher.outbox.folder, self._who, self._mail))
+        if self._dispatcher.is_delivering:
             self._report_channels()
         else:
             self._report_from_afar()
@@ -61,18 +61,18 @@ class PostHealth:
             self._health.set(part, level, text, {"waiting": status.waiting, "refused": status.refused})
 
     def _report_channels(self) -> None:
-        statuses = self._postman.statuses()
+        statuses = self._dispatcher.statuses()
         for status in statuses:
             level, text = judge(status)
             self._set(status.name, level, text, {"waiting": status.waiting, "refused": status.refused})
         self._outbox_is(f"{self._who} delivers")
         state: list[object] = [(s.name, s.waiting, s.since, s.refused, s.error, s.refusal) for s in statuses]
         if state != self._status or time.monotonic() - self._written >= STATUS:
-            self._postman.write_status()
+            self._dispatcher.write_status()
             self._status, self._written = state, time.monotonic()
 
     def _report_from_afar(self) -> None:
-        outbox, holder = self._postman.outbox, self._postman.lock.holder()
+        outbox, holder = self._dispatcher.outbox, self._dispatcher.lock.holder()
         for part in self._parts - {"outbox"}:  # that were this program's to say
             self._health.drop(part)
         self._parts &= {"outbox"}

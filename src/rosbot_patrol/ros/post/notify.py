@@ -24,9 +24,9 @@ from typing import Any
 from rosgraph.names import get_ros_namespace
 
 from rosbot_patrol.alerts.channels.channel import Channel
-from rosbot_patrol.alerts.channels.channel_test import trial_notice, try_channel
+from rosbot_patrol.alerts.channels.channel_test import make_test_notice, try_channel
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, load_channels, make_channels
-from rosbot_patrol.alerts.dispatch.dispatcher import Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.dispatch.settings_file import read_settings, state_of
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.counts import count_of
@@ -64,16 +64,16 @@ def run(arguments: list[str]) -> int:
 
 def try_all(channels: list[Channel]) -> int:
     """Send a test notice through each channel."""
-    notice = trial_notice(time.time(), socket.gethostname())
+    notice = make_test_notice(time.time(), socket.gethostname())
     good = True
     for channel in channels:
         print(f"{channel.name}: {channel.transport.describe()} ...", flush=True)
-        trial = try_channel(channel, notice)
-        good = good and trial.is_taken
-        result = "taken" if trial.is_taken else "NOT taken"
-        print(f"{channel.name}: {result} after {trial.seconds:.1f} s: {trial.text}")
-        if trial.advice:
-            print(f"{channel.name}: {trial.advice}")
+        tested = try_channel(channel, notice)
+        good = good and tested.is_taken
+        result = "taken" if tested.is_taken else "NOT taken"
+        print(f"{channel.name}: {result} after {tested.seconds:.1f} s: {tested.text}")
+        if tested.advice:
+            print(f"{channel.name}: {tested.advice}")
     return 0 if good else 1
 
 
@@ -97,29 +97,29 @@ def flush(folder: Path, channels: list[Channel]) -> int:
     if not folder.is_dir():
         return show(folder)
     fast = [replace(channel, pace=replace(channel.pace, interval=0.0)) for channel in channels]
-    postman = Postman(Outbox(folder), fast, who="notify --flush")
-    if postman.take_over():
-        with postman.lock.beating():
-            left = _flush_here(postman)
+    dispatcher = Dispatcher(Outbox(folder), fast, who="notify --flush")
+    if dispatcher.take_over():
+        with dispatcher.lock.beating():
+            left = _flush_here(dispatcher)
     else:
-        print(f"{postman.lock.holder()} delivers and is asked to try all.")
+        print(f"{dispatcher.lock.holder()} delivers and is asked to try all.")
         left = _flush_there(folder)
     print(f"{_count(left)} still." if left else "Nothing waits.")
     return 1 if left else 0
 
 
-def _flush_here(postman: Postman) -> int:
+def _flush_here(dispatcher: Dispatcher) -> int:
     print("No node delivers at the moment: this program does.")
     try:
-        postman.nudge(all_=True)
-        for name in postman.channels:
-            while (done := postman.deliver(name)) is not None:
+        dispatcher.nudge(all_=True)
+        for name in dispatcher.channels:
+            while (done := dispatcher.deliver(name)) is not None:
                 print(f"{name}: {done.text}")
-        postman.refresh()
-        postman.write_status()
-        return len(postman.outbox.waiting())
+        dispatcher.refresh()
+        dispatcher.write_status()
+        return len(dispatcher.outbox.waiting())
     finally:
-        postman.hand_over()
+        dispatcher.hand_over()
 
 
 def _flush_there(folder: Path) -> int:

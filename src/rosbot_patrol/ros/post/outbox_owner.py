@@ -22,7 +22,7 @@ import rospy
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
 from rosbot_patrol.alerts.channels.network_state import network_mark
 from rosbot_patrol.alerts.channels.secrets_on_disk import refuse_secrets
-from rosbot_patrol.alerts.dispatch.dispatcher import Delivery, Postman
+from rosbot_patrol.alerts.dispatch.dispatcher import Delivery, Dispatcher
 from rosbot_patrol.alerts.dispatch.settings_file import Settings, write_settings
 from rosbot_patrol.alerts.dispatch.spare_post import SparePost
 from rosbot_patrol.alerts.outbox.damaged_notices import replacement
@@ -59,7 +59,7 @@ class OwnerPost:
         around = Surroundings(home=ros_home(), environ=os.environ, host=socket.gethostname())
         channels = make_channels(mail, around, prefix=rospy.get_name() + "/")
         self._outbox = Outbox(state_dir / "outbox")
-        self._postman = Postman(self._outbox, channels, who=self._who)
+        self._dispatcher = Dispatcher(self._outbox, channels, who=self._who)
         self._wakes = {channel.name: threading.Event() for channel in channels}
         self._wake = threading.Event()
         self._listeners: list[Callable[[Delivery], None]] = []
@@ -75,7 +75,7 @@ class OwnerPost:
         self._seen_mtime = 0
         self._housekept = float("-inf")
         self._network = network_mark()
-        self._reporter = PostHealth(self._who, mail, self._postman, health)
+        self._reporter = PostHealth(self._who, mail, self._dispatcher, health)
 
     @property
     def place(self) -> str:
@@ -84,7 +84,7 @@ class OwnerPost:
 
     def describe(self) -> str:
         """Where notices go."""
-        return "; ".join(f"{c.name}: {c.transport.describe()}" for c in self._postman.channels.values())
+        return "; ".join(f"{c.name}: {c.transport.describe()}" for c in self._dispatcher.channels.values())
 
     def on_delivery(self, listener: Callable[[Delivery], None]) -> None:
         """Have deliveries told, whichever program does them; on threads of this object."""
@@ -156,13 +156,13 @@ class OwnerPost:
         waiting = 0
         try:
             waiting = len(self._outbox.waiting())
-            self._postman.receipts.read_new()
+            self._dispatcher.receipts.read_new()
             write_settings(self._outbox.folder, settings)
         except OSError as err:
             self._disk_failed(err)
         log.info("notices go to %s%s", self.describe(), f"; {waiting} wait from before" if waiting else "")
         Worker(self._supervise, name="post").start()
-        for name in self._postman.channels:
+        for name in self._dispatcher.channels:
             Worker(lambda name=name: self._carry(name), name=f"post: {name}").start()  # type: ignore[misc]
 
     # -- the thread that looks
@@ -196,7 +196,7 @@ class OwnerPost:
             return
         self._probed = time.monotonic()
         if self._is_stuck:
-            self._spare.write_receipts(self._postman.receipts)
+            self._spare.write_receipts(self._dispatcher.receipts)
         elif not len(self._spare):
             self._outbox.probe()
         elif not self._settle():
@@ -207,7 +207,7 @@ class OwnerPost:
     def _settle(self) -> bool:
         count = len(self._spare)
         with self._putting:
-            if not self._spare.settle(self._outbox, self._postman.receipts):
+            if not self._spare.settle(self._outbox, self._dispatcher.receipts):
                 return False
         log.warning("the disk takes notices again: %d that were in memory are in %s now", count, self.place)
         return True
@@ -227,15 +227,15 @@ class OwnerPost:
             self.put(notice)
 
     def _look(self) -> None:
-        was_delivering = self._postman.is_delivering
+        was_delivering = self._dispatcher.is_delivering
         if not was_delivering:
             self._look_on()
         self._is_others, self._is_stuck = False, True  # where the lock cannot be used
-        self._is_others, self._is_stuck = not self._postman.take_over(), False
+        self._is_others, self._is_stuck = not self._dispatcher.take_over(), False
         if self._is_others:
             pass
         elif not was_delivering or self._has_changed():
-            self._postman.refresh()
+            self._dispatcher.refresh()
             self._wake_all()
 
     def _mind_recent(self) -> None:
@@ -273,7 +273,7 @@ class OwnerPost:
     def _look_on(self) -> None:
         """Another program delivers: hear what it delivered."""
         try:
-            receipts = self._postman.receipts.read_new()
+            receipts = self._dispatcher.receipts.read_new()
         except OSError as err:  # it is no reason not to deliver
             self._disk_failed(err)
             return
@@ -304,19 +304,19 @@ class OwnerPost:
         self._spare.tell_faults()
         self._reporter.report_spare(self._spare.statuses())
         self._try_again_where_it_helps()
-        if self._postman.is_delivering:
+        if self._dispatcher.is_delivering:
             self._mend()
-            self._postman.tell_faults()
+            self._dispatcher.tell_faults()
         self._reporter.report()
 
     def _try_again_where_it_helps(self) -> None:
         flush = self._outbox.folder / "flush"
-        is_asked = self._postman.is_delivering and flush.exists()
-        has_trouble = self._postman.has_trouble or len(self._spare) > 0
+        is_asked = self._dispatcher.is_delivering and flush.exists()
+        has_trouble = self._dispatcher.has_trouble or len(self._spare) > 0
         mark = network_mark() if has_trouble else self._network
         if is_asked or mark != self._network:
             self._spare.nudge()
-            self._postman.nudge(all_=is_asked)
+            self._dispatcher.nudge(all_=is_asked)
             self._network = mark
             self._wake_all()
             flush.unlink(missing_ok=True)
@@ -340,15 +340,15 @@ class OwnerPost:
         done = self._spare.deliver(name)
         pause = self._spare.pause(name)
         try:
-            done = done or self._postman.deliver(name)
-            pause = min(pause, self._postman.pause(name))
+            done = done or self._dispatcher.deliver(name)
+            pause = min(pause, self._dispatcher.pause(name))
         except OSError as err:
             self._disk_failed(err)
             pause = min(pause, RETRY)
         if done is not None and done.delivered:
             receipt = Receipt(channel=name, transport=done.transport, ids=done.ids, wall=time.time(), where=done.where)
             self._spare.learn(receipt)
-            self._postman.learn(receipt)
+            self._dispatcher.learn(receipt)
         return done, pause
 
     def _tell(self, delivery: Delivery) -> None:

@@ -1,9 +1,9 @@
 from rosbot_patrol.alerts.channels.channel import FailureCause
-from rosbot_patrol.alerts.channels.channel_test import Trial
+from rosbot_patrol.alerts.channels.channel_test import ChannelTest
 
 
 def test_every_cause_that_has_a_name_has_advice():
     for cause in FailureCause:
-        trial = Trial(channel="a", text="", seconds=0.0, cause=cause)
-        assert bool(trial.advice) is (cause is not FailureCause.OTHER)
-    assert Trial(channel="a", text="", seconds=0.0).advice == ""
+        tested = ChannelTest(channel="a", text="", seconds=0.0, cause=cause)
+        assert bool(tested.advice) is (cause is not FailureCause.OTHER)
+    assert ChannelTest(channel="a", text="", seconds=0.0).advice == ""

@@ -3,7 +3,7 @@ import random
 import pytest
 
 from rosbot_patrol.alerts.channels.channel import Pace
-from rosbot_patrol.alerts.dispatch.channel_queue import Lane
+from rosbot_patrol.alerts.dispatch.channel_queue import ChannelQueue
 from rosbot_patrol.alerts.outbox.outbox import Waiting
 
 
@@ -16,8 +16,8 @@ def entries(*names):
     ]
 
 
-def lane(*names, **pace):
-    made = Lane(Pace(**{"interval": 0.0, "jitter": 0.0, **pace}), random.Random(1))
+def queue(*names, **pace):
+    made = ChannelQueue(Pace(**{"interval": 0.0, "jitter": 0.0, **pace}), random.Random(1))
     made.offer(entries(*names))
     return made
 
@@ -31,11 +31,11 @@ def drain(made, now=0.0):
 
 
 def test_incidents_leave_one_by_one_in_order():
-    assert drain(lane("b", "a", "c")) == ["b", "a", "c"]
+    assert drain(queue("b", "a", "c")) == ["b", "a", "c"]
 
 
 def test_the_interval_delays_and_never_drops():
-    made = lane("a", "b", interval=10.0)
+    made = queue("a", "b", interval=10.0)
     made.delivered(made.due(100.0), 100.0)  # at once, however lately the program began
     assert made.due(109.0) == []
     assert made.wait(109.0) == pytest.approx(1.0)
@@ -43,7 +43,7 @@ def test_the_interval_delays_and_never_drops():
 
 
 def test_a_channel_that_is_down_is_tried_ever_more_seldom_and_keeps_the_order():
-    made, now, delays = lane("a", "b", first_delay=5.0, max_delay=60.0), 0.0, []
+    made, now, delays = queue("a", "b", first_delay=5.0, max_delay=60.0), 0.0, []
     for _ in range(7):
         delays.append(made.failed(made.due(now), now, "down"))
         assert made.due(now + delays[-1] - 0.01) == []
@@ -55,7 +55,7 @@ def test_a_channel_that_is_down_is_tried_ever_more_seldom_and_keeps_the_order():
 
 
 def test_delays_are_left_to_chance_a_little_and_bounded():
-    made, delays = lane("a", first_delay=100.0, jitter=0.2), []
+    made, delays = queue("a", first_delay=100.0, jitter=0.2), []
     for _ in range(30):
         delays.append(made.failed(made.due(1e9), 1e9, "down"))
         made.nudge(1e9, all_=True)
@@ -65,13 +65,13 @@ def test_delays_are_left_to_chance_a_little_and_bounded():
 
 
 def test_the_other_sides_wish_is_heeded_within_bounds():
-    made = lane("a")
+    made = queue("a")
     assert made.failed(made.due(0.0), 0.0, "503", delay=120.0) == 120.0
     assert made.failed(made.due(120.0), 120.0, "503", delay=1e9) == 900.0
 
 
 def test_the_other_sides_wish_outlasts_a_new_notice_but_not_somebody_who_asks():
-    made = lane("a", first_delay=5.0)
+    made = queue("a", first_delay=5.0)
     made.failed(made.due(0.0), 0.0, "429", delay=64.57)
     made.nudge(10.0)
     assert made.due(64.5) == []
@@ -84,13 +84,13 @@ def test_the_other_sides_wish_outlasts_a_new_notice_but_not_somebody_who_asks():
 
 
 def test_a_wish_shorter_than_our_own_pause_changes_nothing():
-    made = lane("a", first_delay=5.0)
+    made = queue("a", first_delay=5.0)
     assert made.failed(made.due(0.0), 0.0, "429", delay=0.0) == 5.0
     assert made.failed(made.due(5.0), 5.0, "429", delay=3.0) == 10.0
 
 
 def test_a_new_notice_tries_again_but_does_not_hammer():
-    made, now = lane("a", first_delay=5.0), 0.0
+    made, now = queue("a", first_delay=5.0), 0.0
     for _ in range(8):
         now += made.failed(made.due(now), now, "down")
     made.nudge(now - 1.0)  # the last try is 300 s ago
@@ -102,7 +102,7 @@ def test_a_new_notice_tries_again_but_does_not_hammer():
 
 
 def test_what_is_refused_for_good_lets_the_others_pass_and_is_tried_rarely():
-    made = lane("bad", "good")
+    made = queue("bad", "good")
     assert made.failed(made.due(0.0), 0.0, "550 no", permanent=True) == 900.0
     assert drain(made, 1.0) == ["good"]
     assert made.wait(1.0) == pytest.approx(899.0)
@@ -113,7 +113,7 @@ def test_what_is_refused_for_good_lets_the_others_pass_and_is_tried_rarely():
 
 
 def test_a_storm_of_sensors_becomes_digests():
-    made, sent = lane(interval=10.0), []
+    made, sent = queue(interval=10.0), []
     names = []
     for tenth in range(900):  # 1000 within a minute, then silence
         now = tenth / 10
@@ -131,7 +131,7 @@ def test_a_storm_of_sensors_becomes_digests():
 
 
 def test_an_incident_is_never_merged_and_waits_for_no_sensor():
-    made = lane("s0", interval=10.0)
+    made = queue("s0", interval=10.0)
     assert drain(made, 0.0) == ["s0"]
     made.offer(entries("s1", "s2", "s3", "i1", "s4", "i2"))
     assert drain(made, 1.0) == ["s1+s2+s3", "i1"]  # what stands before it leaves at once: the order is kept
@@ -140,17 +140,17 @@ def test_an_incident_is_never_merged_and_waits_for_no_sensor():
 
 
 def test_of_two_sensor_notices_each_is_a_message():
-    assert drain(lane("s1", "s2")) == ["s1", "s2"]
+    assert drain(queue("s1", "s2")) == ["s1", "s2"]
 
 
 def test_a_digest_that_is_refused_is_taken_apart():
-    made = lane("s1", "s2", "s3")
+    made = queue("s1", "s2", "s3")
     assert made.failed(made.due(0.0), 0.0, "552 too large", permanent=True) == 0.0
     assert drain(made) == ["s1", "s2", "s3"]
 
 
 def test_a_digest_to_a_recipient_that_is_refused_is_one_try_and_the_next_waits_for_the_interval():
-    made = lane("s1", "s2", "s3", interval=10.0)
+    made = queue("s1", "s2", "s3", interval=10.0)
     assert made.failed(made.due(0.0), 0.0, "550 no such user", permanent=True, of_recipient=True) == 900.0
     assert len(made.refused_for_good) == 3
     made.offer(entries("s1", "s2", "s3", "i1"))
@@ -159,7 +159,7 @@ def test_a_digest_to_a_recipient_that_is_refused_is_one_try_and_the_next_waits_f
 
 
 def test_nothing_to_do_is_no_time():
-    assert lane().wait(5.0) is None
+    assert queue().wait(5.0) is None
 
 
 def serve(made, now, wants, patience=1000.0):
@@ -181,7 +181,7 @@ def serve(made, now, wants, patience=1000.0):
 
 
 def test_one_that_is_never_wanted_does_not_hold_up_the_others_for_ever():
-    made = lane("bad", "b", "c", first_delay=1.0)
+    made = queue("bad", "b", "c", first_delay=1.0)
     taken, now = serve(made, 0.0, lambda name, _: name != "bad", patience=800.0)
     assert taken == ["b", "c"]
     assert now < 200.0
@@ -189,7 +189,7 @@ def test_one_that_is_never_wanted_does_not_hold_up_the_others_for_ever():
 
 
 def test_a_server_that_wants_nothing_for_an_hour_gets_all_then():
-    made = lane("a", "b", "c", first_delay=5.0)
+    made = queue("a", "b", "c", first_delay=5.0)
     taken, now = serve(made, 0.0, lambda _, now: now >= 3600.0)
     assert sorted(taken) == ["a", "b", "c"]
     assert taken.index("a") <= 1
@@ -197,7 +197,7 @@ def test_a_server_that_wants_nothing_for_an_hour_gets_all_then():
 
 
 def test_a_server_that_is_not_there_never_changes_the_order():
-    made, now = lane("a", "b", first_delay=1.0), 0.0
+    made, now = queue("a", "b", first_delay=1.0), 0.0
     for _ in range(20):
         assert made.due(now)[0].id == "a"
         now += made.failed(made.due(now), now, "refused")

@@ -2,7 +2,7 @@ import json
 import os
 
 import pytest
-from post import Box, Time, channel, deliver_all, notice, postman
+from post import Box, Time, channel, deliver_all, dispatcher, notice
 
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
@@ -18,7 +18,7 @@ def no_sync(monkeypatch):
 
 def test_a_notice_goes_to_every_channel_and_is_crossed_out_then(tmp_path):
     mail, phone = Box(), Box()
-    post = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    post = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone))
     for name in ("a", "b"):
         post.outbox.put(notice(name))
     assert post.take_over()
@@ -33,7 +33,7 @@ def test_a_channel_that_is_down_holds_up_only_itself(tmp_path):
     time = Time()
     mail, phone = Box(time), Box()
     mail.down = "no server"
-    post = postman(tmp_path, channel("mail", mail), channel("phone", phone), time=time)
+    post = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone), time=time)
     for name in ("a", "b"):
         post.outbox.put(notice(name))
     post.take_over()
@@ -52,13 +52,13 @@ def test_a_channel_that_is_down_holds_up_only_itself(tmp_path):
 def test_what_one_channel_took_is_not_sent_to_it_again_after_a_crash(tmp_path):
     mail, phone = Box(), Box()
     phone.down = "no network"
-    post = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    post = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone))
     post.outbox.put(notice("a"))
     post.take_over()
     deliver_all(post)
     post.lock.release()  # as the system does when the process is killed
     phone.down = ""
-    again = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    again = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone))
     again.take_over()
     deliver_all(again)
     assert (mail.ids, phone.ids) == (["a"], ["a"])
@@ -67,7 +67,7 @@ def test_what_one_channel_took_is_not_sent_to_it_again_after_a_crash(tmp_path):
 
 def test_one_delivers_and_the_other_takes_over(tmp_path):
     first, second = Box(), Box()
-    a, b = (postman(tmp_path, channel("mail", box)) for box in (first, second))
+    a, b = (dispatcher(tmp_path, channel("mail", box)) for box in (first, second))
     assert a.take_over()
     assert not b.take_over()
     b.outbox.put(notice("x"))
@@ -92,7 +92,7 @@ def wait(posts, time, seconds):
 
 def test_one_that_hangs_loses_the_deliveries_to_the_other_and_sends_no_more(tmp_path, caplog):
     time, first, second = Time(), Box(), Box()
-    a, b = (postman(tmp_path, channel("mail", box), time=time) for box in (first, second))
+    a, b = (dispatcher(tmp_path, channel("mail", box), time=time) for box in (first, second))
     assert a.take_over()
     assert wait((a, b), time, 120.0) == [a]
     a.outbox.put(notice("x"))
@@ -112,7 +112,7 @@ def test_one_that_hangs_loses_the_deliveries_to_the_other_and_sends_no_more(tmp_
 
 def test_one_whose_locks_file_was_removed_says_so_and_goes_on(tmp_path, caplog):
     time, box = Time(), Box()
-    post = postman(tmp_path, channel("mail", box), time=time)
+    post = dispatcher(tmp_path, channel("mail", box), time=time)
     assert post.take_over()
     post.lock.path.unlink()
     post.outbox.put(notice("x"))
@@ -126,7 +126,7 @@ def test_one_whose_locks_file_was_removed_says_so_and_goes_on(tmp_path, caplog):
 
 def test_one_that_hangs_in_a_delivery_ends_it_and_nothing_is_lost(tmp_path):
     time, second = Time(), Box()
-    b = postman(tmp_path, channel("mail", second), time=time)
+    b = dispatcher(tmp_path, channel("mail", second), time=time)
 
     class Hangs(Box):
         def send(self, told):
@@ -136,7 +136,7 @@ def test_one_that_hangs_in_a_delivery_ends_it_and_nothing_is_lost(tmp_path):
             return super().send(told)
 
     first = Hangs()
-    a = postman(tmp_path, channel("mail", first), time=time)
+    a = dispatcher(tmp_path, channel("mail", first), time=time)
     a.take_over()
     for name in ("x", "y"):
         a.outbox.put(notice(name))
@@ -150,7 +150,7 @@ def test_one_that_hangs_in_a_delivery_ends_it_and_nothing_is_lost(tmp_path):
 
 def test_two_that_wait_for_one_that_hangs_do_not_both_take_over(tmp_path):
     time = Time()
-    a, b, c = (postman(tmp_path, channel("mail", Box()), time=time) for _ in range(3))
+    a, b, c = (dispatcher(tmp_path, channel("mail", Box()), time=time) for _ in range(3))
     a.take_over()
     assert len(wait((b, c), time, 60.0)) == 1
     assert sum(post.is_delivering for post in (a, b, c)) == 1
@@ -158,7 +158,7 @@ def test_two_that_wait_for_one_that_hangs_do_not_both_take_over(tmp_path):
 
 def test_who_slept_itself_does_not_take_anothers_silence_for_a_hang(tmp_path):
     time = Time()
-    a, b = (postman(tmp_path, channel("mail", Box()), time=time) for _ in range(2))
+    a, b = (dispatcher(tmp_path, channel("mail", Box()), time=time) for _ in range(2))
     assert wait((a, b), time, 5.0) == [a]
     time.now += 3600.0  # the machine, or this process alone
     assert not b.take_over()
@@ -167,7 +167,7 @@ def test_who_slept_itself_does_not_take_anothers_silence_for_a_hang(tmp_path):
 
 def test_channels_take_the_kinds_that_they_ask_for(tmp_path, caplog):
     everything, phone = Box(), Box()
-    post = postman(
+    post = dispatcher(
         tmp_path, channel("phone", phone, kinds=("incident",)), channel("mail", everything, kinds=("sensor",))
     )
     for name, kind in (("i", "incident"), ("s", "sensor"), ("v", "verdict")):
@@ -182,7 +182,9 @@ def test_channels_take_the_kinds_that_they_ask_for(tmp_path, caplog):
 def test_an_hour_without_a_server_then_all_in_order_once(tmp_path, no_sync):
     time = Time()
     mail, phone = Box(time), Box()
-    post = postman(tmp_path, channel("mail", mail, interval=1.0), channel("phone", phone), time=time, down_after=1800.0)
+    post = dispatcher(
+        tmp_path, channel("mail", mail, interval=1.0), channel("phone", phone), time=time, down_after=1800.0
+    )
     post.take_over()
     mail.down, began, names = "no answer within 30 s", time.now, []
     while time.now - began < 3600.0:
@@ -208,7 +210,7 @@ def test_an_hour_without_a_server_then_all_in_order_once(tmp_path, no_sync):
 def test_without_new_notices_a_server_that_is_down_is_tried_ever_more_seldom(tmp_path):
     time, mail = Time(), Box()
     mail.down = "no server"
-    post = postman(tmp_path, channel("mail", mail), time=time)
+    post = dispatcher(tmp_path, channel("mail", mail), time=time)
     post.outbox.put(notice("a"))
     post.take_over()
     for _ in range(720):
@@ -223,7 +225,7 @@ def test_without_new_notices_a_server_that_is_down_is_tried_ever_more_seldom(tmp
 
 def test_a_notice_refused_for_good_lets_the_others_pass_and_is_told_elsewhere_once(tmp_path):
     time, mail, phone = Time(), Box(), Box()
-    post = postman(tmp_path, channel("mail", mail), channel("phone", phone), time=time)
+    post = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone), time=time)
     post.outbox.put(notice("bad"))
     mail.down, mail.permanent = "550 not you", True
     post.take_over()
@@ -247,7 +249,7 @@ def test_a_notice_refused_for_good_lets_the_others_pass_and_is_told_elsewhere_on
 
 def test_a_storm_of_sensor_notices_is_a_few_digests_and_incidents_stay_alone(tmp_path, no_sync):
     time, mail = Time(), Box()
-    post = postman(tmp_path, channel("mail", mail, interval=10.0), time=time)
+    post = dispatcher(tmp_path, channel("mail", mail, interval=10.0), time=time)
     post.take_over()
     put = []
     for _ in range(80):
@@ -273,7 +275,7 @@ def test_the_same_digest_after_a_crash_has_the_same_id(tmp_path):
     mail = Box()
     ids = []
     for name in ("first", "again"):
-        post = postman(tmp_path / name, channel("mail", mail))
+        post = dispatcher(tmp_path / name, channel("mail", mail))
         for i in range(4):
             post.outbox.put(notice(f"s{i}", "sensor", text=f"text {i}"))
         post.take_over()
@@ -285,7 +287,7 @@ def test_the_same_digest_after_a_crash_has_the_same_id(tmp_path):
 
 def test_a_disk_that_takes_no_receipt_leads_to_no_second_mail_while_the_program_lives(tmp_path, monkeypatch, caplog):
     mail = Box()
-    post = postman(tmp_path, channel("mail", mail))
+    post = dispatcher(tmp_path, channel("mail", mail))
     post.outbox.put(notice("a"))
     post.take_over()
 
@@ -308,7 +310,7 @@ def test_a_channel_that_stumbles_over_one_notice_takes_the_others(tmp_path, capl
     mail = Box()
     real = mail.send
     mail.send = lambda n: 1 / 0 if n.id == "bad" else real(n)
-    post = postman(tmp_path, channel("mail", mail))
+    post = dispatcher(tmp_path, channel("mail", mail))
     for name in ("bad", "good"):
         post.outbox.put(notice(name))
     post.take_over()
@@ -319,7 +321,7 @@ def test_a_channel_that_stumbles_over_one_notice_takes_the_others(tmp_path, capl
 
 def test_a_notice_whose_file_is_taken_away_or_spoiled_does_not_stop_the_others(tmp_path):
     mail = Box()
-    post = postman(tmp_path, channel("mail", mail))
+    post = dispatcher(tmp_path, channel("mail", mail))
     for name in ("a", "b", "c"):
         post.outbox.put(notice(name))
     post.take_over()
@@ -334,7 +336,7 @@ def test_a_notice_whose_file_is_taken_away_or_spoiled_does_not_stop_the_others(t
 
 def test_the_interval_outlives_the_program(tmp_path):
     time, mail = Time(), Box()
-    post = postman(tmp_path, channel("mail", mail, interval=10.0), time=time)
+    post = dispatcher(tmp_path, channel("mail", mail, interval=10.0), time=time)
     post.outbox.put(notice("a"))
     post.take_over()
     deliver_all(post)
@@ -351,7 +353,7 @@ def test_the_interval_outlives_the_program(tmp_path):
 def test_how_it_goes_lies_on_disk(tmp_path):
     mail = Box()
     mail.down = "no server"
-    post = postman(tmp_path, channel("mail", mail))
+    post = dispatcher(tmp_path, channel("mail", mail))
     post.outbox.put(notice("a"))
     post.take_over()
     deliver_all(post)
@@ -363,12 +365,12 @@ def test_how_it_goes_lies_on_disk(tmp_path):
 def test_a_channel_that_is_gone_from_the_configuration_holds_nothing_up(tmp_path):
     mail, phone = Box(), Box()
     phone.down = "gone for ever"
-    post = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    post = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone))
     post.outbox.put(notice("a"))
     post.take_over()
     deliver_all(post)
     post.hand_over()
-    without = postman(tmp_path, channel("mail", mail))
+    without = dispatcher(tmp_path, channel("mail", mail))
     without.take_over()
     assert Outbox(tmp_path).waiting() == []
 
@@ -385,7 +387,7 @@ def test_a_crash_between_taking_and_crossing_out_sends_again_with_the_same_id(tm
     mail, folder = Box(), tmp_path / "mail"
     disk = MaildirTransport(folder, make_envelope("", ""))
     for stage in range(3):
-        post = postman(tmp_path / "outbox", channel("mail", mail), channel("disk", disk))
+        post = dispatcher(tmp_path / "outbox", channel("mail", mail), channel("disk", disk))
         post.outbox.put(notice("a"))
         assert post.take_over()
         with monkeypatch.context() as patched:
@@ -406,7 +408,7 @@ def test_what_was_taken_long_ago_and_waits_for_another_channel_is_not_forgotten(
     mail, phone = Box(), Box()
     phone.down = "no network"
     channels = channel("mail", mail), channel("phone", phone)
-    post = postman(tmp_path, *channels)
+    post = dispatcher(tmp_path, *channels)
     post.outbox.put(notice("old"))
     post.take_over()
     deliver_all(post)
@@ -415,7 +417,7 @@ def test_what_was_taken_long_ago_and_waits_for_another_channel_is_not_forgotten(
     with (tmp_path / "taken.jsonl").open("a") as file:
         file.writelines(json.dumps({**line, "ids": [f"n{i}"]}) + "\n" for i in range(600))
     for _ in range(2):
-        again = postman(tmp_path, *channels)
+        again = dispatcher(tmp_path, *channels)
         again.take_over()
         deliver_all(again)
         again.hand_over()

@@ -5,7 +5,7 @@ import shutil
 import threading
 
 import pytest
-from post import Box, Time, channel, deliver_all, notice, postman, send_all, settle, spare
+from post import Box, Time, channel, deliver_all, dispatcher, notice, send_all, settle, spare
 
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
@@ -51,7 +51,7 @@ def test_what_one_channel_took_goes_to_the_others_only_when_the_disk_is_back(tmp
     assert settle(post, tmp_path)
     assert post.find("a") is None
     phone.down = ""
-    disk = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    disk = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone))
     disk.take_over()
     deliver_all(disk)
     assert (mail.ids, phone.ids) == (["a", "b"], ["a", "b"])
@@ -63,7 +63,7 @@ def test_what_one_channel_took_goes_to_the_others_only_when_the_disk_is_back(tmp
 def test_another_program_that_delivers_meanwhile_sends_nothing_twice(tmp_path):
     """The receipts come before the notice, and who delivers reads them after it looked at the folder."""
     mail = Box()
-    disk = postman(tmp_path, channel("mail", mail))
+    disk = dispatcher(tmp_path, channel("mail", mail))
     disk.take_over()
     post = spare(channel("mail", mail))
     post.put(notice("a"))
@@ -101,7 +101,7 @@ def test_a_channel_that_is_busy_is_waited_for(tmp_path):
     may_go.set()
     thread.join()
     assert settle(post, tmp_path)
-    disk = postman(tmp_path, channel("mail", mail), channel("slow", slow))
+    disk = dispatcher(tmp_path, channel("mail", mail), channel("slow", slow))
     disk.take_over()
     deliver_all(disk)
     assert (mail.ids, slow.ids) == (["a"], ["a"])
@@ -127,7 +127,7 @@ def test_a_disk_that_fails_again_in_the_midst_loses_and_doubles_nothing(tmp_path
     assert settle(post, tmp_path)
     assert (tmp_path / "taken.jsonl").read_text().count("\n") == 1
     phone.down = ""
-    disk = postman(tmp_path, channel("mail", mail), channel("phone", phone))
+    disk = dispatcher(tmp_path, channel("mail", mail), channel("phone", phone))
     disk.take_over()
     deliver_all(disk)
     assert (mail.ids, phone.ids) == (["a"], ["a"])
@@ -160,7 +160,7 @@ def test_a_storm_becomes_a_digest_and_an_intruder_does_not_wait(tmp_path):
 
 def test_a_folder_that_is_removed_is_made_again(tmp_path):
     mail, box = Box(), tmp_path / "outbox"
-    post = postman(box, channel("mail", mail))
+    post = dispatcher(box, channel("mail", mail))
     post.outbox.put(notice("a"))
     post.take_over()
     deliver_all(post)

@@ -5,7 +5,7 @@ import os
 from contextlib import suppress
 
 import pytest
-from post import Box, Time, channel, deliver_all, postman
+from post import Box, Time, channel, deliver_all, dispatcher
 
 from rosbot_patrol.alerts.outbox.damaged_notices import replacement
 from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
@@ -141,14 +141,14 @@ def test_it_leaves_once_by_each_channel_that_did_not_take_it(tmp_path, how, is_r
     keep(tmp_path)
     time, mail, phone = Time(), Box(), Box()
     phone.down = "no network"
-    post = postman(tmp_path / "outbox", channel("mail", mail), channel("phone", phone), time=time)
+    post = dispatcher(tmp_path / "outbox", channel("mail", mail), channel("phone", phone), time=time)
     post.outbox.put(incident_notice(SEEN, JPEG))
     post.take_over()
     deliver_all(post)
     (path,) = (tmp_path / "outbox").glob("*.notice")
     if not is_read:
         post.hand_over()
-        post = postman(tmp_path / "outbox", channel("mail", mail), channel("phone", phone))
+        post = dispatcher(tmp_path / "outbox", channel("mail", mail), channel("phone", phone))
     harm(path, how)
     phone.down, time.now = "", time.now + 10.0
     post.take_over()

@@ -2,18 +2,18 @@
 
 import json
 
-from rosbot_patrol.alerts.outbox.delayed_notices import HeldNotices
+from rosbot_patrol.alerts.outbox.delayed_notices import DelayedNotices
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.patrol.calls.ignored_log import MOST, IgnoredLog
 from rosbot_patrol.patrol.records.commands import Ignored
 
 
 def test_a_notice_waits_and_is_gone_when_removed(tmp_path):
-    held = HeldNotices(tmp_path / "held")
+    held = DelayedNotices(tmp_path / "held")
     assert held.get("a-1") is None
     notice = Notice(id="a-1", wall=1.0, kind="incident", subject="s", text="t", picture=b"jpeg")
     held.put(notice)
-    assert HeldNotices(tmp_path / "held").get("a-1") == notice
+    assert DelayedNotices(tmp_path / "held").get("a-1") == notice
     held.remove("a-1")
     held.remove("a-1")
     assert not held.has("a-1")
