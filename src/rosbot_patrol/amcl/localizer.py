@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.amcl.motion_model import OdometryNoise, move_particles
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.particles.kld import KldRule
-from rosbot_patrol.amcl.particles.motion_model import OdometryNoise, move_particles
 from rosbot_patrol.amcl.particles.odometry_track import OdometryTrack, Reading
 from rosbot_patrol.amcl.particles.particle_filter import Estimate, ParticleFilter
 from rosbot_patrol.amcl.scan_model.known_map import KnownMap

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rosbot_patrol.amcl.particles.motion_model import MOTION_MODELS
+from rosbot_patrol.amcl.motion_model import MOTION_MODELS
 from rosbot_patrol.params import param
 
 SENSOR_MODELS = ("beam", "likelihood_field", "likelihood_field_prob")

@@ -9,8 +9,8 @@ from rosbot_patrol.control.collision_guard import CollisionGuard
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.layers.obstacle import ObservationBuffer
 from rosbot_patrol.costmap.layers.range_layer import RangeReading
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams
 from rosbot_patrol.costmap.sources.depth import DepthPicture, Optics, observe_depth
-from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.scene.matrices import from_pose2d, to_pose2d

@@ -33,7 +33,7 @@ from rosbot_patrol.costmap.params import (
     StaticParams,
 )
 from rosbot_patrol.costmap.scrolling import ScrollingCells, strips
-from rosbot_patrol.costmap.sources.sensor_params import RangeSensorParams
+from rosbot_patrol.costmap.sensor_params import RangeSensorParams
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
 

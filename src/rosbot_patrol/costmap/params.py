@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rosbot_patrol.costmap.sources.sensor_params import DEPTH_IMAGE, DepthSourceParams, RangeSensorParams, SourceParams
+from rosbot_patrol.costmap.sensor_params import DEPTH_IMAGE, DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import load, param
 

@@ -27,9 +27,9 @@ from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import param
 from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.nodes.setup import Setup, build_replay, node_of, parse_transform, read_parameters
-from rosbot_patrol.replay.results.comparison import field_names, field_of
+from rosbot_patrol.replay.results.comparison import Field, field_names, field_of
 from rosbot_patrol.replay.results.tables import Result
-from rosbot_patrol.replay.runner import Field, run_replay
+from rosbot_patrol.replay.runner import run_replay
 from rosbot_patrol.yaml_files import read_mapping
 
 SUFFIX = ".replay.yaml"

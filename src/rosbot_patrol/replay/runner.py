@@ -33,23 +33,6 @@ class Input:
     instead: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Field:
-    """How a value of a result is compared.
-
-    Attributes:
-        tolerance: by how much it may differ, absolutely; of a map the share of known cells, 0 to 1.
-        unit: for the report.
-        is_angle: differences are wrapped.
-        is_by_order: of TABLE.rows: the n-th row is held against the n-th, not the one of the same time.
-    """
-
-    tolerance: float = 0.0
-    unit: str = ""
-    is_angle: bool = False
-    is_by_order: bool = False
-
-
 class Replay(Protocol):
     """A node's pure object and what its node does around it."""
 

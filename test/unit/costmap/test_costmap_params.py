@@ -12,7 +12,7 @@ import yaml
 from rosbot_patrol.costmap.footprint import Footprint, read_footprint
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.params import read_costmap
-from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams, SourceParams
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, SourceParams
 from rosbot_patrol.errors import ParamError
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -16,7 +16,7 @@ from rosbot_patrol.costmap.layers import range_kernels as kernels
 from rosbot_patrol.costmap.layers.layer import Layer
 from rosbot_patrol.costmap.layers.marks import MarkMemory
 from rosbot_patrol.costmap.scrolling import ScrollingCells, fill_outside
-from rosbot_patrol.costmap.sources.sensor_params import RangeSensorParams
+from rosbot_patrol.costmap.sensor_params import RangeSensorParams
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.grid import GridInfo
 from rosbot_patrol.scan import is_silent_range

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rosbot_patrol.costmap.sensor_params import SourceParams
 from rosbot_patrol.costmap.sources.observation import Observation
-from rosbot_patrol.costmap.sources.sensor_params import SourceParams
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ImageError
 

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.costmap.costs import CostCells
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams
 from rosbot_patrol.costmap.sources import depth_kernels as kernels
 from rosbot_patrol.costmap.sources.observation import Observation
-from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.grid import GridInfo
 

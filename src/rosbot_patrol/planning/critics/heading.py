@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rosbot_patrol.planning.critics import critic_kernels as kernels
 from rosbot_patrol.planning.critics.situation import Array, Situation
-from rosbot_patrol.planning.local_planners import critic_kernels as kernels
 
 
 class HeadingCritic:

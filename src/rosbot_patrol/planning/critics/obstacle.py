@@ -12,8 +12,8 @@ from rosbot_patrol.costmap.costs import INSCRIBED, LETHAL, UNKNOWN
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
 from rosbot_patrol.grid import Grid
+from rosbot_patrol.planning.critics import sweep_kernels as kernels
 from rosbot_patrol.planning.critics.situation import Array
-from rosbot_patrol.planning.local_planners import sweep_kernels as kernels
 
 _SPACING = 0.25  # of the outline's points, of a cell: a cell's corner hardly fits between two
 SUDDEN = (1e6, 1e6, 1e6)  # accelerations of a base that follows at once

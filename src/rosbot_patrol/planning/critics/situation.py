@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.costmap.costs import INSCRIBED
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo, cells_of_points
-from rosbot_patrol.planning.local_planners import critic_kernels as kernels
+from rosbot_patrol.planning.critics import critic_kernels as kernels
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from rosbot_patrol.errors import ControlError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo, cells_of_points
 from rosbot_patrol.planning.critics import Situation, distances_from, shrink
+from rosbot_patrol.planning.critics import sweep_kernels as kernels
 from rosbot_patrol.planning.interfaces import Array, LocalView
-from rosbot_patrol.planning.local_planners import sweep_kernels as kernels
 
 _TOO_NEAR = 0.3  # of a plan that is blocked, less than this ahead is not worth driving [m]
 _NEIGHBOURS = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]

@@ -8,8 +8,8 @@ import numpy as np
 
 from rosbot_patrol.errors import ControlError
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.planning.critics import critic_kernels as kernels
 from rosbot_patrol.planning.interfaces import Array, LocalView
-from rosbot_patrol.planning.local_planners import critic_kernels as kernels
 
 
 class Track:

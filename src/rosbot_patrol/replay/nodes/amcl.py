@@ -19,8 +19,9 @@ from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.replay.bags.records import KINDS, MapRecord, Refused
+from rosbot_patrol.replay.results.comparison import Field
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
-from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
+from rosbot_patrol.replay.runner import TF_TYPES, Input
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.tf.tree import Edge, TransformTree
 

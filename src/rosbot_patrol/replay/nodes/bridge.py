@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 
 from rosbot_patrol.replay.bags.definitions import STAMP as HEADER
 from rosbot_patrol.replay.bags.records import Kind, stamp_of
+from rosbot_patrol.replay.results.comparison import Field
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
-from rosbot_patrol.replay.runner import Field, Input
+from rosbot_patrol.replay.runner import Input
 from rosbot_patrol.rosserial.protocol.topics import TopicId
 from rosbot_patrol.rosserial.server.events import (
     Announced,

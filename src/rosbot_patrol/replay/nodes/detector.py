@@ -9,8 +9,9 @@ from typing import Any
 from rosbot_patrol.detection.detector import Detector
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.replay.bags.picture_records import KINDS, PictureRecord
+from rosbot_patrol.replay.results.comparison import Field
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
-from rosbot_patrol.replay.runner import Field, Input
+from rosbot_patrol.replay.runner import Input
 
 INPUTS = (
     Input(name="camera", topic="camera/rgb/image_raw", types=("sensor_msgs/Image", "sensor_msgs/CompressedImage")),

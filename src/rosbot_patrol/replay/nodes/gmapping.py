@@ -14,8 +14,9 @@ from rosbot_patrol.gmapping.core import GmappingCore, Step
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.replay.bags.records import KINDS
+from rosbot_patrol.replay.results.comparison import Field
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows, Table
-from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
+from rosbot_patrol.replay.runner import TF_TYPES, Input
 from rosbot_patrol.tf.tree import Edge, TransformTree
 
 INPUTS = (

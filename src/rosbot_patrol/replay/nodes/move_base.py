@@ -28,8 +28,9 @@ from rosbot_patrol.planning.registry import make_global_planner, make_local_plan
 from rosbot_patrol.replay.bags.records import MapRecord
 from rosbot_patrol.replay.nodes import move_base_records as heard
 from rosbot_patrol.replay.nodes.bag_costmap import BagCostmap
+from rosbot_patrol.replay.results.comparison import Field
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
-from rosbot_patrol.replay.runner import TF_TYPES, Field, Input
+from rosbot_patrol.replay.runner import TF_TYPES, Input
 from rosbot_patrol.scan import LaserScan, level_scan, scan_problem
 from rosbot_patrol.tf.tree import Edge, TransformTree
 

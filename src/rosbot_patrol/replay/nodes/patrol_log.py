@@ -6,8 +6,8 @@ import math
 
 from rosbot_patrol.patrol.records.commands import Commands
 from rosbot_patrol.patrol.records.mission import Mission
+from rosbot_patrol.replay.results.comparison import Field
 from rosbot_patrol.replay.results.tables import STAMP, Result, Rows
-from rosbot_patrol.replay.runner import Field
 
 TABLES = {
     "reports": ("state", "room", "origin", "queue", "verdict", "last_verdict", "mode", "why"),

@@ -27,7 +27,8 @@ from rosbot_patrol.replay.nodes import gmapping as gmapping_replay
 from rosbot_patrol.replay.nodes import move_base as move_base_replay
 from rosbot_patrol.replay.nodes import patrol as patrol_replay
 from rosbot_patrol.replay.nodes import patrol_log
-from rosbot_patrol.replay.runner import Field, Input, Replay
+from rosbot_patrol.replay.results.comparison import Field
+from rosbot_patrol.replay.runner import Input, Replay
 from rosbot_patrol.rosserial.server.settings import SerialNodeParams
 from rosbot_patrol.sensors.sensor_file import load_sensors
 from rosbot_patrol.tf.tree import Edge

@@ -15,12 +15,28 @@ from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import wrap_angles
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.replay.results.tables import STAMP, Result, Table
-from rosbot_patrol.replay.runner import Field
 
 SAME_TIME_S = 1e-6  # rows whose stamps are closer are of one time
 SHOWN = 3  # times of missing rows that are named
 
 Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """How a value of a result is compared.
+
+    Attributes:
+        tolerance: by how much it may differ, absolutely; of a map the share of known cells, 0 to 1.
+        unit: for the report.
+        is_angle: differences are wrapped.
+        is_by_order: of TABLE.rows: the n-th row is held against the n-th, not the one of the same time.
+    """
+
+    tolerance: float = 0.0
+    unit: str = ""
+    is_angle: bool = False
+    is_by_order: bool = False
 
 
 @dataclass(frozen=True)

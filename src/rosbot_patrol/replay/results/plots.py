@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from rosbot_patrol.errors import ResultError
 from rosbot_patrol.files import write_atomic
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.replay.results.comparison import column_errors, field_of, map_difference, paired
+from rosbot_patrol.replay.results.comparison import Field, column_errors, field_of, map_difference, paired
 from rosbot_patrol.replay.results.tables import STAMP, Result, Table
-from rosbot_patrol.replay.runner import Field
 
 WIDTH, HEIGHT, LEFT, TOP, GAP = 900.0, 110.0, 80.0, 24.0, 34.0  # of a panel, and round it [px]
 MOST = 4000  # points of a line

@@ -22,9 +22,9 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.layers.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
 from rosbot_patrol.costmap.layers.range_layer import RangeReading, RangeSensorLayer
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams
 from rosbot_patrol.costmap.sources.cloud import CloudLayout, cloud_points, observe_cloud
 from rosbot_patrol.costmap.sources.depth import DepthPicture, Optics, observe_depth
-from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams
 from rosbot_patrol.errors import ImageError, LaserTilted, SensorError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.ros.messages.convert import scan_from_msg

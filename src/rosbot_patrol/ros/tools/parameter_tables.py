@@ -20,7 +20,7 @@ from rosbot_patrol.costmap.params import (
     StaticParams,
     VoxelParams,
 )
-from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.images.compressed import CompressedParams

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from house_run import MOUNT, house_map, scan_at
 
+from rosbot_patrol.amcl.motion_model import MOTION_MODELS, OdometryNoise, move_particles
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.particles import resample_kernels
 from rosbot_patrol.amcl.particles.kld import KldRule
-from rosbot_patrol.amcl.particles.motion_model import MOTION_MODELS, OdometryNoise, move_particles
 from rosbot_patrol.amcl.particles.particle_filter import ParticleFilter
 from rosbot_patrol.amcl.scan_model import field_kernels
 from rosbot_patrol.amcl.scan_model.likelihood_field import blocked_distances

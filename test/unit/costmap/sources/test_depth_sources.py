@@ -11,10 +11,10 @@ import pytest
 from rosbot_patrol.costmap.costs import LETHAL
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.params import read_costmap
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, SourceParams
 from rosbot_patrol.costmap.sources.cloud import CloudLayout, cloud_points, observe_cloud
 from rosbot_patrol.costmap.sources.depth import DepthPicture, Optics, observe_depth
 from rosbot_patrol.costmap.sources.observation import Observation
-from rosbot_patrol.costmap.sources.sensor_params import DepthSourceParams, SourceParams
 from rosbot_patrol.errors import ImageError, ParamError
 from rosbot_patrol.geometry import Pose2D
 

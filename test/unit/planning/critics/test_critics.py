@@ -25,10 +25,11 @@ from rosbot_patrol.planning.critics import (
     PathDistanceCritic,
     Situation,
     TwirlingCritic,
+    critic_kernels,
     distances_from,
     shrink,
+    sweep_kernels,
 )
-from rosbot_patrol.planning.local_planners import critic_kernels, sweep_kernels
 
 CORNERS = np.array([[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]])
 INFO = GridInfo(resolution=0.05, width=60, height=60, origin_x=-1.5, origin_y=-1.5)

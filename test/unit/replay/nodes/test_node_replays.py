@@ -11,8 +11,8 @@ from made_bag import Maker, write_bag
 from made_drive import BEGIN, LASER, drive_messages, room_map, truth_at
 
 from rosbot_patrol.amcl import localizer
+from rosbot_patrol.amcl.motion_model import move_particles
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.amcl.particles.motion_model import move_particles
 from rosbot_patrol.errors import BagError, MapError
 from rosbot_patrol.geometry import Pose2D, compose, invert
 from rosbot_patrol.gmapping.parameters import GmappingParams

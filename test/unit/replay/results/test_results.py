@@ -11,9 +11,8 @@ import pytest
 
 from rosbot_patrol.errors import ResultError
 from rosbot_patrol.grid import Grid, GridInfo
-from rosbot_patrol.replay.results.comparison import compare, map_difference
+from rosbot_patrol.replay.results.comparison import Field, compare, map_difference
 from rosbot_patrol.replay.results.tables import Result, Rows, load_result, save_result
-from rosbot_patrol.replay.runner import Field
 
 BEGIN = 1_600_000_000.0
 

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.amcl.particles import motion_kernels as kernels
+from rosbot_patrol.amcl import motion_kernels as kernels
 from rosbot_patrol.geometry import Pose2D, angle_difference
 
 Array = NDArray[np.float64]
