@@ -39,17 +39,19 @@ SUFFIX = ".replay.yaml"
 class CaseParams:
     """Keys of a NAME.replay.yaml."""
 
-    bag: str = param(doc="the bag")
-    node: str = param(doc="whose replay: amcl, slam_gmapping, move_base, darknet_ros, patrol_robot, serial_node")
-    parameters: Any = param(None, doc="of the node: a yaml file, or the parameters themselves; none: our config")
-    map: str = param("", doc="yaml of the map; empty: the bag's")
-    topics: dict[str, Any] = param({}, doc="topics of the bag by the node's own names")
-    transforms: list[str] = param([], doc="static transforms that the bag lacks: 'x y z yaw pitch roll PARENT CHILD'")
-    rooms: str = param("", doc="points file of patrol_robot; empty: its path_to_params, or our house's")
-    seed: int = param(0, lo=0, doc="of all chance")
-    expected: str = param("", doc="the stored result; empty: NAME.expected.npz")
-    tolerances: dict[str, Any] = param({}, doc="by field, as poses.x or poses.*; others keep the node's own")
-    optional: bool = param(False, doc="as a test it is skipped where the bag is not there")
+    bag: str = param(doc="bag to replay")
+    node: str = param(doc="node to replay: amcl, slam_gmapping, move_base, darknet_ros, patrol_robot, serial_node")
+    parameters: Any = param(None, doc="parameters of the node: a yaml file, or a mapping; none: those in config/")
+    map: str = param("", doc="yaml file of the map; empty: the bag's map")
+    topics: dict[str, Any] = param({}, doc="topics of the bag, by the node's own names")
+    transforms: list[str] = param([], doc="static transforms missing in the bag: 'x y z yaw pitch roll PARENT CHILD'")
+    rooms: str = param("", doc="points file of patrol_robot; empty: its path_to_params, else the one of our house")
+    seed: int = param(0, lo=0, doc="seed of all random numbers")
+    expected: str = param("", doc="stored result; empty: NAME.expected.npz")
+    tolerances: dict[str, Any] = param(
+        {}, doc="tolerances by field, such as poses.x or poses.*; other fields keep the node's own"
+    )
+    optional: bool = param(False, doc="as a test, skip the case if the bag is missing")
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ class EngineParams:
     battery: BatteryParams = field(default_factory=BatteryParams)
     camera: CameraParams = field(default_factory=CameraParams)
     motion: MotionSensorParams = field(default_factory=MotionSensorParams)
-    seed: int = param(0, lo=0, doc="of all noise")
+    seed: int = param(0, lo=0, doc="seed of all noise")
 
 
 class Engine:

@@ -15,14 +15,14 @@ _VOLTS = (3.00, 3.30, 3.45, 3.58, 3.68, 3.80, 3.97, 4.06, 4.18)
 
 @dataclass(frozen=True, kw_only=True)
 class BatteryParams:
-    """Size of the battery and what the robot draws."""
+    """Size of the battery, and the current that the robot draws."""
 
     capacity: float = param(3.5, unit="Ah", lo=0.01, doc="charge of a full battery")
-    cells: int = param(3, lo=1, doc="cells in series")
-    charge: float = param(1.0, lo=0.0, hi=1.0, doc="charge at the start")
-    idle_current: float = param(1.1, unit="A", lo=0.0, doc="drawn at rest")
-    drive_current: float = param(2.0, unit="A", lo=0.0, doc="drawn on top at full wheel speed")
-    resistance: float = param(0.09, unit="Ohm", lo=0.0, doc="of the whole battery")
+    cells: int = param(3, lo=1, doc="number of cells in series")
+    charge: float = param(1.0, lo=0.0, hi=1.0, doc="share of the charge at the start")
+    idle_current: float = param(1.1, unit="A", lo=0.0, doc="current at rest")
+    drive_current: float = param(2.0, unit="A", lo=0.0, doc="additional current at full wheel speed")
+    resistance: float = param(0.09, unit="Ohm", lo=0.0, doc="internal resistance of the battery")
 
 
 class Battery:

@@ -34,12 +34,12 @@ _BODY_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0,
 
 @dataclass(frozen=True, kw_only=True)
 class FrameParams:
-    """Links that the sensors sit on, where they are not to be found by their names."""
+    """Links of the sensors; needed if their names do not tell."""
 
-    laser: str = param("", doc="link of the lidar, empty: found by its name")
-    camera: str = param("", doc="link of the camera, empty: found by its name")
-    imu: str = param("", doc="link of the inertial unit, empty: found by its name")
-    ranges: tuple[str, ...] = param((), doc="links of the range sensors, empty: found by their names")
+    laser: str = param("", doc="link of the lidar; empty: found by its name")
+    camera: str = param("", doc="link of the camera; empty: found by its name")
+    imu: str = param("", doc="link of the IMU; empty: found by its name")
+    ranges: tuple[str, ...] = param((), doc="links of the range sensors; empty: found by their names")
 
 
 @dataclass(frozen=True, kw_only=True)

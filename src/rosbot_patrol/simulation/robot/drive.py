@@ -24,23 +24,38 @@ from rosbot_patrol.simulation.robot.description import RobotDescription
 class DriveParams:
     """The base: geometry, limits, slip. `legacy_wheel_separation` 0.1 gives the turning rate of the 2019 model."""
 
-    left_joints: tuple[str, ...] = param((), doc="joints of the left wheels, empty: the URDF's continuous ones there")
-    right_joints: tuple[str, ...] = param((), doc="joints of the right wheels, empty: the URDF's continuous ones there")
-    wheel_radius: float = param(0.0, unit="m", lo=0.0, doc="radius of the wheels, 0: as in the URDF")
+    left_joints: tuple[str, ...] = param(
+        (), doc="joints of the left wheels; empty: the URDF's continuous joints on the left"
+    )
+    right_joints: tuple[str, ...] = param(
+        (), doc="joints of the right wheels; empty: the URDF's continuous joints on the right"
+    )
+    wheel_radius: float = param(0.0, unit="m", lo=0.0, doc="radius of the wheels; 0: from the URDF")
     effective_track: float = param(
-        0.0, unit="m", lo=0.0, doc="wheel distance by which the base really turns, 0: the URDF's, with skid_stretch"
+        0.0,
+        unit="m",
+        lo=0.0,
+        doc="wheel distance that determines how the base turns; 0: from the URDF, with skid_stretch",
     )
-    skid_stretch: float = param(0.04, lo=0.0, hi=2.0, doc="how much longer the track of several wheels a side acts")
+    skid_stretch: float = param(
+        0.04, lo=0.0, hi=2.0, doc="relative widening of the track by skidding, with several wheels on a side"
+    )
     legacy_wheel_separation: float = param(
-        0.0, unit="m", lo=0.0, doc="wheel distance that the controller assumes, 0: the real one (2019 model: 0.1)"
+        0.0, unit="m", lo=0.0, doc="wheel distance that the controller assumes; 0: the true one (2019 model: 0.1)"
     )
-    max_wheel_speed: float = param(10.0, unit="rad/s", lo=0.1, doc="fastest turn of a wheel")
-    wheel_acceleration: float = param(40.0, unit="rad/s^2", lo=0.1, doc="fastest change of a wheel's speed")
-    command_timeout: float = param(0.5, unit="s", lo=0.0, doc="after the last command the base stops, 0: never")
-    traction: float = param(0.8, lo=0.01, doc="friction of the tyres on the floor")
-    slip: float = param(0.002, lo=0.0, hi=0.5, doc="relative spread of the way of each side against its wheels'")
-    scrub: float = param(0.004, lo=0.0, hi=0.5, doc="relative spread of the angle turned against the wheels'")
-    slip_time: float = param(3.0, unit="s", lo=0.01, doc="how long a slip lasts")
+    max_wheel_speed: float = param(10.0, unit="rad/s", lo=0.1, doc="top speed of a wheel")
+    wheel_acceleration: float = param(40.0, unit="rad/s^2", lo=0.1, doc="maximum acceleration of a wheel")
+    command_timeout: float = param(
+        0.5, unit="s", lo=0.0, doc="time after the last command at which the base stops; 0: never"
+    )
+    traction: float = param(0.8, lo=0.01, doc="friction coefficient of tyres and floor")
+    slip: float = param(
+        0.002, lo=0.0, hi=0.5, doc="relative standard deviation of each side's travel from its wheels' rotation"
+    )
+    scrub: float = param(
+        0.004, lo=0.0, hi=0.5, doc="relative standard deviation of the turned angle from the wheels' rotation"
+    )
+    slip_time: float = param(3.0, unit="s", lo=0.01, doc="correlation time of slip and scrub")
 
     @property
     def wheel_separation(self) -> float:

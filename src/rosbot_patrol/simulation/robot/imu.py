@@ -15,16 +15,19 @@ GRAVITY = 9.8
 
 @dataclass(frozen=True, kw_only=True)
 class ImuParams:
-    """Errors of the unit; zero everywhere is Gazebo's."""
+    """Errors of the IMU; all zero as in Gazebo."""
 
-    gyro_noise: float = param(0.002, unit="rad/s", lo=0.0, doc="standard deviation of a turning rate")
+    gyro_noise: float = param(0.002, unit="rad/s", lo=0.0, doc="standard deviation of the turning rates")
     gyro_bias: float = param(0.0002, unit="rad/s", doc="constant error of the turning rate about z")
     gyro_walk: float = param(
-        0.0, unit="rad/s", lo=0.0, doc="spread that the bias of the turning rate gains in a second (in s with its root)"
+        0.0,
+        unit="rad/s",
+        lo=0.0,
+        doc="random walk of that bias: standard deviation after 1 s; it grows with the root of time",
     )
-    accel_noise: float = param(0.02, unit="m/s^2", lo=0.0, doc="standard deviation of an acceleration")
+    accel_noise: float = param(0.02, unit="m/s^2", lo=0.0, doc="standard deviation of the accelerations")
     accel_bias: float = param(0.0, unit="m/s^2", doc="constant error of the accelerations along x and y")
-    heading_noise: float = param(0.002, unit="rad", lo=0.0, doc="standard deviation of an orientation")
+    heading_noise: float = param(0.002, unit="rad", lo=0.0, doc="standard deviation of the heading")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,14 +11,14 @@ from rosbot_patrol.params import param
 
 @dataclass(frozen=True, kw_only=True)
 class OdometryParams:
-    """What the encoders and the calibration of the base are worth."""
+    """Resolution of the encoders, and calibration errors of the base."""
 
-    ticks_per_turn: float = param(1024.0, lo=1.0, doc="encoder ticks a turn of a wheel")
-    radius_error: float = param(0.004, lo=-0.5, hi=0.5, doc="relative error of the wheel radius that odometry believes")
+    ticks_per_turn: float = param(1024.0, lo=1.0, doc="encoder ticks per turn of a wheel")
+    radius_error: float = param(0.004, lo=-0.5, hi=0.5, doc="relative error of the wheel radius in odometry")
     radius_difference: float = param(
-        0.0, lo=-0.5, hi=0.5, doc="relative excess of the right wheels' radius over the left ones', unknown to odometry"
+        0.0, lo=-0.5, hi=0.5, doc="relative excess of the right wheels' radius over the left, unknown to odometry"
     )
-    track_error: float = param(-0.002, lo=-0.5, hi=0.5, doc="relative error of the track that odometry believes")
+    track_error: float = param(-0.002, lo=-0.5, hi=0.5, doc="relative error of the track width in odometry")
 
 
 class EncoderOdometry:

@@ -36,18 +36,18 @@ def _finite_or_none(value: float | None) -> str | None:
 class Timed:
     """Something that happens at a time, counted from an event."""
 
-    at: float = param(0.0, unit="s", lo=0.0, check=finite, doc="when, counted from the event `after`")
+    at: float = param(0.0, unit="s", lo=0.0, check=finite, doc="time, counted from the event `after`")
     after: str = param("", choices=("", *EVENTS), doc="event of the patrol; empty: the scenario's own beginning")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fault(Timed):
-    """What all faults have."""
+    """What all faults have in common."""
 
     kind: ClassVar[str] = ""
     is_instant: ClassVar[bool] = False
 
-    duration: float = param(0.0, unit="s", lo=0.0, check=finite, doc="how long it lasts, 0: until it is cleared")
+    duration: float = param(0.0, unit="s", lo=0.0, check=finite, doc="duration of the fault; 0: until it is cleared")
 
     @property
     def where(self) -> str:
@@ -71,38 +71,38 @@ _COMMON = ("at", "after", "duration", "target")
 
 @dataclass(frozen=True, kw_only=True)
 class CameraFrozen(Fault):
-    """The same picture again and again, with new stamps."""
+    """The camera repeats one image, with new stamps."""
 
     kind: ClassVar[str] = "camera_frozen"
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraBlack(Fault):
-    """Colour 0 everywhere, no depth anywhere, as behind a cover."""
+    """The image is black and has no depth, as behind a cover."""
 
     kind: ClassVar[str] = "camera_black"
 
 
 @dataclass(frozen=True, kw_only=True)
 class CameraSilent(Fault):
-    """No pictures, and no camera_info."""
+    """The camera sends neither images nor camera_info."""
 
     kind: ClassVar[str] = "camera_silent"
 
 
 @dataclass(frozen=True, kw_only=True)
 class LidarSilent(Fault):
-    """No scans."""
+    """The lidar sends no scans."""
 
     kind: ClassVar[str] = "lidar_silent"
 
 
 @dataclass(frozen=True, kw_only=True)
 class OdometrySlip(Fault):
-    """The wheels turn as told, and the base follows by a part of it."""
+    """The wheels turn as commanded; the base covers only a part of the distance."""
 
     kind: ClassVar[str] = "odometry_slip"
-    factor: float = param(0.5, lo=0.0, hi=1.0, doc="part of the wheels' way that the base makes")
+    factor: float = param(0.5, lo=0.0, hi=1.0, doc="share of the wheels' distance that the base covers")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,26 +110,26 @@ class WheelStuck(Fault):
     """The wheels of one side do not turn."""
 
     kind: ClassVar[str] = "wheel_stuck"
-    target: str = param(choices=("left", "right"), doc="which side")
+    target: str = param(choices=("left", "right"), doc="side of the base")
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorFault(Fault):
-    """What befalls one motion sensor."""
+    """A fault of one motion sensor."""
 
     target: int = param(lo=0, hi=255, doc="id of the motion sensor")
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionStuck(SensorFault):
-    """The output stays high: it calls once, and never again."""
+    """The output stays high: the sensor calls once and never again."""
 
     kind: ClassVar[str] = "motion_stuck"
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotionSilent(SensorFault):
-    """The device says nothing more, neither motion nor heartbeat, on a link that stays open."""
+    """The device sends neither motion nor heartbeat; its link stays open."""
 
     kind: ClassVar[str] = "motion_silent"
 
@@ -139,7 +139,7 @@ class MotionFlapping(SensorFault):
     """The output goes up and down."""
 
     kind: ClassVar[str] = "motion_flapping"
-    period: float = param(4.0, unit="s", lo=0.2, check=finite, doc="from one rise to the next")
+    period: float = param(4.0, unit="s", lo=0.2, check=finite, doc="time from one rise to the next")
 
     def is_high(self, since: float) -> bool:
         """The output, so long [s] after the beginning: high in the first half of each period."""
@@ -148,36 +148,38 @@ class MotionFlapping(SensorFault):
 
 @dataclass(frozen=True, kw_only=True)
 class MotionRebooting(SensorFault):
-    """The device starts anew: its link breaks, and the sensor is blind while it warms up."""
+    """The device restarts: its link breaks, and the sensor is blind while it warms up."""
 
     kind: ClassVar[str] = "motion_rebooting"
-    every: float = param(0.0, unit="s", lo=0.0, check=finite, doc="again after that long, 0: only once")
+    every: float = param(0.0, unit="s", lo=0.0, check=finite, doc="time until the next restart; 0: only one")
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinkPoor(Fault):
-    """Frames of a sensor's TCP link come late or not at all, and the link breaks; in real time."""
+    """Frames of a sensor's TCP link are delayed or lost, and the link breaks; in real time."""
 
     kind: ClassVar[str] = "link_poor"
-    target: int = param(ALL_SENSORS, lo=ALL_SENSORS, hi=255, doc="id of the motion sensor, -1: all of them")
-    loss: float = param(0.0, lo=0.0, hi=1.0, doc="part of the frames that get lost")
-    delay: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="time that each frame takes")
-    jitter: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="longest time on top of it")
-    drop_every: float = param(0.0, unit="s", lo=0.0, check=finite, doc="mean time between two breaks, 0: none")
+    target: int = param(ALL_SENSORS, lo=ALL_SENSORS, hi=255, doc="id of the motion sensor; -1: all")
+    loss: float = param(0.0, lo=0.0, hi=1.0, doc="share of the frames that are lost")
+    delay: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="delay of each frame")
+    jitter: float = param(0.0, unit="s", lo=0.0, hi=60.0, doc="maximum additional delay")
+    drop_every: float = param(
+        0.0, unit="s", lo=0.0, check=finite, doc="mean time between two breaks of the link; 0: none"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class DoorwayBlocked(Fault):
-    """A box stands in a doorway: a named one (`target`), or wherever x, y say."""
+    """A box stands in a doorway: in the named one (`target`), or at x, y."""
 
     kind: ClassVar[str] = "doorway_blocked"
     target: str = param("", doc="name of the doorway")
-    x: float | None = param(None, unit="m", check=_finite_or_none, doc="middle of the box")
-    y: float | None = param(None, unit="m", check=_finite_or_none, doc="middle of the box")
-    yaw: float | None = param(None, unit="rad", check=_finite_or_none, doc="along its width")
-    width: float | None = param(None, unit="m", lo=0.05, hi=20.0, doc="along the wall (0.9)")
-    height: float = param(1.0, unit="m", lo=0.05, hi=3.0, doc="from the floor")
-    depth: float = param(0.3, unit="m", lo=0.02, hi=5.0, doc="across the wall")
+    x: float | None = param(None, unit="m", check=_finite_or_none, doc="centre of the box")
+    y: float | None = param(None, unit="m", check=_finite_or_none, doc="centre of the box")
+    yaw: float | None = param(None, unit="rad", check=_finite_or_none, doc="direction of its width")
+    width: float | None = param(None, unit="m", lo=0.05, hi=20.0, doc="size along the wall (default 0.9)")
+    height: float = param(1.0, unit="m", lo=0.05, hi=3.0, doc="height above the floor")
+    depth: float = param(0.3, unit="m", lo=0.02, hi=5.0, doc="size across the wall")
 
     def __str__(self) -> str:
         place = "" if self.x is None or self.y is None else f"({self.x:.2f}, {self.y:.2f})"
@@ -186,13 +188,13 @@ class DoorwayBlocked(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotCarried(Fault):
-    """The robot is lifted and put down elsewhere at once; its odometry does not notice."""
+    """The robot is carried to another place at once; its odometry does not notice."""
 
     kind: ClassVar[str] = "robot_carried"
     is_instant: ClassVar[bool] = True
-    x: float = param(unit="m", check=finite, doc="where to, in the frame map")
-    y: float = param(unit="m", check=finite, doc="where to, in the frame map")
-    yaw: float = param(0.0, unit="rad", check=finite, doc="direction that it looks in there")
+    x: float = param(unit="m", check=finite, doc="new position in the map frame")
+    y: float = param(unit="m", check=finite, doc="new position in the map frame")
+    yaw: float = param(0.0, unit="rad", check=finite, doc="new heading")
 
     @property
     def pose(self) -> Pose2D:
@@ -202,10 +204,10 @@ class RobotCarried(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class Doorway:
-    """A place to put a box: its middle [m], the direction of the wall that it is in [rad], its width [m]."""
+    """A place for a box: its centre [m], the direction of the wall [rad], its width [m]."""
 
-    x: float = param(unit="m", check=finite, doc="middle")
-    y: float = param(unit="m", check=finite, doc="middle")
+    x: float = param(unit="m", check=finite, doc="centre")
+    y: float = param(unit="m", check=finite, doc="centre")
     yaw: float = param(0.0, unit="rad", check=finite, doc="direction of the wall")
     width: float = param(0.9, unit="m", lo=0.05, hi=20.0, doc="clear width")
 

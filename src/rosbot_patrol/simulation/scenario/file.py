@@ -51,42 +51,42 @@ def pose_of(point: Sequence[float]) -> Pose2D:
 class Way(Timed):
     """Where an actor walks, from a time on."""
 
-    path: list[list[float]] = param([], check=_points, doc="points [x, y] or [x, y, yaw] in the frame map")
-    speed: float = param(0.8, unit="m/s", lo=0.05, hi=8.0, doc="how fast")
-    loop: bool = param(False, doc="again and again")
-    pause: float = param(0.0, unit="s", lo=0.0, check=finite, doc="stands that long at each point")
-    yields: bool = param(True, doc="stops before the robot; else it walks on, over it if need be")
-    roam: float = param(0.0, unit="m", lo=0.0, hi=50.0, doc="instead of a path: wanders within that radius")
+    path: list[list[float]] = param([], check=_points, doc="points [x, y] or [x, y, yaw] in the map frame")
+    speed: float = param(0.8, unit="m/s", lo=0.05, hi=8.0, doc="walking speed")
+    loop: bool = param(False, doc="repeat the path for ever")
+    pause: float = param(0.0, unit="s", lo=0.0, check=finite, doc="stop at each point")
+    yields: bool = param(True, doc="stop in front of the robot; false: walk on, over the robot if need be")
+    roam: float = param(0.0, unit="m", lo=0.0, hi=50.0, doc="radius of random walking, instead of a path")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ActorEntry(Way):
-    """Someone who comes, walks, and may go again."""
+    """A person, animal or object that appears, walks, and may leave again."""
 
-    name: str = param(doc="unique")
-    model: str = param("person", doc="person, fire_hydrant, cat, dog, poster")
-    look: str = param("", doc="name of a look, empty: drawn from the seed")
-    posture: str = param("", doc="of a person: standing, sitting, crouching, creeping")
-    start: list[float] = param(check=_point, doc="where it appears, [x, y] or [x, y, yaw]")
-    stays: float = param(0.0, unit="s", lo=0.0, check=finite, doc="gone after that long, 0: stays")
+    name: str = param(doc="unique name")
+    model: str = param("person", doc="person, fire_hydrant, cat, dog or poster")
+    look: str = param("", doc="name of an appearance; empty: drawn from the seed")
+    posture: str = param("", doc="posture of a person: standing, sitting, crouching, creeping")
+    start: list[float] = param(check=_point, doc="place of appearance, [x, y] or [x, y, yaw]")
+    stays: float = param(0.0, unit="s", lo=0.0, check=finite, doc="time until it disappears; 0: never")
 
 
 @dataclass(frozen=True, kw_only=True)
 class WalkEntry(Way):
-    """A further way of an actor."""
+    """A further walk of an actor."""
 
-    actor: str = param(doc="its name")
+    actor: str = param(doc="name of the actor")
 
 
 @dataclass(frozen=True, kw_only=True)
 class DoorEntry:
-    """A door that is hung before the beginning."""
+    """A door that is in place from the beginning."""
 
-    name: str = param(doc="unique")
-    hinge: list[float] = param(check=_point, doc="[x, y, yaw]: the leaf lies along yaw where it is closed")
-    width: float = param(0.9, unit="m", lo=0.1, hi=5.0, doc="of the leaf")
+    name: str = param(doc="unique name")
+    hinge: list[float] = param(check=_point, doc="[x, y, yaw]: place of the hinge; the closed leaf lies along yaw")
+    width: float = param(0.9, unit="m", lo=0.1, hi=5.0, doc="width of the leaf")
     swing: float = param(SWING, unit="rad", lo=-3.1, hi=3.1, doc="angle of the open door, counter-clockwise")
-    opening: float = param(0.0, lo=0.0, hi=1.0, doc="0: closed, 1: open")
+    opening: float = param(0.0, lo=0.0, hi=1.0, doc="opening at the start; 0: closed, 1: open")
 
     @property
     def place(self) -> DoorPlace:
@@ -98,27 +98,31 @@ class DoorEntry:
 class DoorMove(Timed):
     """A door opens or closes."""
 
-    door: str = param(doc="its name")
-    opening: float = param(lo=0.0, hi=1.0, doc="0: closed, 1: open")
-    speed: float = param(SPEED, unit="rad/s", lo=0.0, hi=10.0, doc="how fast, 0: at once")
+    door: str = param(doc="name of the door")
+    opening: float = param(lo=0.0, hi=1.0, doc="opening to move to; 0: closed, 1: open")
+    speed: float = param(SPEED, unit="rad/s", lo=0.0, hi=10.0, doc="speed of the leaf; 0: at once")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trigger(Timed):
-    """A motion sensor calls, whatever it sees."""
+    """A call of a motion sensor, whatever it sees."""
 
-    sensor: int = param(lo=0, hi=255, doc="its id")
+    sensor: int = param(lo=0, hi=255, doc="id of the sensor")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Expect:
-    """What should have come of it."""
+    """Expected outcome of the scenario."""
 
-    verdicts: dict[Any, Any] = param({}, doc="room: verdict of the last mission to it")
-    missions: int | None = param(None, lo=0, hi=1000, doc="how many, one for each room of `verdicts` unless said")
-    mails: int | None = param(None, lo=0, hi=1000, doc="how many")
-    home: bool = param(True, doc="the robot is home at the end")
-    within: float = param(600.0, unit="s", lo=1.0, check=finite, doc="simulated time from the first guard on")
+    verdicts: dict[Any, Any] = param({}, doc="verdict of the last mission to each room: {room: verdict}")
+    missions: int | None = param(
+        None, lo=0, hi=1000, doc="number of missions; without it one for each room of `verdicts`"
+    )
+    mails: int | None = param(None, lo=0, hi=1000, doc="number of mails")
+    home: bool = param(True, doc="whether the robot is home at the end")
+    within: float = param(
+        600.0, unit="s", lo=1.0, check=finite, doc="simulated time allowed, counted from the first time on guard"
+    )
 
     @property
     def least_missions(self) -> int:
@@ -128,24 +132,24 @@ class Expect:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """Where the robot is at the beginning, in the frame map."""
+    """Pose of the robot at the beginning, in the map frame."""
 
-    x: float = param(0.0, unit="m", check=finite, doc="place")
-    y: float = param(0.0, unit="m", check=finite, doc="place")
-    yaw: float = param(0.0, unit="rad", check=finite, doc="direction")
+    x: float = param(0.0, unit="m", check=finite, doc="position")
+    y: float = param(0.0, unit="m", check=finite, doc="position")
+    yaw: float = param(0.0, unit="rad", check=finite, doc="heading")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """World and settings; an empty name leaves what the launch file says. Files are relative to the scenario's."""
+    """World and settings; an empty name keeps the launch file's. Paths are relative to the scenario's file."""
 
-    title: str = param("", doc="what it is about, in a line")
+    title: str = param("", doc="subject of the scenario, in one line")
     world: str = param("", doc="SDF file of the world")
     motion_sensors: str = param("", doc="file of the motion sensors")
-    map: str = param("", doc="file of the map (yaml)")
-    room_points: str = param("", doc="file of the rooms' points")
-    seed: int | None = param(None, lo=0, doc="of all noise")
-    begin: str = param("on_guard", choices=EVENTS, doc="event that times count from where an entry says no `after`")
+    map: str = param("", doc="yaml file of the map")
+    room_points: str = param("", doc="points file of the rooms")
+    seed: int | None = param(None, lo=0, doc="seed of all noise")
+    begin: str = param("on_guard", choices=EVENTS, doc="event from which times count if an entry has no `after`")
 
 
 @dataclass(frozen=True, kw_only=True)

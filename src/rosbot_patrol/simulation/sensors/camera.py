@@ -26,19 +26,21 @@ _ROBOT = "the robot, in the window"
 
 @dataclass(frozen=True, kw_only=True)
 class CameraParams:
-    """The camera; defaults as Gazebo's openni_kinect plug-in was set up for the ROSbot, with a little noise."""
+    """The camera; defaults as Gazebo's openni_kinect plug-in for the ROSbot, with a little noise."""
 
-    width: int = param(640, unit="px", lo=16, hi=4096, doc="width of a picture")
-    height: int = param(480, unit="px", lo=16, hi=4096, doc="height of a picture")
-    horizontal_fov: float = param(1.047, unit="rad", lo=0.1, hi=3.0, doc="opening")
-    depth_min: float = param(0.4, unit="m", lo=0.0, doc="nearer depth is NaN")
-    depth_max: float = param(5.0, unit="m", lo=0.1, doc="farther depth is NaN")
-    noise: float = param(2.0, lo=0.0, hi=50.0, doc="standard deviation of a colour, of 255")
-    depth_noise: float = param(0.0012, lo=0.0, doc="standard deviation of a depth at 1 m [m], grows with its square")
-    exposure: float = param(1.0, lo=0.01, hi=20.0, doc="gain of the colours, 1: a white face in full light is 255")
-    auto_exposure: bool = param(False, doc="choose the gain by each picture's own brightness")
-    blur: float = param(0.0, unit="s", lo=0.0, hi=0.2, doc="how long the shutter is open: motion blurs the colours")
-    renderer: str = param("egl", choices=("egl", "tiny"), doc="egl: OpenGL without a display; tiny: PyBullet's")
+    width: int = param(640, unit="px", lo=16, hi=4096, doc="width of the image")
+    height: int = param(480, unit="px", lo=16, hi=4096, doc="height of the image")
+    horizontal_fov: float = param(1.047, unit="rad", lo=0.1, hi=3.0, doc="horizontal field of view")
+    depth_min: float = param(0.4, unit="m", lo=0.0, doc="minimum depth; smaller ones are NaN")
+    depth_max: float = param(5.0, unit="m", lo=0.1, doc="maximum depth; larger ones are NaN")
+    noise: float = param(2.0, lo=0.0, hi=50.0, doc="standard deviation of a colour value (0 to 255)")
+    depth_noise: float = param(
+        0.0012, lo=0.0, doc="standard deviation of depth at 1 m [m]; it grows with the square of the depth"
+    )
+    exposure: float = param(1.0, lo=0.01, hi=20.0, doc="gain of the colours; at 1 a white surface in full light is 255")
+    auto_exposure: bool = param(False, doc="choose the gain from each image's brightness")
+    blur: float = param(0.0, unit="s", lo=0.0, hi=0.2, doc="exposure time; motion blurs the colours")
+    renderer: str = param("egl", choices=("egl", "tiny"), doc="egl: OpenGL without a display; tiny: PyBullet's own")
 
     @property
     def intrinsics(self) -> Intrinsics:

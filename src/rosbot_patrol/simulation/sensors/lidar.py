@@ -19,20 +19,24 @@ _BEYOND = 1.0  # what a beam without return is told at, over the range, where it
 
 @dataclass(frozen=True, kw_only=True)
 class LidarParams:
-    """The scanner; defaults as the ros1 branch of the robot's description has it."""
+    """The lidar; defaults as in the ros1 branch of the robot's description."""
 
-    samples: int = param(720, lo=2, hi=10000, doc="beams of a sweep")
+    samples: int = param(720, lo=2, hi=10000, doc="number of beams in a scan")
     angle_min: float = param(-math.pi, unit="rad", lo=-math.pi, hi=math.pi, doc="direction of the first beam")
     angle_max: float = param(math.pi, unit="rad", lo=-math.pi, hi=math.pi, doc="direction of the last beam")
-    range_min: float = param(0.2, unit="m", lo=0.0, doc="nearer is -inf (REP 117)")
-    range_max: float = param(12.0, unit="m", lo=0.01, doc="farther is no return")
-    resolution: float = param(0.01, unit="m", lo=0.0, doc="ranges are whole multiples of it, 0: not rounded")
+    range_min: float = param(0.2, unit="m", lo=0.0, doc="minimum range; shorter ones are -inf (REP 117)")
+    range_max: float = param(12.0, unit="m", lo=0.01, doc="maximum range; longer ones are no return")
+    resolution: float = param(0.01, unit="m", lo=0.0, doc="step of the ranges; 0: not rounded")
     noise: float = param(0.01, unit="m", lo=0.0, doc="standard deviation of a range")
-    no_return: str = param("inf", choices=("inf", "beyond"), doc="a beam without return is inf, or range_max + 1 m")
-    dropped: float = param(0.0, lo=0.0, hi=1.0, doc="share of the beams that by chance have no return")
-    dropped_as: str = param("inf", choices=("inf", "zero"), doc="what such a beam is: as without return, or 0")
-    sweep_time: float = param(0.0, unit="s", lo=0.0, hi=1.0, doc="how long a sweep takes: motion within it distorts it")
-    height_offset: float = param(0.0, unit="m", doc="height of the beams above the lidar")
+    no_return: str = param(
+        "inf", choices=("inf", "beyond"), doc="range of a beam without return: inf, or range_max + 1 m"
+    )
+    dropped: float = param(0.0, lo=0.0, hi=1.0, doc="share of the beams that lose their return by chance")
+    dropped_as: str = param("inf", choices=("inf", "zero"), doc="range of such a beam: as without return, or 0")
+    sweep_time: float = param(
+        0.0, unit="s", lo=0.0, hi=1.0, doc="duration of a scan; motion during it distorts the scan"
+    )
+    height_offset: float = param(0.0, unit="m", doc="height of the beams above the lidar's link")
 
 
 def measure_scan(

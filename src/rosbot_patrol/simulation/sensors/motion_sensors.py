@@ -16,30 +16,30 @@ from rosbot_patrol.params import param
 
 @dataclass(frozen=True, kw_only=True)
 class MotionSensorParams:
-    """One kind of sensor; defaults as the module's data sheet and its two potentiometers at the left."""
+    """One type of sensor; defaults from the module's data sheet, both potentiometers at the left stop."""
 
-    cone_deg: float = param(110.0, unit="deg", lo=1.0, hi=180.0, doc="opening of the lens")
-    reach: float = param(7.0, unit="m", lo=0.1, doc="farthest that a person is noticed")
+    cone_deg: float = param(110.0, unit="deg", lo=1.0, hi=180.0, doc="opening angle of the lens")
+    reach: float = param(7.0, unit="m", lo=0.1, doc="maximum range at which a person is noticed")
     zone_deg: float = param(4.0, unit="deg", lo=0.1, doc="change of bearing that counts as motion")
-    memory: float = param(1.5, unit="s", lo=0.1, doc="the change has to happen within")
-    warm_up: float = param(60.0, unit="s", lo=0.0, doc="silent after switching on")
-    prewarmed: bool = param(True, doc="was switched on long before the start")
-    hold: float = param(2.5, unit="s", lo=0.1, doc="output stays high")
-    lock_out: float = param(2.5, unit="s", lo=0.0, doc="blind after the output fell")
+    memory: float = param(1.5, unit="s", lo=0.1, doc="time within which that change must happen")
+    warm_up: float = param(60.0, unit="s", lo=0.0, doc="time without output after power-on")
+    prewarmed: bool = param(True, doc="power-on was long before the start")
+    hold: float = param(2.5, unit="s", lo=0.1, doc="time that the output stays high")
+    lock_out: float = param(2.5, unit="s", lo=0.0, doc="blind time after the output has fallen")
     retrigger: bool = param(True, doc="motion during the hold prolongs it")
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorPlace:
-    """A sensor on its wall: id (of its room), TCP port of its bridge, place and direction in the frame map."""
+    """A sensor on its wall: id, room, TCP port of its bridge, position and direction in the map frame."""
 
-    id: int = param(lo=0, hi=255, doc="id that it reports")
+    id: int = param(lo=0, hi=255, doc="id that the sensor reports")
     room: int = param(lo=0, hi=255, doc="room that it watches")
     port: int = param(11411, lo=0, hi=65535, doc="TCP port of the bridge")
-    x: float = param(unit="m", doc="place")
-    y: float = param(unit="m", doc="place")
+    x: float = param(unit="m", doc="position")
+    y: float = param(unit="m", doc="position")
     z: float = param(1.6, unit="m", lo=0.0, doc="height")
-    yaw: float = param(unit="rad", doc="direction that it looks in")
+    yaw: float = param(unit="rad", doc="viewing direction")
 
 
 class MotionSensor:

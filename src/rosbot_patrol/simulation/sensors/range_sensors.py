@@ -15,12 +15,12 @@ _BEAMS = 5
 
 @dataclass(frozen=True, kw_only=True)
 class RangeParams:
-    """The four sensors at the robot's corners."""
+    """The four range sensors at the robot's corners."""
 
-    range_min: float = param(0.01, unit="m", lo=0.0, doc="shortest distance that is told apart")
-    range_max: float = param(0.9, unit="m", lo=0.01, doc="told where nothing is nearer")
-    field_of_view: float = param(0.1, unit="rad", lo=0.001, doc="opening of the cone")
-    noise: float = param(0.005, unit="m", lo=0.0, doc="standard deviation")
+    range_min: float = param(0.01, unit="m", lo=0.0, doc="minimum range; the sensor reports it for anything nearer")
+    range_max: float = param(0.9, unit="m", lo=0.01, doc="maximum range; the sensor reports it if nothing is nearer")
+    field_of_view: float = param(0.1, unit="rad", lo=0.001, doc="opening angle of the cone")
+    noise: float = param(0.005, unit="m", lo=0.0, doc="standard deviation of a range")
 
 
 def measure_range(
