@@ -19,26 +19,28 @@ log = logging.getLogger(__name__)
 class CostmapParams:
     """Parameters of a costmap_2d costmap."""
 
-    global_frame: str = param("map", doc="frame the costmap lies in")
-    robot_base_frame: str = param("base_link", doc="the robot's frame")
+    global_frame: str = param("map", doc="frame of the costmap")
+    robot_base_frame: str = param("base_link", doc="frame of the robot")
     transform_tolerance: float = param(
-        0.3, unit="s", lo=0.0, hi=10.0, clamps="both", doc="how old the robot's pose may be"
+        0.3, unit="s", lo=0.0, hi=10.0, clamps="both", doc="maximum age of the robot's pose"
     )
-    update_frequency: float = param(5.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="how often costs are updated")
+    update_frequency: float = param(5.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="rate of updates")
     publish_frequency: float = param(
-        0.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="how often it is shown; 0 is never"
+        0.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="rate of publishing; 0: never"
     )
-    width: float = param(10.0, unit="m", lo=0.0, clamps="both", doc="extent in x where no map gives it")
-    height: float = param(10.0, unit="m", lo=0.0, clamps="both", doc="extent in y where no map gives it")
+    width: float = param(10.0, unit="m", lo=0.0, clamps="both", doc="extent in x, unless a map gives it")
+    height: float = param(10.0, unit="m", lo=0.0, clamps="both", doc="extent in y, unless a map gives it")
     resolution: float = param(0.05, unit="m", lo=0.001, hi=50.0, clamps="above", doc="edge of a cell")
-    origin_x: float = param(0.0, unit="m", doc="left edge; a rolling window follows the robot instead")
-    origin_y: float = param(0.0, unit="m", doc="lower edge")
+    origin_x: float = param(0.0, unit="m", doc="left edge; ignored with rolling_window")
+    origin_y: float = param(0.0, unit="m", doc="lower edge; ignored with rolling_window")
     rolling_window: bool = param(False, doc="keep the robot in the middle")
-    track_unknown_space: bool = param(False, doc="tell unknown cells from free ones")
-    always_send_full_costmap: bool = param(False, doc="publish whole grids, no updates")
+    track_unknown_space: bool = param(False, doc="distinguish unknown cells from free ones")
+    always_send_full_costmap: bool = param(False, doc="publish whole grids instead of updates")
     footprint: Any = param("[]", doc="corners of the robot [[x, y], ...]")
-    robot_radius: float = param(0.46, unit="m", lo=0.0, hi=10.0, clamps="both", doc="used where there is no footprint")
-    footprint_padding: float = param(0.01, unit="m", doc="added to each corner")
+    robot_radius: float = param(
+        0.46, unit="m", lo=0.0, hi=10.0, clamps="both", doc="radius of the robot, if no footprint is given"
+    )
+    footprint_padding: float = param(0.01, unit="m", doc="margin added to each corner")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +48,9 @@ class StaticParams:
     """Parameters of costmap_2d::StaticLayer."""
 
     enabled: bool = param(True)
-    map_topic: str = param("map", doc="nav_msgs/OccupancyGrid to use")
+    map_topic: str = param("map", doc="topic of the map (nav_msgs/OccupancyGrid)")
     first_map_only: bool = param(False, doc="ignore later maps")
-    subscribe_to_updates: bool = param(False, doc="listen to <map_topic>_updates")
+    subscribe_to_updates: bool = param(False, doc="use <map_topic>_updates")
     track_unknown_space: bool = param(True)
     use_maximum: bool = param(False, doc="combine by maximum instead of overwriting")
     lethal_cost_threshold: int = param(100, lo=0, hi=100, clamps="both")
@@ -61,57 +63,61 @@ class ObstacleParams:
     """Parameters of costmap_2d::ObstacleLayer."""
 
     enabled: bool = param(True)
-    track_unknown_space: bool = param(False, doc="the costmap's own where not given")
+    track_unknown_space: bool = param(
+        False, doc="distinguish unknown cells from free ones; default: the costmap's setting"
+    )
     footprint_clearing_enabled: bool = param(True, doc="cells under the robot are free")
-    combination_method: int = param(1, doc="0 overwrites, 1 maximum, any other nothing (upstream: 99)")
+    combination_method: int = param(
+        1, doc="0: overwrite, 1: maximum, any other: leave the costmap as it is (upstream: 99)"
+    )
     max_obstacle_height: float = param(2.0, unit="m", lo=0.0, hi=50.0, clamps="both")
     transform_tolerance: float = param(0.2, unit="s", lo=0.0)
-    observation_sources: str = param("", doc="names of sources, separated by spaces")
-    depth_sources: str = param("", doc="ours: the same for depth cameras, in a place that upstream does not read")
+    observation_sources: str = param("", doc="names of the sources, separated by spaces")
+    depth_sources: str = param(
+        "", doc="ours: names of depth cameras, separated by spaces; a key that upstream does not read"
+    )
     forget_unseen_after: float = param(
         0.0,
         unit="s",
         lo=0.0,
-        doc="ours: a mark goes that was not hit for so long while beams passed its place, ended they or not; 0 never",
+        doc="ours: time after which a mark goes if beams passed its place and none hit it; 0: never",
     )
     forget_out_of_view_after: float = param(
-        0.0, unit="s", lo=0.0, doc="ours: a mark goes that was neither hit nor in view for so long; 0 never"
+        0.0, unit="s", lo=0.0, doc="ours: time after which a mark goes that was neither hit nor in view; 0: never"
     )
     forget_beside_after: float = param(
         0.0,
         unit="s",
         lo=0.0,
-        doc="ours: the same within 0.6 m of the robot's middle, where it cannot look again; 0: as elsewhere",
+        doc="ours: the same within 0.6 m of the robot's centre, where it cannot look again; 0: as elsewhere",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class VoxelParams(ObstacleParams):
-    """Parameters of costmap_2d::VoxelLayer, which with planar scans is an obstacle layer."""
+    """Parameters of costmap_2d::VoxelLayer; with planar scans it is an obstacle layer."""
 
     origin_z: float = param(0.0, unit="m", lo=0.0, clamps="both", doc="height of the lowest voxel")
     z_resolution: float = param(0.2, unit="m", lo=0.0, hi=50.0, clamps="both", doc="height of a voxel")
-    z_voxels: int = param(
-        10, lo=0, hi=16, clamps="both", doc="voxels in a column; points above the column are not marked"
-    )
+    z_voxels: int = param(10, lo=0, hi=16, clamps="both", doc="voxels in a column; points above the column are ignored")
     unknown_threshold: int = param(
         15, lo=0, hi=16, clamps="both", doc="accepted, has no effect: cells that beams passed are free"
     )
     mark_threshold: int = param(
-        0, lo=0, hi=16, clamps="both", doc="more voxels than this mark a cell; a planar scan has one"
+        0, lo=0, hi=16, clamps="both", doc="number of voxels above which a cell is marked; a planar scan has one"
     )
     publish_voxel_map: bool = param(False, doc="accepted, has no effect: there are no voxels to show")
 
 
 @dataclass(frozen=True, kw_only=True)
 class KeepoutParams(StaticParams):
-    """Parameters of rosbot_patrol/KeepoutLayer, which is ours."""
+    """Parameters of rosbot_patrol/KeepoutLayer (ours)."""
 
-    map_topic: str = param("keepout_mask", doc="nav_msgs/OccupancyGrid with the mask, where there is no mask_file")
-    mask_file: str = param("", doc="yaml of map_server to take the mask from")
+    map_topic: str = param("keepout_mask", doc="topic of the mask (nav_msgs/OccupancyGrid), if there is no mask_file")
+    mask_file: str = param("", doc="map_server yaml of the mask")
     mask_frame: str = param("map", doc="frame of mask_file")
-    subscribe_to_updates: bool = param(False, doc="listen to <map_topic>_updates")
-    trinary_costmap: bool = param(True, doc="false: values between become costs")
+    subscribe_to_updates: bool = param(False, doc="use <map_topic>_updates")
+    trinary_costmap: bool = param(True, doc="false: intermediate values become costs")
 
 
 @dataclass(frozen=True, kw_only=True)

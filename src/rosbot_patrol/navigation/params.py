@@ -13,40 +13,44 @@ from rosbot_patrol.params import param
 class MoveBaseParams:
     """Parameters of the node move_base."""
 
-    base_global_planner: str = param("navfn/NavfnROS", doc="plug-in that plans")
-    base_local_planner: str = param("base_local_planner/TrajectoryPlannerROS", doc="plug-in that drives")
+    base_global_planner: str = param("navfn/NavfnROS", doc="global planner plug-in")
+    base_local_planner: str = param("base_local_planner/TrajectoryPlannerROS", doc="local planner plug-in")
     controller_frequency: float = param(
-        20.0, unit="Hz", lo=0.1, hi=100.0, clamps="above", doc="control cycles a second"
+        20.0, unit="Hz", lo=0.1, hi=100.0, clamps="above", doc="control cycles per second"
     )
     planner_frequency: float = param(
-        0.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="plans a second; 0 plans on demand"
+        0.0, unit="Hz", lo=0.0, hi=100.0, clamps="both", doc="plans per second; 0: plan on demand"
     )
     planner_patience: float = param(
-        5.0, unit="s", lo=0.0, clamps="both", doc="how long to try for a plan before recovering"
+        5.0, unit="s", lo=0.0, clamps="both", doc="longest time without a valid plan before recovery"
     )
-    controller_patience: float = param(15.0, unit="s", lo=0.0, clamps="both", doc="the same for a velocity")
-    max_planning_retries: int = param(-1, lo=-1, clamps="both", doc="failures before recovering, -1 is no limit")
+    controller_patience: float = param(
+        15.0, unit="s", lo=0.0, clamps="both", doc="longest time without a valid velocity before recovery"
+    )
+    max_planning_retries: int = param(-1, lo=-1, clamps="both", doc="failed plans before recovery; -1: no limit")
     oscillation_timeout: float = param(
-        0.0, unit="s", lo=0.0, clamps="both", doc="how long to move on the spot, 0 is for ever"
+        0.0, unit="s", lo=0.0, clamps="both", doc="longest time without progress before recovery; 0: no limit"
     )
-    oscillation_distance: float = param(0.5, unit="m", lo=0.0, clamps="both", doc="motion that counts as progress")
+    oscillation_distance: float = param(0.5, unit="m", lo=0.0, clamps="both", doc="distance that counts as progress")
     conservative_reset_dist: float = param(
-        3.0, unit="m", lo=0.0, clamps="both", doc="square kept by the first clearing"
+        3.0, unit="m", lo=0.0, clamps="both", doc="side of the square that the first clearing keeps"
     )
     clearing_radius: float = param(
-        -1.0, unit="m", doc="the second clearing keeps four times this; circumscribed_radius where not given"
+        -1.0, unit="m", doc="the second clearing keeps a square of four times this; default: circumscribed_radius"
     )
     circumscribed_radius: float = param(0.46, unit="m", lo=0.0)
     inscribed_radius: float = param(0.325, unit="m", lo=0.0, doc="accepted, has no effect")
     clearing_rotation_allowed: bool = param(True, doc="turn on the spot to recover")
-    recovery_behavior_enabled: bool = param(True, doc="recover at all")
-    shutdown_costmaps: bool = param(False, doc="accepted; the costmaps are always kept up to date")
+    recovery_behavior_enabled: bool = param(True, doc="run recovery behaviours at all")
+    shutdown_costmaps: bool = param(False, doc="accepted; the costmaps always stay up to date")
     make_plan_clear_costmap: bool = param(True, doc="accepted, has no effect")
-    make_plan_add_unreachable_goal: bool = param(True, doc="end make_plan at the goal asked for")
-    odom_topic: str = param("odom", doc="where velocities come from")
-    odom_timeout: float = param(0.5, unit="s", lo=0.0, doc="older odometry stops the robot, 0 is never; ours")
+    make_plan_add_unreachable_goal: bool = param(True, doc="end make_plan's path at the requested goal")
+    odom_topic: str = param("odom", doc="topic with the velocities")
+    odom_timeout: float = param(
+        0.5, unit="s", lo=0.0, doc="ours: maximum age of odometry; older stops the robot; 0: never"
+    )
     stop_without_map: bool = param(
-        False, doc="ours: stand while nobody publishes the map any more; false drives on by what it has, as upstream"
+        False, doc="ours: stop while nobody publishes the map; false: drive on with the last one, as upstream"
     )
     give_way: GiveWayParams = field(default_factory=GiveWayParams)
     movers: MoverParams = field(default_factory=MoverParams)

@@ -29,10 +29,10 @@ class ClearCostmapParams:
     """Parameters of clear_costmap_recovery/ClearCostmapRecovery."""
 
     reset_distance: float = param(3.0, unit="m", lo=0.0, doc="side of the square around the robot that is kept")
-    invert_area_to_clear: bool = param(False, doc="clear what is inside the square instead")
-    force_updating: bool = param(False, doc="compute the costs at once, not at the next update")
-    affected_maps: str = param("both", choices=("local", "global", "both"), doc="which costmaps are cleared")
-    layer_names: list[str] = param([], doc="layers that are cleared; all that sense where empty")
+    invert_area_to_clear: bool = param(False, doc="clear inside the square instead of outside")
+    force_updating: bool = param(False, doc="compute the costs at once instead of at the next update")
+    affected_maps: str = param("both", choices=("local", "global", "both"), doc="costmaps to clear")
+    layer_names: list[str] = param([], doc="layers to clear; empty: all layers with sensors")
 
 
 class ClearCostmap(Recovery):
@@ -83,12 +83,16 @@ class ClearCostmap(Recovery):
 class RotateParams:
     """Parameters of rotate_recovery/RotateRecovery (speeds default to the local planner's)."""
 
-    sim_granularity: float = param(0.017, unit="rad", lo=0.001, doc="step between poses that are checked")
+    sim_granularity: float = param(
+        0.017, unit="rad", lo=0.001, doc="angle between the poses that are checked for collisions"
+    )
     frequency: float = param(20.0, unit="Hz", lo=0.1, doc="accepted; the controller's frequency is used")
-    acc_lim_th: float = param(3.2, unit="rad/s^2", lo=0.01, doc="turning acceleration")
+    acc_lim_th: float = param(3.2, unit="rad/s^2", lo=0.01, doc="maximum turning acceleration")
     max_rotational_vel: float = param(1.0, unit="rad/s", lo=0.0, doc="top turning speed")
-    min_in_place_rotational_vel: float = param(0.4, unit="rad/s", lo=0.0, doc="slowest turn that moves the base")
-    yaw_goal_tolerance: float = param(0.1, unit="rad", lo=0.0, doc="how near to a full turn is one")
+    min_in_place_rotational_vel: float = param(
+        0.4, unit="rad/s", lo=0.0, doc="slowest turning speed that moves the base"
+    )
+    yaw_goal_tolerance: float = param(0.1, unit="rad", lo=0.0, doc="tolerance at the end of the full turn")
 
 
 class Rotate(Recovery):
@@ -146,11 +150,13 @@ def _is_free(costmap: LayeredCostmap, pose: Pose2D, angle: float, step: float) -
 class MoveSlowParams:
     """Parameters of move_slow_and_clear/MoveSlowAndClear."""
 
-    clearing_distance: float = param(0.5, unit="m", lo=0.0, doc="so far to each side of the robot is forgotten")
-    limited_trans_speed: float = param(0.25, unit="m/s", lo=0.01, doc="top speed afterwards")
-    limited_rot_speed: float = param(0.45, unit="rad/s", lo=0.01, doc="top turning speed afterwards")
-    limited_distance: float = param(0.3, unit="m", lo=0.0, doc="for so long a way")
-    planner_namespace: str = param("DWAPlannerROS", doc="accepted, has no effect: the planner in use is told")
+    clearing_distance: float = param(
+        0.5, unit="m", lo=0.0, doc="distance to each side of the robot within which marks are forgotten"
+    )
+    limited_trans_speed: float = param(0.25, unit="m/s", lo=0.01, doc="top speed after the clearing")
+    limited_rot_speed: float = param(0.45, unit="rad/s", lo=0.01, doc="top turning speed after the clearing")
+    limited_distance: float = param(0.3, unit="m", lo=0.0, doc="distance for which these limits hold")
+    planner_namespace: str = param("DWAPlannerROS", doc="accepted, has no effect: the limits go to the planner in use")
     max_trans_param_name: str = param("max_trans_vel", doc="accepted, has no effect")
     max_rot_param_name: str = param("max_rot_vel", doc="accepted, has no effect")
 

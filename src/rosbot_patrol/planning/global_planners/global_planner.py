@@ -37,14 +37,16 @@ class GlobalPlannerParams:
     """Parameters of GlobalPlanner."""
 
     allow_unknown: bool = param(True, doc="plan through unknown cells")
-    default_tolerance: float = param(0.0, unit="m", lo=0.0, doc="how far from the goal a plan may end")
+    default_tolerance: float = param(0.0, unit="m", lo=0.0, doc="maximum distance of the plan's end from the goal")
     lethal_cost: int = param(
-        253, lo=2, hi=255, clamps="both", doc="cells of this cost less one and more cannot be crossed"
+        253, lo=2, hi=255, clamps="both", doc="cells with at least this cost minus one are impassable"
     )
-    neutral_cost: int = param(50, lo=1, hi=255, clamps="both", doc="what crossing a free cell costs")
-    cost_factor: float = param(3.0, lo=0.01, hi=5.0, clamps="both", doc="what each unit of a cell's cost adds")
-    use_grid_path: bool = param(False, doc="plans step from cell to cell, in eight directions")
-    outline_map: bool = param(True, doc="the outermost cells are obstacles; false for a rolling window")
+    neutral_cost: int = param(50, lo=1, hi=255, clamps="both", doc="cost of crossing a free cell")
+    cost_factor: float = param(
+        3.0, lo=0.01, hi=5.0, clamps="both", doc="weight of a cell's cost, added to neutral_cost"
+    )
+    use_grid_path: bool = param(False, doc="plan from cell to cell, in eight directions")
+    outline_map: bool = param(True, doc="treat the outermost cells as obstacles; false for a rolling window")
     orientation_mode: int = param(
         1,
         lo=0,
@@ -54,7 +56,7 @@ class GlobalPlannerParams:
         "5 leftwards, 6 rightwards",
     )
     orientation_window_size: int = param(
-        1, lo=1, hi=255, clamps="both", doc="points on each side that a heading is taken from"
+        1, lo=1, hi=255, clamps="both", doc="number of points on each side from which a heading is computed"
     )
     use_dijkstra: bool = param(True, doc=_NO_EFFECT)
     use_quadratic: bool = param(True, doc=_NO_EFFECT)
@@ -65,7 +67,9 @@ class GlobalPlannerParams:
     planner_window_x: float = param(0.0, unit="m", doc=_NO_EFFECT + " (upstream's neither)")
     planner_window_y: float = param(0.0, unit="m", doc=_NO_EFFECT + " (upstream's neither)")
     planner_costmap_publish_frequency: float = param(0.0, unit="Hz", doc=_NO_EFFECT + " (upstream's neither)")
-    escape_radius: float = param(0.4, unit="m", lo=0.0, doc="how far a start near an obstacle may lead out; ours")
+    escape_radius: float = param(
+        0.4, unit="m", lo=0.0, doc="ours: maximum distance that a start close to an obstacle may lead out"
+    )
 
 
 def crossing_costs(params: GlobalPlannerParams) -> NDArray[np.float32]:

@@ -34,11 +34,13 @@ class NavfnParams:
     """Parameters of NavfnROS."""
 
     allow_unknown: bool = param(True, doc="plan through unknown cells")
-    default_tolerance: float = param(0.0, unit="m", lo=0.0, doc="how far from the goal a plan may end")
+    default_tolerance: float = param(0.0, unit="m", lo=0.0, doc="maximum distance of the plan's end from the goal")
     visualize_potential: bool = param(False, doc="accepted, has no effect")
-    planner_window_x: float = param(0.0, unit="m", doc="accepted, has no effect (upstream's neither)")
-    planner_window_y: float = param(0.0, unit="m", doc="accepted, has no effect (upstream's neither)")
-    escape_radius: float = param(0.4, unit="m", lo=0.0, doc="how far a start near an obstacle may lead out; ours")
+    planner_window_x: float = param(0.0, unit="m", doc="accepted, has no effect, as upstream")
+    planner_window_y: float = param(0.0, unit="m", doc="accepted, has no effect, as upstream")
+    escape_radius: float = param(
+        0.4, unit="m", lo=0.0, doc="ours: maximum distance that a start close to an obstacle may lead out"
+    )
 
 
 def crossing_costs(allow_unknown: bool) -> NDArray[np.float32]:
