@@ -39,19 +39,27 @@ _BESIDE = 0.1  # so far off its axis a range sensor's reading still tells that n
 class GuardParams:
     """Parameters of the collision guard."""
 
-    half_length: float = param(0.12, lo=0.01, unit="m", doc="footprint ahead of and behind base_link")
-    half_width: float = param(0.14, lo=0.01, unit="m", doc="footprint to either side")
-    gap: float = param(0.05, lo=0.0, unit="m", doc="kept free ahead in the direction of motion")
-    slack: float = param(0.01, lo=0.0, unit="m", doc="taken off the sides it does not move to (noise of the lidar)")
-    deceleration: float = param(1.0, lo=0.05, unit="m/s^2", doc="what the base surely brakes with")
-    turn_deceleration: float = param(3.0, lo=0.05, unit="rad/s^2", doc="the same for turning")
-    latency: float = param(0.2, lo=0.0, unit="s", doc="from the light on the obstacle to the brake")
-    min_points: int = param(2, lo=1, doc="beams that must agree on an obstacle")
-    stale_after: float = param(0.6, lo=0.05, unit="s", doc="older scans are not trusted")
-    stale_speed: float = param(0.1, lo=0.0, unit="m/s", doc="speed without a fresh scan")
-    stale_turn: float = param(0.4, lo=0.0, unit="rad/s", doc="turning without a fresh scan")
-    memory: float = param(20.0, lo=0.0, unit="s", doc="how long a thing in the lidar's blind ring is remembered")
-    range_memory: float = param(3.0, lo=0.0, unit="s", doc="how long what a range sensor met is remembered")
+    half_length: float = param(
+        0.12, lo=0.01, unit="m", doc="distance from base_link to the front and the rear of the footprint"
+    )
+    half_width: float = param(0.14, lo=0.01, unit="m", doc="distance from base_link to each side of the footprint")
+    gap: float = param(0.05, lo=0.0, unit="m", doc="distance kept from obstacles in the direction of motion")
+    slack: float = param(
+        0.01, lo=0.0, unit="m", doc="taken off the footprint on the sides that do not lead, for the lidar's noise"
+    )
+    deceleration: float = param(1.0, lo=0.05, unit="m/s^2", doc="deceleration that the base always reaches")
+    turn_deceleration: float = param(
+        3.0, lo=0.05, unit="rad/s^2", doc="turning deceleration that the base always reaches"
+    )
+    latency: float = param(0.2, lo=0.0, unit="s", doc="delay from the measurement to the brake")
+    min_points: int = param(2, lo=1, doc="minimum number of beams on an obstacle")
+    stale_after: float = param(0.6, lo=0.05, unit="s", doc="maximum age of a scan")
+    stale_speed: float = param(0.1, lo=0.0, unit="m/s", doc="maximum speed without a fresh scan")
+    stale_turn: float = param(0.4, lo=0.0, unit="rad/s", doc="maximum turning speed without a fresh scan")
+    memory: float = param(
+        20.0, lo=0.0, unit="s", doc="time for which obstacles closer than the lidar's range_min are remembered"
+    )
+    range_memory: float = param(3.0, lo=0.0, unit="s", doc="time for which obstacles of a range sensor are remembered")
 
 
 class RangeReading(NamedTuple):

@@ -24,15 +24,28 @@ _SUDDEN = 0.6  # [s]
 class GiveWayParams:
     """Parameters of giving way."""
 
-    clearance: float = param(0.75, lo=0.0, unit="m", doc="from base_link to the middle of who passes")
-    near: float = param(1.4, lo=0.0, unit="m", doc="who is nearer and comes nearer is waited for in any case")
-    beside: float = param(0.6, lo=0.0, unit="m", doc="who is nearer is waited for until they clearly leave")
-    horizon: float = param(2.2, lo=0.0, unit="s", doc="how far it is looked ahead; 0 gives way to nobody")
-    turn_horizon: float = param(1.2, lo=0.0, unit="s", doc="the same for turning on the spot")
-    least_speed: float = param(0.15, lo=0.0, unit="m/s", doc="who is slower is an obstacle like others")
-    least_age: float = param(0.25, lo=0.0, unit="s", doc="who was followed for less is not believed, unless near")
-    hold: float = param(0.5, lo=0.0, unit="s", doc="it stands at least so long")
-    hold_near: float = param(1.5, lo=0.0, unit="s", doc="the same after somebody was near, who may go on at once")
+    clearance: float = param(
+        0.75, lo=0.0, unit="m", doc="minimum distance from base_link to the middle of a passing person"
+    )
+    near: float = param(1.4, lo=0.0, unit="m", doc="the robot waits for anyone nearer than this who comes nearer")
+    beside: float = param(
+        0.6, lo=0.0, unit="m", doc="the robot waits for anyone nearer than this until they clearly leave"
+    )
+    horizon: float = param(2.2, lo=0.0, unit="s", doc="prediction time; 0: give way to nobody")
+    turn_horizon: float = param(1.2, lo=0.0, unit="s", doc="prediction time for turning on the spot")
+    least_speed: float = param(
+        0.15, lo=0.0, unit="m/s", doc="minimum speed of a moving object; slower ones are ordinary obstacles"
+    )
+    least_age: float = param(
+        0.25, lo=0.0, unit="s", doc="minimum tracking time of a moving object, unless it is within `near`"
+    )
+    hold: float = param(0.5, lo=0.0, unit="s", doc="minimum duration of a stop")
+    hold_near: float = param(
+        1.5,
+        lo=0.0,
+        unit="s",
+        doc="minimum duration of a stop for somebody within `near`, who may set off again at once",
+    )
 
 
 class GiveWay:

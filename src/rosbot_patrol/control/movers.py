@@ -38,16 +38,18 @@ _NEVER = -math.inf
 
 @dataclass(frozen=True, kw_only=True)
 class MoverParams:
-    """Parameters of the watch for what moves."""
+    """Parameters of the detection of moving objects."""
 
-    reach: float = param(4.0, lo=0.5, hi=20.0, unit="m", doc="nothing farther is followed")
-    memory: float = param(2.0, lo=0.2, unit="s", doc="how long a place counts as seen free")
-    still_after: float = param(1.2, lo=0.2, unit="s", doc="what stands that long is no mover any more")
-    min_points: int = param(3, lo=1, doc="beams that must agree on a thing")
-    gap: float = param(0.45, lo=0.05, unit="m", doc="nearer points are one thing: two legs, one person")
-    jump: float = param(0.6, lo=0.1, unit="m", doc="farthest that a thing is from where it was expected")
-    window: float = param(0.7, lo=0.2, unit="s", doc="places of so long give the velocity")
-    coast: float = param(0.6, lo=0.0, unit="s", doc="how long a thing that is hidden is believed to go on")
+    reach: float = param(4.0, lo=0.5, hi=20.0, unit="m", doc="maximum range of tracked objects")
+    memory: float = param(2.0, lo=0.2, unit="s", doc="time for which a place counts as seen free")
+    still_after: float = param(1.2, lo=0.2, unit="s", doc="standstill after which an object no longer counts as moving")
+    min_points: int = param(3, lo=1, doc="minimum number of beams on an object")
+    gap: float = param(
+        0.45, lo=0.05, unit="m", doc="points closer than this belong to one object: two legs, one person"
+    )
+    jump: float = param(0.6, lo=0.1, unit="m", doc="maximum distance of an object from its predicted position")
+    window: float = param(0.7, lo=0.2, unit="s", doc="time span of the positions that give the velocity")
+    coast: float = param(0.6, lo=0.0, unit="s", doc="time for which a hidden object is extrapolated")
 
 
 class Mover(NamedTuple):

@@ -14,25 +14,25 @@ from rosbot_patrol.params import param
 class SourceParams:
     """One velocity topic."""
 
-    name: str = param(doc="what it is called in messages")
-    topic: str = param(doc="geometry_msgs/Twist")
-    timeout: float = param(0.5, lo=0.0, unit="s", doc="silence after which it has no say; 0: never")
-    priority: int = param(lo=0, hi=255, doc="the highest that speaks is heard")
+    name: str = param(doc="name in messages")
+    topic: str = param(doc="topic (geometry_msgs/Twist)")
+    timeout: float = param(0.5, lo=0.0, unit="s", doc="silence after which the source is ignored; 0: never")
+    priority: int = param(lo=0, hi=255, doc="the active source of the highest priority drives")
 
 
 @dataclass(frozen=True, kw_only=True)
 class LockParams:
-    """One lock: while it is true, sources of lower priority are not heard."""
+    """One lock: while it is true, sources of lower priority are ignored."""
 
-    name: str = param(doc="what it is called in messages")
-    topic: str = param(doc="std_msgs/Bool")
+    name: str = param(doc="name in messages")
+    topic: str = param(doc="topic (std_msgs/Bool)")
     timeout: float = param(0.0, lo=0.0, unit="s", doc="silence after which it counts as true; 0: never")
-    priority: int = param(lo=0, hi=255, doc="sources below it are locked")
+    priority: int = param(lo=0, hi=255, doc="sources of lower priority are locked")
 
 
 @dataclass(frozen=True, kw_only=True)
 class MuxParams:
-    """twist_mux's configuration file."""
+    """Keys of twist_mux's configuration file."""
 
     topics: tuple[SourceParams, ...] = param(doc="velocity sources")
     locks: tuple[LockParams, ...] = param((), doc="locks")

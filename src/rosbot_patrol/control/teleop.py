@@ -60,12 +60,14 @@ Ctrl-C ends
 class TeleopParams:
     """Parameters of teleop_twist_keyboard."""
 
-    speed: float = param(0.5, lo=0.0, unit="m/s", doc="speed at the start")
-    turn: float = param(1.0, lo=0.0, unit="rad/s", doc="turning at the start")
-    speed_limit: float = param(1000.0, lo=0.0, unit="m/s", doc="highest speed that can be set")
-    turn_limit: float = param(1000.0, lo=0.0, unit="rad/s", doc="highest turning that can be set")
-    repeat_rate: float = param(0.0, lo=0.0, hi=1000.0, unit="1/s", doc="the last command is repeated; 0: it is not")
-    key_timeout: float = param(0.0, lo=0.0, unit="s", doc="stop so long after the last key; 0: never")
+    speed: float = param(0.5, lo=0.0, unit="m/s", doc="initial speed")
+    turn: float = param(1.0, lo=0.0, unit="rad/s", doc="initial turning speed")
+    speed_limit: float = param(1000.0, lo=0.0, unit="m/s", doc="maximum speed that can be set")
+    turn_limit: float = param(1000.0, lo=0.0, unit="rad/s", doc="maximum turning speed that can be set")
+    repeat_rate: float = param(
+        0.0, lo=0.0, hi=1000.0, unit="1/s", doc="rate at which the last command is repeated; 0: never"
+    )
+    key_timeout: float = param(0.0, lo=0.0, unit="s", doc="time after the last key at which the robot stops; 0: never")
     stamped: bool = param(False, doc="publish TwistStamped")
     frame_id: str = param("", doc="frame of a TwistStamped")
 

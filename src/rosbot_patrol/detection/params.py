@@ -10,10 +10,10 @@ from rosbot_patrol.params import param
 
 @dataclass(frozen=True, kw_only=True)
 class CameraTopic:
-    """Where pictures come from."""
+    """Topic of the images."""
 
-    topic: str = param("/camera/image_raw", doc="picture topic, its base name where `image_transport` is not raw")
-    queue_size: int = param(1, lo=1, doc="read for compatibility; only the newest picture is ever kept")
+    topic: str = param("/camera/image_raw", doc="image topic; its base name if `image_transport` is not raw")
+    queue_size: int = param(1, lo=1, doc="accepted, has no effect: only the newest image is kept")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,27 +25,27 @@ class Subscribers:
 
 @dataclass(frozen=True, kw_only=True)
 class FoundObject:
-    """The topic that counts boxes."""
+    """Topic with the number of boxes."""
 
-    topic: str = param("found_object", doc="number of boxes of each picture")
+    topic: str = param("found_object", doc="number of boxes in each image")
     queue_size: int = param(1, lo=1)
     latch: bool = param(False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoundingBoxes:
-    """The topic with the boxes."""
+    """Topic with the boxes."""
 
-    topic: str = param("bounding_boxes", doc="boxes of a picture in which something is seen")
+    topic: str = param("bounding_boxes", doc="boxes of each image that shows something")
     queue_size: int = param(1, lo=1)
     latch: bool = param(False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class DetectionImage:
-    """The topic with the drawn picture."""
+    """Topic with the annotated image."""
 
-    topic: str = param("detection_image", doc="picture with its boxes drawn, sent only while somebody listens")
+    topic: str = param("detection_image", doc="image with its boxes drawn, sent only while somebody subscribes")
     queue_size: int = param(1, lo=1)
     latch: bool = param(True)
 
@@ -61,10 +61,10 @@ class Publishers:
 
 @dataclass(frozen=True, kw_only=True)
 class ActionName:
-    """The action's name."""
+    """Name of the action."""
 
     topic: str = param("check_for_objects", doc="name of the action")
-    name: str = param("", doc="stands in many files and is not read, by upstream neither")
+    name: str = param("", doc="accepted, has no effect, as upstream; present in many files")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,33 +76,33 @@ class Actions:
 
 @dataclass(frozen=True, kw_only=True)
 class ImageView:
-    """What a person in front of it sees."""
+    """Output for a person at the screen."""
 
-    enable_opencv: bool = param(True, doc="a window with the boxes, where there is a display")
-    wait_key_delay: int = param(3, unit="ms", doc="read for compatibility, as upstream")
-    enable_console_output: bool = param(False, doc="print rate and objects, once a second at most")
-    use_darknet: bool = param(False, doc="read for compatibility, as upstream")
+    enable_opencv: bool = param(True, doc="window with the boxes, if there is a display")
+    wait_key_delay: int = param(3, unit="ms", doc="accepted, has no effect")
+    enable_console_output: bool = param(False, doc="print rate and objects, at most once a second")
+    use_darknet: bool = param(False, doc="accepted, has no effect")
 
 
 @dataclass(frozen=True, kw_only=True)
 class FileName:
-    """A file's name."""
+    """Name of a file."""
 
-    name: str = param("", doc="name of the file in its folder; where neither folder is given, of our own network")
+    name: str = param("", doc="name of the file in its folder; without both folders, one of our own network")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Threshold:
-    """The threshold."""
+    """Threshold of detections."""
 
-    value: float = param(0.3, lo=0.0, hi=1.0, doc="least objectness, and least probability of a class")
+    value: float = param(0.3, lo=0.0, hi=1.0, doc="minimum objectness, and minimum probability of a class")
 
 
 @dataclass(frozen=True, kw_only=True)
 class DetectionClasses:
-    """The classes."""
+    """Names of the classes."""
 
-    names: list[str] = param([], doc="names of the network's classes; where empty, of the .names file beside the cfg")
+    names: list[str] = param([], doc="names of the network's classes; empty: from the .names file beside the cfg")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,19 +127,23 @@ class DarknetParams:
     weights_path: str = param("", doc="folder of the weights file")
     config_path: str = param("", doc="folder of the network file")
     network: str = param("darknet", choices=("darknet", "hog"), doc="hog: OpenCV's people detector, without any files")
-    image_transport: str = param("raw", choices=("raw", "compressed"), doc="how pictures come in")
-    publish_empty: bool = param(False, doc="send bounding_boxes also of pictures in which nothing is seen")
-    enabled: bool = param(True, doc="look from the start; the service ~enable switches it")
-    max_rate: float = param(0.0, unit="Hz", lo=0.0, doc="most pictures looked at in a second, 0 for all")
+    image_transport: str = param("raw", choices=("raw", "compressed"), doc="transport of the images")
+    publish_empty: bool = param(False, doc="publish bounding_boxes for images without a detection, too")
+    enabled: bool = param(True, doc="detect from the start; the service ~enable switches it")
+    max_rate: float = param(0.0, unit="Hz", lo=0.0, doc="maximum rate of images processed; 0: all")
     standby_after: float = param(
         0.0,
         unit="s",
         lo=0.0,
-        doc="look only while no other detector on the same topics was heard for so long; 0: always",
+        doc="silence of other detectors on the same topics after which this one starts; 0: always run",
     )
-    threads: int = param(1, lo=1, doc="cores that the network may use")
-    camera_timeout: float = param(2.0, unit="s", lo=0.1, doc="a camera silent for longer has stopped (wall time)")
-    frozen_timeout: float = param(10.0, unit="s", lo=0.0, doc="pictures the same for longer are a fault, 0 for never")
+    threads: int = param(1, lo=1, doc="number of cores for the network")
+    camera_timeout: float = param(
+        2.0, unit="s", lo=0.1, doc="silence after which the camera counts as stopped (wall time)"
+    )
+    frozen_timeout: float = param(
+        10.0, unit="s", lo=0.0, doc="time of unchanging images after which the camera counts as frozen; 0: never"
+    )
 
     def network_files(self, own_models: str) -> tuple[str, str]:
         """Paths of cfg and weights; without any folder given our own network in `own_models`."""

@@ -22,12 +22,12 @@ _NEARER = 0.15  # that is progress [m]
 
 @dataclass(frozen=True, kw_only=True)
 class ExplorerParams:
-    """When to go on to another border."""
+    """When to go on to another frontier."""
 
     frontiers: FrontierParams = FrontierParams()
-    progress_timeout: float = param(30.0, unit="s", lo=1.0, doc="a goal that comes no nearer for so long is given up")
-    look_again: float = param(2.0, unit="s", lo=0.1, doc="between two looks at the map while driving")
-    map_patience: float = param(15.0, unit="s", lo=0.5, doc="longest wait for the map that shows what was seen")
+    progress_timeout: float = param(30.0, unit="s", lo=1.0, doc="time without progress after which a goal is given up")
+    look_again: float = param(2.0, unit="s", lo=0.1, doc="time between evaluations of the map while driving")
+    map_patience: float = param(15.0, unit="s", lo=0.5, doc="longest wait for the map that includes the latest scans")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,15 +26,15 @@ _FREE_BELOW, _WALL_ABOVE = 25, 65  # occupancy, map_server's thresholds
 
 @dataclass(frozen=True, kw_only=True)
 class FrontierParams:
-    """What is worth a drive."""
+    """Frontiers that are worth a drive."""
 
-    robot_radius: float = param(0.2, unit="m", lo=0.05, doc="no goal, and no way to one, lies nearer to an obstacle")
-    frontier_length: float = param(0.5, unit="m", lo=0.05, doc="shorter borders to the unknown are left alone")
+    robot_radius: float = param(0.2, unit="m", lo=0.05, doc="minimum distance of goals and routes from obstacles")
+    frontier_length: float = param(0.5, unit="m", lo=0.05, doc="minimum length of a frontier")
     frontier_clearance: float = param(
-        0.12, unit="m", lo=0.0, doc="what is nearer to an obstacle is no border: beams pass along walls"
+        0.12, unit="m", lo=0.0, doc="minimum distance of a frontier from obstacles: beams pass along walls"
     )
-    frontier_near: float = param(1.0, unit="m", lo=0.1, doc="so near to a border the robot has to get")
-    frontier_gain: float = param(0.8, lo=0.0, doc="metres of way that a metre of border is worth")
+    frontier_near: float = param(1.0, unit="m", lo=0.1, doc="maximum distance of a goal from its frontier")
+    frontier_gain: float = param(0.8, lo=0.0, doc="metres of route that a metre of frontier is worth")
 
 
 @dataclass(frozen=True, kw_only=True)

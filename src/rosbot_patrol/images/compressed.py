@@ -35,12 +35,12 @@ _BY_CHANNELS = {1: "GRAY", 3: "BGR", 4: "BGRA"}
 class CompressedParams:
     """Parameters of a compressed publisher; names and defaults as compressed_image_transport's."""
 
-    format: str = param("jpeg", choices=("jpeg", "png"), doc="how pictures are compressed")
-    jpeg_quality: int = param(80, lo=1, hi=100, doc="quality of a jpeg")
+    format: str = param("jpeg", choices=("jpeg", "png"), doc="compression of the images")
+    jpeg_quality: int = param(80, lo=1, hi=100, doc="quality of JPEG")
     jpeg_progressive: bool = param(False)
     jpeg_optimize: bool = param(False)
     jpeg_restart_interval: int = param(0, lo=0, hi=65535)
-    png_level: int = param(9, lo=1, hi=9, doc="effort of a png")
+    png_level: int = param(9, lo=1, hi=9, doc="compression effort of PNG")
 
     @property
     def plain(self) -> bool:

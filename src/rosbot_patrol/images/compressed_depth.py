@@ -31,10 +31,10 @@ METRES, MILLIMETRES = ("32FC1",), ("16UC1", "mono16")
 class CompressedDepthParams:
     """Parameters of a compressedDepth publisher; names and defaults as compressed_depth_image_transport's."""
 
-    format: str = param("png", choices=("png", "rvl"), doc="how the values are compressed")
-    depth_max: float = param(10.0, unit="m", lo=1.0, hi=100.0, doc="what is farther is unknown")
+    format: str = param("png", choices=("png", "rvl"), doc="compression of the values")
+    depth_max: float = param(10.0, unit="m", lo=1.0, hi=100.0, doc="maximum depth; larger values become unknown")
     depth_quantization: float = param(100.0, lo=1.0, hi=150.0, doc="depth at which the accuracy is 1 m [m]")
-    png_level: int = param(9, lo=1, hi=9, doc="effort of a png")
+    png_level: int = param(9, lo=1, hi=9, doc="compression effort of PNG")
 
 
 def compress_depth(picture: Picture, params: CompressedDepthParams) -> tuple[str, bytes]:

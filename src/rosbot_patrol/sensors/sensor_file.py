@@ -31,16 +31,20 @@ def _bad_name(value: str) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorSpec:
-    """One motion sensor: a key each of the file's entries."""
+    """One motion sensor: the keys of an entry in the file."""
 
-    id: int = param(lo=0, hi=255, doc="what it reports in /motion_trigger")
-    room: int = param(lo=0, hi=255, doc="number of the room that it watches, of the points file")
-    name: str = param("", check=_bad_name, doc="for people; empty: its room's name says enough")
-    enabled: bool = param(True, doc="false: out of service, neither watched nor answered")
+    id: int = param(lo=0, hi=255, doc="id that it reports in /motion_trigger")
+    room: int = param(lo=0, hi=255, doc="number of the room that it watches, as in the points file")
+    name: str = param("", check=_bad_name, doc="name in messages; empty: the room's name")
+    enabled: bool = param(True, doc="false: out of service: neither supervised nor answered")
     heartbeat: float = param(
-        0.5, unit="s", lo=0.0, hi=3600.0, doc="it reports at least this often; 0: only motion, its silence says nothing"
+        0.5,
+        unit="s",
+        lo=0.0,
+        hi=3600.0,
+        doc="longest time between its reports; 0: it reports motion only, and its silence means nothing",
     )
-    peers: tuple[str, ...] = param((), doc="addresses and networks that it may speak from; empty: any")
+    peers: tuple[str, ...] = param((), doc="addresses and networks that it may connect from; empty: any")
 
     def may_speak_from(self, host: str) -> bool:
         """Whether an address is one of `peers`; what is no address, such as a serial device, is."""

@@ -28,40 +28,49 @@ class SerialNodeParams:
     port: str = param(DEFAULT_PORT, doc="serial device, or 'tcp' for a TCP server")
     baud: int = param(57600, lo=50, hi=4_000_000, unit="baud", reads_text=True, doc="speed of the serial device")
     tcp_port: int = param(
-        DEFAULT_TCP_PORT, lo=0, hi=65535, reads_text=True, doc="TCP port; without it /rosserial_embeddedlinux/tcp_port"
+        DEFAULT_TCP_PORT, lo=0, hi=65535, reads_text=True, doc="TCP port; default: /rosserial_embeddedlinux/tcp_port"
     )
-    fork_server: bool = param(False, doc="accepted and not needed: one process serves all clients")
-    fix_pyserial_for_test: bool = param(False, doc="accepted and not needed: pseudo-terminals work as they are")
+    fork_server: bool = param(False, doc="accepted, not needed: one process serves all clients")
+    fix_pyserial_for_test: bool = param(False, doc="accepted, not needed: pseudo-terminals work without it")
     tcp_ports: tuple[int, ...] = param((), lo=0, hi=65535, reads_text=True, doc="further TCP ports of the same process")
     host: str = param("", doc="address to listen on; empty: every address, IPv4 and IPv6")
-    restrict: str = param("tcp", choices=("tcp", "always", "never"), doc="where the allow_ lists hold")
+    restrict: str = param("tcp", choices=("tcp", "always", "never"), doc="links restricted by the allow_ lists")
     allow_publish: tuple[str, ...] = param(MOTION_TRIGGER_RULES, doc="'TOPIC TYPE' that devices may publish")
     allow_subscribe: tuple[str, ...] = param((), doc="'TOPIC TYPE' that devices may subscribe to")
     allow_services: tuple[str, ...] = param(
-        (), doc="'SERVICE TYPE' that devices may offer or call; 'offer' or 'call' before it: only that"
+        (), doc="'SERVICE TYPE' that devices may offer or call; a prefix 'offer' or 'call' allows only that"
     )
-    allow_parameters: tuple[str, ...] = param((), doc="parameters that devices are told")
-    key_file: str = param("", doc="keys of the sensors, each TCP client must prove that it has one; empty: none needed")
+    allow_parameters: tuple[str, ...] = param((), doc="parameters that devices may read")
+    key_file: str = param(
+        "", doc="file with the sensors' keys, which every TCP client must prove to hold; empty: no keys needed"
+    )
     allow_peers: tuple[str, ...] = param((), doc="addresses and networks that may connect; empty: all")
     allow_sensors: tuple[str, ...] = param(
-        (), doc="'NETWORK IDS', sensors that peers may be: '192.168.1.12 2', 'fc94::/16 1-9 12'; empty: any"
+        (), doc="'NETWORK IDS': sensor ids allowed by address: '192.168.1.12 2', 'fc94::/16 1-9 12'; empty: any"
     )
-    max_clients: int = param(600, lo=1, hi=20000, doc="TCP clients at a time, all ports together")
-    max_clients_per_address: int = param(64, lo=0, doc="TCP clients of one address at a time; 0: any")
+    max_clients: int = param(600, lo=1, hi=20000, doc="maximum number of TCP clients on all ports together")
+    max_clients_per_address: int = param(64, lo=0, doc="maximum number of TCP clients of one address; 0: no limit")
     max_strangers: int = param(
-        32, lo=1, doc="TCP clients of one address that proved and announced nothing; a newcomer ends the oldest"
+        32, lo=1, doc="maximum number of clients of one address without key and topic; a newcomer replaces the oldest"
     )
-    max_rate: float = param(200.0, lo=0.0, unit="1/s", doc="frames a second and client, beyond it reads slowly; 0: any")
+    max_rate: float = param(
+        200.0,
+        lo=0.0,
+        unit="1/s",
+        doc="frames per second from a client; faster clients are read more slowly; 0: no limit",
+    )
     max_rate_per_address: float = param(
-        2000.0, lo=0.0, unit="1/s", doc="frames a second of all clients of one address, likewise; 0: any"
+        2000.0, lo=0.0, unit="1/s", doc="frames per second from all clients of one address, likewise; 0: no limit"
     )
-    max_topics: int = param(16, lo=1, hi=1000, doc="topics and services of one restricted client")
-    max_payload: int = param(1024, lo=64, hi=32767, unit="bytes", doc="longest message of a restricted client")
-    silence_timeout: float = param(15.0, lo=1.0, unit="s", doc="hang up on a TCP client not heard of for that long")
+    max_topics: int = param(16, lo=1, hi=1000, doc="maximum number of topics and services of a restricted client")
+    max_payload: int = param(
+        1024, lo=64, hi=32767, unit="bytes", doc="maximum length of a message from a restricted client"
+    )
+    silence_timeout: float = param(15.0, lo=1.0, unit="s", doc="silence after which a TCP client is disconnected")
     sensor_timeout: float = param(
-        10.0, lo=1.0, unit="s", doc="a motion sensor without a heartbeat for that long is silent"
+        10.0, lo=1.0, unit="s", doc="time without a heartbeat after which a motion sensor counts as silent"
     )
-    record_bytes: bool = param(False, doc="publish what devices send, byte for byte, on ~bytes, for bags to replay")
+    record_bytes: bool = param(False, doc="publish the bytes that devices send on ~bytes, for bags to replay")
 
     @property
     def is_tcp(self) -> bool:
