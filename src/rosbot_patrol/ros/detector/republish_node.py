@@ -51,16 +51,18 @@ FOREIGN_KEYS = ("enable",)
 class DecoderParams:
     """Parameters of a compressed subscriber, as upstream's."""
 
-    mode: str = param("unchanged", choices=("unchanged", "color", "gray"), doc="how a picture is decoded")
+    mode: str = param("unchanged", choices=("unchanged", "color", "gray"), doc="decoding of the image")
 
 
 @dataclass(frozen=True, kw_only=True)
 class RepublishParams:
     """Parameters of republish."""
 
-    image_transport: str = param("", doc="transport of the input, in place of the first argument")
+    image_transport: str = param("", doc="transport of the input; replaces the first argument")
     compressed: DecoderParams = field(default_factory=DecoderParams)
-    camera_timeout: float = param(2.0, unit="s", lo=0.1, doc="an input silent for longer has stopped (wall time)")
+    camera_timeout: float = param(
+        2.0, unit="s", lo=0.1, doc="silence after which the input counts as stopped (wall time)"
+    )
 
 
 def main() -> None:

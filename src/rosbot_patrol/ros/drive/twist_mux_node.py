@@ -57,10 +57,12 @@ REPEAT_LOG = 15.0
 class TwistMuxParams(MuxParams):
     """Parameters of twist_mux."""
 
-    guard: bool = param(True, doc="slow and stop for what the lidar sees")
+    guard: bool = param(True, doc="slow down and stop for obstacles that the lidar sees")
     base_frame: str = param("base_link", doc="frame of the footprint")
     odom_frame: str = param("odom", doc="frame in which motion between scans is measured")
-    range_topics: tuple[str, ...] = param((), doc="sensor_msgs/Range near the floor that the guard stops for too")
+    range_topics: tuple[str, ...] = param(
+        (), doc="topics of sensor_msgs/Range near the floor; the guard stops for them, too"
+    )
     collision_guard: GuardParams = dataclasses.field(default_factory=GuardParams)
     give_way: GiveWayParams = dataclasses.field(default_factory=lambda: GiveWayParams(horizon=1.5))
     movers: MoverParams = dataclasses.field(default_factory=MoverParams)

@@ -41,8 +41,8 @@ GREEN = ColorRGBA(0.1, 0.8, 0.3, 0.9)
 class ExploreParams:
     """Parameters of the node explore."""
 
-    save_map: str = param("", doc="NAME: the map is written to NAME.pgm and NAME.yaml at the end; empty: it is not")
-    base_frame: str = param("base_link", doc="of the robot")
+    save_map: str = param("", doc="NAME: write the final map to NAME.pgm and NAME.yaml; empty: do not save it")
+    base_frame: str = param("base_link", doc="frame of the robot")
     explorer: ExplorerParams = ExplorerParams()
 
 

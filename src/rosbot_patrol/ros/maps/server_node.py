@@ -41,9 +41,11 @@ class MapServerParams:
     """Parameters of map_server; names and defaults as upstream."""
 
     frame_id: str = param("map", doc="frame of the map")
-    negate: int = param(0, choices=(0, 1), doc="white is a wall (only for a bare picture)")
-    occupied_thresh: float = param(0.65, lo=0.0, hi=1.0, doc="darkness of a wall (only for a bare picture)")
-    free_thresh: float = param(0.196, lo=0.0, hi=1.0, doc="darkness of the floor (only for a bare picture)")
+    negate: int = param(0, choices=(0, 1), doc="white is occupied (only for a bare image)")
+    occupied_thresh: float = param(
+        0.65, lo=0.0, hi=1.0, doc="darkness above which a cell is occupied (only for a bare image)"
+    )
+    free_thresh: float = param(0.196, lo=0.0, hi=1.0, doc="darkness below which a cell is free (only for a bare image)")
 
 
 class MapServer:

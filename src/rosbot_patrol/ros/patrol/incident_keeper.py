@@ -50,12 +50,12 @@ _PATIENCE = 3.0  # [s] more than a clip should take
 
 @dataclass(frozen=True, kw_only=True)
 class RecordParams:
-    """Which incidents get a report of their own on the disk."""
+    """Incidents that get a report of their own on the disk."""
 
     report_verdicts: list[str] = param(
         ["confirmed", "unverified"],
         choices=("confirmed", "clear", "unreachable", "unverified"),
-        doc="incidents of these verdicts get a report.html at once; `incidents report` makes one of any",
+        doc="verdicts of incidents that get a report.html at once; `incidents report` makes one for any",
     )
 
 

@@ -56,15 +56,13 @@ MAX_WAITING = 20_000  # messages between two steps; more than a flood can need
 
 @dataclass(frozen=True, kw_only=True)
 class SensorWatchParams:
-    """The node's own parameters; those of mail, times and looks come beside them."""
+    """The node's own parameters; mail, times and looks have their own declarations."""
 
-    path_to_params: str = param(doc="points file, which names the rooms")
-    sensors: str = param(
-        "", doc="file of the sensors; empty or none: each room's sensor has the room's number as its id"
-    )
-    motion_sensors: str = param("", doc="the simulator's file, to hold `sensors` against; empty: none")
+    path_to_params: str = param(doc="points file with the names of the rooms")
+    sensors: str = param("", doc="sensors file; empty or missing: a sensor's id is the number of its room")
+    motion_sensors: str = param("", doc="the simulator's sensors file, compared with `sensors`; empty: none")
     state_dir: str = param(
-        "", doc="folder of notices that wait, as the patrol's; empty: rosbot_patrol(-NAMESPACE) in ROS's home"
+        "", doc="folder of waiting notices, the patrol's own; empty: rosbot_patrol(-NAMESPACE) in ROS's home"
     )
 
 

@@ -21,9 +21,9 @@ from rosbot_patrol.yaml_files import read_mapping
 
 @dataclass(frozen=True, kw_only=True)
 class WalkParams:
-    """How the intruder comes in."""
+    """Path and speed of the intruder."""
 
-    path: list[list[float]] = param(doc="points x, y of the walk in the frame map; the first is where they appear")
+    path: list[list[float]] = param(doc="points x, y of the walk in the map frame; the intruder appears at the first")
     speed: float = param(0.8, unit="m/s", lo=0.05, hi=3.0, doc="walking speed")
 
 
@@ -31,10 +31,10 @@ class WalkParams:
 class DemoParams:
     """Parameters of the node demo_intruder."""
 
-    walks: str = param(doc="yaml file: for each room a path and a speed")
-    room: int = param(5, lo=0, doc="room that the intruder walks into")
-    delay: float = param(3.0, unit="s", lo=0.0, doc="time on guard before they come")
-    look: str = param("", doc="name of the intruder's look, empty: drawn from the simulator's seed")
+    walks: str = param(doc="yaml file with a path and a speed for each room")
+    room: int = param(5, lo=0, doc="room that the intruder enters")
+    delay: float = param(3.0, unit="s", lo=0.0, doc="time on guard before the intruder appears")
+    look: str = param("", doc="name of the intruder's appearance; empty: drawn from the simulator's seed")
     simulator: str = param("simulator", doc="node name of the simulator")
 
 

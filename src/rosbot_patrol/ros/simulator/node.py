@@ -64,30 +64,32 @@ _BEHIND = 0.5  # what is farther behind the clock is late for the nodes that lis
 class SimulatorParams(EngineParams):
     """Parameters of the node simulator: its own, and those of the engine's parts."""
 
-    world: str = param("", doc="SDF file of the world, empty: a floor without walls")
-    model_path: tuple[str, ...] = param((), doc="folders of model://, before GAZEBO_MODEL_PATH and ~/.gazebo/models")
-    robot: bool = param(True, doc="place the robot at the start; false waits for ~spawn_robot")
-    urdf: str = param("", doc="URDF file of the robot, empty: the parameter /robot_description")
-    x: float = param(0.0, unit="m", doc="where the robot starts")
-    y: float = param(0.0, unit="m", doc="where the robot starts")
-    yaw: float = param(0.0, unit="rad", doc="where the robot starts")
-    rate: float = param(1.0, lo=0.0, doc="real-time factor, 0: as fast as it goes")
-    seed: int = param(1, lo=0, doc="of all noise")
-    paused: bool = param(False, doc="begin paused")
-    gui: bool = param(False, doc="a window with the house from above, where there is a display")
-    odometry: str = param("encoder", choices=("encoder", "ground_truth"), doc="what /odom tells")
-    motion_sensors: str = param("", doc="file of the motion sensors, empty: none")
-    prewarmed: bool = param(True, doc="the motion sensors need no minute of warm-up")
-    bridge_host: str = param("localhost", doc="where the bridge of the motion sensors runs")
+    world: str = param("", doc="SDF file of the world; empty: a floor without walls")
+    model_path: tuple[str, ...] = param(
+        (), doc="folders of model://, searched before GAZEBO_MODEL_PATH and ~/.gazebo/models"
+    )
+    robot: bool = param(True, doc="place the robot at the start; false: wait for ~spawn_robot")
+    urdf: str = param("", doc="URDF file of the robot; empty: the parameter /robot_description")
+    x: float = param(0.0, unit="m", doc="initial position")
+    y: float = param(0.0, unit="m", doc="initial position")
+    yaw: float = param(0.0, unit="rad", doc="initial heading")
+    rate: float = param(1.0, lo=0.0, doc="real-time factor; 0: as fast as possible")
+    seed: int = param(1, lo=0, doc="seed of all noise")
+    paused: bool = param(False, doc="start paused")
+    gui: bool = param(False, doc="window with the house from above, if there is a display")
+    odometry: str = param("encoder", choices=("encoder", "ground_truth"), doc="source of /odom")
+    motion_sensors: str = param("", doc="file of the motion sensors; empty: none")
+    prewarmed: bool = param(True, doc="motion sensors are warm at the start")
+    bridge_host: str = param("localhost", doc="host of the motion sensors' bridge")
     bridge_port: int = param(
         DEFAULT_TCP_PORT, lo=1, hi=65535, doc="TCP port of the first bridge, which is 11411 in the sensors' file"
     )
-    clock: bool = param(True, doc="publish /clock; false: keep to the time that another node tells")
+    clock: bool = param(True, doc="publish /clock; false: follow another node's clock")
     key_file: str = param(
-        "", doc="keys by which the motion sensors prove themselves to a bridge that asks; empty: none"
+        "", doc="keys with which the motion sensors prove themselves to a bridge that asks; empty: none"
     )
-    scenario: str = param("", doc="file of a scenario to play; what it says of world, sensors, seed and start counts")
-    scenario_watched: bool = param(False, doc="begin it only when somebody listens to ~scenario")
+    scenario: str = param("", doc="file of a scenario to play; its world, sensors, seed and start take precedence")
+    scenario_watched: bool = param(False, doc="start the scenario only when somebody listens to ~scenario")
     rates: RateParams = field(default_factory=RateParams)
     lockstep: LockstepParams = field(default_factory=LockstepParams)
 

@@ -28,17 +28,17 @@ _RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")  # advertised b
 
 @dataclass(frozen=True, kw_only=True)
 class RateParams:
-    """How often each thing is published, in simulated time: on average, each at a whole hundredth of a second."""
+    """Publishing rates in simulated time: on average, each at a whole hundredth of a second."""
 
-    odometry: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="/odom and its transform")
-    scan: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="/scan (Gazebo: 40)")
-    camera: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="the camera's five topics")
-    imu: float = param(10.0, unit="Hz", lo=0.1, hi=100.0, doc="/rosbot/imu")
-    range: float = param(5.0, unit="Hz", lo=0.1, hi=50.0, doc="/range/*")
-    joints: float = param(10.0, unit="Hz", lo=0.1, hi=100.0, doc="/joint_states (Gazebo: 50)")
-    battery: float = param(1.0, unit="Hz", lo=0.01, hi=10.0, doc="/battery")
-    ground_truth: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="/ground_truth/odom")
-    actors: float = param(5.0, unit="Hz", lo=0.1, hi=100.0, doc="/ground_truth/actors")
+    odometry: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="rate of /odom and its transform")
+    scan: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="rate of /scan (Gazebo: 40)")
+    camera: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="rate of the camera's five topics")
+    imu: float = param(10.0, unit="Hz", lo=0.1, hi=100.0, doc="rate of /rosbot/imu")
+    range: float = param(5.0, unit="Hz", lo=0.1, hi=50.0, doc="rate of /range/*")
+    joints: float = param(10.0, unit="Hz", lo=0.1, hi=100.0, doc="rate of /joint_states (Gazebo: 50)")
+    battery: float = param(1.0, unit="Hz", lo=0.01, hi=10.0, doc="rate of /battery")
+    ground_truth: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="rate of /ground_truth/odom")
+    actors: float = param(5.0, unit="Hz", lo=0.1, hi=100.0, doc="rate of /ground_truth/actors")
 
 
 class Outputs:

@@ -30,11 +30,13 @@ _PATIENCE = 2.0  # [s] wall time for a node to answer
 
 @dataclass(frozen=True, kw_only=True)
 class LockstepParams:
-    """Nodes that the clock waits for at rate 0: each topic speaks once in so much simulated time, or is idle."""
+    """Nodes that the clock waits for at rate 0; a topic that stays silent counts as idle."""
 
-    topics: tuple[str, ...] = param((), doc="topics of the nodes that have to keep up; tf:FRAME for who places a frame")
-    slack: float = param(0.25, unit="s", lo=0.02, doc="how far the clock may run ahead of their last message")
-    patience: float = param(0.4, unit="s", lo=0.0, doc="wall time after which a silent topic is taken for idle")
+    topics: tuple[str, ...] = param(
+        (), doc="topics of the nodes to wait for; tf:FRAME for the node that publishes a frame"
+    )
+    slack: float = param(0.25, unit="s", lo=0.02, doc="maximum lead of the clock over their last messages")
+    patience: float = param(0.4, unit="s", lo=0.0, doc="wall time after which a silent topic counts as idle")
 
 
 class Pace:

@@ -30,8 +30,8 @@ MOTION_SHOWN_S = 5.0
 class MarkersParams:
     """Parameters of the node house_markers."""
 
-    path_to_params: str = param(doc="room points, as for the patrol")
-    motion_sensors: str = param("", doc="motion sensors of the house, empty: none")
+    path_to_params: str = param(doc="points file of the rooms, as for the patrol")
+    motion_sensors: str = param("", doc="file of the motion sensors; empty: none")
 
 
 def _marker(name: str, key: int, kind: int, x: float, y: float, z: float) -> Marker:

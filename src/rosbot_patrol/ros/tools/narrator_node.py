@@ -30,20 +30,25 @@ VERDICTS = ("", "confirmed", "clear", "unreachable", "unverified")
 
 @dataclass(frozen=True, kw_only=True)
 class NarratorParams:
-    """What to do beyond telling."""
+    """What the narrator does beside printing."""
 
-    exit_after_mission: bool = param(False, doc="end when a mission has ended and its mail is delivered")
-    missions: int = param(1, lo=1, doc="how many missions to wait for")
-    expect_verdict: str = param("", choices=VERDICTS, doc="exit status 3 where the last verdict is another")
-    delivery_wait: float = param(30.0, unit="s", lo=0.0, doc="wait this long for the mail of a confirmed intruder")
-    patience: float = param(
-        5.0, unit="s", lo=0.0, doc="typed by hand without time_limit: end if nobody publishes the state; 0: wait"
+    exit_after_mission: bool = param(False, doc="exit after a mission has ended and its mail is delivered")
+    missions: int = param(1, lo=1, doc="number of missions to wait for")
+    expect_verdict: str = param(
+        "", choices=VERDICTS, doc="expected verdict of the last mission; exit status 3 for another one"
     )
-    time_limit: float = param(0.0, unit="s", lo=0.0, doc="exit status 4 after this time; 0: none")
-    summary_file: str = param("", doc="JSON file for all that was seen; empty: none")
-    scenario: str = param("", doc="file of the scenario that is played; empty: none")
+    delivery_wait: float = param(30.0, unit="s", lo=0.0, doc="longest wait for the mail of a confirmed intruder")
+    patience: float = param(
+        5.0,
+        unit="s",
+        lo=0.0,
+        doc="started by hand without time_limit: longest wait for the patrol to appear; 0: for ever",
+    )
+    time_limit: float = param(0.0, unit="s", lo=0.0, doc="time after which to exit with status 4; 0: no limit")
+    summary_file: str = param("", doc="JSON file with everything that was seen; empty: none")
+    scenario: str = param("", doc="file of the scenario being played; empty: none")
     simulator: str = param("simulator", doc="node name of the simulator that plays it")
-    on_guard_hint: str = param("", doc="line printed when the patrol is on guard for the first time")
+    on_guard_hint: str = param("", doc="line printed when the patrol is first on guard")
 
 
 class NarratorNode:
