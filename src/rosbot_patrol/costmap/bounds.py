@@ -1,4 +1,4 @@
-"""A rectangle of cells."""
+"""Rectangles of cells, such as the part of a costmap that an update changes."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ class Bounds(NamedTuple):
 
     @property
     def is_empty(self) -> bool:
-        """Whether no cell is inside."""
+        """Whether the rectangle holds no cell."""
         return self.x1 <= self.x0 or self.y1 <= self.y0
 
     @property
     def size(self) -> int:
-        """How many cells are inside."""
+        """Number of cells inside."""
         return 0 if self.is_empty else (self.x1 - self.x0) * (self.y1 - self.y0)
 
     def union(self, other: Bounds) -> Bounds:
-        """The smallest rectangle around both."""
+        """Smallest rectangle around both."""
         if self.is_empty:
             return other
         if other.is_empty:
@@ -32,7 +32,7 @@ class Bounds(NamedTuple):
         return Bounds(min(self.x0, other.x0), min(self.y0, other.y0), max(self.x1, other.x1), max(self.y1, other.y1))
 
     def grown(self, cells: int) -> Bounds:
-        """Larger by so many cells on each side."""
+        """The rectangle, larger by this many cells on each side."""
         if self.is_empty:
             return self
         return Bounds(self.x0 - cells, self.y0 - cells, self.x1 + cells, self.y1 + cells)
@@ -46,7 +46,7 @@ class Bounds(NamedTuple):
         return self.x0 < other.x1 and other.x0 < self.x1 and self.y0 < other.y1 and other.y0 < self.y1
 
     def without(self, other: Bounds) -> list[Bounds]:
-        """What is left of it where `other`, which overlaps it, is cut out: at most four rectangles."""
+        """The rest of the rectangle after `other`, which overlaps it, is cut out: at most four rectangles."""
         y0, y1 = max(self.y0, other.y0), min(self.y1, other.y1)
         pieces = (
             Bounds(self.x0, self.y0, self.x1, y0),
@@ -61,9 +61,9 @@ NOTHING = Bounds(0, 0, 0, 0)
 
 
 def merged(areas: list[Bounds]) -> list[Bounds]:
-    """The same cells (and perhaps a few more) as rectangles without a common cell.
+    """Merge rectangles into ones without a common cell; they may cover a few cells more.
 
-    Two that overlap become one where that adds little; else the common part is cut off one of them.
+    Two overlapping rectangles become one if that adds few cells; otherwise the common part is cut off one of them.
     """
     todo = [a for a in areas if not a.is_empty]
     done: list[Bounds] = []

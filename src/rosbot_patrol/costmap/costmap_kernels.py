@@ -1,4 +1,4 @@
-"""Inner loops of the layers: ray tracing, marking, merging into the master, maps that lie differently, polygons."""
+"""Inner loops of the layers: ray tracing, marking, merging into the master, sampling a map, filling polygons."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from rosbot_patrol.kernels import kernel
 
-CLEARED = 1  # a lethal cell that a ray has cleared in this update and that nothing has marked again yet
+CLEARED = 1  # a lethal cell cleared by a ray in this update and not marked again yet
 
 
 @kernel("void(int64[::1], int64, int64)")
@@ -24,7 +24,7 @@ def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, 
     """Free the cells from the sensor to each end [m], at most `reach` cells far.
 
     Lines are costmap_2d's: cut at the window's edge, then Bresenham's, both ends included. A lethal cell becomes
-    CLEARED and is noted, so that `settle` can tell which really went.
+    CLEARED and is recorded, so that `settle` knows which marks are really gone.
 
     Args:
         cells: the layer's costs.
@@ -91,7 +91,7 @@ def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, 
 
 @kernel("void(uint8[:, ::1], float64, float64, float64, float64, float64, float64[:, ::1], float64, int64[::1])")
 def mark_points(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, points, obstacle_range, changes):
-    """Make the cells of points [m] nearer to the sensor than `obstacle_range` lethal; see `clear_rays`."""
+    """Make the cells of points [m] within `obstacle_range` of the sensor lethal; see `clear_rays`."""
     height, width = cells.shape
     reach = obstacle_range * obstacle_range
     for i in range(points.shape[0]):
@@ -129,7 +129,9 @@ def settle(cells, cleared, changes):
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)")
 def merge_max(master, layer, x0, y0, x1, y1):
-    """Upstream's combination by maximum: unknown cells of the layer say nothing, unknown ones of the master yield."""
+    """Combine by maximum, as upstream: unknown cells of the layer are ignored, unknown cells of the master are
+    replaced.
+    """
     for y in range(y0, y1):
         old, new = master[y, x0:x1], layer[y, x0:x1]
         for x in range(len(old)):
@@ -140,7 +142,7 @@ def merge_max(master, layer, x0, y0, x1, y1):
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)")
 def merge_over(master, layer, x0, y0, x1, y1):
-    """Upstream's combination by overwriting: all but the layer's unknown cells."""
+    """Combine by overwriting, as upstream: every known cell of the layer replaces the master's."""
     for y in range(y0, y1):
         old, new = master[y, x0:x1], layer[y, x0:x1]
         for x in range(len(old)):
@@ -149,7 +151,7 @@ def merge_over(master, layer, x0, y0, x1, y1):
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64, float64[::1], boolean)")
 def sample_map(master, source, x0, y0, x1, y1, affine, use_maximum):
-    """Write a map that lies differently into the master.
+    """Write a map with another place, resolution or rotation into the master.
 
     `affine` is (a, b, c, d, e, f): source ix = a * x + b * y + c, source iy = d * x + e * y + f, for the master's
     cells x, y.

@@ -1,4 +1,4 @@
-"""Cost values and their translation from and to occupancy (costmap_2d's documented tables)."""
+"""Cost values, and their conversion to and from occupancy (costmap_2d's documented tables)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OCCUPANCY_OF_COST = _occupancy_table()
 
 
 def occupancy_of(cells: CostCells) -> NDArray[np.int8]:
-    """Costs as an occupancy grid shows them: 0, 1 to 98, 99 inscribed, 100 lethal, -1 unknown."""
+    """Convert costs to an occupancy grid: 0, 1 to 98, 99 inscribed, 100 lethal, -1 unknown."""
     return OCCUPANCY_OF_COST[cells]
 
 
@@ -37,12 +37,12 @@ def costs_of_occupancy(
     track_unknown: bool = True,
     trinary: bool = True,
 ) -> CostCells:
-    """An occupancy grid as costs.
+    """Convert an occupancy grid to costs.
 
     Args:
         occupancy: -1 unknown, 0 to 100.
-        lethal_threshold: from here on a cell is lethal.
-        unknown_value: which value means unknown, as the byte's signed or unsigned form.
+        lethal_threshold: lowest occupancy of a lethal cell.
+        unknown_value: the value for unknown, as a signed or unsigned byte.
         track_unknown: keep unknown cells apart from free ones.
         trinary: only free, lethal and unknown; otherwise values between are scaled.
     """

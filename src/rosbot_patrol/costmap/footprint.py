@@ -1,4 +1,4 @@
-"""The robot's outline: reading, padding, radii, and the points that collision checks look at."""
+"""Outline of the robot: reading, padding, radii, and the points used by collision checks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def read_footprint(value: Any, name: str = "footprint") -> Array:
-    """Corners of shape (N, 2) from a list or upstream's text form "[[x, y], ...]"; empty where none is given.
+    """Corners, shape (N, 2), from a list or upstream's text form "[[x, y], ...]"; empty if none are given.
 
     Raises:
         ParamError: it is not a list of at least three pairs of finite numbers.
@@ -41,13 +41,13 @@ def read_footprint(value: Any, name: str = "footprint") -> Array:
 
 
 def circle_footprint(radius: float, corners: int = 16) -> Array:
-    """A round robot as a polygon, as upstream makes of `robot_radius`."""
+    """Polygon of a round robot, as upstream derives it from `robot_radius`."""
     angles = np.arange(corners) * math.tau / corners
     return radius * np.column_stack((np.cos(angles), np.sin(angles)))
 
 
 def padded(corners: Array, padding: float) -> Array:
-    """Each corner moved outwards by the padding in x and in y."""
+    """Corners, each moved outwards by the padding in x and in y."""
     return corners + np.sign(corners) * padding
 
 
@@ -61,7 +61,7 @@ def _edge_distances(corners: Array) -> Array:
 
 @dataclass(frozen=True)
 class Footprint:
-    """A padded outline and the robot's own, shape (N, 2) each, in the robot's frame."""
+    """The robot's outline with and without padding, shape (N, 2) each, in the robot's frame."""
 
     corners: Array
     body: Array

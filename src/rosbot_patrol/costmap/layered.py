@@ -1,11 +1,11 @@
 """A costmap of layers (matches costmap_2d 1.17's LayeredCostmap and the grid side of Costmap2DROS).
 
-An update computes only what can have changed: the cells that layers say have another cost, those in reach of them
-through the inflation, and what came into a rolling window. The result is, cell for cell, that of computing the whole
-window anew; the window slides over its memory, so that moving it copies nothing.
+An update computes only cells that can have changed: those that a layer reports, those within the inflation's reach of
+them, and those that entered a rolling window. Cell for cell the result equals that of computing the whole window. The
+window slides over its memory, so that moving it copies nothing.
 
-Differs: what came into a rolling window is inflated at once, and the inflation of what has left it goes; upstream
-leaves both as they are until a beam touches the cells. Distances of the inflation are exact.
+Differs: cells that enter a rolling window are inflated at once, and the inflation of obstacles that have left it is
+removed; upstream leaves both until a beam touches the cells. Distances of the inflation are exact.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _info(p: CostmapParams) -> GridInfo:
 
 
 def make_layer(config: LayerConfig) -> Layer:
-    """The layer that a configuration describes."""
+    """Make the layer that a configuration describes."""
     params = config.params
     if isinstance(params, KeepoutParams):
         return KeepoutLayer(params, name=config.name)
@@ -64,7 +64,7 @@ def make_layer(config: LayerConfig) -> Layer:
 
 
 class LayeredCostmap:
-    """Costs around the robot, from layers in the configured order. Not safe between threads: its user locks."""
+    """Costs around the robot, from layers in the configured order. Not thread-safe: its user locks."""
 
     def __init__(self, config: CostmapConfig) -> None:
         p = config.params
@@ -80,7 +80,7 @@ class LayeredCostmap:
         self._resize(_info(p))
 
     def configure(self, params: CostmapParams) -> None:
-        """Take other parameters; where size, place or resolution change, what was sensed is forgotten (maps are kept).
+        """Use other parameters; a change of size, place or resolution forgets sensor data but keeps maps.
 
         Raises:
             ParamError: the footprint is none.
@@ -94,12 +94,12 @@ class LayeredCostmap:
         self._fresh = True
 
     def configure_layer(self, layer: Layer, params: StaticParams | ObstacleParams | InflationParams) -> None:
-        """Give one of the layers other parameters."""
+        """Use other parameters for one of the layers."""
         layer.configure(params)
         self._fresh = True
 
     def _arrange(self) -> None:
-        """Tell the layers what else there is."""
+        """Tell the layers about each other."""
         for i, layer in enumerate(self.layers):
             others = [o for o in self.layers if o is not layer and not isinstance(o, InflationLayer)]
             if isinstance(layer, InflationLayer):
@@ -142,14 +142,14 @@ class LayeredCostmap:
 
     @property
     def circumscribed_cost(self) -> int:
-        """A centre that costs less than this has its whole footprint free; 0 where nothing is inflated."""
+        """Cost below which the whole footprint around a cell is free; 0 without an inflation layer."""
         radius = self.footprint.circumscribed_radius
         costs = [layer.cost_at(radius) for layer in self.layers if isinstance(layer, InflationLayer) and layer.enabled]
         is_last = bool(self.layers) and isinstance(self.layers[-1], InflationLayer)
         return max(costs, default=FREE) if is_last else FREE
 
     def update(self, now: float, pose: Pose2D) -> list[Bounds]:
-        """Take in what the layers know, the robot standing at `pose`; returns the areas written, none twice."""
+        """Update from all layers with the robot at `pose`; returns the areas written, without overlap."""
         self.pose = pose
         areas = self._follow(pose) if self.params.rolling_window else self._match_map()
         enabled = [layer.enabled for layer in self.layers]
@@ -184,7 +184,7 @@ class LayeredCostmap:
         return []
 
     def _follow(self, pose: Pose2D) -> list[Bounds]:
-        """Move the window to the robot; returns what has to be computed anew for that."""
+        """Move the window to the robot; returns the areas to compute again."""
         info = self.info
         # upstream's size ends at the centre of the last cell (Costmap2D::getSizeInMetersX)
         width, height = (info.width - 0.5) * info.resolution, (info.height - 0.5) * info.resolution
@@ -202,7 +202,7 @@ class LayeredCostmap:
         return [*came, *(area.grown(self._reach) for area in left)]
 
     def _lethal_leaving(self, dx: int, dy: int) -> list[Bounds]:
-        """Where lethal cells that are inflated will lie, outside the window, when it has moved."""
+        """Places outside the moved window of lethal cells that have been inflated."""
         found = []
         inflated = [layer.sources(self.cells) for layer in self.layers if isinstance(layer, InflationLayer)]
         for strip in strips(self.info.width, self.info.height, -dx, -dy):
@@ -219,25 +219,25 @@ class LayeredCostmap:
         return all(layer.is_current(now) for layer in self.layers if layer.enabled)
 
     def reset(self) -> None:
-        """Forget what was sensed; the map stays."""
+        """Forget sensor data; the map stays."""
         for layer in self.layers:
             layer.reset()
         self._fresh = True
 
     def clear_outside(self, pose: Pose2D, side: float) -> None:
-        """Forget what was sensed outside a square of `side` [m] around a pose."""
+        """Forget sensor data outside a square of `side` [m] around a pose."""
         self.clear_square(pose, side)
 
     def clear_square(
         self, pose: Pose2D, side: float, *, inside: bool = False, names: Sequence[str] | None = None
     ) -> list[str]:
-        """Forget what was sensed outside or inside a square around a pose.
+        """Forget sensor data outside or inside a square around a pose.
 
         Args:
             pose: its middle.
             side: its extent [m].
             inside: forget what is inside.
-            names: of the layers that forget; all where None.
+            names: of the layers to clear; None: all.
 
         Returns:
             Those of the names that no layer has.
@@ -253,6 +253,6 @@ class LayeredCostmap:
         return [name for name in names or () if name not in own]
 
     def update_now(self, now: float) -> None:
-        """Take in at once what was cleared; the next update computes and returns everything again."""
+        """Apply what was cleared at once; the next update computes and returns everything again."""
         self.update(now, self.pose)
         self._fresh = True

@@ -132,7 +132,7 @@ class InflationParams:
 
 @dataclass(frozen=True)
 class LayerConfig:
-    """One configured layer: name, upstream's type without its package, parameters, and sources of observations."""
+    """One configured layer: name, upstream's type without its package, parameters, and observation sources."""
 
     name: str
     type: str
@@ -180,10 +180,10 @@ _LEGACY: dict[str, tuple[str, ...]] = {
 
 
 def read_costmap(tree: Mapping[str, Any], *, name: str = "~costmap/") -> CostmapConfig:
-    """A costmap's namespace as one checked configuration.
+    """Read a costmap's namespace into one checked configuration.
 
-    Without `plugins` the pre-hydro names are translated, as upstream's loadOldParameters does; with them, layers take
-    some parameters from the costmap's namespace, as its copyParentParameters does.
+    Without `plugins`, pre-hydro names are translated as in upstream's loadOldParameters. With `plugins`, layers inherit
+    some parameters from the costmap's namespace as in its copyParentParameters.
 
     Raises:
         ParamError: a value is wrong, or a plug-in's type is not known.
@@ -205,7 +205,7 @@ def read_costmap(tree: Mapping[str, Any], *, name: str = "~costmap/") -> Costmap
 
 
 def translate_legacy(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """Pre-hydro parameters as plug-ins: static_layer if `static_map`, then obstacle_layer, then inflation_layer."""
+    """Translate pre-hydro parameters to plug-ins: static_layer if `static_map`, obstacle_layer, inflation_layer."""
     out = dict(tree)
     plugins = [{"name": "obstacle_layer", "type": "costmap_2d::ObstacleLayer"}]
     if tree.get("map_type") == "voxel":
@@ -261,7 +261,7 @@ def _read_layer(tree: Mapping[str, Any], plugin: tuple[str, str], params: Costma
 
 
 def _read_source(tree: Mapping[str, Any], layer: Mapping[str, Any], source: str, prefix: str) -> SourceParams:
-    """Ranges and heights are looked for in the source, then in the layer, then in the costmap (searchParam)."""
+    """Read a source; ranges and heights are looked up in the source, the layer and the costmap (searchParam)."""
     inherited: dict[str, Any] = {}
     for scope in (tree, layer):
         inherited.update({key: scope[key] for key in _RANGES if key in scope})

@@ -1,4 +1,4 @@
-"""Cells of a window that moves: the window slides over its memory, so that a step copies nothing."""
+"""Cells of a moving window: the window slides over its memory, so that a step copies nothing."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from rosbot_patrol.costmap.costs import CostCells
 
 
 class ScrollingCells:
-    """Cells of shape (height, width), always contiguous, that can be shifted in no time.
+    """Cells of shape (height, width), always contiguous, that shift in constant time.
 
-    Rows lie one after the other, so content that moves by (-dx, -dy) cells is the same memory read from
-    dy * width + dx farther on; what runs over a row's end lies in cells that come in and are overwritten. Where the
-    slack at an end is used up the cells are moved back to the middle once.
+    Rows lie one after the other in memory. Content that moves by (-dx, -dy) cells is therefore the same memory, read
+    from dy * width + dx farther on. Whatever runs over the end of a row lies in entering cells and is overwritten. When
+    the slack at one end is used up, the cells are moved back to the middle once.
     """
 
     def __init__(self, height: int, width: int, default: int, *, moves: bool = True) -> None:
@@ -30,7 +30,7 @@ class ScrollingCells:
         return self._memory[self._at : self._at + height * width].reshape(height, width)
 
     def shift(self, dx: int, dy: int) -> None:
-        """Move the content by (-dx, -dy) cells; what comes in is the default. Arrays taken before are stale."""
+        """Move the content by (-dx, -dy) cells; entering cells get the default. Earlier arrays become stale."""
         height, width = self._shape
         if abs(dx) >= width or abs(dy) >= height:
             self.cells.fill(self._default)
@@ -44,7 +44,7 @@ class ScrollingCells:
             self.cells[strip.y0 : strip.y1, strip.x0 : strip.x1] = self._default
 
     def _centre(self, step: int) -> None:
-        """Make room for a step, however long."""
+        """Make room for a step of any length."""
         count = self._shape[0] * self._shape[1]
         if abs(step) > self._slack:
             self._slack = 2 * abs(step)
@@ -56,7 +56,7 @@ class ScrollingCells:
 
 
 def fill_outside(cells: CostCells, keep: Bounds, value: int) -> None:
-    """Set all cells but those in an area, which may lie partly or wholly off them."""
+    """Set all cells outside an area, which may lie partly or wholly off the grid."""
     keep = keep.clipped(cells.shape[1], cells.shape[0])
     if keep.is_empty:
         cells.fill(value)
@@ -68,7 +68,7 @@ def fill_outside(cells: CostCells, keep: Bounds, value: int) -> None:
 
 
 def strips(width: int, height: int, dx: int, dy: int) -> list[Bounds]:
-    """The cells that come into a window that moved by (dx, dy), as rectangles without a common cell."""
+    """Cells that enter a window which moved by (dx, dy), as rectangles without a common cell."""
     dx, dy = max(-width, min(dx, width)), max(-height, min(dy, height))
     found = []
     if dy:

@@ -1,4 +1,4 @@
-"""Parameters of what costmaps see by: observation sources of an obstacle layer, and range sensors."""
+"""Parameters of observation sources, depth cameras and range sensors."""
 
 from __future__ import annotations
 
@@ -39,10 +39,11 @@ class SourceParams:
 class DepthSourceParams(SourceParams):
     """One of `depth_sources` (ours): obstacles that a depth camera sees and the lidar misses.
 
-    They stand beside `observation_sources`, as upstream's layer ends move_base for a data_type that it does not know.
+    They have their own list beside `observation_sources`, because upstream's layer ends move_base for a data_type that
+    it does not know.
 
-    Heights are above the floor, which lies at `floor_height` in the costmap's frame: odom and map lie where base_link
-    does, on the ROSbot at the height of its axles.
+    Heights are above the floor, which lies at `floor_height` in the costmap's frame. The origins of odom and map are at
+    the height of base_link: on the ROSbot that of its axles.
     """
 
     data_type: str = param(DEPTH_IMAGE, choices=(DEPTH_IMAGE,), doc="sensor_msgs/Image with 32FC1 or 16UC1")

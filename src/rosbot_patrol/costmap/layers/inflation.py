@@ -42,9 +42,9 @@ def cost_table(
 class InflationLayer(Layer):
     """Matches costmap_2d::InflationLayer.
 
-    Differs: distances are exact, where upstream hands sources from cell to cell and is now and then too far by less
-    than a cell; cells that would cost 0 are not visited, so a radius beyond what `cost_scaling_factor` lets decay
-    costs no time; only lethal cells of the layers before are inflated, also where a later update is in part.
+    Differs: distances are exact; upstream passes sources from cell to cell and sometimes overestimates by less than a
+    cell. Cells that would cost 0 are not visited, so a radius beyond the decay of `cost_scaling_factor` costs no time.
+    Only lethal cells of earlier layers are inflated, also after a partial update by a later layer.
     """
 
     def __init__(self, params: InflationParams, *, name: str = "inflation_layer") -> None:
@@ -60,20 +60,20 @@ class InflationLayer(Layer):
         self._is_new = True
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
-        """Take the master's place and size."""
+        """Adopt the master's place and size."""
         self._info = info
         self._inscribed = footprint.inscribed_radius
         self._source = ScrollingCells(info.height, info.width, FREE) if self.keeps_source else None
         self._set_table()
 
     def configure(self, params: InflationParams) -> None:
-        """Take other parameters; the next update inflates anew."""
+        """Use other parameters; the next update inflates again."""
         self.params, self.enabled = params, params.enabled
         if self._info is not None:
             self._set_table()
 
     def fit(self, footprint: Footprint) -> None:
-        """Take another outline of the robot."""
+        """Use another outline of the robot."""
         self._inscribed = footprint.inscribed_radius
         if self._info is not None:
             self._set_table()
@@ -108,7 +108,7 @@ class InflationLayer(Layer):
 
     @property
     def reach(self) -> int:
-        """How far a lethal cell raises costs [cells]."""
+        """Distance up to which a lethal cell raises costs [cells]."""
         return self._reach if self.enabled else 0
 
     def update_bounds(self, now: float, pose: Pose2D, bounds: Bounds) -> Bounds:
@@ -119,11 +119,11 @@ class InflationLayer(Layer):
         return bounds.grown(self._reach)
 
     def sources(self, master: CostCells) -> CostCells:
-        """Where the lethal cells are that this layer inflates."""
+        """Grid with the lethal cells that this layer inflates."""
         return master if self._source is None else self._source.cells
 
     def take_sources(self, master: CostCells, areas: list[Bounds]) -> None:
-        """Note what the layers before wrote, where others write later: before the first of the areas is inflated."""
+        """Copy the costs of the earlier layers before a later layer writes over them."""
         if self._source is not None:
             for area in areas:
                 at = np.s_[area.y0 : area.y1, area.x0 : area.x1]

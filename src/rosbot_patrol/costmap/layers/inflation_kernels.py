@@ -1,4 +1,4 @@
-"""Inner loops of the inflation: exact Euclidean distances, bounded, turned into costs.
+"""Inner loops of the inflation layer: bounded exact Euclidean distances, converted to costs.
 
 Distances separate into columns and rows (Meijster, Roerdink, Hesselink 2000): d2(x, y) is the least over x' of
 (x - x')^2 + g(x', y)^2, where g is the distance along the column to the nearest lethal cell. For reaches of up to
@@ -18,8 +18,8 @@ from rosbot_patrol.kernels import kernel
 NEAR = 254  # cells; its square still fits 16 bits
 _BLOCK = 64  # cells of a row that are worked on at once
 _SHIFT = 6  # log2 of it
-_STEPS = 16  # distances tried between two looks whether to stop
-_PAD = 336  # room beside a row, NEAR, the last steps and a block; no cell of it lethal
+_STEPS = 16  # distances tried between two checks whether to stop
+_PAD = 336  # padding of a row: NEAR, the last steps and a block; none of its cells is lethal
 _BAND = 128  # rows whose column distances are held at once
 _NONE = np.uint16(65535)
 _ONE, _TWO, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
@@ -39,7 +39,7 @@ def _plus(a, b):
 
 @kernel("boolean(uint16[::1], int64, int64, uint16[::1], int64, uint16[::1])", inline="never")
 def _nearest_in_row(squares, at, reach, least, d2_max, found):
-    """Least d2 of a block of cells; False where none of them is near enough to change, or all are lethal.
+    """Compute the least d2 of a block of cells; False if none is near enough to change, or all are lethal.
 
     Args:
         squares: g^2 of the row, with _PAD cells more on each side.
@@ -62,7 +62,7 @@ def _nearest_in_row(squares, at, reach, least, d2_max, found):
         top = max(top, here[j])
     if top == 0:
         return False
-    bound = min(np.int64(top), d2_max + 1)  # a d2 below it would still make a difference
+    bound = min(np.int64(top), d2_max + 1)  # a smaller d2 would still change the result
     step = 1
     while step <= reach and step * step < bound:
         end = min(step + _STEPS, reach + 1)
@@ -77,7 +77,7 @@ def _nearest_in_row(squares, at, reach, least, d2_max, found):
         if near:
             for d in range(step, step + _STEPS, 4):  # four at once keep `found` in registers
                 s0, s1, s2, s3 = _square(d), _square(d + 1), _square(d + 2), _square(d + 3)
-                l0, r0 = np.uint64(at - d), np.uint64(at + d)  # unsigned: no look for negative indices
+                l0, r0 = np.uint64(at - d), np.uint64(at + d)  # unsigned: no check for negative indices
                 l1, r1, l2, r2, l3, r3 = l0 - _ONE, r0 + _ONE, l0 - _TWO, r0 + _TWO, l0 - _THREE, r0 + _THREE
                 for j in range(_BLOCK):
                     i = np.uint64(j)

@@ -1,4 +1,4 @@
-"""A layer of places where the robot must not go, although nothing stands there."""
+"""Keepout layer: places where the robot must not go, although nothing stands there."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from rosbot_patrol.costmap.params import KeepoutParams
 
 
 class KeepoutLayer(StaticLayer):
-    """A mask over the costmap (the idea is nav2's KeepoutFilter): occupied cells become lethal, all others stay.
+    """A mask over the costmap (after nav2's KeepoutFilter): occupied cells become lethal, all others stay.
 
-    The mask is a grid like a map, in any place, resolution and frame. Cells from `lethal_cost_threshold` on are lethal;
-    those below become costs where `trinary_costmap` is false, unknown ones say nothing. Costs combine by maximum and
-    the mask never gives the costmap its size. Put it before the inflation layer, so that the way keeps its distance.
-    As with a map, the costmap is not current until the mask has come: a robot that does not know yet where it must
-    not go does not start. Files are read at the edges: the node gives `set_map` what `mask_file` holds, if that is
-    set, else what comes on `map_topic`.
+    The mask is an occupancy grid in any place, resolution and frame. Cells of at least `lethal_cost_threshold` are
+    lethal; lower ones become costs if `trinary_costmap` is false; unknown ones are ignored. Costs combine by maximum,
+    and the mask never sets the costmap's size. Put the layer before the inflation layer, so that plans keep their
+    distance. The costmap is not current until the mask has arrived: a robot that does not know its forbidden places
+    does not start. Files are read at the edges: the node passes `set_map` the contents of `mask_file`, if it is set,
+    else the messages on `map_topic`.
     """
 
     sets_size = False
@@ -35,7 +35,7 @@ class KeepoutLayer(StaticLayer):
         return costs
 
     def update_costs(self, master: CostCells, bounds: Bounds) -> None:
-        """Raise the costs to the mask's."""
+        """Raise the costs to the mask's costs."""
         if self.map_info is None or self._info is None:
             return
         if self._is_aligned:

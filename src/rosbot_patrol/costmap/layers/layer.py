@@ -1,4 +1,4 @@
-"""What a layer of a costmap is."""
+"""Interface of a costmap layer."""
 
 # ruff: noqa: B027 - a layer overrides only the hooks that it needs
 from __future__ import annotations
@@ -14,10 +14,10 @@ from rosbot_patrol.grid import GridInfo
 
 
 class Layer(ABC):
-    """One source of costs; the layered costmap calls the layers in the order in which they are configured.
+    """One source of costs; the layered costmap calls its layers in the configured order.
 
-    An update has two halves, as upstream: `update_bounds` says which cells may change, then `update_costs` writes
-    this layer's costs over those cells of the master, which hold what the layers before wrote.
+    As upstream, an update has two halves: `update_bounds` reports the cells that may change, then `update_costs` writes
+    this layer's costs over those cells of the master. The master holds the costs of the earlier layers by then.
     """
 
     name: str = ""
@@ -25,34 +25,34 @@ class Layer(ABC):
     params: Any = None
 
     def configure(self, params: Any) -> None:
-        """Take other parameters of the same class; the costmap is then computed anew."""
+        """Use other parameters of the same class; the costmap is then computed again."""
         self.params, self.enabled = params, params.enabled
 
     def fit(self, footprint: Footprint) -> None:
-        """Take another outline of the robot, keeping what is known and sensed."""
+        """Use another outline of the robot; maps and sensor data stay."""
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
-        """Take the master's place and size, forgetting everything that depends on it."""
+        """Adopt the master's place and size, and forget everything that depends on it."""
 
     def move(self, info: GridInfo, dx: int, dy: int) -> None:
-        """The master moved by (dx, dy) cells: content shifts by (-dx, -dy)."""
+        """Follow the master, which moved by (dx, dy) cells: the content shifts by (-dx, -dy)."""
 
     @abstractmethod
     def update_bounds(self, now: float, pose: Pose2D, bounds: Bounds) -> Bounds:
-        """`bounds`, grown by the cells that this layer changes."""
+        """Return `bounds`, grown by the cells that this layer changes."""
 
     @abstractmethod
     def update_costs(self, master: CostCells, bounds: Bounds) -> None:
         """Write costs into `master` over `bounds`."""
 
     def reset(self) -> None:
-        """Forget what was sensed (not what is known, such as the map)."""
+        """Forget sensor data, but not maps."""
 
     def clear_outside(self, keep: Bounds) -> None:
-        """Forget what was sensed outside `keep`."""
+        """Forget sensor data outside `keep`."""
 
     def clear_inside(self, area: Bounds) -> None:
-        """Forget what was sensed in `area`."""
+        """Forget sensor data in `area`."""
 
     def is_current(self, now: float) -> bool:
         """Whether the layer's inputs are as fresh as its parameters demand."""

@@ -1,4 +1,4 @@
-"""When each mark of an obstacle layer was last seen, so that what has gone is forgotten."""
+"""Ages of an obstacle layer's marks, so that obstacles that have gone are forgotten."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from rosbot_patrol.costmap.sources.observation import Observation
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import GridInfo
 
-_PERIOD = 0.2  # between two looks at all marks [s]
-_LONGEST = 1.0  # most that one look adds to the time in view [s]
+_PERIOD = 0.2  # time between two checks of all marks [s]
+_LONGEST = 1.0  # maximum time in view that one check adds [s]
 _ROW = 1 << 31  # keys are (iy + half a row) * _ROW + ix + half a row
 _HALF = 1 << 30
-_BESIDE = 0.6  # what is nearer to the robot's middle may stand where it cannot look again [m]
-_MARGIN = 1.5  # a beam passes a cell if it goes on this much behind its centre [cells]
+_BESIDE = 0.6  # marks nearer to the robot's centre may be where it cannot look again [m]
+_MARGIN = 1.5  # a beam passes a cell if it continues this far behind the cell's centre [cells]
 
 Seen = list[tuple[SourceParams, Observation]]
 
 
 class MarkMemory:
-    """Marked cells with their ages, by places that stay the same while the window moves.
+    """Marked cells and their ages, by places that stay the same while the window moves.
 
-    A mark is seen while a hit falls into its cell. Its place is in view and empty where both beams beside its bearing
-    go on behind it, be it to something farther or to nothing at all; it is hidden where one of them ends before.
+    A mark is seen while a hit falls into its cell. Its place is in view and empty if both neighbouring beams continue
+    behind it, whether they hit something farther or nothing. It is hidden if one of them ends before it.
 
     Args:
-        in_view: a mark is forgotten after so long in view and empty [s], 0 is never.
-        out_of_view: a mark is forgotten after so long neither seen nor in view [s], 0 is never.
-        beside: the same for a mark right beside the robot [s], 0 is as elsewhere.
+        in_view: time in view and empty after which a mark is forgotten [s]; 0: never.
+        out_of_view: time neither seen nor in view after which a mark is forgotten [s]; 0: never.
+        beside: the same for a mark right beside the robot [s]; 0: as elsewhere.
     """
 
     def __init__(self, in_view: float, out_of_view: float, beside: float = 0.0) -> None:
@@ -41,7 +41,7 @@ class MarkMemory:
         self.clear()
 
     def clear(self) -> None:
-        """Know no mark."""
+        """Forget all marks."""
         self._keys = np.empty(0, np.int64)
         self._empty_for = np.empty(0)
         self._last_view = np.empty(0)
@@ -50,11 +50,11 @@ class MarkMemory:
         return len(self._keys)
 
     def move(self, dx: int, dy: int) -> None:
-        """The window moved by (dx, dy) cells."""
+        """Follow the window, which moved by (dx, dy) cells."""
         self._shift = self._shift[0] + dx, self._shift[1] + dy
 
     def note(self, now: float, ix: NDArray[np.int64], iy: NDArray[np.int64]) -> None:
-        """Cells of the window that were hit."""
+        """Record cells of the window that were hit."""
         keys = np.unique((iy + (self._shift[1] + _HALF)) * _ROW + ix + (self._shift[0] + _HALF))
         at = np.searchsorted(self._keys, keys)
         known = np.zeros(len(keys), bool)
@@ -71,14 +71,14 @@ class MarkMemory:
     def expired(
         self, now: float, cells: CostCells, info: GridInfo, seen: Seen, robot: Pose2D | None = None
     ) -> NDArray[np.int64]:
-        """Cells (ix, iy) of the window to be forgotten, shape (N, 2).
+        """Cells (ix, iy) of the window to forget, shape (N, 2).
 
         Args:
-            now: time [s]; where it went back all ages start anew.
-            cells: the layer's costs; what is not lethal any more is dropped.
+            now: time [s]; if it went back, all ages start again.
+            cells: the layer's costs; cells that are no longer lethal are dropped.
             info: the window's place.
             seen: the observations of this update.
-            robot: where it stands, in the window's frame, where that matters.
+            robot: its place in the window's frame, if `beside` is used.
         """
         none = np.empty((0, 2), np.int64)
         if now < self._next - 2.0 * _PERIOD:
@@ -121,7 +121,7 @@ class MarkMemory:
 
     @staticmethod
     def _is_empty(at: NDArray[np.int64], info: GridInfo, seen: Seen) -> NDArray[np.bool_]:
-        """Which places the newest scan of a clearing source looks behind."""
+        """Whether the newest scan of a clearing source looks behind each place, shape (N,)."""
         empty = np.zeros(len(at), bool)
         newest = {id(source): (source, o) for source, o in seen if source.clearing and o.view is not None}
         for source, observation in newest.values():

@@ -1,4 +1,4 @@
-"""The obstacle layer: what the lidar sees now, and what it saw where it does not look now."""
+"""Obstacle layer: marks what the lidar sees, keeps older marks outside its view."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from rosbot_patrol.grid import GridInfo
 
 __all__ = ["Observation", "ObservationBuffer", "ObstacleLayer", "height_problem", "observe", "observe_level"]
 
-_CLEARED = 1 << 16  # lethal cells that one update can clear without a search for them
+_CLEARED = 1 << 16  # lethal cells that one update can clear without searching for them
 _LOW, _HIGH = np.iinfo(np.int64).max, np.iinfo(np.int64).min
 
 
 class ObstacleLayer(Layer):
-    """Matches costmap_2d::ObstacleLayer, and VoxelLayer where scans are planar: rays clear, hits mark.
+    """Matches costmap_2d::ObstacleLayer, and VoxelLayer with planar scans: rays clear, hits mark.
 
-    The robot's own cells are free. The bounds of an update hold the cells that have another cost than before, not
-    all that rays passed: a scan like the last one changes nothing.
+    The robot's own cells are free. The bounds of an update hold the cells with a changed cost, not all cells that rays
+    passed: a scan like the previous one changes nothing.
 
     Differs:
     - Only the robot itself is cleared, without its padding; upstream clears the padding too, so that a slow robot
@@ -65,7 +65,7 @@ class ObstacleLayer(Layer):
         self._marks = MarkMemory(*ages) if max(ages) > 0.0 else None
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
-        """Take the master's place and size."""
+        """Adopt the master's place and size."""
         self._info, self._footprint = info, footprint
         self._window = ScrollingCells(info.height, info.width, self._default)
         self._outline = None
@@ -74,12 +74,12 @@ class ObstacleLayer(Layer):
         self._dirty = Bounds(0, 0, info.width, info.height)
 
     def configure(self, params: ObstacleParams) -> None:
-        """Take other parameters; what was sensed stays."""
+        """Use other parameters; sensor data stays."""
         super().configure(params)
         self._outline = None
 
     def fit(self, footprint: Footprint) -> None:
-        """Take another outline of the robot."""
+        """Use another outline of the robot."""
         self._footprint = footprint
 
     def move(self, info: GridInfo, dx: int, dy: int) -> None:
@@ -142,7 +142,7 @@ class ObstacleLayer(Layer):
             changes[2:4] = np.maximum(changes[2:4], old.max(axis=0) + 1)
 
     def _free_robot(self, info: GridInfo, pose: Pose2D, changes: NDArray[np.int64]) -> Bounds:
-        """Free the robot's own cells here; returns where the master has to be looked at for them."""
+        """Free the robot's own cells in this layer; returns the area to check for them in the master."""
         if not self.params.footprint_clearing_enabled or self._footprint is None:
             return NOTHING
         corners = (transform_points(pose, self._footprint.body) - (info.origin_x, info.origin_y)) / info.resolution
@@ -162,19 +162,19 @@ class ObstacleLayer(Layer):
             kernels.merge_over(master, self._window.cells, *bounds)
 
     def reset(self) -> None:
-        """Forget what was sensed."""
+        """Forget sensor data."""
         if self._info is not None:
             self.clear_outside(NOTHING)
 
     def clear_outside(self, keep: Bounds) -> None:
-        """Forget what was sensed outside an area."""
+        """Forget sensor data outside an area."""
         if self._info is None:
             return
         fill_outside(self._window.cells, keep, self._default)
         self._dirty = Bounds(0, 0, self._info.width, self._info.height)
 
     def clear_inside(self, area: Bounds) -> None:
-        """Forget what was sensed in an area."""
+        """Forget sensor data in an area."""
         if self._info is None:
             return
         area = area.clipped(self._info.width, self._info.height)
@@ -188,7 +188,7 @@ class ObstacleLayer(Layer):
 
 
 def _no_changes() -> NDArray[np.int64]:
-    """What the kernels grow: x0, y0, x1, y1, and a count of cleared cells."""
+    """Initial value of what the kernels update: x0, y0, x1, y1, and a count of cleared cells."""
     return np.array([_LOW, _LOW, _HIGH, _HIGH, 0], np.int64)
 
 

@@ -1,4 +1,4 @@
-"""Inner loop of the range sensor layer: one reading into the cells of its cone."""
+"""Inner loop of the range sensor layer: adds one reading to the cells of its cone."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from rosbot_patrol.kernels import kernel
 def update_cone(
     cells, resolution, origin_x, origin_y, sensor_x, sensor_y, yaw, reading, half_angle, phi, inflate, is_clear, changes
 ):
-    """Bayesian update of the cells in a sensor's cone.
+    """Update the cells in a sensor's cone by Bayes' rule.
 
     Args:
         cells: probabilities, 0 to 254 for 0 to 1.
         resolution: edge of a cell [m].
         origin_x: left edge of the window [m].
         origin_y: lower edge [m].
-        sensor_x: where the sensor is [m].
+        sensor_x: position of the sensor [m].
         sensor_y: the same.
-        yaw: where it looks [rad].
+        yaw: its viewing direction [rad].
         reading: distance [m].
         half_angle: of the cone [rad].
-        phi: distance from which on readings count half [m].
+        phi: distance beyond which readings count half [m].
         inflate: how much of the space beside the cone is updated, 0 to 1; the model says nothing there.
-        is_clear: nothing was met up to the reading.
+        is_clear: there is no obstacle up to the reading.
         changes: x0, y0, x1, y1 around the cells that changed, grown here.
     """
     height, width = cells.shape
-    delta = max(resolution * reading, 0.75 * resolution)  # half the thickness of what was met [m]
+    delta = max(resolution * reading, 0.75 * resolution)  # half the thickness of the obstacle [m]
     reach = reading + 2.0 * delta
     x0 = max(math.floor((sensor_x - reach - origin_x) / resolution), 0)
     x1 = min(math.floor((sensor_x + reach - origin_x) / resolution) + 1, width)

@@ -1,4 +1,4 @@
-"""A layer of what range sensors (ultrasound, infrared) say, cell by cell as probabilities."""
+"""Range sensor layer: readings of ultrasonic or infrared sensors, kept as a probability of each cell."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class RangeReading:
     Attributes:
         stamp: when it was measured [s].
         pose: of the sensor in the costmap's frame.
-        distance: what it says [m]; -inf nearer than it can see, inf nothing (REP 117).
-        range_min: shortest it can say [m].
-        range_max: longest [m]; where both are the same the sensor only tells nearer or not.
-        field_of_view: of the cone [rad].
+        distance: reading [m]; -inf: nearer than it can measure, inf: nothing (REP 117).
+        range_min: shortest reading [m].
+        range_max: longest reading [m]; if both are equal, the sensor only switches.
+        field_of_view: opening angle of the cone [rad].
     """
 
     stamp: float
@@ -46,16 +46,16 @@ class RangeReading:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the sensor only tells nearer or not."""
+        """Whether the sensor only switches: something is nearer than its fixed distance, or not."""
         return self.range_min == self.range_max
 
 
 class RangeSensorLayer(Layer):
     """Matches range_sensor_layer::RangeSensorLayer 0.5: Bayesian updates over each reading's cone.
 
-    A cell's probability starts at a half. What lies nearer than the reading becomes less probable, what lies at it
-    more, the less so the farther from the cone's axis and from the sensor (`phi`). Cells above `mark_threshold` are
-    lethal, cells below `clear_threshold` free, the others say nothing; costs combine by maximum.
+    A cell's probability starts at one half. Cells nearer than the reading become less probable, cells at the reading
+    more; the effect falls with the angle from the cone's axis and with the distance (`phi`). Cells above
+    `mark_threshold` are lethal, cells below `clear_threshold` free, the others are ignored; costs combine by maximum.
 
     Differs:
     - A cell counts by its part nearest to the cone's axis, and what was met is at least three quarters of a cell thick;
@@ -85,24 +85,24 @@ class RangeSensorLayer(Layer):
 
     @property
     def topics(self) -> list[str]:
-        """What it listens to."""
+        """Topics of the sensors."""
         ns = self.params.ns.rstrip("/")
         return [f"{ns}/{topic.lstrip('/')}" if ns else topic for topic in self.params.topics]
 
     @property
     def probabilities(self) -> NDArray[np.float64]:
-        """Of each cell, shape (height, width)."""
+        """Probability of each cell, shape (height, width)."""
         return self._window.cells / 254.0
 
     def add(self, reading: RangeReading) -> None:
-        """Take a reading in at the next update."""
+        """Store a reading for the next update."""
         kind = self.params.input_sensor_type
         if kind != "ALL" and reading.is_fixed != (kind == "FIXED"):
             return
         self._waiting.append(reading)
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
-        """Take the master's place and size."""
+        """Adopt the master's place and size."""
         self._info, self._footprint = info, footprint
         self._window = ScrollingCells(info.height, info.width, _HALF)
         if self._memory is not None:
@@ -190,7 +190,7 @@ class RangeSensorLayer(Layer):
             self.clear_outside(NOTHING)
 
     def clear_outside(self, keep: Bounds) -> None:
-        """Forget what was sensed outside an area."""
+        """Forget sensor data outside an area."""
         if self._info is None:
             return
         fill_outside(self._window.cells, keep, _HALF)

@@ -1,4 +1,4 @@
-"""The static layer: a map that is given."""
+"""Static layer: a given map."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from rosbot_patrol.grid import Grid, GridInfo
 
 
 class StaticLayer(Layer):
-    """Matches costmap_2d::StaticLayer: an occupancy grid, whole or by updates, as costs.
+    """Matches costmap_2d::StaticLayer: an occupancy grid, whole or as updates, becomes costs.
 
-    In a costmap that does not roll the master takes the map's place and size; in a rolling one, or one in another
-    frame, the map is sampled at the master's cells through `master_from_map`.
+    A costmap that does not roll adopts the map's place and size. In a rolling costmap, or one in another frame, the map
+    is sampled at the master's cells through `master_from_map`.
     """
 
     sets_size = True  # whether a costmap that does not roll takes the map's place
@@ -38,7 +38,7 @@ class StaticLayer(Layer):
         self._sampled_from: Pose2D | None = None
 
     def set_map(self, grid: Grid) -> None:
-        """Take a new map; ignored after the first where `first_map_only`."""
+        """Use a new map; ignored after the first with `first_map_only`."""
         if self.params.first_map_only and self.map_info is not None:
             return
         grid.info.require_aligned(self.name)
@@ -51,7 +51,7 @@ class StaticLayer(Layer):
         self.map_info = grid.info
 
     def update_map(self, x: int, y: int, cells: np.ndarray) -> None:
-        """Take new occupancy for a rectangle of the map; what lies outside is ignored."""
+        """Use new occupancy values for a rectangle of the map; cells outside the map are ignored."""
         if self.map_info is None:
             return
         height, width = cells.shape
@@ -74,7 +74,7 @@ class StaticLayer(Layer):
         return np.ascontiguousarray(costs)
 
     def match(self, info: GridInfo, footprint: Footprint) -> None:
-        """Take the master's place and size."""
+        """Adopt the master's place and size."""
         self._info = info
         if self.map_info is not None:
             self._changed = Bounds(0, 0, self.map_info.width, self.map_info.height)
@@ -118,14 +118,14 @@ class StaticLayer(Layer):
         self._sample(master, bounds, use_maximum=self.params.use_maximum)
 
     def _sample(self, master: CostCells, bounds: Bounds, *, use_maximum: bool) -> None:
-        """Write the map's costs at the places of the master's cells."""
+        """Write the map's costs at the master's cells."""
         assert self._info is not None
         assert self.map_info is not None
         self._sampled_from = self.master_from_map
         kernels.sample_map(master, self._costs, *bounds, self._affine(self._info, self.map_info), use_maximum)
 
     def _affine(self, info: GridInfo, source: GridInfo) -> np.ndarray:
-        """Cell of the map for a cell of the master, as `sample_map` wants it."""
+        """Transform from cells of the master to cells of the map, as `sample_map` expects it."""
         back = invert(self.master_from_map)
         c, s = math.cos(back.yaw), math.sin(back.yaw)
         ratio = info.resolution / source.resolution
@@ -140,7 +140,7 @@ class StaticLayer(Layer):
 
 
 def _difference(before: CostCells, after: CostCells) -> Bounds:
-    """A rectangle around the cells that differ, of two grids of one shape."""
+    """Rectangle around the cells that differ between two grids of the same shape."""
     differs = before != after
     rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
     if not len(rows):

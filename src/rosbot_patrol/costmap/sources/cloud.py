@@ -1,7 +1,7 @@
-"""Point clouds as an obstacle layer's source (costmap_2d's `data_type: PointCloud2` and `PointCloud`).
+"""Point clouds as a source of an obstacle layer (costmap_2d's `data_type: PointCloud2` and `PointCloud`).
 
-Matches costmap_2d::ObservationBuffer: points between `min_obstacle_height` and `max_obstacle_height` of the costmap's
-frame count, the others neither mark nor clear; the ray from the sensor to each clears in the plane.
+Matches costmap_2d::ObservationBuffer: points between `min_obstacle_height` and `max_obstacle_height` in the costmap's
+frame count; the others neither mark nor clear. The ray from the sensor to each point clears in the plane.
 
 Differs: of a cloud every `stride`-th row and column is used (4; of a cloud without rows every `stride`-th point).
 """
@@ -25,7 +25,7 @@ _FLOATS = {7: "f4", 8: "f8"}  # of sensor_msgs/PointField
 
 @dataclass(frozen=True)
 class CloudLayout:
-    """How a sensor_msgs/PointCloud2 lies in its bytes.
+    """Memory layout of a sensor_msgs/PointCloud2.
 
     Attributes:
         fields: name to offset [bytes], type and count, as in sensor_msgs/PointField.
@@ -42,7 +42,7 @@ class CloudLayout:
 
 
 def cloud_points(data: bytes, layout: CloudLayout, stride: int = 1) -> Array:
-    """Points of a cloud, shape (N, 3) [m], without those that are not finite; only what is used is copied.
+    """Finite points of a cloud, shape (N, 3) [m]; only the points used are copied.
 
     Raises:
         ImageError: it has no floats x, y and z, or not so many bytes as it says.
@@ -75,14 +75,14 @@ def cloud_points(data: bytes, layout: CloudLayout, stride: int = 1) -> Array:
 def observe_cloud(
     points: Array, costmap_from_sensor: Array, params: SourceParams, *, stamp: float, top: float = np.inf
 ) -> Observation:
-    """A cloud taken at a pose as an observation.
+    """Turn a cloud, taken at a pose, into an observation.
 
     Args:
         points: in the sensor's frame [m], shape (N, 3).
         costmap_from_sensor: shape (4, 4).
         params: of the source.
         stamp: when it was measured [s].
-        top: the layer's `max_obstacle_height` [m]: what is higher clears, and is not marked.
+        top: the layer's `max_obstacle_height` [m]: higher points clear and do not mark.
     """
     placed = points @ costmap_from_sensor[:3, :3].T + costmap_from_sensor[:3, 3]
     z = placed[:, 2]

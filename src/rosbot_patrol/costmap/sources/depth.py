@@ -1,14 +1,14 @@
-"""Depth pictures as an obstacle layer's source: low things that pass under the lidar's plane, or over it.
+"""Depth images as a source of an obstacle layer: obstacles below or above the lidar's plane.
 
-`depth_sources` are ours. Upstream takes a depth camera as PointCloud2, and clears by rays in the plane: such a
-ray passes over a low thing to the wall behind it and takes its mark away as soon as the robot is too near to see the
-thing any more. Here a mark goes only when the camera looks behind it, from just above the floor to the top (the idea
-is that of projective fusion, e.g. Newcombe et al., KinectFusion, 2011). Give it a layer of its own: beams of a lidar in
-the same layer clear the camera's marks.
+`depth_sources` are ours. Upstream takes a depth camera as PointCloud2 and clears by rays in the plane. Such a ray
+passes over a low obstacle to the wall behind it; it removes the mark as soon as the robot is too near to see the
+obstacle. Here a mark goes only when the camera looks behind it, from just above the floor to the top (as in projective
+fusion, e.g. Newcombe et al., KinectFusion, 2011). Give the source its own layer: a lidar's beams in the same layer
+would clear the camera's marks.
 
-The floor's band grows with the distance, as the errors of the camera's pitch and of the depth do. What the camera
-sees at the lidar's height is left to the lidar (`lidar_height`), so that people who pass leave no marks behind that
-only the camera can take away.
+The height up to which points count as floor grows with the distance, as do the errors of the camera's pitch and of the
+depth. Obstacles at the lidar's height are left to the lidar (`lidar_height`); otherwise people who pass would leave
+marks that only the camera can clear.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DepthCells = NDArray[np.float32]
 EDGE = 0.05  # of a square of floor in which points are counted [m]
 _MOST = 4096  # places in one picture
 _BAND = 0.02  # above and below the lidar's height [m]
-_STEP = 0.025  # between the heights that are looked behind [m]
+_STEP = 0.025  # between the heights checked for a view behind a mark [m]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class DepthPicture:
 
 @dataclass(frozen=True)
 class DepthView:
-    """What a depth picture looks behind.
+    """The space behind marks that a depth image shows.
 
     Attributes:
         picture: the depths.
@@ -99,7 +99,7 @@ class DepthView:
     params: DepthSourceParams
 
     def clear(self, cells: CostCells, info: GridInfo, cleared: NDArray[np.int32], changes: NDArray[np.int64]) -> None:
-        """Clear the marks that it looks behind; arguments as `costmap_kernels.clear_rays` has them."""
+        """Clear the marks that the camera looks behind; arguments as in `costmap_kernels.clear_rays`."""
         p = self.params
         kernels.clear_looked_behind(
             cells, info.resolution, info.origin_x, info.origin_y, self.picture.depth, self.picture.optics,
@@ -110,13 +110,13 @@ class DepthView:
 
 @dataclass(frozen=True, kw_only=True)
 class DepthObservation(Observation):
-    """A depth picture in the costmap's frame: `hits` are the places where something stands; it clears by `depth`."""
+    """A depth image in the costmap's frame: `hits` are the obstacles; it clears by `depth`."""
 
     depth: DepthView
 
 
 def observe_depth(picture: DepthPicture, costmap_from_optical: Array, params: DepthSourceParams) -> DepthObservation:
-    """A depth picture taken at a pose as an observation.
+    """Turn a depth image, taken at a pose, into an observation.
 
     Args:
         picture: the depths.

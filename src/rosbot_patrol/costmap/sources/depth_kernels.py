@@ -1,4 +1,4 @@
-"""Inner loops of depth pictures: what stands on the floor, and which marks the camera looks behind."""
+"""Inner loops of depth images: obstacles on the floor, and marks that the camera looks behind."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _CLEARED = 1  # as in costmap_kernels
     "int64, int64, float64[:, :, ::1], float64[:, ::1])"
 )
 def standing_points(depth, optics, pose, nearest, farthest, low, slope, heights, edge, min_points, reach, bins, found):
-    """Places where something stands on the floor that the lidar does not see.
+    """Find obstacles on the floor that the lidar does not see.
 
-    Points of the picture above the floor's band and below the top fall into squares around the camera. A square with
-    enough of them is a place, at their mean, unless there are points at the lidar's height in it or near it.
+    Points above the floor's band and below the top fall into squares around the camera. A square with enough points is
+    an obstacle at their mean, unless the square or its neighbours hold points at the lidar's height.
 
     Args:
         depth: along the optical axis [m], shape (H, W); what is not finite or not positive is unknown.
@@ -28,7 +28,7 @@ def standing_points(depth, optics, pose, nearest, farthest, low, slope, heights,
         nearest: shortest distance along the floor [m].
         farthest: longest [m].
         low: the floor's band at the camera [m].
-        slope: what it grows by for each metre.
+        slope: growth of that band per metre.
         heights: top [m], and lowest and highest point at the lidar's height [m].
         edge: of a square [m].
         min_points: that make a place.
@@ -114,11 +114,11 @@ def clear_looked_behind(
     cleared,
     changes,
 ):
-    """Free the marks that the camera looks behind in the whole height that counts.
+    """Free the marks that the camera looks behind, from the floor's band to the top.
 
-    From the floor's band up to the top, the ray to each point above a marked cell's middle must go on behind it. Where
-    the lowest point is not in the picture, or something hides one of them, the mark stays. Above the lowest, no depth
-    (nothing in the camera's range) is as good as a far one. A mark becomes CLEARED and is noted, as in
+    The ray to each point above a marked cell's centre, from the floor's band to the top, must continue behind it. If
+    the lowest point is outside the image, or something hides one of the points, the mark stays. Above the lowest point,
+    no depth (nothing in the camera's range) counts as a far one. A mark becomes CLEARED and is recorded, as in
     `costmap_kernels.clear_rays`.
 
     Args:

@@ -1,4 +1,4 @@
-"""Scans as the obstacle layer uses them, and the buffer that says which of them still count."""
+"""Scans as the obstacle layer uses them, and the buffer of those that still count."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from rosbot_patrol.scan import LaserScan, LevelScan
 
 Array = NDArray[np.float64]
 
-_EPSILON = 1e-4  # upstream's step back from range_max for a beam that hit nothing [m]
+_EPSILON = 1e-4  # upstream shortens range_max by this for a beam without a hit [m]
 _HAIR = 1e-6  # of heights: rounding of a transform [m]
 
 
 @dataclass(frozen=True)
 class View:
-    """How far a scan saw along each beam.
+    """Free distance along each beam of a scan.
 
     Attributes:
         start: bearing of the first beam in the costmap's frame [rad].
         increment: from beam to beam [rad].
-        clear: nothing stands nearer than this [m], inf where the beam hit nothing, 0 where nothing is known; (N,).
+        clear: free distance [m], inf without a hit, 0 if unknown; shape (N,).
     """
 
     start: float
@@ -33,7 +33,9 @@ class View:
     clear: Array
 
     def free_to(self, bearings: Array) -> Array:
-        """How far it is surely free in the directions of `bearings` [rad]: the shorter of the two beams beside."""
+        """Distance that is certainly free in the directions `bearings` [rad]: the shorter of the two neighbouring
+        beams.
+        """
         if len(self.clear) == 0 or self.increment == 0.0:
             return np.zeros(len(bearings))
         period = math.tau / abs(self.increment)
@@ -53,11 +55,11 @@ class Observation:
 
     Attributes:
         stamp: when it was measured [s].
-        sensor: where from, (x, y) [m].
-        hits: what was hit, shape (N, 2).
-        ends: up to where the way is free, shape (M, 2).
+        sensor: its position (x, y) [m].
+        hits: points that were hit, shape (N, 2).
+        ends: end points of the free rays, shape (M, 2).
         height: of the points above the ground [m].
-        view: how far each beam saw, None where that is not known.
+        view: free distance of each beam, None if unknown.
     """
 
     stamp: float
@@ -69,12 +71,12 @@ class Observation:
 
 
 def observe(scan: LaserScan, pose: Pose2D, *, inf_is_valid: bool = False, height: float = 0.1) -> Observation:
-    """A level scan taken at `pose` (of the sensor, in the costmap's frame) as an observation.
+    """Turn a level scan, taken at `pose` (of the sensor, in the costmap's frame), into an observation.
 
-    Beams outside the scan's own limits, range_max included, say nothing, as in laser_geometry; with `inf_is_valid` a
-    beam that hit nothing clears up to the range's end, or for 100 m where the scan has no upper limit.
+    Beams outside the scan's own limits, range_max included, are ignored, as in laser_geometry. With `inf_is_valid` a
+    beam without a hit clears up to range_max, or 100 m for a scan without an upper limit.
 
-    Differs: upstream makes such a beam's end an obstacle where obstacle_range reaches that far; here it never marks.
+    Differs: upstream marks the end of such a beam if obstacle_range reaches that far; here it never marks.
     """
     angles = scan.angles
     units = np.column_stack((np.cos(angles), np.sin(angles)))
@@ -97,7 +99,7 @@ def observe(scan: LaserScan, pose: Pose2D, *, inf_is_valid: bool = False, height
 
 
 def observe_level(level: LevelScan, source: SourceParams, top: float = math.inf) -> Observation:
-    """A scan that was laid level in the costmap's frame as an observation.
+    """Turn a scan, laid level in the costmap's frame, into an observation.
 
     Points of a tilted laser have heights of their own: those outside the source's limits neither mark nor clear, as in
     costmap_2d::ObservationBuffer.
@@ -105,7 +107,7 @@ def observe_level(level: LevelScan, source: SourceParams, top: float = math.inf)
     Args:
         level: the scan.
         source: its limits.
-        top: the layer's `max_obstacle_height` [m]: what is higher clears, and is not marked.
+        top: the layer's `max_obstacle_height` [m]: higher points clear and do not mark.
     """
     scan = level.scan
     if level.rises is None:
@@ -122,7 +124,7 @@ def observe_level(level: LevelScan, source: SourceParams, top: float = math.inf)
 
 
 def height_problem(level: LevelScan, source: SourceParams) -> str:
-    """Why a source takes nothing of a scan, "" where it does: upstream's then marks and clears nothing, in silence."""
+    """Reason why a source ignores a scan, "" if it does not: upstream then ignores it in silence."""
     low, high = source.min_obstacle_height, source.max_obstacle_height
     if level.rises is not None or low - _HAIR <= level.height <= high + _HAIR:
         return ""
@@ -133,7 +135,7 @@ def height_problem(level: LevelScan, source: SourceParams) -> str:
 
 
 class ObservationBuffer:
-    """The observations of one source that are still to be used."""
+    """The observations of one source that are still used."""
 
     def __init__(self, params: SourceParams) -> None:
         self.params = params
@@ -141,7 +143,7 @@ class ObservationBuffer:
         self._last = float("-inf")
 
     def add(self, observation: Observation) -> None:
-        """Store one; older ones go as `observation_persistence` says."""
+        """Store an observation; older ones are dropped as `observation_persistence` says."""
         if observation.stamp < self._last - 1.0:  # time went back
             self._kept.clear()
         self._last = observation.stamp
@@ -152,12 +154,12 @@ class ObservationBuffer:
             self._kept = self._kept[-1:]
 
     def all(self) -> list[Observation]:
-        """What an update uses, oldest first; none where the points' height is outside the source's limits."""
+        """Observations for an update, oldest first; none if the points' height is outside the source's limits."""
         lowest, highest = self.params.min_obstacle_height, self.params.max_obstacle_height
         return [o for o in self._kept if lowest - _HAIR <= o.height <= highest + _HAIR]
 
     def clear(self) -> None:
-        """Forget all, so that what was cleared does not come back from an old scan."""
+        """Forget all, so that an old scan does not restore what was cleared."""
         self._kept.clear()
 
     def is_current(self, now: float) -> bool:
