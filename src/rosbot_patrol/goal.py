@@ -17,6 +17,30 @@ class GoalState(Enum):
     FAILED = "failed"
 
 
+# Statuses of actionlib_msgs/GoalStatus, which only ros/ can import.
+_UNDER_WAY = {0, 1, 6, 7}  # PENDING, ACTIVE, PREEMPTING, RECALLING
+_SUCCEEDED = 3
+_ENDINGS = {
+    2: "the goal was given up for another",  # PREEMPTED
+    5: "the goal was rejected",
+    8: "the goal was called back",  # RECALLED
+    9: "the goal was lost",
+}
+SILENCE = 5.0  # time without a status after which the server of an action counts as down [s]
+
+
+def goal_state(status: int) -> GoalState:
+    """Tell how far a goal has come by its actionlib_msgs/GoalStatus."""
+    if status in _UNDER_WAY:
+        return GoalState.ACTIVE
+    return GoalState.SUCCEEDED if status == _SUCCEEDED else GoalState.FAILED
+
+
+def ending_text(status: int) -> str:
+    """Say how a goal of this actionlib_msgs/GoalStatus ended, for a server that does not; "" if nothing is to say."""
+    return _ENDINGS.get(status, "")
+
+
 @dataclass(frozen=True, kw_only=True)
 class GoalLink:
     """What is known of the navigation.

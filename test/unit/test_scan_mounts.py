@@ -19,11 +19,11 @@ from rosbot_patrol.costmap.params import SourceParams, read_costmap
 from rosbot_patrol.geometry import Pose2D, Transform, Twist2D
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.patrol.house.floor import floor_of
-from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.intruder.lidar_motion import Witness
-from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
+from rosbot_patrol.patrol.senses.health import NoHealth
+from rosbot_patrol.patrol.senses.lidar import Lidar
+from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.patrol.visibility.coverage import sight_of_scan
-from rosbot_patrol.replay.nodes.patrol_sight import PatrolSight
 from rosbot_patrol.scan import LevelScan, level_scan
 from rosbot_patrol.scan_feed import ScanFeed
 from rosbot_patrol.simulation.engine import Engine, EngineParams
@@ -214,10 +214,8 @@ def edges_of(mount: Transform) -> list[Edge]:
 
 
 @every_mount
-def test_a_replays_patrol_sees_the_same_room(mount: Transform) -> None:
-    rooms = Rooms((Room(id=0, name="home", pose=Pose2D()),), source="rooms")
-    sight = PatrolSight(EyesTopics(), InputParams(), rooms, ["person"], tree_of(mount))
-    view = sight.look(measure(mount, ROOM))
+def test_the_patrol_sees_the_same_room(mount: Transform) -> None:
+    view = Lidar(InputParams(), tree_of(mount), NoHealth()).place(measure(mount, ROOM), 10.0)
     assert view is not None
     assert distance_to_walls(LevelScan(view.scan, view.map_from_laser).points).max() < 0.02
 
@@ -232,8 +230,7 @@ def test_amcl_and_gmapping_are_fed_with_the_same_room(mount: Transform) -> None:
 
 def test_a_laser_that_looks_up_the_wall_is_refused_by_the_replays() -> None:
     mount, scan = mounted(roll=0.8), measure(mounted(), ROOM)
-    rooms = Rooms((Room(id=0, name="home", pose=Pose2D()),), source="rooms")
-    assert PatrolSight(EyesTopics(), InputParams(), rooms, ["person"], tree_of(mount)).look(scan) is None
+    assert Lidar(InputParams(), tree_of(mount), NoHealth()).place(scan, 10.0) is None
     feed = ScanFeed(tree_of(mount), "odom", "base_link", lost="nothing is mapped")
     feed.hear(scan, 10.0)
     assert list(feed.placed(13.0)) == []

@@ -130,7 +130,9 @@ class Picture:
         return ((red * 4899 + green * 9617 + blue * 1868 + 8192) >> 14).astype(np.uint8)[:, :, None]
 
 
-def unpack(data: bytes, encoding: str, *, width: int, height: int, step: int = 0, big_endian: bool = False) -> Picture:
+def unpack(
+    data: bytes | memoryview, encoding: str, *, width: int, height: int, step: int = 0, big_endian: bool = False
+) -> Picture:
     """Read the bytes of a picture message.
 
     Args:

@@ -12,8 +12,8 @@ import rospy
 from nav_msgs.msg import OccupancyGrid
 
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.patrol.mission.params import EyesTopics, InputParams
-from rosbot_patrol.ros.patrol import sight as patrol_eyes
+from rosbot_patrol.patrol.senses.house_map import HouseMap
+from rosbot_patrol.ros.patrol import sight_topics
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN
 from rosbot_patrol.ros.runtime.node import Worker
 
@@ -25,22 +25,19 @@ class Health:
         self.told: list[tuple[str, int, str]] = []
         self.came = threading.Event()
 
-    def set(self, part: str, level: int, message: str, values: object = None) -> None:
+    def set(self, part: str, level: int, message: str) -> None:
         self.told.append((part, level, message))
         self.came.set()
 
 
 @pytest.fixture
-def eyes(monkeypatch: pytest.MonkeyPatch) -> tuple[patrol_eyes.PatrolEyes, Health]:
-    """The patrol's eyes with nothing to listen to."""
+def listening(monkeypatch: pytest.MonkeyPatch) -> tuple[sight_topics.MapTopic, HouseMap, Health]:
+    """The map's topic with nothing to listen to."""
     health = Health()
-    monkeypatch.setattr(patrol_eyes, "Lenses", lambda _topic: None)
-    monkeypatch.setattr(patrol_eyes, "DepthRing", lambda *_: None)
     monkeypatch.setattr(rospy, "Subscriber", lambda *_, **__: None)
-    monkeypatch.setattr(patrol_eyes, "now", lambda: 0.0)
-    rooms = load_rooms(ROOT / "params" / "room_points.yaml")
-    made = patrol_eyes.PatrolEyes(EyesTopics(), rooms, ("person",), None, frames=InputParams(), health=health)
-    return made, health
+    monkeypatch.setattr(sight_topics, "now", lambda: 0.0)
+    house_map = HouseMap(load_rooms(ROOT / "params" / "room_points.yaml"), health)
+    return sight_topics.MapTopic(house_map), house_map, health
 
 
 def hall() -> OccupancyGrid:
@@ -69,35 +66,35 @@ def unknown(message: OccupancyGrid) -> None:
 
 
 @pytest.mark.parametrize("spoil", [cut, flat, empty, unknown])
-def test_a_bad_map_is_told_and_the_next_good_one_taken(eyes, spoil) -> None:
-    guard, health = eyes
+def test_a_bad_map_is_told_and_the_next_good_one_taken(listening, spoil) -> None:
+    topic, rooms, health = listening
     bad = hall()
     spoil(bad)
-    guard._on_map(bad)
+    topic._on_map(bad)
     assert health.came.wait(10.0)
     assert health.told[-1][:2] == ("map", ERROR)
-    assert guard.house is None
+    assert rooms.house is None
     health.came.clear()
-    guard._on_map(hall())
+    topic._on_map(hall())
     assert health.came.wait(10.0)
     assert health.told[-1][:2] == ("map", OK)
-    assert guard.house is not None
+    assert rooms.house is not None
 
 
-def test_a_bad_map_after_a_good_one_leaves_the_rooms_as_they_are(eyes) -> None:
-    guard, health = eyes
-    guard._on_map(hall())
+def test_a_bad_map_after_a_good_one_leaves_the_rooms_as_they_are(listening) -> None:
+    topic, rooms, health = listening
+    topic._on_map(hall())
     assert health.came.wait(10.0)
-    house = guard.house
+    house = rooms.house
     health.came.clear()
     bad = hall()
     cut(bad)
-    guard._on_map(bad)
+    topic._on_map(bad)
     assert health.came.wait(10.0)
     assert health.told[-1][:2] == ("map", WARN)
     assert "has 39999 cells, expected 200 x 200" in health.told[-1][2]
-    assert guard.house is house
+    assert rooms.house is house
 
 
-def test_the_thread_is_one_that_ends_the_node_with_it(eyes) -> None:
+def test_the_thread_is_one_that_ends_the_node_with_it(listening) -> None:
     assert any(isinstance(thread, Worker) and thread.name == "rooms" for thread in threading.enumerate())

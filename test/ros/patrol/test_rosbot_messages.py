@@ -11,11 +11,9 @@ from rosbot_ekf.msg import Imu
 from rosbot_ekf.srv import Configuration, ConfigurationResponse
 from sensor_msgs.msg import BatteryState, Range
 
-from rosbot_patrol.patrol.records.inputs import Battery
 from rosbot_patrol.ros.bridge.channels import message_class, service_class
 from rosbot_patrol.ros.drive.twist_mux_node import Eyes
-from rosbot_patrol.ros.patrol import inputs as patrol_inputs
-from rosbot_patrol.ros.runtime.latest import Latest
+from rosbot_patrol.ros.messages.senses import battery_from_msg
 
 
 def test_sums_are_those_of_the_firmware():
@@ -32,20 +30,14 @@ def test_the_bridge_finds_them():
     assert service_class("rosbot_ekf/Configuration") is Configuration
 
 
-def heard(monkeypatch, **fields) -> Battery:
-    """What the patrol's inputs keep of a message."""
-    monkeypatch.setattr(patrol_inputs, "now", lambda: 7.0)
-    inputs = SimpleNamespace(_battery=Latest())
-    patrol_inputs.PatrolInputs._on_battery(inputs, BatteryState(**fields))
-    return inputs._battery.get()
-
-
-def test_what_the_patrol_takes_from_a_battery(monkeypatch):
-    rosbot = heard(monkeypatch, voltage=12.4, power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION)
-    assert (rosbot.share, rosbot.voltage, rosbot.is_charging, rosbot.at) == (None, 12.4, False, 7.0)
-    empty = heard(monkeypatch, voltage=math.nan, percentage=0.0, present=True)
+def test_what_the_patrol_takes_from_a_battery():
+    rosbot = battery_from_msg(
+        BatteryState(voltage=12.4, power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION)
+    )
+    assert (rosbot.share, rosbot.voltage, rosbot.is_charging) == (None, 12.4, False)
+    empty = battery_from_msg(BatteryState(voltage=math.nan, percentage=0.0, present=True))
     assert (empty.share, empty.voltage) == (0.0, None)
-    turtlebot3 = heard(monkeypatch, voltage=12.5, percentage=1.126, present=True, power_supply_status=1)
+    turtlebot3 = battery_from_msg(BatteryState(voltage=12.5, percentage=1.126, present=True, power_supply_status=1))
     assert (turtlebot3.share, turtlebot3.voltage, turtlebot3.is_charging) == (None, 12.5, True)
 
 

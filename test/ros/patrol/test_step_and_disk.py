@@ -16,10 +16,8 @@ from rosbot_patrol.srv import ArmRequest
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.mission.params import InputParams
-from rosbot_patrol.patrol.records.inputs import Guarded
 from rosbot_patrol.ros.patrol import orders as patrol_orders
-from rosbot_patrol.ros.patrol.inputs import PatrolInputs
+from rosbot_patrol.ros.patrol.calls import CallDesk
 
 ROOMS = Rooms(tuple(Room(id=i, name=f"name {i}", pose=Pose2D()) for i in range(3)))
 
@@ -60,35 +58,33 @@ def in_time(work):
     return found[0]
 
 
-def inputs_on(disk: SlowDisk) -> PatrolInputs:
+def calls_on(disk: SlowDisk) -> CallDesk:
     store = SimpleNamespace(taken=0, is_handled=lambda *_: False, note_latched=lambda *_: None)
-    sensors = SimpleNamespace(has_file=False)
     wake = lambda: disk.order.append("taken")  # noqa: E731
-    return PatrolInputs(InputParams(), ROOMS, sensors, store, SlowJournal(disk), None, None, wake)
+    return CallDesk(ROOMS, store, SlowJournal(disk), latched_window=10.0, wake=wake)
 
 
 def test_a_call_on_its_way_to_the_disk_holds_up_no_step_and_is_taken_once_it_is_there() -> None:
     disk = SlowDisk()
-    inputs = inputs_on(disk)
-    inputs._guarded = Guarded()
-    callback = threading.Thread(target=inputs._call, args=(1, ""), daemon=True)
+    calls = calls_on(disk)
+    callback = threading.Thread(target=calls.call, args=(1, ""), daemon=True)
     callback.start()
     assert disk.is_writing.wait(10.0)
-    assert in_time(inputs._take_calls) == ()
+    assert in_time(calls.take) == ()
     disk.may_go.set()
     callback.join(10.0)
     assert disk.order == ["on disk", "taken"]
-    assert inputs._take_calls() == (1,)
-    assert inputs.taken == 1
+    assert calls.take() == (1,)
+    assert calls.taken == 1
 
 
 def test_dropping_lines_of_the_journal_holds_up_no_step() -> None:
     disk = SlowDisk()
-    inputs = inputs_on(disk)
-    saver = threading.Thread(target=inputs.note_saved, args=(frozenset(), 0), daemon=True)
+    calls = calls_on(disk)
+    saver = threading.Thread(target=calls.note_saved, args=(frozenset(), 0), daemon=True)
     saver.start()
     assert disk.is_writing.wait(10.0)
-    assert in_time(inputs._take_calls) == ()
+    assert in_time(calls.take) == ()
     disk.may_go.set()
     saver.join(10.0)
 
@@ -96,17 +92,15 @@ def test_dropping_lines_of_the_journal_holds_up_no_step() -> None:
 def test_two_callbacks_at_once_are_numbered_in_the_order_in_which_they_are_taken() -> None:
     disk = SlowDisk()
     disk.may_go.set()
-    inputs = inputs_on(disk)
-    threads = [
-        threading.Thread(target=inputs._call, args=(room, ""), daemon=True) for room in (1, 2) for _ in range(50)
-    ]
+    calls = calls_on(disk)
+    threads = [threading.Thread(target=calls.call, args=(room, ""), daemon=True) for room in (1, 2) for _ in range(50)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join(10.0)
-    numbers = [call.number for call in inputs._calls if call.number]
+    numbers = [call.number for call in calls._calls if call.number]
     assert numbers == sorted(numbers)
-    assert set(inputs._take_calls()) == {1, 2}
+    assert set(calls.take()) == {1, 2}
 
 
 @pytest.fixture

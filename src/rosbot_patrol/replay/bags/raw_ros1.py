@@ -19,11 +19,13 @@ SCAN_MD5 = "90c7ef2dc6895d81024acba2ac42f369"  # sensor_msgs/LaserScan
 TF_MD5 = "94810edda583a504dfda3829e70d7eec"  # tf2_msgs/TFMessage and tf/tfMessage
 COUNT_MD5 = "123675bf4420958597b5a78cb3800a1f"  # darknet_ros_msgs/ObjectCount
 GOAL_MD5 = "660d6895a1b9a16dce51fbdd9a64a56b"  # move_base_msgs/MoveBaseActionGoal
+IMAGE_MD5 = "060021388200f6f0f447d0fcd9c64743"  # sensor_msgs/Image
 RESULT_MD5 = "1eb06eeff08fa7ea874431638cb52332"  # move_base_msgs/MoveBaseActionResult
 
 _HEADER = struct.Struct("<IIII")  # seq, seconds, nanoseconds, length of the frame's name
 _BEAMS = struct.Struct("<7fI")  # angle_min, angle_max, angle_increment, time_increment, scan_time, range_min, range_max
 _COUNT, _INT8, _UINT8, _TIME = struct.Struct("<I"), struct.Struct("<b"), struct.Struct("<B"), struct.Struct("<II")
+_SIZE, _ROWS = struct.Struct("<II"), struct.Struct("<BII")  # of an image: height, width; byte order, step, length
 _TRANSFORM = struct.Struct("<7d")  # x, y, z and the quaternion
 
 
@@ -57,6 +59,24 @@ def read_count(raw: bytes) -> tuple[float, int]:
     """
     _, seconds, nanoseconds, length = _HEADER.unpack_from(raw)
     return seconds + nanoseconds / 1e9, _INT8.unpack_from(raw, _HEADER.size + length)[0]
+
+
+def read_image(raw: bytes) -> tuple[float, int, int, str, bool, int, memoryview]:
+    """A sensor_msgs/Image: time [s], height and width [px], encoding, is big-endian, bytes of a row, all rows.
+
+    Raises:
+        struct.error, ValueError: the bytes end too early or the encoding is no text.
+    """
+    _, seconds, nanoseconds, length = _HEADER.unpack_from(raw)
+    at = _HEADER.size + length
+    height, width = _SIZE.unpack_from(raw, at)
+    encoding, at = _text(raw, at + _SIZE.size)
+    is_big_endian, step, size = _ROWS.unpack_from(raw, at)
+    at += _ROWS.size
+    if at + size > len(raw):
+        raise struct.error(f"a picture of {size} bytes does not fit into {len(raw) - at}")
+    data = memoryview(raw)[at : at + size]
+    return seconds + nanoseconds / 1e9, height, width, encoding, bool(is_big_endian), step, data
 
 
 def read_goal(raw: bytes) -> str:

@@ -4,9 +4,9 @@ While it rests on guard, only every tenth of those steps is taken, and the next 
 comes of silence alone, as a dead detector, is told up to 0.4 s later than the node tells it.
 
 The way is the bag's: where the robot was, what its sensors and the detector said, when move_base was done. So a replay
-shows what this patrol decides from the same senses; where it would have driven elsewhere, the goals differ, and what
-comes after means little. Not replayed: depth pictures (places are told by lidar and floor), whether pictures are black
-or stand still, orders by service and action, rounds, mail, what was kept from before a restart.
+shows what this patrol decides from the same senses. Where it would have driven elsewhere, the goals differ, and what
+comes after means little. Depth pictures count where the bag has them. Not replayed: whether pictures are black or stand
+still, orders by service and action, rounds, mail, what was kept from before a restart.
 """
 
 from __future__ import annotations
@@ -16,31 +16,38 @@ import math
 from collections.abc import Collection, Iterable
 from typing import Any
 
-import numpy as np
-
-from rosbot_patrol.errors import TransformError
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.mission.manager import PatrolManager
-from rosbot_patrol.patrol.mission.params import InputParams, ManagerParams, NodeParams
-from rosbot_patrol.patrol.mission.robot_place import RobotPlace
-from rosbot_patrol.patrol.records.inputs import Battery, Frame, Guarded, Inputs
-from rosbot_patrol.patrol.records.request import Origin, Request
+from rosbot_patrol.patrol.mission.params import ManagerParams, NodeParams
+from rosbot_patrol.patrol.records.inputs import Battery, Guarded, Inputs
 from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.senses.health import NoHealth
+from rosbot_patrol.patrol.senses.params import InputParams
+from rosbot_patrol.patrol.senses.records import (
+    BoxesRecord,
+    CountRecord,
+    LensRecord,
+    LookRecord,
+    Moment,
+    TriggerRecord,
+)
+from rosbot_patrol.patrol.senses.senses import PatrolSenses
+from rosbot_patrol.patrol.senses.sensor_rooms import SensorRooms
 from rosbot_patrol.replay.bags.records import KINDS, MapRecord, Refused
 from rosbot_patrol.replay.nodes import patrol_records as heard
 from rosbot_patrol.replay.nodes.patrol_link import BagLink
 from rosbot_patrol.replay.nodes.patrol_log import PatrolLog
-from rosbot_patrol.replay.nodes.patrol_sight import PatrolSight
 from rosbot_patrol.replay.results.tables import Result
 from rosbot_patrol.replay.runner import TF_TYPES, Input
-from rosbot_patrol.scan import LaserScan, level_scan, scan_problem
+from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.sensors.sensor_file import SensorList
 from rosbot_patrol.tf.tree import Edge, TransformTree
 
 STOPPED = "the emergency stop was pressed (topic /e_stop)"
 AT_REST = 10  # steps of which one is taken
 CAMERA = "camera"  # the input that only says that pictures come
+DEPTH, DEPTH_LENS = "camera/depth/image_raw", "camera/depth/camera_info"
 
 INPUTS = (
     Input(name="motion_trigger", types=("rosbot_patrol/EspTrigger", "rosbot_patrol_simulation/EspTrigger")),
@@ -51,6 +58,8 @@ INPUTS = (
     Input(name="darknet_ros/bounding_boxes", types=("darknet_ros_msgs/BoundingBoxes",), is_needed=False),
     Input(name="darknet_ros/found_object", types=("darknet_ros_msgs/ObjectCount",), is_needed=False),
     Input(name="camera/rgb/camera_info", types=("sensor_msgs/CameraInfo",), is_needed=False),
+    Input(name=DEPTH, types=("sensor_msgs/Image",), is_needed=False),
+    Input(name=DEPTH_LENS, types=("sensor_msgs/CameraInfo",), is_needed=False),
     Input(
         name=CAMERA,
         topic="camera/rgb/image_raw",
@@ -93,27 +102,30 @@ class PatrolReplay:
         static: Iterable[Edge] = (),
     ) -> None:
         self._node, self._params, self._frames = node, params, frames
-        self._rooms, self._sensors, self._judge = rooms, sensors, judge
+        self._rooms, self._judge = rooms, judge
+        self._sensor_rooms = SensorRooms(sensors)
         self._tree = TransformTree()
         for edge in static:
             self._tree.add(edge, is_static=True)
-        self._place = RobotPlace(self._tree, frames)
-        self._sight = PatrolSight(node.eyes, frames, rooms, node.alarm_classes, self._tree)
         self._link = BagLink()
         self._log = PatrolLog()
-        self._calls: list[int] = []
-        self._requests: list[Request] = []
-        self._scan: tuple[LaserScan, float] | None = None
-        self._nearest: tuple[LaserScan, float | None] | None = None
-        self._battery: Battery | None = None
         self._guarded, self._stop = Guarded(), ""
-        self._detector_at = self._camera_at = -math.inf
+        self._camera_at = -math.inf
         self._next: float | None = None
         self._steps, self._left_out, self._is_awake = 0, 0, True
         self.begin(())
 
     def begin(self, names: Collection[str]) -> None:
-        """Which inputs will be heard; without pictures nobody waits for a camera."""
+        """Note which inputs will be heard: nobody waits for a camera or for depth that the bag has not."""
+        eyes = self._node.eyes
+        self._senses = PatrolSenses(
+            self._frames,
+            eyes if DEPTH in names else dataclasses.replace(eyes, depth_topic=""),
+            self._tree,
+            rooms=self._rooms,
+            alarm_classes=self._node.alarm_classes,
+            health=NoHealth(),
+        )
         views = Eyes(self._node)
         self._manager = PatrolManager(
             self._rooms,
@@ -127,73 +139,54 @@ class PatrolReplay:
     def hear(self, name: str, now: float, content: Any) -> None:
         """Take in a record of the input of that name, recorded at a time [s]."""
         self._step_until(now)
-        if isinstance(content, heard.TriggerRecord):
+        if isinstance(content, TriggerRecord):
             self._hear_call(content, now)
         elif name in ("tf", "tf_static"):
             for edge in content:
                 self._tree.add(edge, is_static=name == "tf_static")
         elif isinstance(content, LaserScan):
-            self._scan = None if scan_problem(content) else (content, now)
-        elif isinstance(content, heard.BoxesRecord):
-            self._hear_boxes(content, now)
-        elif isinstance(content, heard.CountRecord):
-            self._detector_at = now
-            if content.objects == 0:  # other counts come with their boxes
-                self._sight.hear_frame(Frame(), content.stamp, now)
+            self._senses.lidar.hear(content, now)
+        elif isinstance(content, BoxesRecord | CountRecord):
+            self._senses.hear_detector(content, _moment(now))
+        elif name == CAMERA:
+            self._camera_at = now
+        elif name == DEPTH:
+            self._senses.depth.hear(content)
+        elif isinstance(content, heard.AliveRecord):
+            self._link.hear_status(now)
         elif not isinstance(content, Refused):
+            self._is_awake = True
             self._hear_state(name, content, now)
 
     def finish(self) -> Result:
-        """What the patrol said and did."""
+        """Give what the patrol said and did."""
         return self._log.result(steps=self._steps)
 
     # -- what it hears
 
-    def _hear_call(self, record: heard.TriggerRecord, now: float) -> None:
-        room = self._room_of(record.sensor) if record.moves else None
+    def _hear_call(self, record: TriggerRecord, now: float) -> None:
+        room = self._sensor_rooms.room_of(record.sensor, now) if record.moves else None
         if room is not None:
-            self._calls.append(room)
+            self._senses.hear_call(room)
             self._step(now)  # the node is waked, too
 
-    def _room_of(self, sensor: int) -> int | None:
-        return self._sensors.room_of(sensor) if self._sensors.has_file else sensor
-
-    def _hear_boxes(self, record: heard.BoxesRecord, now: float) -> None:
-        self._detector_at = now
-        if record.boxes:  # the count, which always comes, says so of none
-            stamp = record.stamp or now
-            self._sight.hear_frame(Frame(stamp=stamp, boxes=record.boxes), stamp, now)
-
     def _hear_state(self, name: str, content: Any, now: float) -> None:
-        self._is_awake |= not isinstance(content, heard.AliveRecord)
         match content:
-            case heard.AliveRecord():
-                if name == CAMERA:
-                    self._camera_at = now
-                else:
-                    self._link.hear_status(now)
             case heard.GoalRecord():
                 self._link.hear_goal(content)
             case heard.OutcomeRecord():
                 self._link.hear_outcome(content)
-            case heard.LensRecord():
-                self._sight.hear_lens(content)
+            case LensRecord():
+                eye = self._senses.depth if name == DEPTH_LENS else self._senses.camera
+                eye.hear_lens(content)
             case MapRecord():
-                self._sight.hear_map(content.grid)
+                self._senses.house_map.hear(content.grid)
             case Battery():
-                self._battery = dataclasses.replace(content, at=now)
+                self._senses.hear_battery(content, now)
             case heard.ModeRecord():
-                until = now + content.entry_delay if content.entry_delay > 0.0 else None
-                self._guarded = Guarded(
-                    mode=content.mode,
-                    rooms=content.rooms,
-                    why="" if content.rooms is None else content.why,
-                    is_quiet=content.is_quiet,
-                    holds_until=until,
-                )
-            case heard.LookRecord() if content.room >= 0:
-                origin = Origin.SILENT_SENSOR
-                self._requests.append(Request(room_id=content.room, origin=origin, note=content.text, wall=now))
+                self._guarded = _guarded(content, now)
+            case LookRecord():
+                self._senses.ask(content.request(now))
             case heard.StopRecord():
                 self._stop = STOPPED if content.is_pressed else ""
 
@@ -219,41 +212,21 @@ class PatrolReplay:
 
     def _inputs(self, now: float) -> Inputs:
         is_busy = self._manager.mission is not None
-        scan = self._fresh_scan(now) if is_busy else None
-        view = self._sight.look(scan)
-        calls, self._calls = tuple(self._calls), []
-        requests, self._requests = tuple(self._requests), []
-        return Inputs(
-            wall=now,
-            triggers=calls,
-            requests=requests,
-            frames=self._sight.take(now, is_busy=is_busy),
-            yaw=self._place.yaw(now),
-            pose=self._place.pose(now),
-            clearance=self._clearance(scan),
-            link=self._link.state(now),
-            detector_at=self._detector_at,
-            camera_at=self._camera_at,
-            scan=view,
-            house=self._sight.house,
-            battery=self._battery,
-            guarded=self._guarded,
-            stop=self._stop,
-        )
+        known = self._senses.take(_moment(now), self._guarded, self._stop, is_busy=is_busy)
+        return dataclasses.replace(known, link=self._link.state(now), camera_at=self._camera_at)
 
-    def _fresh_scan(self, now: float) -> LaserScan | None:
-        is_fresh = self._scan is not None and now - self._scan[1] <= self._frames.scan_timeout
-        return self._scan[0] if self._scan is not None and is_fresh else None
 
-    def _clearance(self, scan: LaserScan | None) -> float | None:
-        """From the robot's centre to the nearest thing [m]; reckoned once for each scan."""
-        if scan is None:
-            return None
-        if self._nearest is None or self._nearest[0] is not scan:
-            base = self._frames.base_frame
-            try:
-                points = level_scan(scan, self._tree.transform(base, scan.frame_id), base).points
-            except TransformError:
-                return None
-            self._nearest = scan, float(np.hypot(*points.T).min()) if len(points) else None
-        return self._nearest[1]
+def _moment(now: float) -> Moment:
+    """A bag has one clock."""
+    return Moment(now=now, steady=now, wall=now)
+
+
+def _guarded(record: heard.ModeRecord, now: float) -> Guarded:
+    """What a mode that came at a time [s] guards."""
+    return Guarded(
+        mode=record.mode,
+        rooms=record.rooms,
+        why="" if record.rooms is None else record.why,
+        is_quiet=record.is_quiet,
+        holds_until=now + record.entry_delay if record.entry_delay > 0.0 else None,
+    )

@@ -4,17 +4,8 @@ from __future__ import annotations
 
 import math
 
-from rosbot_patrol.goal import Goal, GoalLink, GoalState
+from rosbot_patrol.goal import SILENCE, Goal, GoalLink, GoalState, ending_text, goal_state
 from rosbot_patrol.replay.nodes.patrol_records import GoalRecord, OutcomeRecord
-
-SILENCE = 5.0  # the server counts as down when its status was not heard for so long [s]
-SUCCEEDED = 3  # actionlib_msgs/GoalStatus
-WORDS = {
-    2: "the goal was given up for another",
-    5: "the goal was rejected",
-    8: "the goal was called back",
-    9: "the goal was lost",
-}
 
 
 class BagLink:
@@ -51,5 +42,5 @@ class BagLink:
         outcome = self._outcomes.get(self._goals[self._sent - 1]) if self._sent <= len(self._goals) else None
         if outcome is None:
             return GoalLink(is_up=is_up, tag=self._tag, state=GoalState.ACTIVE)
-        state = GoalState.SUCCEEDED if outcome.status == SUCCEEDED else GoalState.FAILED
-        return GoalLink(is_up=is_up, tag=self._tag, state=state, text=outcome.text or WORDS.get(outcome.status, ""))
+        text = outcome.text or ending_text(outcome.status)
+        return GoalLink(is_up=is_up, tag=self._tag, state=goal_state(outcome.status), text=text)

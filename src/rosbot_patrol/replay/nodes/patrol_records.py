@@ -5,8 +5,16 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rosbot_patrol.patrol.guard.battery import battery_of
-from rosbot_patrol.patrol.intruder.measure import Lens
 from rosbot_patrol.patrol.records.inputs import Battery, Box
+from rosbot_patrol.patrol.senses.records import (
+    BoxesRecord,
+    CountRecord,
+    ImageRecord,
+    LensRecord,
+    LookRecord,
+    TriggerRecord,
+    lens_record,
+)
 from rosbot_patrol.replay.bags import raw_ros1
 from rosbot_patrol.replay.bags.definitions import STAMP
 from rosbot_patrol.replay.bags.records import ANY, Kind, Refused, stamp_of
@@ -14,34 +22,6 @@ from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5
 
 CHARGING = 1  # sensor_msgs/BatteryState.POWER_SUPPLY_STATUS_CHARGING
 LOOK = "look"  # rosbot_patrol/SensorEvent.LOOK
-
-
-class TriggerRecord(NamedTuple):
-    """EspTrigger: id of the motion sensor, and whether it sees motion (else it only lives)."""
-
-    sensor: int
-    moves: bool
-
-
-class BoxesRecord(NamedTuple):
-    """darknet_ros_msgs/BoundingBoxes: when the picture was taken [s], 0 where that is not told, and what was in it."""
-
-    stamp: float
-    boxes: tuple[Box, ...]
-
-
-class CountRecord(NamedTuple):
-    """darknet_ros_msgs/ObjectCount: when the picture was taken [s], and how many objects were in it."""
-
-    stamp: float
-    objects: int
-
-
-class LensRecord(NamedTuple):
-    """sensor_msgs/CameraInfo: the camera's frame and its lens."""
-
-    frame: str
-    lens: Lens
 
 
 class GoalRecord(NamedTuple):
@@ -68,13 +48,6 @@ class ModeRecord(NamedTuple):
     why: str
 
 
-class LookRecord(NamedTuple):
-    """rosbot_patrol/SensorEvent: the room to look at, -1 where it asks for none, and why."""
-
-    room: int
-    text: str
-
-
 class StopRecord(NamedTuple):
     """std_msgs/Bool on /e_stop."""
 
@@ -95,11 +68,16 @@ def _boxes(message: Any) -> BoxesRecord:
 
 def _lens(message: Any) -> LensRecord | Refused:
     k = message.K if hasattr(message, "K") else message.k  # as ROS 1 and ROS 2 name it
-    if message.width <= 0 or message.height <= 0 or k[0] <= 0.0 or k[4] <= 0.0:
-        return Refused(f"a camera_info of width {message.width} and focal length {k[0]:g} tells no lens")
-    fx, fy, cx, cy = (float(k[i]) for i in (0, 4, 2, 5))
-    lens = Lens(fx=fx, fy=fy, cx=cx, cy=cy, width=int(message.width), height=int(message.height))
-    return LensRecord(message.header.frame_id.lstrip("/"), lens)
+    try:
+        return lens_record(message.header.frame_id, k, width=message.width, height=message.height)
+    except ValueError as err:
+        return Refused(str(err))
+
+
+def _image(message: Any) -> ImageRecord:
+    stamp, is_big_endian = stamp_of(message.header.stamp), bool(message.is_bigendian)
+    size = int(message.height), int(message.width)
+    return ImageRecord(stamp, *size, message.encoding, is_big_endian, int(message.step), message.data.tobytes())
 
 
 def _battery(message: Any) -> Battery:
@@ -175,7 +153,14 @@ KINDS: dict[str, Kind] = {
         raw_ros1.RESULT_MD5,
     ),
     "actionlib_msgs/msg/GoalStatusArray": _ALIVE,
-    "sensor_msgs/msg/Image": _ALIVE,
+    "sensor_msgs/msg/Image": Kind(
+        _image,
+        STAMP
+        | {"height": "int", "width": "int", "step": "int", "is_bigendian": "int"}
+        | {"encoding": "string", "data": "int[]"},
+        lambda raw: ImageRecord(*raw_ros1.read_image(raw)),
+        raw_ros1.IMAGE_MD5,
+    ),
     "sensor_msgs/msg/CompressedImage": _ALIVE,
     "rosbot_patrol/msg/Arming": Kind(
         _mode,

@@ -19,7 +19,8 @@ from rosbot_patrol.package_files import package_file, read_move_base
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.intruder.known_objects import load_known
-from rosbot_patrol.patrol.mission.params import InputParams, NodeParams, manager_params
+from rosbot_patrol.patrol.mission.params import NodeParams, manager_params
+from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.replay.nodes import amcl as amcl_replay
 from rosbot_patrol.replay.nodes import bridge as serial_replay
 from rosbot_patrol.replay.nodes import detector as detector_replay

@@ -7,19 +7,11 @@ import time
 
 import actionlib
 import rospy
-from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from actionlib_msgs.msg import GoalStatusArray
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 
-from rosbot_patrol.goal import Goal, GoalLink, GoalState
+from rosbot_patrol.goal import SILENCE, Goal, GoalLink, ending_text, goal_state
 from rosbot_patrol.ros.messages import convert
-
-_ACTIVE = {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}
-_WORDS = {
-    GoalStatus.PREEMPTED: "the goal was given up for another",
-    GoalStatus.RECALLED: "the goal was called back",
-    GoalStatus.REJECTED: "the goal was rejected",
-    GoalStatus.LOST: "the goal was lost",
-}
 
 
 class MoveBase:
@@ -30,7 +22,7 @@ class MoveBase:
         silence: the server counts as down when its status was not heard for so long [s], wall time.
     """
 
-    def __init__(self, frame: str = "map", silence: float = 5.0) -> None:
+    def __init__(self, frame: str = "map", silence: float = SILENCE) -> None:
         self._frame = frame
         self._silence = silence
         self._client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
@@ -58,8 +50,8 @@ class MoveBase:
             if not self._tag:
                 return GoalLink(is_up=self.is_up)
             state = self._client.get_state()
-            text = self._client.get_goal_status_text() or _WORDS.get(state, "")
-            return GoalLink(is_up=self.is_up, tag=self._tag, state=_state(state), text=text)
+            text = self._client.get_goal_status_text() or ending_text(state)
+            return GoalLink(is_up=self.is_up, tag=self._tag, state=goal_state(state), text=text)
 
     def send(self, goal: Goal) -> None:
         """Send a goal; the one before is no longer followed."""
@@ -78,9 +70,3 @@ class MoveBase:
     def cancel_all(self) -> None:
         """Give up every goal that the server has, whoever sent it."""
         self._client.cancel_all_goals()
-
-
-def _state(status: int) -> GoalState:
-    if status in _ACTIVE:
-        return GoalState.ACTIVE
-    return GoalState.SUCCEEDED if status == GoalStatus.SUCCEEDED else GoalState.FAILED

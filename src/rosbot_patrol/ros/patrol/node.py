@@ -47,11 +47,15 @@ from rosbot_patrol.patrol.records.inputs import Box, Inputs
 from rosbot_patrol.patrol.records.mission import Phase
 from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.senses.params import InputParams
+from rosbot_patrol.patrol.senses.senses import PatrolSenses
+from rosbot_patrol.patrol.senses.sensor_rooms import SensorRooms
 from rosbot_patrol.patrol.story.mission_log import Chronicle
 from rosbot_patrol.ros.patrol.action import PatrolActions
 from rosbot_patrol.ros.patrol.alert_desk import AlertDesk
+from rosbot_patrol.ros.patrol.calls import CallDesk
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper, RecordParams
-from rosbot_patrol.ros.patrol.inputs import InputParams, PatrolInputs
+from rosbot_patrol.ros.patrol.inputs import PatrolInputs
 from rosbot_patrol.ros.patrol.missed_calls import MissedCalls
 from rosbot_patrol.ros.patrol.move_base import MoveBase
 from rosbot_patrol.ros.patrol.orders import ArmingDesk, Orders, StopSwitch
@@ -65,7 +69,6 @@ from rosbot_patrol.ros.patrol.settings import (
     load_manager_params,
     load_or_say,
 )
-from rosbot_patrol.ros.patrol.sight import PatrolEyes
 from rosbot_patrol.ros.post.outbox_owner import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import Health
 from rosbot_patrol.ros.runtime.node import Loop, now, run_node
@@ -131,18 +134,18 @@ class PatrolNode:
         self._loop = Loop(self.params.rate, self._step, name="patrol")
         journal = Journal(folder / "calls.jsonl", self.store.taken)
         self._lost_calls = journal.damage
-        transforms = Transforms()
-        eyes = PatrolEyes(
-            self.params.eyes,
-            rooms,
-            self.params.alarm_classes,
-            transforms,
-            frames=inputs,
-            health=self.health,
+        topic = self.params.eyes.depth_topic
+        eyes = dataclasses.replace(self.params.eyes, depth_topic=rospy.resolve_name(topic) if topic else "")
+        senses = PatrolSenses(
+            inputs, eyes, Transforms(), rooms=rooms, alarm_classes=self.params.alarm_classes, health=self.health
         )
+        wake = self._loop.hurry
+        calls = CallDesk(rooms, self.store, journal, latched_window=inputs.latched_window, wake=wake)
         self.inputs = PatrolInputs(
-            inputs, rooms, self.sensors, self.store, journal, eyes=eyes, transforms=transforms, wake=self._loop.hurry
+            inputs, eyes, senses=senses, calls=calls, sensor_rooms=SensorRooms(self.sensors), wake=wake
         )
+        for _, room, wall in journal.left:
+            self.inputs.ask(Request(room_id=room, wall=wall, note="kept over a restart"))
         self.inputs.on_boxes = self._note_sighting
         self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of)
         self.neighbour = Neighbour(self.params.sensor_watch_after, self.params.sensor_watch_notice_after, self.health)
@@ -268,10 +271,10 @@ class PatrolNode:
             self.pictures.start()
         elif self.desk.is_recorded:
             self.pictures.stop()
-        self.inputs.note_served(self.manager.served())
+        self.inputs.calls.note_served(self.manager.served())
         changed = commands.changed or self._schedule_changed
         self._schedule_changed = False
-        self._save(self.inputs.has_latched() or changed)
+        self._save(self.inputs.calls.has_latched() or changed)
 
     def _record(self, time_now: float, commands: Commands, pose: Pose2D | None = None) -> None:
         mission = self.manager.mission
@@ -300,11 +303,11 @@ class PatrolNode:
         if not changed:
             return
         memory, served = self.manager.snapshot(), self.manager.served()
-        taken, schedule = self.inputs.taken, self.schedule.snapshot()
+        taken, schedule = self.inputs.calls.taken, self.schedule.snapshot()
 
         def save() -> None:
             self.store.save(memory, taken=taken, schedule=schedule)
-            self.inputs.note_saved(served, taken)
+            self.inputs.calls.note_saved(served, taken)
 
         self.desk.remember(save)
 

@@ -17,9 +17,10 @@ from rosbot_patrol.patrol.guard.battery import BatteryParams
 from rosbot_patrol.patrol.guard.schedule import Round
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.mission.drive import DriveParams
-from rosbot_patrol.patrol.mission.params import InputParams, ManagerParams, NodeParams, manager_params
+from rosbot_patrol.patrol.mission.params import ManagerParams, NodeParams, manager_params
 from rosbot_patrol.patrol.search.look import LookParams
 from rosbot_patrol.patrol.search.turn import SpinParams
+from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
 from rosbot_patrol.ros.runtime.diagnostics import WARN, Health
 from rosbot_patrol.ros.runtime.node import load_params

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
@@ -48,3 +49,11 @@ class Latest(Generic[T]):
         One that came after `now` was read is fresh; a clock that went back by more than the time-out counts as stale.
         """
         return self._value is not None and abs(now - self._stamp) <= timeout
+
+
+def drain(source: deque[T]) -> list[T]:
+    """Take all that a queue holds, while others may append to it."""
+    items = []
+    while source:
+        items.append(source.popleft())
+    return items

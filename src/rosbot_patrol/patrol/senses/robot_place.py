@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, compose
-from rosbot_patrol.patrol.mission.params import InputParams
+from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.tf.frames import Frames
 
 

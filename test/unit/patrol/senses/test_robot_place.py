@@ -8,8 +8,8 @@ import pytest
 
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.mission.params import InputParams
-from rosbot_patrol.patrol.mission.robot_place import RobotPlace
+from rosbot_patrol.patrol.senses.params import InputParams
+from rosbot_patrol.patrol.senses.robot_place import RobotPlace
 
 NOW = 1000.0
 
