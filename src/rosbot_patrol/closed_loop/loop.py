@@ -28,7 +28,7 @@ from rosbot_patrol.costmap.layers.obstacle import observe_level
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome
+from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome, Reason
 from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.package_files import read_move_base
@@ -231,14 +231,14 @@ class ClosedLoop:
             self.drive.outcome = command.outcome
         if command.recovery is not None:
             self.drive.recoveries.append(command.recovery[2])
-        if command.reason and command.reason not in self.drive.reasons[-1:]:
-            self.drive.reasons.append(command.reason)
+        if command.text not in self.drive.reasons[-1:]:
+            self.drive.reasons.append(command.text)
         if command.plan is not None and not self.drive.planned:
             self.drive.planned = float(np.hypot(*np.diff(command.plan[:, :2], axis=0).T).sum())
         if command.twist is None:
             return
         verdict = self._guard.limit(command.twist, now, odom)
-        if "someone" in command.reason:
+        if command.reason is Reason.WAITING:
             self.drive.waited += self._every * STEP
         self._commands.append((now + self._delays.command, verdict.twist))
 

@@ -26,6 +26,27 @@ class State(enum.Enum):
     CLEARING = "clearing"
 
 
+class Reason(enum.Enum):
+    """Why the robot does what it does; the value is the sentence for it if there is no better one."""
+
+    NO_GOAL = "no goal"
+    CANCELLED = "cancelled"
+    ENDED = "the goal has ended"
+    DEPARTED = "a program that the robot cannot drive without has gone"
+    POSE_UNKNOWN = "the robot's pose is not known"
+    NO_ODOMETRY = "there is no odometry"
+    SENSORS_OLD = "sensor data is out of date"
+    PLANNING = "planning"
+    PLANNING_LONG = "planning takes long"
+    NO_PLAN = "there is no plan"
+    DRIVING = "driving"
+    NO_CONTROL = "there is no safe velocity"
+    WAITING = "waiting for somebody"
+    RECOVERING = "recovering"
+    RECOVERY = "a recovery behaviour runs"
+    RECOVERED = "planning after a recovery"
+
+
 class Trigger(enum.Enum):
     """Why it recovers, with upstream's result text for when that is no use."""
 
@@ -102,11 +123,18 @@ class Command:
         outcome: set when the goal has ended.
         plan: a new plan to show.
         recovery: index, count and name of a behaviour that has just begun.
-        reason: why it does what it does, in one string.
+        reason: why it does what it does.
+        detail: the same in a sentence, "" if `reason` says all.
     """
 
     twist: Twist2D | None = None
     outcome: Outcome | None = None
     plan: Array | None = None
     recovery: tuple[int, int, str] | None = None
-    reason: str = ""
+    reason: Reason
+    detail: str = ""
+
+    @property
+    def text(self) -> str:
+        """Why it does what it does, in a sentence."""
+        return self.detail or self.reason.value

@@ -30,6 +30,7 @@ from rosbot_patrol.navigation.interfaces import (
     Outcome,
     PlanResult,
     PlanSource,
+    Reason,
     State,
     Trigger,
 )
@@ -78,6 +79,10 @@ class Navigator:
         plans: where plans come from.
         controller: turns plans into velocities.
         recoveries: tried in turn.
+
+    Attributes:
+        state: what it does.
+        text: why it does that, in a sentence.
     """
 
     def __init__(
@@ -94,7 +99,7 @@ class Navigator:
         self._controller = controller
         self._recoveries = list(recoveries)
         self._context: _Context | None = None
-        self.reason = "no goal"
+        self.text = Reason.NO_GOAL.value
 
     @property
     def goal(self) -> Pose2D | None:
@@ -123,12 +128,12 @@ class Navigator:
     def cancel(self) -> Command:
         """Give the goal up; the robot stands."""
         self._end()
-        return Command(twist=STOP, reason="cancelled")
+        return Command(twist=STOP, reason=Reason.CANCELLED)
 
     def _end(self) -> None:
         self._plans.drop()
         self._context = None
-        self.state, self.reason = State.IDLE, "no goal"
+        self.state, self.text = State.IDLE, Reason.NO_GOAL.value
 
     def _begin_planning(self, now: float) -> None:
         assert self._context is not None
@@ -145,11 +150,11 @@ class Navigator:
         """One control cycle; `view` is None where the robot's pose is not known."""
         context = self._context
         if context is None:
-            return Command(reason=self.reason)
+            return Command(reason=Reason.NO_GOAL, detail=self.text)
         if view is None:
             context.progress.wait(now)
-            self.reason = "the robot's pose is not known"
-            return Command(twist=STOP, reason=self.reason)
+            self.text = Reason.POSE_UNKNOWN.value
+            return Command(twist=STOP, reason=Reason.POSE_UNKNOWN)
         self._watch_motion(now, view.local.pose, context)
         result = self._plans.poll()
         taken = self._take_plan(now, result, context) if result is not None else None
@@ -161,7 +166,7 @@ class Navigator:
             State.CLEARING: self._clearing,
         }[self.state]
         command = step(now, view, context)
-        self.reason = command.reason
+        self.text = command.text
         return command if taken is None else replace(command, plan=taken)
 
     def _watch_motion(self, now: float, pose: Pose2D, context: _Context) -> None:
@@ -176,13 +181,13 @@ class Navigator:
         progress = context.progress
         if result.poses is None:
             progress.retries += 1
-            self.reason = str(result.error)
-            if self.state is State.PLANNING and (not context.failures or context.failures[-1] != self.reason):
-                log.warning("no plan: %s", self.reason)
+            self.text = problem = str(result.error)
+            if self.state is State.PLANNING and (not context.failures or context.failures[-1] != problem):
+                log.warning("no plan: %s", problem)
                 if isinstance(result.error, OutOfBounds) and result.error.what == "goal":
                     is_navfn = "navfn" in self.params.base_global_planner.lower()
                     log.warning(OFF_MAP.format("navfn" if is_navfn else "global"))
-                context.failures.append(self.reason)
+                context.failures.append(problem)
             return None
         progress.last_plan, progress.retries = now, 0
         context.failures.clear()
@@ -208,13 +213,14 @@ class Navigator:
             if not self._plans.is_busy:
                 return self._recover(Trigger.PLANNING, context)
             if now <= progress.last_plan + 4.0 * p.planner_patience + 10.0:
-                return Command(twist=STOP, reason="planning takes long")
+                return Command(twist=STOP, reason=Reason.PLANNING_LONG)
             return self._recover(Trigger.PLANNING, context)
         if now - progress.last_request >= (1.0 / p.planner_frequency if p.planner_frequency > 0.0 else 0.2):
             self._request(now)
         coasting = now < progress.coast_until and view.is_current and not context.failures
-        reason = context.failures[-1] if context.failures else "planning"
-        return Command(twist=None if coasting else STOP, reason=reason)
+        failure = context.failures[-1] if context.failures else ""
+        reason = Reason.NO_PLAN if failure else Reason.PLANNING
+        return Command(twist=None if coasting else STOP, reason=reason, detail=failure)
 
     def _controlling(self, now: float, view: NavigatorView, context: _Context) -> Command:
         progress, p = context.progress, self.params
@@ -224,7 +230,7 @@ class Navigator:
             return self._recover(Trigger.OSCILLATION, context)
         if not view.is_current:
             progress.wait(now)
-            return Command(twist=STOP, reason="sensor data is out of date")
+            return Command(twist=STOP, reason=Reason.SENSORS_OLD)
         if p.planner_frequency > 0.0 and now - progress.last_request >= 1.0 / p.planner_frequency:
             self._request(now)
         try:
@@ -235,21 +241,21 @@ class Navigator:
             progress.control_failed = True
             progress.last_plan, progress.retries = now, 0
             self._begin_planning(now)
-            return Command(twist=STOP, reason=str(err))
+            return Command(twist=STOP, reason=Reason.NO_CONTROL, detail=str(err))
         progress.last_control, progress.control_failed = now, False
         if progress.trigger is Trigger.CONTROLLING:
             progress.recovery_index = 0
         someone = view.must_wait(twist)
         if someone:
             progress.last_motion = now  # to wait for somebody is no oscillation
-            return Command(twist=STOP, reason=f"waiting: {someone}")
-        return Command(twist=twist, reason="driving")
+            return Command(twist=STOP, reason=Reason.WAITING, detail=f"waiting: {someone}")
+        return Command(twist=twist, reason=Reason.DRIVING)
 
     def _recover(self, trigger: Trigger, context: _Context) -> Command:
         context.progress.trigger = trigger
         context.progress.running = context.progress.held_back = None
         self.state = State.CLEARING
-        return Command(twist=STOP, reason=f"recovering ({trigger.name.lower()})")
+        return Command(twist=STOP, reason=Reason.RECOVERING, detail=f"recovering ({trigger.name.lower()})")
 
     def _clearing(self, now: float, view: NavigatorView, context: _Context) -> Command:
         progress = context.progress
@@ -264,26 +270,27 @@ class Navigator:
             return Command(
                 twist=STOP,
                 recovery=(progress.recovery_index, count, progress.running.name),
-                reason=f"recovery {progress.running.name}",
+                reason=Reason.RECOVERY,
+                detail=f"recovery {progress.running.name}",
             )
         if not view.is_current:
             progress.wait(now)
-            return Command(twist=STOP, reason="sensor data is out of date")
+            return Command(twist=STOP, reason=Reason.SENSORS_OLD)
         twist = progress.held_back or progress.running.step(view.recovery)
         if twist is not None and (someone := view.must_wait(twist)):
             progress.held_back = twist
-            return Command(twist=STOP, reason=f"waiting: {someone}")
+            return Command(twist=STOP, reason=Reason.WAITING, detail=f"waiting: {someone}")
         progress.held_back = None
         if twist is not None:
-            return Command(twist=twist, reason=f"recovery {progress.running.name}")
+            return Command(twist=twist, reason=Reason.RECOVERY, detail=f"recovery {progress.running.name}")
         log.info("recovery %s: %s", progress.running.name, progress.running.last_words)
         progress.running = None
         progress.recovery_index += 1
         progress.last_plan = progress.last_motion = progress.last_control = now
         progress.retries = 0
         self._begin_planning(now)
-        return Command(twist=STOP, reason="planning after a recovery")
+        return Command(twist=STOP, reason=Reason.RECOVERED)
 
     def _finish(self, text: str, *, succeeded: bool) -> Command:
         self._end()
-        return Command(twist=STOP, outcome=Outcome(succeeded=succeeded, text=text), reason=text)
+        return Command(twist=STOP, outcome=Outcome(succeeded=succeeded, text=text), reason=Reason.ENDED, detail=text)

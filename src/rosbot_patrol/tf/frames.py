@@ -6,6 +6,8 @@ from typing import Protocol
 
 from rosbot_patrol.geometry import Pose2D, Transform
 
+NO_FRAME = "set header.frame_id in its driver; a ROSbot's firmware before 0.14 leaves it empty"
+
 
 class Frames(Protocol):
     """Transforms between named frames; a name may carry tf1's leading slash."""

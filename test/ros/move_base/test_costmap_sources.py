@@ -10,7 +10,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2, Range
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.costmap.costs import LETHAL
-from rosbot_patrol.costmap.layered import LayeredCostmap
+from rosbot_patrol.costmap.fed import FedCostmap
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, Transform
@@ -61,6 +61,7 @@ class Frames:
             raise TransformError("odom", "camera_depth_frame", "not yet")
 
     laser = Transform(0.1, 0.0, 0.2)
+    camera = Transform(0.0, 0.0, EYE, -0.5, 0.5, -0.5, 0.5)  # x right, y down, z ahead
 
     def lookup(self, target, source, stamp):
         del target, source
@@ -69,23 +70,20 @@ class Frames:
 
     def transform(self, target, source, stamp):
         del target
-        assert source == "laser"
         self._check(stamp)
-        return self.laser
-
-    def lookup_matrix(self, target, source, stamp):
-        del target
-        assert source == "camera_depth_frame"
-        self._check(stamp)
-        matrix = np.eye(4)
-        matrix[:3, :3] = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
-        matrix[2, 3] = EYE
-        return matrix
+        return {"laser": self.laser, "camera_depth_frame": self.camera}[source]
 
 
 @pytest.fixture
 def topics(monkeypatch):
     return Topics(monkeypatch)
+
+
+def subscribed(tree):
+    """A costmap and its inputs, behind their topics."""
+    fed = FedCostmap(read_costmap(tree), Frames(), "local_costmap", now=100.0)
+    costmap_sources.subscribe_inputs(fed)
+    return fed.costmap, fed.inputs
 
 
 def make(**depth):
@@ -111,8 +109,7 @@ def make(**depth):
         "resolution": 0.05,
         "footprint": [[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]],
     }
-    costmap = LayeredCostmap(read_costmap(tree))
-    return costmap, costmap_sources.subscribe_sources(costmap)
+    return subscribed(tree)
 
 
 def picture(stamp, *, encoding="32FC1"):
@@ -132,7 +129,7 @@ def info(stamp=100.0):
 
 def update(costmap, sources, frames, now):
     for source in sources:
-        source.take(frames, "odom")
+        source.take(frames, "odom", now)
     costmap.update(now, Pose2D())
     return int((costmap.cells == LETHAL).sum())
 
@@ -226,20 +223,16 @@ def test_range_readings_that_name_no_frame_are_refused_in_words(topics):
 
 def test_a_cloud_marks(topics):
     source = {"data_type": "PointCloud2", "topic": "points"}
-    costmap = LayeredCostmap(
-        read_costmap(
-            {
-                "plugins": [{"name": "cloud", "type": "costmap_2d::ObstacleLayer"}],
-                "cloud": {"observation_sources": "points", "points": source},
-                "rolling_window": True,
-                "width": 6.0,
-                "height": 6.0,
-                "resolution": 0.05,
-                "robot_radius": 0.2,
-            }
-        )
-    )
-    sources = costmap_sources.subscribe_sources(costmap)
+    tree = {
+        "plugins": [{"name": "cloud", "type": "costmap_2d::ObstacleLayer"}],
+        "cloud": {"observation_sources": "points", "points": source},
+        "rolling_window": True,
+        "width": 6.0,
+        "height": 6.0,
+        "resolution": 0.05,
+        "robot_radius": 0.2,
+    }
+    costmap, sources = subscribed(tree)
     depth = np.full((480, 640), np.nan, np.float32)
     depth[242, 322] = 1.5
     cloud = messages.cloud_msg(np.zeros((480, 640, 3), np.uint8), depth, CAMERA, 100.0, "camera_depth_frame")
@@ -264,8 +257,7 @@ def make_scans(**source):
         "resolution": 0.05,
         "footprint": [[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]],
     }
-    costmap = LayeredCostmap(read_costmap(tree))
-    return costmap, costmap_sources.subscribe_sources(costmap)
+    return subscribed(tree)
 
 
 def scan(stamp, **changes):
@@ -309,12 +301,12 @@ def test_scans_that_say_nothing_stop_the_robot_and_are_named(topics, caplog, lim
         topics.time = 100.0 + 0.1 * k
         topics.send("scan", scan(topics.time, ranges=np.zeros(360)))
         update(costmap, [source], frames, topics.time)
-        assert source.blind(topics.time) == (0.1 * k > (limit or 1.0))
+        assert source.is_blind(topics.time) == (0.1 * k > (limit or 1.0))
     assert "say nothing" in source.trouble(topics.time)
     assert len([record for record in caplog.records if "say nothing" in record.getMessage()]) == 1
     topics.send("scan", scan(topics.time))
     update(costmap, [source], frames, topics.time)
-    assert (source.blind(topics.time), source.trouble(topics.time)) == (False, "")
+    assert (source.is_blind(topics.time), source.trouble(topics.time)) == (False, "")
 
 
 def test_a_tilted_laser_and_one_too_low_stop_the_robot_and_are_named(topics):
@@ -327,7 +319,7 @@ def test_a_tilted_laser_and_one_too_low_stop_the_robot_and_are_named(topics):
         frames.laser = laser
         topics.send("scan", scan(100.0))
         assert update(costmap, [source], frames, 100.0) == 0
-        assert source.blind(100.0)
+        assert source.is_blind(100.0)
         assert named in source.trouble(100.0)
 
 

@@ -9,7 +9,7 @@ from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.params import read_costmap
 from rosbot_patrol.errors import ControlError, NoPath, OutOfBounds
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
-from rosbot_patrol.navigation.interfaces import NavigatorView, PlanResult, State
+from rosbot_patrol.navigation.interfaces import NavigatorView, PlanResult, Reason, State
 from rosbot_patrol.navigation.navigator import Navigator
 from rosbot_patrol.navigation.params import MoveBaseParams
 from rosbot_patrol.planning.interfaces import LocalPlanner, LocalView, Recovery, RecoveryView
@@ -314,7 +314,7 @@ def test_it_waits_for_somebody_without_counting_that_as_being_stuck():
     for _ in range(100):
         command = bench.step()
         assert command.twist == STOP
-        assert command.reason == "waiting: someone comes this way"
+        assert (command.reason, command.text) == (Reason.WAITING, "waiting: someone comes this way")
     assert bench.navigator.state is State.CONTROLLING
     bench.someone = ""
     assert bench.step().twist == FORWARD

@@ -42,9 +42,10 @@ from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 from rosbot_patrol.ros.runtime.latest import Latest
 from rosbot_patrol.ros.runtime.node import load_params, now, run_node
 from rosbot_patrol.ros.runtime.process import Priority
-from rosbot_patrol.ros.runtime.transforms import NO_FRAME, Transforms
+from rosbot_patrol.ros.runtime.transforms import Transforms
 from rosbot_patrol.scan import LaserScan, level_scan
 from rosbot_patrol.scan_check import ScanCheck
+from rosbot_patrol.tf.frames import NO_FRAME
 
 log = logging.getLogger(__name__)
 

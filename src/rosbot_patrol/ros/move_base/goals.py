@@ -15,7 +15,7 @@ from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.navigation.interfaces import BAD_QUATERNION, Outcome
 from rosbot_patrol.ros.messages.convert import pose2d_from_pose, pose_to_msg
-from rosbot_patrol.ros.runtime.transforms import Transforms
+from rosbot_patrol.tf.frames import Frames
 
 log = logging.getLogger(__name__)
 
@@ -24,7 +24,7 @@ class GoalRefusedError(Exception):
     """A goal that cannot be worked on; its text is the action's result text."""
 
 
-def read_pose(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
+def read_pose(msg: PoseStamped, frame: str, transforms: Frames) -> Pose2D:
     """A pose of make_plan in a frame: as upstream, whatever its orientation.
 
     Raises:
@@ -37,7 +37,7 @@ def read_pose(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
     return _in_frame(pose, msg.header.frame_id.lstrip("/"), frame, transforms)
 
 
-def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
+def read_goal(msg: PoseStamped, frame: str, transforms: Frames) -> Pose2D:
     """A goal message in a frame.
 
     Raises:
@@ -56,7 +56,7 @@ def read_goal(msg: PoseStamped, frame: str, transforms: Transforms) -> Pose2D:
     return _in_frame(Pose2D(p.x, p.y, yaw), msg.header.frame_id.lstrip("/"), frame, transforms)
 
 
-def _in_frame(pose: Pose2D, source: str, frame: str, transforms: Transforms) -> Pose2D:
+def _in_frame(pose: Pose2D, source: str, frame: str, transforms: Frames) -> Pose2D:
     if source == frame:
         return pose
     try:
@@ -76,7 +76,7 @@ class GoalServer:
         notify: called, on another thread, when a goal has come or was cancelled.
     """
 
-    def __init__(self, frame: str, transforms: Transforms, notify: Callable[[], None]) -> None:
+    def __init__(self, frame: str, transforms: Frames, notify: Callable[[], None]) -> None:
         self._frame = frame
         self._transforms = transforms
         self._pub_goal = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=1)

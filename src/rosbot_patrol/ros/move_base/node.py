@@ -18,138 +18,92 @@ from __future__ import annotations
 
 import logging
 import threading
-from dataclasses import replace
 from typing import Any
 
 import rospy
 from nav_msgs.msg import Odometry
 from nav_msgs.srv import GetPlan, GetPlanRequest, GetPlanResponse
+from sensor_msgs.msg import LaserScan as LaserScanMsg
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
-from rosbot_patrol.costmap.params import read_costmap
-from rosbot_patrol.errors import ParamError, PlanningError, TransformError
-from rosbot_patrol.geometry import STOP, Pose2D, Twist2D
-from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome, State
-from rosbot_patrol.navigation.navigator import Navigator
+from rosbot_patrol.errors import PlanningError, TransformError
+from rosbot_patrol.geometry import STOP
+from rosbot_patrol.navigation.interfaces import Outcome, Reason, State
 from rosbot_patrol.navigation.params import MoveBaseParams
-from rosbot_patrol.planning.interfaces import LocalView, Recovery, RecoveryView
-from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries, short_name
-from rosbot_patrol.ros.messages.convert import path_to_msg, twist_from_msg
+from rosbot_patrol.navigation.stack import Cycle, NavigationStack
+from rosbot_patrol.planning.registry import short_name
+from rosbot_patrol.ros.messages.convert import path_to_msg, scan_from_msg, twist_from_msg
 from rosbot_patrol.ros.move_base.costmap import CostmapNode
 from rosbot_patrol.ros.move_base.goals import GoalRefusedError, GoalServer, read_pose
-from rosbot_patrol.ros.move_base.movers import People
 from rosbot_patrol.ros.move_base.outputs import HealthTeller, Outputs
 from rosbot_patrol.ros.move_base.plans import ThreadedPlans
 from rosbot_patrol.ros.move_base.tuning import Tuning
-from rosbot_patrol.ros.runtime.latest import Latest
 from rosbot_patrol.ros.runtime.logs import LineThrottle
-from rosbot_patrol.ros.runtime.node import Loop, load_params, now, run_node
+from rosbot_patrol.ros.runtime.node import Loop, now, run_node
 from rosbot_patrol.ros.runtime.process import Priority, give_back_large_blocks
 from rosbot_patrol.ros.runtime.transforms import Transforms
 
 log = logging.getLogger(__name__)
 
 _REPEAT_S = 10.0  # between two lines of one kind
-_NORMAL = ("waiting", "planning after", "recovering")  # reasons that belong to a drive
+_NORMAL = {Reason.WAITING, Reason.RECOVERING, Reason.RECOVERED}  # reasons that belong to a drive
+_LOGGED_ELSEWHERE = {Reason.NO_PLAN, Reason.RECOVERY}  # by the navigator
+_NO_NEWS = {Reason.DRIVING, Reason.PLANNING, *_LOGGED_ELSEWHERE}
+_WITH_FIGURES = {Reason.WAITING, Reason.POSE_UNKNOWN, Reason.SENSORS_OLD}  # whose sentences change all the time
 _CLOCK_NOISE = 1e-4  # of differences of times as floats [s]
 
 
-def _group(tree: dict[str, Any], key: str) -> dict[str, Any]:
-    group = tree.get(key, {})
-    if not isinstance(group, dict):
-        raise ParamError(f"{rospy.get_name()}/{key}", f"expected a group of parameters, got {group!r}")
-    return group
-
-
 class MoveBaseNode:
-    """Reads inputs, steps the navigator, publishes what it commands."""
+    """The topics, services, actions and threads of a NavigationStack."""
 
     def __init__(self) -> None:
         tree: dict[str, Any] = rospy.get_param("~", {}) or {}
-        groups = [key for key, value in tree.items() if isinstance(value, dict)]
-        self.params = load_params(MoveBaseParams, tree=tree, ignore=[*groups, "recovery_behaviors"])
-        name = rospy.get_name() + "/"
-        self._tree, self._name = tree, name
+        self._name = rospy.get_name() + "/"
         self._cycle = threading.RLock()
         self._transforms = Transforms()
-        self._global = self._make_costmap(tree, "global_costmap", name)
-        self._local = self._make_costmap(tree, "local_costmap", name, keeps_last=True)
-        p = self.params
-        self._planner = make_global_planner(p.base_global_planner, tree, name=name)
-        self._plans = ThreadedPlans(self._planner, self._global)
-        self._controller = make_local_planner(
-            p.base_local_planner,
-            tree,
-            self._local.costmap,
-            controller_frequency=p.controller_frequency,
-            name=name,
-        )
-        self._navigator = Navigator(
-            p, plans=self._plans, controller=self._controller, recoveries=self._make_recoveries(p)
-        )
-        self._people = People(self._scan_topic(), self._local.frame, self._transforms, p.movers, p.give_way)
-        self._velocity: Latest[Twist2D] = Latest()
+        self._stack = NavigationStack(tree, self._transforms, ThreadedPlans, name=self._name, now=now())
+        self._stack.departed = self._departed
+        self._navigator, self._controller = self._stack.navigator, self._stack.controller
+        self._global, self._local = (CostmapNode(costmap) for costmap in self._stack.costmaps)
+        self._frame = self._stack.global_costmap.frame
         self._slow_cycles = 0
         self._said = ""
         self._repeats = LineThrottle(_REPEAT_S)
-        self._control = Loop(p.controller_frequency, self.step, name="control")
+        self._control = Loop(self._stack.params.controller_frequency, self.step, name="control")
         self._advertise()
+        self._subscribe()
         self._offer_tuning()
 
-    def _make_recoveries(self, p: MoveBaseParams) -> list[Recovery]:
-        return make_recoveries(
-            self._tree,
-            conservative=p.conservative_reset_dist,
-            clearing_radius=p.aggressive_radius,
-            clearing_rotation=p.clearing_rotation_allowed,
-            name=self._name,
-            planner=self._controller,
-        )
-
     def _offer_tuning(self) -> None:
+        p, stack = self._stack.params, self._stack
         tuning = Tuning(self._name, self._cycle)
-        tuning.offer_node(self.params, self._configure)
-        tuning.offer_planner(short_name(self.params.base_global_planner), self._planner)
-        tuning.offer_planner(short_name(self.params.base_local_planner), self._controller)
+        tuning.offer_node(p, self._configure)
+        tuning.offer_planner(short_name(p.base_global_planner), stack.planner)
+        tuning.offer_planner(short_name(p.base_local_planner), stack.controller)
         tuning.offer_costmap(self._global, lambda: None)
-        tuning.offer_costmap(self._local, self._fit_controller)
+        tuning.offer_costmap(self._local, stack.fit_controller)
 
     def _configure(self, params: MoveBaseParams) -> None:
-        self.params = params
-        self._navigator.configure(params, self._make_recoveries(params))
+        self._stack.configure(params)
         self._control.set_rate(params.controller_frequency)
-        if "controller_frequency" not in _group(self._tree, short_name(params.base_local_planner)):
-            own = replace(self._controller.params, controller_frequency=params.controller_frequency)
-            self._controller.set_params(own)
-
-    def _fit_controller(self) -> None:
-        costmap = self._local.costmap
-        self._controller.fit(costmap.footprint, resolution=costmap.info.resolution)
-
-    def _scan_topic(self) -> str:
-        """Where the local costmap's first scans come from, "" where it takes none."""
-        for layer in self._local.costmap.obstacle_layers:
-            for key, buffer in layer.buffers.items():
-                if buffer.params.data_type == "LaserScan":
-                    return buffer.params.topic or key
-        return ""
-
-    def _make_costmap(self, tree: dict[str, Any], key: str, name: str, *, keeps_last: bool = False) -> CostmapNode:
-        config = read_costmap(_group(tree, key), name=f"{name}{key}/")
-        return CostmapNode(config, self._transforms, key, keeps_last=keeps_last)
 
     def _advertise(self) -> None:
-        p = self.params
+        p = self._stack.params
         global_name, local_name = short_name(p.base_global_planner), short_name(p.base_local_planner)
-        frames = {"global_frame": self._global.frame, "local_frame": self._local.frame}
+        frames = {"global_frame": self._frame, "local_frame": self._stack.local_costmap.frame}
         self._outputs = Outputs(global_name, local_name, **frames)
-        self._health = HealthTeller((self._global, self._local))
-        self._goals = GoalServer(self._global.frame, self._transforms, self._control.hurry)
-        rospy.Subscriber(p.odom_topic, Odometry, self._on_odom, queue_size=1, tcp_nodelay=True)
+        self._health = HealthTeller(self._stack.costmaps)
+        self._goals = GoalServer(self._frame, self._transforms, self._control.hurry)
         rospy.Service("~make_plan", GetPlan, self._on_make_plan)
         rospy.Service(f"~{global_name}/make_plan", GetPlan, self._on_planner_make_plan)
         rospy.Service("~clear_costmaps", Empty, self._on_clear)
         rospy.on_shutdown(self._stop)
+
+    def _subscribe(self) -> None:
+        p, topic = self._stack.params, self._stack.scan_topic
+        rospy.Subscriber(p.odom_topic, Odometry, self._on_odom, queue_size=1, tcp_nodelay=True)
+        if topic and p.give_way.horizon > 0.0:
+            rospy.Subscriber(topic, LaserScanMsg, self._on_scan, queue_size=1, buff_size=2**18, tcp_nodelay=True)
 
     def run(self) -> None:
         """Until shutdown."""
@@ -157,13 +111,13 @@ class MoveBaseNode:
         self._local.start()
         self._goals.start()
         self._control.start()
-        log.info("move_base takes goals in frame '%s'", self._global.frame)
+        log.info("move_base takes goals in frame '%s'", self._frame)
         self._tell_reach()
         rospy.spin()
 
     def _tell_reach(self) -> None:
         """Say how far goals may be where the global costmap moves with the robot, as with the tutorial's values."""
-        shape = self._global.params
+        shape = self._stack.global_costmap.params
         if shape.rolling_window:
             log.warning(
                 "the global costmap is a window of %.0f x %.0f m that moves with the robot: goals that lie farther than"
@@ -178,12 +132,14 @@ class MoveBaseNode:
     # ---- inputs
 
     def _on_odom(self, msg: Odometry) -> None:
-        self._velocity.set(twist_from_msg(msg.twist.twist), now())
+        self._stack.hear_velocity(twist_from_msg(msg.twist.twist), now())
+
+    def _on_scan(self, msg: LaserScanMsg) -> None:
+        self._stack.people.hear(scan_from_msg(msg))
 
     def _on_clear(self, request: EmptyRequest) -> EmptyResponse:
-        for costmap in (self._global, self._local):
-            with costmap.lock:
-                costmap.costmap.reset()
+        for costmap in self._stack.costmaps:
+            costmap.reset()
         return EmptyResponse()
 
     def _on_make_plan(self, request: GetPlanRequest) -> GetPlanResponse | None:
@@ -195,21 +151,21 @@ class MoveBaseNode:
     def _on_planner_make_plan(self, request: GetPlanRequest) -> GetPlanResponse | None:
         try:
             if request.start.header.frame_id:
-                start = read_pose(request.start, self._global.frame, self._transforms)
+                start = read_pose(request.start, self._frame, self._transforms)
             else:
-                start = self._global.robot_pose(now())
-            goal = read_pose(request.goal, self._global.frame, self._transforms)
+                start = self._stack.global_costmap.robot_pose(now())
+            goal = read_pose(request.goal, self._frame, self._transforms)
         except (GoalRefusedError, TransformError) as err:
             log.error("make_plan: %s", err)
             return None
         response = GetPlanResponse()
-        response.plan.header.frame_id = self._global.frame
+        response.plan.header.frame_id = self._frame
         try:
-            poses = self._plans.plan(start, goal, tolerance=request.tolerance)
+            poses = self._stack.plan(start, goal, tolerance=request.tolerance)
         except PlanningError as err:
             log.error("make_plan: %s", err)
             return response
-        response.plan = path_to_msg(poses, self._global.frame, now())
+        response.plan = path_to_msg(poses, self._frame, now())
         return response
 
     # ---- the control cycle
@@ -238,96 +194,51 @@ class MoveBaseNode:
         self._work(time)
 
     def _work(self, time: float) -> None:
-        self._people.look()
-        view, problem = self._view(time)
-        if self._navigator.state is State.CLEARING:
-            with self._global.lock, self._local.lock:
-                command = self._navigator.step(time, view)
-        else:
-            command = self._navigator.step(time, view)
+        cycle = self._stack.step(time)
+        command = cycle.command
         self._outputs.publish(command, self._controller, time)
-        self._say(problem or command.reason, command.outcome)
-        if view is not None:
-            self._goals.feedback(view.recovery.pose_global, time)
+        self._say(cycle, command.outcome)
+        if cycle.pose is not None:
+            self._goals.feedback(cycle.pose, time)
         if command.outcome is not None:
             self._goals.finish(command.outcome)
         self._watch_rate(time)
         self._tell(time)
 
-    def _say(self, reason: str, outcome: Outcome | None) -> None:
+    def _say(self, cycle: Cycle, outcome: Outcome | None) -> None:
         """Log why the base does not simply drive; the end of a goal always, another reason once in a while."""
-        kind = reason.split(":")[0]  # what follows has figures that change
-        is_told = reason == self._navigator.plan_failure or kind.startswith("recovery ")  # by the navigator
-        is_new = kind not in ("", "driving", "planning", self._said) and not is_told
+        reason = cycle.reason
+        kind = reason.value if reason in _WITH_FIGURES else cycle.text
+        is_new = reason not in _NO_NEWS and kind != self._said
         self._said = kind
         more = "" if outcome is not None else self._repeats.due(kind, now()) if is_new else None
         if more is not None:
-            is_normal = outcome.succeeded if outcome is not None else kind.startswith(_NORMAL)
-            log.log(logging.INFO if is_normal else logging.WARNING, "%s%s", reason, more)
+            is_normal = outcome.succeeded if outcome is not None else reason in _NORMAL
+            log.log(logging.INFO if is_normal else logging.WARNING, "%s%s", cycle.text, more)
 
     def _departed(self) -> str:
         """Which other node that it cannot drive without has gone, in a sentence; else empty."""
-        gone = self._transforms.departed(self._local.base_frame)
-        if not gone and self.params.stop_without_map:
+        gone = self._transforms.departed(self._stack.local_costmap.base_frame)
+        if not gone and self._stack.params.stop_without_map:
             topic = self._global.departed_map or self._local.departed_map
             gone = f"nobody publishes the map on {topic} any more" if topic else ""
         return gone
 
-    def _view(self, time: float) -> tuple[NavigatorView | None, str]:
-        """What the navigator sees, None and why where it must not drive by it: the robot's pose is not known."""
-        gone = self._departed()
-        if gone:
-            return None, gone
-        try:
-            pose_global = self._global.robot_pose(time)
-            pose_local = self._local.robot_pose(time)
-            frames = self._local.frame, self._global.frame
-            local_from_plan = Pose2D() if frames[0] == frames[1] else self._transforms.lookup(*frames)
-        except TransformError as err:
-            return None, str(err)
-        timeout = self.params.odom_timeout
-        moving_known = timeout == 0.0 or self._velocity.fresh(time, timeout)
-        local = LocalView(
-            now=time,
-            pose=pose_local,
-            velocity=self._velocity.get() or STOP,
-            costmap=self._local.last,
-            local_from_plan=local_from_plan,
-        )
-        recovery = RecoveryView(
-            now=time,
-            pose_global=pose_global,
-            pose_local=pose_local,
-            global_costmap=self._global.costmap,
-            local_costmap=self._local.costmap,
-        )
-        problem = "" if moving_known else f"no odometry on {self.params.odom_topic} for {timeout} s"
-        if not self._local.is_current(time):
-            problem = "Sensor data is out of date, we're not going to allow commanding of the base for safety"
-            problem = ": ".join([problem, *self._local.troubles(time)])
-        view = NavigatorView(
-            local=local,
-            recovery=recovery,
-            is_current=not problem,
-            must_wait=lambda wish: self._people.waits(wish, pose_local, time),
-        )
-        return view, problem
-
     def _watch_rate(self, time: float) -> None:
         took = now() - time
-        if took > 1.0 / self.params.controller_frequency + _CLOCK_NOISE:
+        if took > 1.0 / self._stack.params.controller_frequency + _CLOCK_NOISE:
             self._slow_cycles += 1
             more = self._repeats.due("slow cycle", time)
             if more is not None:
                 log.warning(
                     "Control loop missed its desired rate of %.4fHz... the loop actually took %.4f seconds%s",
-                    self.params.controller_frequency,
+                    self._stack.params.controller_frequency,
                     took,
                     more,
                 )
 
     def _tell(self, time: float) -> None:
-        self._health.tell(time, self._navigator.state, self._navigator.reason, self._slow_cycles)
+        self._health.tell(time, self._navigator.state, self._navigator.text, self._slow_cycles)
 
 
 def main() -> None:

@@ -11,11 +11,11 @@ from move_base_msgs.msg import RecoveryStatus
 from nav_msgs.msg import Path
 from numpy.typing import NDArray
 
+from rosbot_patrol.costmap.fed import FedCostmap
 from rosbot_patrol.geometry import Twist2D
-from rosbot_patrol.navigation.interfaces import Command, State
+from rosbot_patrol.navigation.interfaces import Command, Reason, State
 from rosbot_patrol.planning.interfaces import LocalPlanner
 from rosbot_patrol.ros.messages.convert import path_to_msg, twist_to_msg
-from rosbot_patrol.ros.move_base.costmap import CostmapNode
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import now
 
@@ -53,7 +53,7 @@ class Outputs:
             self._tell_recovery(command.recovery, time)
         if command.plan is not None:
             self._show(self._plan, command.plan, self._frames[0], time)
-        if command.reason == "driving":
+        if command.reason is Reason.DRIVING:
             self._show(self._global_plan, controller.visible_plan, self._frames[1], time)
             self._show(self._local_plan, controller.local_plan, self._frames[1], time)
 
@@ -79,7 +79,7 @@ class HealthTeller:
         costmaps: the global one and the local one.
     """
 
-    def __init__(self, costmaps: Sequence[CostmapNode]) -> None:
+    def __init__(self, costmaps: Sequence[FedCostmap]) -> None:
         self._health = Health()
         self._costmaps = costmaps
         self._due = float("-inf")

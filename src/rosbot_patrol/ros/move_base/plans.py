@@ -8,8 +8,7 @@ import threading
 from rosbot_patrol.errors import PatrolError, PlanningError, TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.navigation.interfaces import PlanResult
-from rosbot_patrol.planning.interfaces import Array, GlobalPlanner
-from rosbot_patrol.ros.move_base.costmap import CostmapNode
+from rosbot_patrol.navigation.stack import NavigationStack
 from rosbot_patrol.ros.runtime.node import Worker, now
 
 log = logging.getLogger(__name__)
@@ -20,13 +19,15 @@ class PoseUnknownError(PlanningError):
 
 
 class ThreadedPlans:
-    """A PlanSource that plans on a worker thread over a copy of the global costmap."""
+    """A PlanSource that plans on a worker thread.
 
-    def __init__(self, planner: GlobalPlanner, costmap: CostmapNode) -> None:
-        self._planner = planner
-        self._costmap = costmap
+    Args:
+        stack: plans.
+    """
+
+    def __init__(self, stack: NavigationStack) -> None:
+        self._stack = stack
         self._lock = threading.Lock()
-        self._planner_lock = threading.Lock()
         self._wake = threading.Condition(self._lock)
         self._goal: Pose2D | None = None
         self._ticket = 0
@@ -58,11 +59,6 @@ class ThreadedPlans:
             self._ticket += 1
             self._goal, self._result, self._busy = None, None, False
 
-    def plan(self, start: Pose2D, goal: Pose2D, tolerance: float | None = None) -> Array:
-        """A plan now, for services; raises PlanningError."""
-        with self._planner_lock:
-            return self._planner.plan(self._costmap.copy(), start, goal, tolerance=tolerance)
-
     def _run(self) -> None:
         while True:
             with self._wake:
@@ -76,7 +72,7 @@ class ThreadedPlans:
 
     def _attempt(self, goal: Pose2D) -> PlanResult:
         try:
-            return PlanResult(poses=self.plan(self._costmap.robot_pose(now()), goal))
+            return PlanResult(poses=self._stack.plan_from_robot(goal, now()))
         except PlanningError as err:
             return PlanResult(error=err)
         except TransformError as err:

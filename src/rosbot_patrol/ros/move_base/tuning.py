@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from rosbot_patrol.costmap.fed import FedCostmap
 from rosbot_patrol.costmap.layers.layer import Layer
 from rosbot_patrol.costmap.params import (
     CostmapParams,
@@ -107,13 +108,14 @@ class Tuning:
 
         self._servers.append(ReconfigureServer(space, params, names, apply))
 
-    def offer_costmap(self, costmap: CostmapNode, after: Callable[[], None]) -> None:
+    def offer_costmap(self, node: CostmapNode, after: Callable[[], None]) -> None:
         """A costmap's and its layers'; `after` is called when its own have changed."""
+        costmap = node.costmap
 
         def apply(changes: dict[str, Any]) -> CostmapParams:
             wanted = changed(costmap.params, changes, COSTMAP, name=f"{self._prefix}{costmap.name}/")
             with self._cycle, costmap.lock:
-                costmap.configure(wanted)
+                node.configure(wanted)
                 after()
             return wanted
 
@@ -124,7 +126,7 @@ class Tuning:
             self._servers.append(ReconfigureServer(f"{costmap.name}/{layer.name}", layer.params, names, apply_to_layer))
 
     def _apply_to_layer(
-        self, costmap: CostmapNode, layer: Layer, names: tuple[str, ...], changes: dict[str, Any]
+        self, costmap: FedCostmap, layer: Layer, names: tuple[str, ...], changes: dict[str, Any]
     ) -> Any:
         wanted = changed(layer.params, changes, names, name=f"{self._prefix}{costmap.name}/{layer.name}/")
         with costmap.lock:

@@ -11,8 +11,6 @@ from tf2_msgs.msg import TFMessage
 from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D, Transform
 
-NO_FRAME = "set header.frame_id in its driver; a ROSbot's firmware before 0.14 leaves it empty"
-
 
 class _Listener(tf2_ros.TransformListener):
     """Remembers who told where a frame is, too."""

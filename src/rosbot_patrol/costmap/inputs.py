@@ -1,0 +1,345 @@
+"""What a costmap sees by: records of scans, clouds, depth pictures and ranges, which wait for their transform.
+
+`hear` only decodes what is used of a record (of a depth picture every n-th row and column) and keeps the newest few.
+`take` places them, at their stamps, in the costmap's layers. One thread may hear while another takes.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.costmap.layered import LayeredCostmap
+from rosbot_patrol.costmap.layers.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
+from rosbot_patrol.costmap.layers.range_layer import RangeReading, RangeSensorLayer
+from rosbot_patrol.costmap.params import SourceParams
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams
+from rosbot_patrol.costmap.sources.cloud import CloudLayout, cloud_points, observe_cloud
+from rosbot_patrol.costmap.sources.depth import DepthPicture, Optics, observe_depth
+from rosbot_patrol.errors import ImageError, LaserTilted, SensorError, TransformError
+from rosbot_patrol.images.encodings import unpack
+from rosbot_patrol.scan import LaserScan, level_scan
+from rosbot_patrol.scan_check import ScanCheck
+from rosbot_patrol.tf.frames import NO_FRAME, Frames
+
+log = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+_KEPT = 5  # records that wait for their transform
+_OLDEST = 1.0  # a record that is older than the newest that waits by more waits no longer [s]
+_PATIENCE = 1.0  # if the parameters set no limit, scans that say nothing stop the robot after this time [s]
+_SILENT = 5.0  # if the parameters set no limit, an input that is silent for this time is reported [s]
+
+
+class CloudRecord(NamedTuple):
+    """A sensor_msgs/PointCloud2 (bytes and layout) or PointCloud (points [m], layout None)."""
+
+    stamp: float
+    frame: str
+    data: Any
+    layout: CloudLayout | None = None
+
+
+class DepthRecord(NamedTuple):
+    """A sensor_msgs/Image with depths; `data` is anything with that many bytes."""
+
+    stamp: float
+    frame: str
+    width: int
+    height: int
+    encoding: str
+    step: int
+    data: Any
+    is_bigendian: bool = False
+
+
+class OpticsRecord(NamedTuple):
+    """A sensor_msgs/CameraInfo: size and pinhole [px]."""
+
+    width: int
+    height: int
+    optics: Optics
+
+
+class RangeRecord(NamedTuple):
+    """A sensor_msgs/Range: distance and limits [m], width of the cone [rad]."""
+
+    stamp: float
+    frame: str
+    distance: float
+    range_min: float
+    range_max: float
+    field_of_view: float
+
+
+class Input(ABC, Generic[T]):
+    """One topic of a layer. All times [s] are of one clock.
+
+    Args:
+        name: "layer/source", for messages.
+        now: time at the start.
+        limit: silence that stops the robot [s], 0 for none.
+        frame: of the sensor, "" for the record's.
+        max_rate: records a second that are looked at, 0 for all.
+        newest_only: of several records only the newest counts.
+
+    Attributes:
+        refused: why the newest record cannot be used, "" if it can.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        now: float,
+        *,
+        limit: float = 0.0,
+        frame: str = "",
+        max_rate: float = 0.0,
+        newest_only: bool = True,
+    ) -> None:
+        self.name = name
+        self.refused = ""
+        self._limit = limit
+        self._frame = frame.lstrip("/")
+        self._period = 0.95 / max_rate if max_rate > 0.0 else 0.0
+        self._newest_only = newest_only
+        self._heard = self._used = -math.inf
+        self._born = self._placed = now
+        self._unplaced = ""
+        self._waiting: deque[tuple[float, str, T]] = deque(maxlen=_KEPT)
+
+    @abstractmethod
+    def _place(self, item: T, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+        """Put it into the layer; raises TransformError if it cannot be placed yet."""
+
+    def _keep(self, stamp: float, frame: str, now: float, decode: Callable[[], T | None]) -> None:
+        """Decode a record unless they come too fast, and let it wait; `decode` may raise ImageError or SensorError."""
+        self._heard = now
+        if 0.0 <= stamp - self._used < self._period:
+            return
+        try:
+            item = decode()
+        except (ImageError, SensorError) as err:
+            if not self.refused:
+                log.error("%s: %s", self.name, err)
+            self.refused = str(err)
+            return
+        self.refused = ""
+        if item is not None:
+            self._used = stamp
+            self._waiting.append((stamp, self._frame or frame, item))
+
+    def take(self, frames: Frames, target: str, now: float) -> None:
+        """Place what waits, in the frame `target`; what cannot be placed yet waits on."""
+        later: list[tuple[float, str, T]] = []
+        waiting = list(self._waiting)
+        for entry in reversed(waiting) if self._newest_only else waiting:
+            stamp, frame, item = entry
+            try:
+                self._place(item, stamp, frame, frames, target, now)
+            except TransformError as err:
+                self._unplaced = self._unplaced or str(err)
+                later.append(entry)
+                continue
+            self._placed, self._unplaced = now, ""
+            if self._newest_only:
+                break
+        newest = max((entry[0] for entry in later), default=0.0)
+        later.sort(key=lambda entry: entry[0])
+        self._waiting = deque((e for e in later if newest - e[0] < _OLDEST), maxlen=_KEPT)
+
+    def trouble(self, now: float) -> str:
+        """What is wrong with it, "" for nothing."""
+        if self.refused:
+            return f"{self.name}: {self.refused}"
+        limit = self._limit or _SILENT
+        silent = now - max(self._heard, self._born)
+        if silent > limit:
+            return f"{self.name} has been silent for {silent:.1f} s"
+        if self._unplaced and now - self._placed > limit:
+            return f"{self.name} cannot be placed: {self._unplaced}"
+        return ""
+
+    def is_blind(self, now: float) -> bool:
+        """Whether nothing can be seen by it though records come, so that the robot has to stand."""
+        del now
+        return False
+
+
+class _ObstacleInput(Input[T]):
+    """An input of an obstacle layer's source."""
+
+    def __init__(self, name: str, now: float, buffer: ObservationBuffer, layer: ObstacleLayer) -> None:
+        p = buffer.params
+        super().__init__(
+            name,
+            now,
+            limit=p.expected_update_rate,
+            frame=p.sensor_frame,
+            max_rate=p.max_rate,
+            newest_only=p.observation_persistence == 0.0,
+        )
+        self._buffer, self._layer = buffer, layer
+
+    @property
+    def params(self) -> SourceParams:
+        """Of the source."""
+        return self._buffer.params
+
+    @property
+    def _top(self) -> float:
+        return self._layer.params.max_obstacle_height
+
+
+class ScanInput(_ObstacleInput[LaserScan]):
+    """Scans; those that say nothing, or of a laser that cannot be laid level, are as none and stop the robot."""
+
+    def __init__(self, name: str, now: float, buffer: ObservationBuffer, layer: ObstacleLayer) -> None:
+        super().__init__(name, now, buffer, layer)
+        self._check = ScanCheck(f"{name} sees nothing by it")
+
+    def hear(self, scan: LaserScan, now: float) -> None:
+        """Keep a scan until the next update."""
+        self._keep(scan.stamp, scan.frame_id, now, lambda: scan if self._check.accepts(scan, now) else None)
+
+    def _place(self, item: LaserScan, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+        try:
+            level = level_scan(replace(item, frame_id=frame), frames.transform(target, frame, stamp), target)
+            problem = height_problem(level, self.params)
+        except LaserTilted as err:
+            problem = str(err)
+        if problem:
+            self._check.refuse(problem, now)
+            return
+        self._check.clear(now)
+        self._buffer.add(observe_level(level, self.params, self._top))
+
+    def trouble(self, now: float) -> str:
+        """What is wrong with it, "" for nothing."""
+        return f"{self.name}: {self._check.problem}" if self._check.problem else super().trouble(now)
+
+    def is_blind(self, now: float) -> bool:
+        """Whether nothing can be seen by it though scans come."""
+        return self._check.lasts(now, self._limit or _PATIENCE)
+
+
+class CloudInput(_ObstacleInput["NDArray[np.float64]"]):
+    """Point clouds."""
+
+    def hear(self, record: CloudRecord, now: float) -> None:
+        """Keep a cloud until the next update."""
+        self._keep(record.stamp, record.frame, now, lambda: self._points(record))
+
+    def _points(self, record: CloudRecord) -> NDArray[np.float64]:
+        stride = self.params.stride
+        if record.layout is not None:
+            return cloud_points(record.data, record.layout, stride)
+        points = np.array([(p.x, p.y, p.z) for p in record.data[::stride]], np.float64).reshape(-1, 3)
+        return points[np.isfinite(points).all(axis=1)]
+
+    def _place(
+        self, item: NDArray[np.float64], stamp: float, frame: str, frames: Frames, target: str, now: float
+    ) -> None:
+        del now
+        matrix = frames.transform(target, frame, stamp).matrix
+        self._buffer.add(observe_cloud(item, matrix, self.params, stamp=stamp, top=self._top))
+
+
+class DepthInput(Input[DepthPicture]):
+    """Depth pictures, with the camera's optics, which have to be given once.
+
+    Attributes:
+        wants_optics: whether `hear_optics` is waited for.
+        optics_topic: of the optics.
+    """
+
+    def __init__(self, name: str, now: float, buffer: ObservationBuffer, params: DepthSourceParams) -> None:
+        super().__init__(
+            name, now, limit=params.expected_update_rate, frame=params.sensor_frame, max_rate=params.max_rate
+        )
+        self._buffer, self.params = buffer, params
+        self._optics: OpticsRecord | None = None
+        beside = params.topic[: params.topic.rfind("/") + 1]
+        self.optics_topic = params.camera_info_topic or f"{beside}camera_info"
+        self.wants_optics = True
+
+    def hear_optics(self, record: OpticsRecord) -> None:
+        """Take the optics of the camera."""
+        self._optics, self.wants_optics = record, False
+
+    def hear(self, record: DepthRecord, now: float) -> None:
+        """Keep a picture until the next update."""
+        self._keep(record.stamp, record.frame, now, lambda: self._picture(record, now))
+
+    def _picture(self, record: DepthRecord, now: float) -> DepthPicture | None:
+        known, size = self._optics, (record.width, record.height)
+        if known is None or (known.width, known.height) != size:
+            self.wants_optics = True
+            if known is None and now - self._born < _SILENT:
+                return None
+            said = "none has come" if known is None else f"it tells of {known.width} x {known.height} pixels"
+            raise ImageError(f"a picture of {size[0]} x {size[1]} needs its {self.optics_topic}, {said}")
+        picture = unpack(
+            record.data, record.encoding, width=size[0], height=size[1], step=record.step,
+            big_endian=record.is_bigendian,
+        )  # fmt: skip
+        if picture.encoding not in ("32FC1", "16UC1", "mono16"):
+            raise ImageError(f"pictures are {picture.encoding}, expected depth as 32FC1 or 16UC1")
+        if not (known.optics.fx > 0.0 and known.optics.fy > 0.0):
+            raise ImageError(f"{self.optics_topic} tells no focal length, the camera is not calibrated")
+        return DepthPicture.of(picture.pixels[:, :, 0], known.optics, stride=self.params.stride, stamp=record.stamp)
+
+    def _place(self, item: DepthPicture, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+        del now
+        matrix = frames.transform(target, frame, stamp).matrix
+        self._buffer.add(observe_depth(item, matrix, self.params))
+
+
+class RangeInput(Input[RangeRecord]):
+    """Readings of range sensors."""
+
+    def __init__(self, name: str, now: float, topic: str, layer: RangeSensorLayer) -> None:
+        super().__init__(name, now, limit=layer.params.no_readings_timeout, newest_only=False)
+        self.topic = topic
+        self._layer = layer
+
+    def hear(self, record: RangeRecord, now: float) -> None:
+        """Keep a reading until the next update."""
+        self._keep(record.stamp, record.frame, now, lambda: _framed(record))
+
+    def _place(self, item: RangeRecord, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+        del now
+        pose = frames.lookup(target, frame, stamp)
+        self._layer.add(RangeReading(stamp, pose, item.distance, item.range_min, item.range_max, item.field_of_view))
+
+
+def _framed(record: RangeRecord) -> RangeRecord:
+    if not record.frame:
+        raise SensorError(f"its messages name no frame: {NO_FRAME}")
+    return record
+
+
+def make_inputs(costmap: LayeredCostmap, now: float) -> Sequence[Input[Any]]:
+    """All that a costmap's layers see by; `now` [s] is when silence begins to count."""
+    inputs: list[Input[Any]] = []
+    for layer in costmap.obstacle_layers:
+        for key, buffer in layer.buffers.items():
+            name = f"{layer.name}/{key}"
+            if isinstance(buffer.params, DepthSourceParams):
+                inputs.append(DepthInput(name, now, buffer, buffer.params))
+            elif buffer.params.data_type == "LaserScan":
+                inputs.append(ScanInput(name, now, buffer, layer))
+            else:
+                inputs.append(CloudInput(name, now, buffer, layer))
+    for ranges in costmap.range_layers:
+        inputs += [RangeInput(f"{ranges.name}{topic}", now, topic, ranges) for topic in ranges.topics]
+    return inputs
