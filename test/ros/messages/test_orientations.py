@@ -1,7 +1,6 @@
 """Messages as Python makes them, with a quaternion of zeros, in every reader of an orientation; no master."""
 
 import math
-import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -63,10 +62,8 @@ def test_odometry_and_poses():
 
 def test_an_initial_pose(monkeypatch):
     monkeypatch.setattr(amcl_node, "now", lambda: 0.0)
-    localizer = SimpleNamespace(set_pose=lambda pose, *_: placed.append(pose))
-    node = SimpleNamespace(_lock=threading.Lock(), _localizer=localizer, _global="map", _odom="odom", _base="base_link")
-    node._params = SimpleNamespace(force_update_after_initialpose=False)
-    node._transforms = SimpleNamespace(lookup=fail_to_look_up)
+    core = SimpleNamespace(hear_initial_pose=lambda record, _now: placed.append(record.pose))
+    node = SimpleNamespace(_core=core)
     message = PoseWithCovarianceStamped()
     message.header.frame_id = "map"
     message.pose.covariance = np.diag([0.25, 0.25, 0.0, 0.0, 0.0, 0.1]).ravel()
