@@ -129,9 +129,7 @@ def settle(cells, cleared, changes):
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)")
 def merge_max(master, layer, x0, y0, x1, y1):
-    """Combine by maximum, as upstream: unknown cells of the layer are ignored, unknown cells of the master are
-    replaced.
-    """
+    """Combine by maximum, as upstream; unknown cells of the layer are ignored, those of the master replaced."""
     for y in range(y0, y1):
         old, new = master[y, x0:x1], layer[y, x0:x1]
         for x in range(len(old)):

@@ -1,4 +1,4 @@
-"""What the navigator is told and what it says: plans, views, commands, outcomes, and upstream's result texts."""
+"""Interfaces of the navigator: plans, views, commands, outcomes, and upstream's result texts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class State(enum.Enum):
-    """What the navigator is doing."""
+    """State of the navigator."""
 
     IDLE = "idle"
     PLANNING = "planning"
@@ -48,7 +48,7 @@ class Reason(enum.Enum):
 
 
 class Trigger(enum.Enum):
-    """Why it recovers, with upstream's result text for when that is no use."""
+    """Reason for a recovery, with upstream's result text if it fails."""
 
     PLANNING = "Failed to find a valid plan. Even after executing recovery behaviors."
     CONTROLLING = "Failed to find a valid control. Even after executing recovery behaviors."
@@ -63,20 +63,20 @@ PLAN_REFUSED = "Failed to pass global plan to the controller."
 
 @dataclass(frozen=True)
 class PlanResult:
-    """A plan, shape (N, 3), or why there is none."""
+    """A plan, shape (N, 3), or the reason why there is none."""
 
     poses: Array | None = None
     error: PlanningError | None = None
 
 
 class PlanSource(Protocol):
-    """Plans on request; at most one request is open."""
+    """Makes plans on request; at most one request is open."""
 
     def request(self, goal: Pose2D) -> None:
-        """Begin to plan from where the robot is."""
+        """Start planning from the robot's pose."""
 
     def poll(self) -> PlanResult | None:
-        """The result of the last request, once; None while it is worked on or when there is none."""
+        """Take the result of the last request, once; None while planning, or without a request."""
 
     @property
     def is_busy(self) -> bool:
@@ -92,12 +92,12 @@ def _never(_twist: Twist2D) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class NavigatorView:
-    """What the navigator sees in a step.
+    """Input of the navigator in one step.
 
     Attributes:
-        local, recovery: the views of the planners and of the recovery behaviours.
+        local, recovery: views for the local planner and the recovery behaviours.
         is_current: whether the sensors can be trusted.
-        must_wait: for whom the robot has to stand still instead of driving a velocity, "" for nobody.
+        must_wait: function that names the person for whom the robot must wait before it drives a velocity, "" for nobody.
     """
 
     local: LocalView
@@ -108,7 +108,7 @@ class NavigatorView:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How a goal ended."""
+    """Result of a goal."""
 
     succeeded: bool
     text: str
@@ -116,7 +116,7 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What a step wants done.
+    """Output of one step.
 
     Attributes:
         twist: velocity to send, None to send nothing.

@@ -1,7 +1,7 @@
 """move_base's state machine (matches move_base 1.17), without clocks, threads or ROS.
 
-PLANNING waits for a plan, CONTROLLING drives along it, CLEARING works through the recovery behaviours; a goal ends in
-one of upstream's result texts. Planning itself happens behind `PlanSource`, so it may take its time elsewhere.
+PLANNING waits for a plan, CONTROLLING drives along it, CLEARING runs the recovery behaviours. A goal ends in one of
+upstream's result texts. Planning itself runs behind `PlanSource` and may take its time in another thread.
 
 Differs:
     - A recovery behaviour is cancelled like everything else, at the next step.
@@ -39,12 +39,12 @@ from rosbot_patrol.planning.interfaces import LocalPlanner, Recovery
 
 log = logging.getLogger(__name__)
 
-_COAST = 0.35  # how long the last velocity may hold while a new goal is planned for [s]
+_COAST = 0.35  # time for which the last velocity may hold while a new goal is planned [s]
 
 
 @dataclass
 class _Progress:
-    """Times and counts of the goal that is worked on."""
+    """Times and counts of the current goal."""
 
     last_plan: float
     last_control: float
@@ -56,11 +56,11 @@ class _Progress:
     recovery_index: int = 0
     trigger: Trigger = Trigger.PLANNING
     running: Recovery | None = None
-    held_back: Twist2D | None = None  # what a recovery wanted when somebody came
+    held_back: Twist2D | None = None  # velocity that a recovery wanted when somebody came
     control_failed: bool = False
 
     def wait(self, now: float) -> None:
-        """The robot has to stand for what no planner or behaviour can help: no patience ends by it."""
+        """Restart all time limits: waiting for somebody uses up no patience."""
         self.last_plan = self.last_control = self.last_motion = now
 
 
@@ -77,7 +77,7 @@ class Navigator:
     Args:
         params: move_base's.
         plans: where plans come from.
-        controller: turns plans into velocities.
+        controller: local planner.
         recoveries: tried in turn.
 
     Attributes:
@@ -103,21 +103,21 @@ class Navigator:
 
     @property
     def goal(self) -> Pose2D | None:
-        """The goal that is worked on, in the global costmap's frame."""
+        """Current goal in the global costmap's frame."""
         return self._context.goal if self._context else None
 
     @property
     def plan_failure(self) -> str:
-        """Reason why the last plan for this goal failed, "" if it did not; the log has it already."""
+        """Reason why the last plan for this goal failed, "" if it did not; already logged."""
         return self._context.failures[-1] if self._context and self._context.failures else ""
 
     def configure(self, params: MoveBaseParams, recoveries: Sequence[Recovery]) -> None:
-        """Other parameters from the next step on; a behaviour that is running ends first."""
+        """Use other parameters from the next step on; a running behaviour ends first."""
         self.params = params
         self._recoveries = list(recoveries)
 
     def set_goal(self, goal: Pose2D, now: float) -> None:
-        """Start for a goal; a goal before is given up without stopping."""
+        """Start for a goal; the previous goal is given up without stopping."""
         self._plans.drop()
         self._controller.reset()
         coast_until = now + _COAST if self.state is State.CONTROLLING else -math.inf
@@ -126,7 +126,7 @@ class Navigator:
         self._begin_planning(now)
 
     def cancel(self) -> Command:
-        """Give the goal up; the robot stands."""
+        """Give up the goal; the robot stops."""
         self._end()
         return Command(twist=STOP, reason=Reason.CANCELLED)
 
@@ -147,7 +147,7 @@ class Navigator:
             self._plans.request(self._context.goal)
 
     def step(self, now: float, view: NavigatorView | None) -> Command:
-        """One control cycle; `view` is None where the robot's pose is not known."""
+        """One control cycle; `view` is None if the robot's pose is unknown."""
         context = self._context
         if context is None:
             return Command(reason=Reason.NO_GOAL, detail=self.text)

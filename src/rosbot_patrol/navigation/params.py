@@ -57,5 +57,5 @@ class MoveBaseParams:
 
     @property
     def aggressive_radius(self) -> float:
-        """What `clearing_radius` says, or the circumscribed radius."""
+        """Radius of the second clearing: `clearing_radius`, or by default the circumscribed radius."""
         return self.clearing_radius if self.clearing_radius >= 0.0 else self.circumscribed_radius

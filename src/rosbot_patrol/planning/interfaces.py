@@ -1,4 +1,4 @@
-"""What a global planner, a local planner and a recovery behaviour are, without ROS."""
+"""Interfaces of global planners, local planners and recovery behaviours, without ROS."""
 
 # ruff: noqa: B027 - a planner overrides only the hooks that it needs
 from __future__ import annotations
@@ -18,17 +18,17 @@ Array = NDArray[np.float64]
 
 
 class GlobalPlanner(ABC):
-    """Finds a way over a costmap."""
+    """Plans a path over a costmap."""
 
     @abstractmethod
     def plan(self, costmap: Grid, start: Pose2D, goal: Pose2D, *, tolerance: float | None = None) -> Array:
-        """Poses from start to goal, shape (N, 3), in the costmap's frame.
+        """Plan from start to goal: poses, shape (N, 3), in the costmap's frame.
 
         Args:
             costmap: costs; may be written to.
             start: in the costmap's frame.
             goal: in the costmap's frame.
-            tolerance: how far from the goal the plan may end [m]; the planner's own parameter where None.
+            tolerance: maximum distance of the plan's end from the goal [m]; None: the planner's own parameter.
 
         Raises:
             PlanningError: StartOccupied, GoalOccupied, OutOfBounds or NoPath.
@@ -37,7 +37,7 @@ class GlobalPlanner(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class LocalView:
-    """What a local planner sees in one control cycle, all in the local costmap's frame.
+    """Input of a local planner in one control cycle, all in the local costmap's frame.
 
     Attributes:
         now: time [s].
@@ -54,43 +54,43 @@ class LocalView:
 
 
 class LocalPlanner(ABC):
-    """Turns a plan into velocities."""
+    """Computes velocities that follow a plan."""
 
     @abstractmethod
     def set_plan(self, poses: Array) -> None:
-        """Follow a plan of shape (N, 3), in the plan's frame; raises ControlError where it cannot."""
+        """Follow a plan of shape (N, 3), in the plan's frame; raises ControlError if it cannot."""
 
     @abstractmethod
     def compute(self, view: LocalView) -> Twist2D:
-        """The velocity for this cycle; raises ControlError where none is safe."""
+        """Velocity for this cycle; raises ControlError if none is safe."""
 
     @abstractmethod
     def is_goal_reached(self, view: LocalView) -> bool:
         """Whether the robot stands at the plan's end."""
 
     def reset(self) -> None:
-        """Forget the goal that was worked on."""
+        """Forget the current goal."""
 
     def fit(self, footprint: Footprint, *, resolution: float) -> None:
-        """Drive with another padded outline of the robot, or on cells of another size [m]."""
+        """Use another padded outline of the robot, or cells of another size [m]."""
 
     def limit_speed(self, trans: float, rot: float, *, distance: float) -> None:
-        """Drive no faster than this [m/s, rad/s] until the robot has moved by `distance` [m]; may be ignored."""
+        """Limit the speed to this [m/s, rad/s] until the robot has moved by `distance` [m]; may be ignored."""
 
     @property
     def local_plan(self) -> Array:
-        """What the last velocity would drive, shape (N, 3), in the local costmap's frame."""
+        """Trajectory of the last velocity, shape (N, 3), in the local costmap's frame."""
         return np.empty((0, 3))
 
     @property
     def visible_plan(self) -> Array:
-        """The part of the plan that is followed now, shape (N, 3), in the local costmap's frame."""
+        """Part of the plan that is followed now, shape (N, 3), in the local costmap's frame."""
         return np.empty((0, 3))
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecoveryView:
-    """What a recovery behaviour sees in one cycle.
+    """Input of a recovery behaviour in one cycle.
 
     Attributes:
         now: time [s].
@@ -106,7 +106,7 @@ class RecoveryView:
 
 
 class Recovery(ABC):
-    """Something to try when the robot is stuck; worked on step by step, so that it can be cancelled."""
+    """A recovery behaviour for a stuck robot; it runs step by step, so that it can be cancelled."""
 
     name: str = ""
 
@@ -116,9 +116,9 @@ class Recovery(ABC):
 
     @abstractmethod
     def step(self, view: RecoveryView) -> Twist2D | None:
-        """The velocity for this cycle, None when done."""
+        """Velocity for this cycle, None when done."""
 
     @property
     def last_words(self) -> str:
-        """How it ended, for the log; empty where there is nothing to say."""
+        """Sentence for the log on how it ended; empty if there is nothing to say."""
         return ""

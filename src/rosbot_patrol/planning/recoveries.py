@@ -1,4 +1,4 @@
-"""Recovery behaviours (match clear_costmap_recovery, rotate_recovery and move_slow_and_clear 1.17), step by step.
+"""Recovery behaviours, step by step (match clear_costmap_recovery, rotate_recovery, move_slow_and_clear 1.17).
 
 Differs:
     - All can be cancelled at any step.
@@ -36,7 +36,7 @@ class ClearCostmapParams:
 
 
 class ClearCostmap(Recovery):
-    """Forgets what was sensed farther away than a distance."""
+    """Forgets sensor data beyond a distance from the robot."""
 
     def __init__(self, params: ClearCostmapParams, *, name: str) -> None:
         self.name = name
@@ -74,7 +74,7 @@ class ClearCostmap(Recovery):
 
     @property
     def last_words(self) -> str:
-        """How it ended."""
+        """Sentence on how it ended."""
         side = "within" if self.params.invert_area_to_clear else "beyond"
         return f"costmaps cleared {side} {self.params.reset_distance / 2.0:.2f} m"
 
@@ -96,7 +96,7 @@ class RotateParams:
 
 
 class Rotate(Recovery):
-    """One full turn on the spot, to see what is around."""
+    """One full turn on the spot, to see the surroundings."""
 
     def __init__(self, params: RotateParams, *, name: str) -> None:
         self.name = name
@@ -126,7 +126,7 @@ class Rotate(Recovery):
             self._words = f"turned {math.degrees(self._turned):.0f} degrees only, the base does not follow"
             return None
         speed = max(min(p.max_rotational_vel, math.sqrt(2.0 * p.acc_lim_th * left)), slowest)
-        # what comes within half a second, and while braking
+        # check half a second ahead, plus the time to brake
         ahead = min(left, 0.5 * speed + speed * speed / (2.0 * p.acc_lim_th))
         if not _is_free(view.local_costmap, view.pose_local, ahead, p.sim_granularity):
             log.error("Rotate recovery can't rotate in place because there is a potential collision. Cost: -1.00")
@@ -136,7 +136,7 @@ class Rotate(Recovery):
 
     @property
     def last_words(self) -> str:
-        """How it ended."""
+        """Sentence on how it ended."""
         return self._words
 
 
@@ -162,12 +162,12 @@ class MoveSlowParams:
 
 
 class MoveSlowAndClear(Recovery):
-    """Forgets what was sensed around the robot, and has it drive slowly for a while.
+    """Forgets sensor data around the robot, and limits its speed for a while.
 
     Args:
         params: as upstream.
-        name: what it is called.
-        planner: the local planner that is to drive slowly; none is told where None.
+        name: of the behaviour.
+        planner: the local planner to slow down; None: none.
     """
 
     def __init__(self, params: MoveSlowParams, *, name: str, planner: LocalPlanner | None) -> None:
@@ -191,7 +191,7 @@ class MoveSlowAndClear(Recovery):
 
     @property
     def last_words(self) -> str:
-        """How it ended."""
+        """Sentence on how it ended."""
         p = self.params
         return (
             f"costmaps cleared within {p.clearing_distance:.2f} m; no faster than {p.limited_trans_speed:.2f} m/s for "

@@ -1,4 +1,4 @@
-"""Upstream's plug-in names and what stands behind them here."""
+"""Table of upstream's plug-in names and the classes that implement them here."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ ROTATE = "rotate_recovery/RotateRecovery"
 MOVE_SLOW = "move_slow_and_clear/MoveSlowAndClear"
 LOCAL_PLANNERS = (TRAJECTORY, DWA)
 RECOVERIES = (CLEAR, ROTATE, MOVE_SLOW)
-# What a dynamic_reconfigure server offers, by plug-in; a change goes to the planner's `reconfigure`.
+# Parameters that a dynamic_reconfigure server offers, by plug-in; a change goes to the planner's `reconfigure`.
 TUNABLE = {
     NAVFN: tunable(NavfnParams, NavfnPlanner.tunable),
     GLOBAL_PLANNER: tunable(GlobalPlannerParams, PotentialFieldPlanner.tunable),
@@ -49,7 +49,7 @@ log = logging.getLogger(__name__)
 
 
 def short_name(plugin: str) -> str:
-    """The namespace a plug-in reads its parameters from: "NavfnROS" of "navfn/NavfnROS"."""
+    """Namespace of a plug-in's parameters: "NavfnROS" for "navfn/NavfnROS"."""
     return plugin.replace("::", "/").rsplit("/", 1)[-1]
 
 
@@ -68,7 +68,7 @@ def _group(tree: Tree, key: str, name: str) -> dict[str, Any]:
 
 
 def make_global_planner(plugin: str, tree: Tree, *, name: str = "~") -> GlobalPlanner:
-    """The planner of a name such as navfn/NavfnROS, with its parameters from move_base's namespace."""
+    """Make the planner for a name such as navfn/NavfnROS, with parameters from move_base's namespace."""
     kind = _known(plugin, GLOBAL_PLANNERS, f"{name}base_global_planner")
     space = short_name(kind)
     values, where = _group(tree, space, name), f"{name}{space}/"
@@ -80,7 +80,7 @@ def make_global_planner(plugin: str, tree: Tree, *, name: str = "~") -> GlobalPl
 def make_local_planner(
     plugin: str, tree: Tree, costmap: LayeredCostmap, *, controller_frequency: float, name: str = "~"
 ) -> SamplingPlanner[Any]:
-    """The local planner of a name such as base_local_planner/TrajectoryPlannerROS, over a local costmap."""
+    """Make the local planner for a name such as base_local_planner/TrajectoryPlannerROS, over a local costmap."""
     kind = _known(plugin, LOCAL_PLANNERS, f"{name}base_local_planner")
     space = short_name(kind)
     prefix = f"{name}{space}/"
@@ -115,7 +115,7 @@ def make_recovery(
     defaults: Tree | None = None,
     planner: LocalPlanner | None = None,
 ) -> Recovery:
-    """The recovery behaviour of a plug-in name, called `label`, with its own parameters over `defaults`.
+    """Make the recovery behaviour for a plug-in name, called `label`, with its own parameters over `defaults`.
 
     `planner` is the local planner that MoveSlowAndClear slows down.
     """
@@ -138,7 +138,7 @@ def make_recoveries(
     name: str = "~",
     planner: LocalPlanner | None = None,
 ) -> list[Recovery]:
-    """The behaviours that `recovery_behaviors` names, or upstream's four; `planner` as of `make_recovery`."""
+    """Make the behaviours that `recovery_behaviors` names, or upstream's four; `planner` as in `make_recovery`."""
     turn = _turning(tree, name)
     listed = tree.get("recovery_behaviors")
     if listed is not None:
@@ -153,10 +153,10 @@ def make_recoveries(
 
 
 def _turning(tree: Tree, name: str) -> dict[str, Any]:
-    """The local planner's limits under the names of RotateRecovery, from the first of several names that is given.
+    """The local planner's turning limits under RotateRecovery's names, from the first of several names that is given.
 
-    Upstream reads them from TrajectoryPlannerROS whatever the local planner, and takes max_vel_theta even where there
-    is a max_rotational_vel; here DWAPlannerROS has its own read, and a speed meant for turning on the spot counts.
+    Upstream reads them from TrajectoryPlannerROS whatever the local planner, and uses max_vel_theta even if there is a
+    max_rotational_vel. Here DWAPlannerROS's own are read, and a speed for turning on the spot counts first.
     """
     is_dwa = short_name(str(tree.get("base_local_planner", ""))) == short_name(DWA)
     local = _group(tree, short_name(DWA if is_dwa else TRAJECTORY), name)

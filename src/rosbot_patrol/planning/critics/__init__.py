@@ -1,6 +1,6 @@
-"""What local planners judge velocities by, one file each.
+"""Criteria by which local planners score velocities, one file each.
 
-Those named as in dwa_local_planner are the same there; TrajectoryPlannerROS uses them with its own weights.
+Critics with names from dwa_local_planner are the same as there; TrajectoryPlannerROS uses them with its own weights.
 """
 
 from rosbot_patrol.planning.critics.alignment import AlignmentCritic

@@ -1,4 +1,4 @@
-"""Whether a trajectory ends with the robot's nose on the plan."""
+"""Critic: does the robot's nose end on the plan?"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inner loops of the local planners: the part of the plan in view, distance fields, and reading them."""
+"""Inner loops of the critics: the visible part of the plan, distance fields, and look-ups in them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosbot_patrol.kernels import kernel
 
 @kernel("float64(float32[:, ::1], float64, float64, float64, float64, float64)")
 def read_field(field, resolution, origin_x, origin_y, x, y):
-    """A field at a point, interpolated between the finite cells around; inf where there is none."""
+    """Value of a field at a point, interpolated between the finite cells around; inf if there are none."""
     height, width = field.shape
     u = (x - origin_x) / resolution - 0.5
     v = (y - origin_y) / resolution - 0.5
@@ -34,9 +34,9 @@ def read_field(field, resolution, origin_x, origin_y, x, y):
 
 @kernel("float64[:, ::1](float64[:, ::1], float32[:, ::1], float64, float64, float64, float64)")
 def end_distances(ends, field, resolution, origin_x, origin_y, nose):
-    """A distance field [cells] at poses, shape (K, 3), and at the points `nose` [m] ahead of them; shape (2, K).
+    """Distances [cells] of poses, shape (K, 3), and of the points `nose` [m] ahead of them; shape (2, K).
 
-    Where the pose itself cannot be reached both are inf; a nose in an obstacle counts as far as it can be.
+    If the pose itself is unreachable, both are inf; a nose in an obstacle counts up to its edge.
     """
     out = np.empty((2, ends.shape[0]), np.float64)
     for k in range(ends.shape[0]):
@@ -54,7 +54,7 @@ def end_distances(ends, field, resolution, origin_x, origin_y, nose):
 
 @kernel("uint8[:, ::1](uint8[:, ::1], int64)")
 def shrink(cells, factor):
-    """The highest cost of each block of factor x factor cells (255, unknown, counts as such)."""
+    """Highest cost of each block of factor x factor cells (255, unknown, included)."""
     height, width = cells.shape
     h, w = (height + factor - 1) // factor, (width + factor - 1) // factor
     out = np.zeros((h, w), np.uint8)
@@ -75,13 +75,13 @@ def shrink(cells, factor):
 
 @kernel("float32[:, ::1](uint8[:, ::1], float64[:, ::1])")
 def spread(cells, sources):
-    """Distance [cells] from the nearest source around what cannot be crossed (253 and more), inf where there is no way.
+    """Distance [cells] from the nearest source around impassable cells (253 and more); inf if there is no path.
 
     First-order upwind differences (Sethian 1996), relaxed in the order of a queue; a source's own cell counts as free.
 
     Args:
         cells: costs.
-        sources: points (x, y) [cells, from the grid's corner], shape (N, 2); those outside are left out.
+        sources: points (x, y) [cells, from the grid's corner], shape (N, 2); those outside are ignored.
     """
     height, width = cells.shape
     out = np.full((height, width), np.inf, np.float32)
@@ -146,7 +146,7 @@ def spread(cells, sources):
     "Tuple((float64[:, ::1], int64, int64))(float64[:, ::1], int64, float64[::1], float64[::1], float64[::1], boolean)"
 )
 def cut_plan(plan, passed, local_from_plan, here, window, prune):
-    """The plan in the local frame, from where the robot is to where it leaves the local costmap.
+    """Part of the plan in the local frame, from the robot to where it leaves the local costmap.
 
     Args:
         plan: poses in the plan's frame, shape (N, 3).
@@ -154,7 +154,7 @@ def cut_plan(plan, passed, local_from_plan, here, window, prune):
         local_from_plan: x, y, yaw.
         here: the robot's x, y.
         window: least and greatest x and y of the local costmap.
-        prune: leave out what lies behind; else it is taken from where it came into the local costmap.
+        prune: drop the part behind the robot; else start where the plan enters the local costmap.
 
     Returns:
         Poses inside, shape (M, 3), empty where the nearest is outside; the index of that nearest pose, and how many of
@@ -201,12 +201,12 @@ def cut_plan(plan, passed, local_from_plan, here, window, prune):
 
 @kernel("float64[::1](float64[:, ::1], float64[:, ::1], uint8[:, ::1], float64, float64, float64)")
 def headings_off(ends, plan, cells, resolution, origin_x, origin_y):
-    """Angle between the heading of each end and the first pose of the plan in its line of sight, pi where none is.
+    """Angle between the heading of each end and the first visible pose of the plan; pi if none is visible.
 
     Args:
         ends: poses, shape (K, 3).
         plan: poses, the best first, shape (N, 3).
-        cells: costs; 253 and more hide what is behind.
+        cells: costs; 253 and more block the view.
         resolution: edge of a cell [m].
         origin_x: their corner [m].
         origin_y: their corner [m].

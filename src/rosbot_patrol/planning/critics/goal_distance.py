@@ -1,4 +1,4 @@
-"""How far a trajectory ends from the place where the plan leaves the local costmap."""
+"""Critic: distance of the trajectory's end from the local goal, where the plan leaves the local costmap."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class GoalDistanceCritic:
 
 
 class AttractionCritic:
-    """Squared distance to the local goal as the crow flies (TrajectoryPlannerROS with `simple_attractor`)."""
+    """Squared straight distance to the local goal (TrajectoryPlannerROS with `simple_attractor`)."""
 
     def score(self, situation: Situation) -> Array:
         """Squared distances [m^2], shape (K,)."""

@@ -1,4 +1,4 @@
-"""Whether a trajectory ends with the robot's nose towards the local goal."""
+"""Critic: does the robot's nose end towards the local goal?"""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class FacingGoalCritic:
 
 
 class GoalFrontCritic:
-    """The same with the goal moved away by as much (dwa_local_planner's goal_front costs).
+    """Distance to the local goal, shifted away by the same length (dwa_local_planner's goal_front costs).
 
-    Differs: where the goal moved would lie in an obstacle or off the costmap it is moved only as far as is free.
+    Differs: if the shifted goal would lie in an obstacle or off the costmap, it is shifted only as far as is free.
     """
 
     def score(self, situation: Situation) -> Array:

@@ -1,4 +1,4 @@
-"""Whether a trajectory heads for what can be seen of the plan."""
+"""Critic: does the robot head for the visible part of the plan?"""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from rosbot_patrol.planning.critics.situation import Array, Situation
 class HeadingCritic:
     """Angle between the robot's heading and the farthest pose of the plan in its line of sight.
 
-    That of TrajectoryPlannerROS with `heading_scoring`. Differs: where nothing of the plan is seen it is pi; upstream
-    takes the largest number there is.
+    As TrajectoryPlannerROS with `heading_scoring`. Differs: if nothing of the plan is visible, the angle is pi;
+    upstream uses the largest number.
     """
 
     def score(self, situation: Situation) -> Array:

@@ -1,4 +1,4 @@
-"""Whether a trajectory hits something, and how near it comes."""
+"""Critic: does the trajectory hit something, and how close does it come?"""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from rosbot_patrol.grid import Grid
 from rosbot_patrol.planning.critics import sweep_kernels as kernels
 from rosbot_patrol.planning.critics.situation import Array
 
-_SPACING = 0.25  # of the outline's points, of a cell: a cell's corner hardly fits between two
-SUDDEN = (1e6, 1e6, 1e6)  # accelerations of a base that follows at once
+_SPACING = 0.25  # spacing of the outline's points [cells]: a cell's corner hardly fits between two
+SUDDEN = (1e6, 1e6, 1e6)  # accelerations of a base that reaches a velocity at once
 
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """How velocities are simulated.
+    """Simulation of velocities: duration, steps, accelerations.
 
     Attributes:
-        horizon: for how long [s].
+        horizon: duration [s].
         accelerations: of vx, vy [m/s^2] and wz [rad/s^2].
         granularity: longest step [m]; angular_granularity: the same for turning [rad].
-        judged_at: when the trajectory is judged [s]; at its end where None.
-        stop_time_buffer: time to spare when braking before an obstacle [s].
-        growing: speed from which the footprint is enlarged [m/s], by how much at most, and the speed at which it is.
-        is_held: the velocity is had at once, as in a dynamic window; accelerations count for braking only.
+        judged_at: time at which the trajectory is scored [s]; None: at its end.
+        stop_time_buffer: time reserve for braking before an obstacle [s].
+        growing: speed above which the footprint grows [m/s], its largest growth, and the speed of that growth.
+        is_held: the base has the velocity at once, as in a dynamic window; accelerations count for braking only.
     """
 
     horizon: float
@@ -43,7 +43,7 @@ class Motion:
     is_held: bool = False
 
     def reach(self, samples: Array, velocity: Twist2D) -> float:
-        """How far any of some velocities can lead, counting the time for braking [m]."""
+        """Longest distance that any of some velocities can lead, including braking [m]."""
         if not len(samples):
             return 0.0
         speeds = np.abs(samples).max(axis=0)
@@ -52,7 +52,7 @@ class Motion:
         return speed * 1.05 * max(self.horizon, braking + self.stop_time_buffer)
 
     def packed(self, reach: float, spacing: float) -> Array:
-        """As `sweep_kernels.drive` wants it."""
+        """The values as `sweep_kernels.drive` expects them."""
         judged_at = self.horizon if self.judged_at is None else min(self.judged_at, self.horizon)
         steps = self.granularity, self.angular_granularity
         own = (self.horizon, judged_at, *steps, *self.accelerations, self.stop_time_buffer)
@@ -61,7 +61,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What can be hit from a pose: made once a cycle by `ObstacleCritic.survey`."""
+    """Obstacles around a pose: made once a cycle by `ObstacleCritic.survey`."""
 
     pose: Pose2D
     costmap: Grid
@@ -73,11 +73,11 @@ class Surroundings:
 
 
 class ObstacleCritic:
-    """The highest cost that a trajectory's poses meet; inf where the footprint touches, is unknown or leaves the map.
+    """Highest cost along a trajectory; inf if the footprint hits something, unknown space or the map's edge.
 
     The swept outline is checked cell by cell, whatever the steps of the simulation. A velocity is also refused if the
-    robot could not stop before it hits something. A robot that touches something already may only move so that it
-    touches less; where only its padding does, it can be checked without.
+    robot could not stop before an obstacle. A robot that already touches something may only move so that it touches
+    less. If only its padding touches, it can be checked without the padding.
 
     Args:
         footprint: the robot's padded outline.
@@ -93,13 +93,13 @@ class ObstacleCritic:
     def survey(
         self, costmap: Grid, pose: Pose2D, distance: float, *, growth: float = 0.0, bare: bool = False
     ) -> Surroundings:
-        """Look around a pose.
+        """Collect the obstacles around a pose.
 
         Args:
             costmap: the local costs.
             pose: where the robot is.
-            distance: how far it may be moved [m].
-            growth: by what part its footprint may be enlarged.
+            distance: longest distance that it may move [m].
+            growth: largest relative growth of the footprint.
             bare: check the robot's own outline, without the padding.
         """
         outline = self._bare if bare else self._padded
@@ -110,7 +110,7 @@ class ObstacleCritic:
         x0, y0 = max(ix - side, 0), max(iy - side, 0)
         x1, y1 = min(ix + side + 1, info.width), min(iy + side + 1, info.height)
         cap = math.ceil(2.0 * reach / info.resolution) + 4
-        # cells are coarse: a centre may stand in an inscribed one though the outline is free
+        # cells are coarse: the centre may lie in an inscribed cell although the outline is free
         here = int(costmap.at(pose.x, pose.y)) if info.contains(pose.x, pose.y) else UNKNOWN
         return Surroundings(
             pose=pose,
@@ -132,15 +132,15 @@ class ObstacleCritic:
         ends: Array | None = None,
         failed: Array | None = None,
     ) -> Array:
-        """Costs of velocities driven from the pose surveyed, shape (K,); inf where something is hit.
+        """Costs of velocities driven from the surveyed pose, shape (K,); inf if something is hit.
 
         Args:
-            around: of that pose, far enough for the motion.
+            around: survey of that pose, wide enough for the motion.
             velocity: the robot's now.
             samples: velocities (vx, vy, wz), shape (K, 3).
             motion: how they are simulated.
-            ends: is filled with where each leads, shape (K, 3).
-            failed: costs of which those that are inf need not be looked at again, shape (K,).
+            ends: filled with the final poses, shape (K, 3).
+            failed: costs from an earlier check, shape (K,); samples with inf are skipped.
         """
         info = around.costmap.info
         worst = np.zeros(len(samples)) if failed is None else np.where(np.isfinite(failed), 0.0, -1.0)
@@ -161,7 +161,7 @@ class ObstacleCritic:
         return np.where(worst < 0.0, np.inf, worst)
 
     def is_squeezed(self, costmap: Grid, pose: Pose2D) -> bool:
-        """Whether the padded outline touches something at a pose, or is a hair away from it."""
+        """Whether the padded outline touches something at a pose, or almost does."""
         info = costmap.info
         outline = self._padded * (1.0 + self._spacing / self._reach)
         place = (info.resolution, info.origin_x, info.origin_y)
@@ -174,7 +174,7 @@ class ObstacleCritic:
         return bool(np.isfinite(self.drive(around, twist, samples, motion)[0]))
 
     def trace(self, pose: Pose2D, velocity: Twist2D, twist: Twist2D, motion: Motion) -> Array:
-        """The poses that a velocity leads through, shape (N, 3)."""
+        """Poses along a velocity, shape (N, 3)."""
         start = np.array([*pose, *velocity], dtype=np.float64)
         return kernels.trace(start, np.array([twist], dtype=np.float64), 0, motion.packed(self._reach, self._spacing))
 

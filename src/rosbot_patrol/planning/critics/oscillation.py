@@ -1,4 +1,4 @@
-"""Whether a velocity would undo the one before it, again."""
+"""Critic: would the velocity undo the previous one again?"""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ FORWARD, STRAFING, TURNING = 0, 1, 2
 
 
 class OscillationCritic:
-    """Forbids a direction that was given up for its opposite, until the robot has moved (OscillationCostFunction).
+    """Forbid a direction that was given up for its opposite until the robot has moved (OscillationCostFunction).
 
-    Each of forward, sideways and turning may change its sign once; then the new one stays. Sideways and turning count
-    only while the robot does not move forward.
+    Each of forward, sideways and turning motion may change its sign once; then the new sign stays. Sideways motion and
+    turning count only while the robot does not move forward.
     """
 
     def __init__(self) -> None:
         self._last = [0, 0, 0]  # sign of the last motion of each kind
-        self._only = [0, 0, 0]  # sign that alone is allowed, 0 for both
+        self._only = [0, 0, 0]  # the only sign allowed, 0: both
         self._since = Pose2D()
 
     def reset(self) -> None:
@@ -30,7 +30,7 @@ class OscillationCritic:
         self._last, self._only = [0, 0, 0], [0, 0, 0]
 
     def forbidden(self, samples: Array) -> NDArray[np.bool_]:
-        """Which velocities (vx, vy, wz), shape (K, 3), are forbidden now; shape (K,)."""
+        """Which velocities (vx, vy, wz), shape (K, 3), are forbidden now, shape (K,)."""
         out = np.zeros(len(samples), np.bool_)
         for axis, only in enumerate(self._only):
             if only:
@@ -38,14 +38,14 @@ class OscillationCritic:
         return out
 
     def remember(self, pose: Pose2D, twist: Twist2D, *, still: float, distance: float, angle: float) -> None:
-        """Take note of the velocity that is driven.
+        """Record the velocity that is driven.
 
         Args:
-            pose: where.
-            twist: what.
+            pose: of the robot.
+            twist: its velocity.
             still: forward speeds up to this do not count as moving [m/s].
-            distance: after this much motion all directions are free again [m].
-            angle: or after this much turning [rad].
+            distance: motion after which all directions are allowed again [m].
+            angle: turn after which they are [rad].
         """
         if self._note(twist, still):
             self._since = pose

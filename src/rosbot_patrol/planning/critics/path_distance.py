@@ -1,4 +1,4 @@
-"""How far a trajectory ends from the plan."""
+"""Critic: distance of the trajectory's end from the plan."""
 
 from __future__ import annotations
 

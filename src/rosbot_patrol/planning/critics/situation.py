@@ -1,4 +1,4 @@
-"""What all critics of one control cycle look at."""
+"""Input of all critics in one control cycle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COARSE = 0.05  # edge of the cells of distance fields [m]
 
 
 def shrink(costmap: Grid) -> Grid:
-    """The highest costs of blocks of about 5 cm, over which distance fields are computed."""
+    """Highest costs of blocks of about 5 cm, the grid of the distance fields."""
     info = costmap.info
     factor = max(1, round(COARSE / info.resolution))
     if factor == 1:
@@ -37,22 +37,22 @@ def shrink(costmap: Grid) -> Grid:
 
 
 def distances_from(grid: Grid, points: Array) -> NDArray[np.float32]:
-    """Distance to the nearest of some points around what cannot be crossed [cells], inf where there is no way."""
+    """Distance to the nearest of some points, around impassable cells [cells]; inf if there is no path."""
     info = grid.info
     return kernels.spread(grid.cells, (points - (info.origin_x, info.origin_y)) / info.resolution)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Situation:
-    """One control cycle; the distance fields that critics share are computed once, when first asked for.
+    """One control cycle; distance fields shared by critics are computed when first needed.
 
     Attributes:
         pose: where the robot is.
-        samples: velocities (vx, vy, wz) that are judged, shape (K, 3).
-        ends: where each of them leads, in the local costmap's frame, shape (K, 3).
+        samples: velocities (vx, vy, wz) to score, shape (K, 3).
+        ends: their final poses in the local costmap's frame, shape (K, 3).
         coarse: the local costs in cells of about 5 cm.
         plan: the part of the plan that is followed, shape (N, 3).
-        nose: how far ahead of a pose alignment is judged [m].
+        nose: distance ahead of a pose at which alignment is scored [m].
         goal_field: distance to the local goal, the plan's last pose [cells of the coarse grid].
     """
 
@@ -65,7 +65,7 @@ class Situation:
     goal_field: NDArray[np.float32]
 
     def read(self, field: NDArray[np.float32]) -> Array:
-        """A distance field at the ends and at the points `nose` ahead of them [m], shape (2, K); inf: no way."""
+        """Distances of the ends and of the points `nose` ahead of them in a field [m], shape (2, K); inf: no path."""
         info = self.coarse.info
         found = kernels.end_distances(self.ends, field, info.resolution, info.origin_x, info.origin_y, self.nose)
         return info.resolution * found
@@ -75,7 +75,7 @@ class Situation:
         """Distance to the plan from ends and noses [m], shape (2, K)."""
         info = self.coarse.info
         ix, iy = cells_of_points(info, self.plan[:, :2]).T
-        # what leads through an obstacle must not pull into it
+        # the pull of the plan must not lead into an obstacle
         free = self.coarse.cells[iy.clip(0, info.height - 1), ix.clip(0, info.width - 1)] < INSCRIBED
         return self.read(distances_from(self.coarse, self.plan[free, :2]))
 
@@ -92,5 +92,5 @@ class Situation:
 
     @cached_property
     def goal_distance(self) -> float:
-        """From the robot to the local goal, as the crow flies [m]."""
+        """Straight distance from the robot to the local goal [m]."""
         return math.hypot(self.plan[-1, 0] - self.pose.x, self.plan[-1, 1] - self.pose.y)

@@ -1,4 +1,4 @@
-"""Inner loops of the local planners: clearances, and simulated drives with the check of the swept footprint."""
+"""Inner loops of the local planners: clearances, and simulated motion with a check of the swept footprint."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def clearances(cells, x0, y0, x1, y1, cap):
     "float64)"
 )
 def footprint_clearance(near, left, low, resolution, outline, spacing, reach, scale, x, y, yaw):
-    """How far the robot at a pose may move before it can touch anything, at least [cells]; -1 where it touches.
+    """Distance that the robot at a pose can move at least before it touches anything [cells]; -1: it touches.
 
     Args:
         near: `clearances` of a window.
@@ -115,7 +115,7 @@ def footprint_clearance(near, left, low, resolution, outline, spacing, reach, sc
 
 @kernel("int64(uint8[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64)")
 def count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw):
-    """How many points of the outline lie in lethal cells with the robot at a pose."""
+    """Number of outline points in lethal cells with the robot at a pose."""
     height, width = cells.shape
     c, s = math.cos(yaw), math.sin(yaw)
     count = 0
@@ -130,14 +130,14 @@ def count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw):
 
 @kernel("int64(float64[:, ::1], int64, float64[::1])")
 def count_steps(samples, k, motion):
-    """Steps of sample k: none longer than the granularities [m], [rad], four at least."""
+    """Number of steps of sample k: none longer than the granularities [m], [rad]; at least four."""
     straight = math.sqrt(samples[k, 0] ** 2 + samples[k, 1] ** 2) * motion[0] / motion[2]
     return max(4, math.ceil(max(straight, abs(samples[k, 2]) * motion[0] / motion[3])))
 
 
 @kernel("UniTuple(float64, 6)(float64[::1], float64[:, ::1], int64, float64, float64[::1])")
 def advance(state, samples, k, dt, motion):
-    """(x, y, yaw, vx, vy, wz) after dt [s], speeding up towards sample k as fast as the accelerations allow."""
+    """State (x, y, yaw, vx, vy, wz) after dt [s], accelerating towards sample k."""
     x, y, yaw = state[0], state[1], state[2]
     vx = state[3] + min(max(samples[k, 0] - state[3], -motion[4] * dt), motion[4] * dt)
     vy = state[4] + min(max(samples[k, 1] - state[4], -motion[5] * dt), motion[5] * dt)
@@ -170,7 +170,7 @@ def trace(start, samples, k, motion):
 def drive(start, samples, motion, cells, place, near, near_x, near_y, taken_from, touching, outline, ends, worst):
     """Simulate each sample until it hits something.
 
-    Between two steps the outline is looked at as often as it may have moved by its clearance, or by a cell.
+    Between two steps the outline is checked as often as it may have moved by its clearance, or by a cell.
 
     Args:
         start: pose and velocity (x, y, yaw, vx, vy, wz).

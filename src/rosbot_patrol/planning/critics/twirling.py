@@ -1,4 +1,4 @@
-"""How much a velocity turns."""
+"""Critic: turning speed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rosbot_patrol.planning.critics.situation import Array, Situation
 
 
 class TwirlingCritic:
-    """The turning speed, so that a base that can go sideways does not spin on its way (TwirlingCostFunction)."""
+    """Turning speed, so that a base which can go sideways does not spin on its way (TwirlingCostFunction)."""
 
     def score(self, situation: Situation) -> Array:
         """Turning speeds [rad/s], shape (K,)."""

@@ -1,1 +1,1 @@
-"""GlobalPlanner and NavfnROS: the way over a costmap."""
+"""GlobalPlanner and NavfnROS: plans over a costmap."""

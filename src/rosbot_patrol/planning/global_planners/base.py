@@ -1,7 +1,7 @@
-"""What the planners on arrival times have in common: from poses to cells, and from a way in cells to poses.
+"""Base of both global planners: converts poses to cells, and a path of cells to poses.
 
-A start or goal that cannot be used raises the error that says why. The robot's own cell is taken as free, as upstream
-takes it, and a goal that cannot be reached is replaced by the nearest point within the tolerance.
+An unusable start or goal raises an error with the reason. As upstream, the robot's own cell counts as free, and a goal
+that cannot be reached is replaced by the nearest reachable point within the tolerance.
 
 Differs from upstream:
     - A robot that stands within the inscribed radius of an obstacle (localisation is not exact) still gets a plan
@@ -41,14 +41,14 @@ P = TypeVar("P")
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a planner's parameters come to.
+    """A planner's parameters, converted for planning.
 
     Attributes:
-        prices: what crossing a cell costs, by its cost, inf where it cannot be crossed; shape (256,).
-        tolerance: how far from the goal a plan may end [m], where a request does not say.
-        escape_radius: how far a start near an obstacle may lead out [m].
-        outline: take the outermost cells of the costmap for obstacles.
-        descend: makes a way of a field of arrival times.
+        prices: price of crossing a cell, by its cost; inf if impassable; shape (256,).
+        tolerance: maximum distance of the plan's end from the goal [m], unless the request sets it.
+        escape_radius: maximum distance that a start close to an obstacle may lead out [m].
+        outline: treat the outermost cells of the costmap as obstacles.
+        descend: makes a path from a field of arrival times.
         kinds: `Kind` of a cell by its cost, from the prices; shape (256,).
     """
 
@@ -64,7 +64,7 @@ class Settings:
 
 
 class PotentialPlanner(GlobalPlanner, Generic[P]):
-    """Cheapest ways over the costs; `tunable` names the parameters that may change while it is in use."""
+    """Finds the cheapest path over the costs; `tunable` names the parameters that can change at run time."""
 
     tunable: ClassVar[tuple[str, ...]] = ()
 
@@ -74,12 +74,12 @@ class PotentialPlanner(GlobalPlanner, Generic[P]):
 
     @abstractmethod
     def _settings_of(self, params: P) -> Settings:
-        """What parameters come to."""
+        """Convert parameters to settings."""
 
     def reconfigure(self, changes: Mapping[str, Any], *, name: str = "") -> P:
         """Change some of the parameters in `tunable`, as a dynamic_reconfigure server asks; returns all of them.
 
-        A plan that is being made is finished with the old ones.
+        A plan in progress is finished with the old parameters.
 
         Raises:
             ParamError: one is not tunable, of the wrong type or out of bounds; `name` is the prefix in its message.
@@ -90,12 +90,12 @@ class PotentialPlanner(GlobalPlanner, Generic[P]):
 
     @property
     def prices(self) -> NDArray[np.float32]:
-        """What crossing a cell costs, by its cost, inf where it cannot be crossed; shape (256,)."""
+        """Price of crossing a cell, by its cost; inf if impassable; shape (256,)."""
         return self._settings.prices
 
     @abstractmethod
     def _poses(self, points: Array, start: Pose2D, goal: Pose2D) -> Array:
-        """Headings for points of shape (N, 2), N > 1, as poses of shape (N, 3); the last is the goal's."""
+        """Add headings to points of shape (N, 2), N > 1; poses of shape (N, 3), the last with the goal's heading."""
 
     def plan(self, costmap: Grid, start: Pose2D, goal: Pose2D, *, tolerance: float | None = None) -> Array:
         """As `GlobalPlanner.plan`; `tolerance` replaces the planner's own."""
@@ -135,7 +135,7 @@ class PotentialPlanner(GlobalPlanner, Generic[P]):
 
 
 def with_headings(points: Array, last_yaw: float) -> Array:
-    """Points of shape (N, 2) as poses that look along the path; the last has the heading given."""
+    """Poses along points of shape (N, 2), with headings along the path; the last has the given heading."""
     poses = np.empty((len(points), 3))
     poses[:, :2] = points
     steps = np.diff(points, axis=0)
@@ -145,7 +145,7 @@ def with_headings(points: Array, last_yaw: float) -> Array:
 
 
 def _cell_of(what: str, pose: Pose2D, info: GridInfo, *, margin: float = 0.0) -> Cell:
-    """The cell of a pose, which may lie off the grid by a margin [m]."""
+    """Cell of a pose, which may lie off the grid by a margin [m]."""
     if not (math.isfinite(pose.x) and math.isfinite(pose.y)):
         raise OutOfBounds(what, pose.x, pose.y)  # NaN is nowhere
     cell = info.cell_of(pose.x, pose.y)
@@ -169,7 +169,7 @@ def _occupied(settings: Settings, cells: CostCells, info: GridInfo, goal: Pose2D
 
 
 def _open_start(settings: Settings, cells: CostCells, start: Cell, info: GridInfo) -> None:
-    """Free the robot's cell; where it stands too near to an obstacle, let it out at the highest cost."""
+    """Free the robot's cell; if it stands too close to an obstacle, let it out at the highest cost."""
     ix, iy = start
     if settings.kinds[cells[iy, ix]] == Kind.NARROW:
         r = math.ceil(settings.escape_radius / info.resolution)
@@ -182,7 +182,7 @@ def _open_start(settings: Settings, cells: CostCells, start: Cell, info: GridInf
 
 
 def _way(settings: Settings, info: GridInfo, cells: CostCells, start: Pose2D, goal: Pose2D) -> Array | None:
-    """Points [m], shape (N, 2), from the start to the goal."""
+    """Path from the start to the goal: points [m], shape (N, 2)."""
     origin, resolution = np.array([info.origin_x, info.origin_y]), info.resolution
     ends = [tuple((np.array([pose.x, pose.y]) - origin) / resolution - 0.5) for pose in (start, goal)]
     points = find_way(cells, settings.prices, ends[0], ends[1], settings.descend)

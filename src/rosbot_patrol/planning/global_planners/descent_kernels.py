@@ -1,4 +1,4 @@
-"""The way back down a field of arrival times.
+"""Inner loops that trace a path back down a field of arrival times.
 
 Paths descend the interpolated gradient of the field, so they are not bound to eight directions.
 """
@@ -14,7 +14,7 @@ from rosbot_patrol.kernels import kernel
 
 @kernel("UniTuple(float64, 2)(float32[:, ::1], int64, int64)")
 def slope(times, ix, iy):
-    """Gradient (uphill) at a cell's centre, upwind as the field was built."""
+    """Gradient (uphill) at a cell's centre, upwind as in the field's computation."""
     height, width = times.shape
     here = times[iy, ix]
     left = times[iy, ix - 1] if ix > 0 else np.float32(np.inf)
@@ -31,7 +31,7 @@ def slope(times, ix, iy):
 
 @kernel("Tuple((float64[:, ::1], int64))(float32[:, ::1], float64, float64, float64, float64, float64)")
 def descend(times, from_x, from_y, to_x, to_y, step):
-    """Follow the fall of `times` from a point to (about) a source, in cells with centres at whole numbers.
+    """Follow the descent of `times` from a point to (about) a source; cells have centres at whole numbers.
 
     Returns:
         Points (x, y), shape (N, 2), ending at (to_x, to_y); and 1 if that was reached, else 0.
@@ -54,7 +54,7 @@ def descend(times, from_x, from_y, to_x, to_y, step):
             if ix == end_x or iy == end_y or (math.isfinite(times[iy, end_x]) and math.isfinite(times[end_y, ix])):
                 reached = 1
                 break
-        # gradient, interpolated between the four centres around, those without a way left out
+        # gradient, interpolated between the four centres around, without unreachable ones
         x0, y0 = math.floor(x), math.floor(y)
         fx, fy = x - x0, y - y0
         gx, gy, weight = 0.0, 0.0, 0.0
@@ -104,7 +104,7 @@ def descend(times, from_x, from_y, to_x, to_y, step):
 
 @kernel("Tuple((float64[:, ::1], int64))(float32[:, ::1], int64, int64, int64, int64)")
 def descend_cells(times, from_x, from_y, to_x, to_y):
-    """Follow the fall of `times` from cell to cell, in eight directions, not between cells without a time.
+    """Follow the descent of `times` from cell to cell, in eight directions, never between cells without a time.
 
     Returns:
         Cells (x, y), shape (N, 2), and 1 if the last is (to_x, to_y), else 0.

@@ -4,7 +4,7 @@ As upstream, a cell costs neutral_cost + cost_factor * its cost, but no more tha
 - 1 and more cannot be crossed, unknown ones only with `allow_unknown`; the outermost cells of the costmap are
 obstacles unless `outline_map` is false; and headings come from the orientation filter.
 
-Differs (and as `global_planner_base` says):
+Differs (besides what `base` lists):
     - The field is the same exact one as navfn's, whatever `use_dijkstra`, `use_quadratic` and `old_navfn_behavior`
       say: they choose between ways to compute a coarser one, and how upstream rounds to cells.
     - `default_tolerance` works, for a goal off the costmap too; upstream reads it and does nothing with it.
@@ -73,7 +73,7 @@ class GlobalPlannerParams:
 
 
 def crossing_costs(params: GlobalPlannerParams) -> NDArray[np.float32]:
-    """What crossing a cell costs, by its cost; inf where it cannot be crossed. Shape (256,)."""
+    """Price of crossing a cell, by its cost; inf if impassable; shape (256,)."""
     costs = np.arange(256)
     limit = params.lethal_cost - 1
     table = (params.neutral_cost + params.cost_factor * costs).clip(max=limit).astype(np.float32)
@@ -85,7 +85,7 @@ def crossing_costs(params: GlobalPlannerParams) -> NDArray[np.float32]:
 
 
 class PotentialFieldPlanner(PotentialPlanner[GlobalPlannerParams]):
-    """Shortest ways over the costs, with a choice of paths and headings."""
+    """Cheapest paths over the costs, with a choice of path types and headings."""
 
     tunable = (
         "lethal_cost",

@@ -4,7 +4,7 @@ As upstream, a cell costs COST_NEUTRAL + COST_FACTOR * its cost, inscribed and l
 ones only with `allow_unknown` (at the highest cost), the robot's own cell is taken as free, and a goal that cannot be
 reached, or that lies off the costmap, is replaced by the nearest point within `default_tolerance`.
 
-Differs (and as `global_planner_base` says):
+Differs (besides what `base` lists):
     - The field is an exact upwind solution, of the part of the costmap that matters, so plans are smoother and come
       sooner.
     - `default_tolerance` is a radius; upstream looks in a square.
@@ -44,7 +44,7 @@ class NavfnParams:
 
 
 def crossing_costs(allow_unknown: bool) -> NDArray[np.float32]:
-    """What crossing a cell costs, by its cost; inf where it cannot be crossed. Shape (256,)."""
+    """Price of crossing a cell, by its cost; inf if impassable; shape (256,)."""
     table = (COST_NEUTRAL + COST_FACTOR * np.arange(256)).clip(max=COST_HIGHEST).astype(np.float32)
     table[[INSCRIBED, LETHAL]] = np.inf
     table[UNKNOWN] = COST_HIGHEST if allow_unknown else np.inf
@@ -52,7 +52,7 @@ def crossing_costs(allow_unknown: bool) -> NDArray[np.float32]:
 
 
 class NavfnPlanner(PotentialPlanner[NavfnParams]):
-    """Shortest ways over the costs."""
+    """Cheapest paths over the costs."""
 
     tunable = ("allow_unknown", "default_tolerance")
 

@@ -1,4 +1,4 @@
-"""What can be reached on a costmap, and a sentence on why something cannot."""
+"""Reachable cells of a costmap, and a sentence on why a cell is unreachable."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _BACK = {1: (-1, 0), 2: (1, 0), 3: (0, -1), 4: (0, 1)}
 
 
 class Kind(IntEnum):
-    """What a cell is to a planner, the better ones first."""
+    """Class of a cell for a planner, the better ones first."""
 
     OPEN = 0
     UNKNOWN = 1
@@ -39,7 +39,7 @@ _WHAT = {
 
 
 def kinds_of_costs(prices: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """The `Kind` of a cell by its cost, from the price of crossing it; both of shape (256,)."""
+    """`Kind` of a cell by its cost, from the price of crossing it; both of shape (256,)."""
     kinds = np.full(256, Kind.NARROW, np.uint8)
     kinds[UNKNOWN], kinds[LETHAL] = Kind.UNKNOWN, Kind.OBSTACLE
     kinds[np.isfinite(prices)] = Kind.OPEN
@@ -47,7 +47,7 @@ def kinds_of_costs(prices: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 
 def nearest_reachable(cells: CostCells, kinds: NDArray[np.uint8], start: Cell, goal: Cell, reach: int) -> Cell | None:
-    """The open cell nearest to the goal, at most `reach` cells away, that the start is connected with."""
+    """The open cell nearest to the goal, at most `reach` cells away, that is connected to the start."""
     came, _ = flood(cells, kinds, *start, *_ANYWHERE, Kind.OPEN, _ALL)
     x0, y0 = max(goal[0] - reach, 0), max(goal[1] - reach, 0)
     window = np.s_[y0 : max(goal[1] + reach + 1, 0), x0 : max(goal[0] + reach + 1, 0)]
@@ -61,13 +61,13 @@ def nearest_reachable(cells: CostCells, kinds: NDArray[np.uint8], start: Cell, g
 
 
 def why_no_way(info: GridInfo, cells: CostCells, kinds: NDArray[np.uint8], start: Cell, goal: Cell) -> str:
-    """Which end is shut in, by what and where; empty where neither is."""
+    """Reason for no path: which end is enclosed, by what and where; empty if neither is."""
     came, from_start = flood(cells, kinds, *start, *goal, Kind.OBSTACLE, _ALL)
     ix, iy = goal
     worst, place = Kind.OPEN, goal
     while came[iy, ix] in _BACK:
         kind = Kind(int(kinds[cells[iy, ix]]))
-        if kind and kind >= worst:  # the last one kept is the first from the start
+        if kind and kind >= worst:  # the last one stored is the first seen from the start
             worst, place = kind, (ix, iy)
         step = _BACK[int(came[iy, ix])]
         ix, iy = ix + step[0], iy + step[1]

@@ -33,15 +33,15 @@ _TURN = {
 
 
 def with_orientations(points: Array, start_yaw: float, goal_yaw: float, mode: OrientationMode, window: int) -> Array:
-    """Points of a plan as poses, shape (N, 3); the last has the goal's heading.
+    """Poses along the points of a plan, shape (N, 3); the last has the goal's heading.
 
     Args:
         points: shape (N, 2), N > 1.
         start_yaw: the robot's heading [rad].
         goal_yaw: the goal's [rad].
-        mode: NONE leaves 0, the directions look along the way (or backwards, or to a side), INTERPOLATE turns evenly
+        mode: NONE leaves 0, the directions point along the path (or backwards, or to a side), INTERPOLATE turns evenly
             from the start's heading to the goal's, FORWARD_THEN_INTERPOLATE on the last straight run only.
-        window: points before and after one that the direction at it is taken from.
+        window: number of points before and after a point that give its direction.
     """
     poses = np.zeros((len(points), 3))
     poses[:, :2] = points
@@ -61,14 +61,14 @@ def with_orientations(points: Array, start_yaw: float, goal_yaw: float, mode: Or
 
 
 def directions(points: Array, window: int) -> NDArray[np.float64]:
-    """The direction of the way at each point, from the point `window` before it to that after it [rad], shape (N,)."""
+    """Direction of the path at each point, from the point `window` before it to the one after it [rad], shape (N,)."""
     i = np.arange(len(points))
     steps = points[np.minimum(i + window, len(points) - 1)] - points[np.maximum(i - window, 0)]
     return np.arctan2(steps[:, 1], steps[:, 0])
 
 
 def _last_run(yaws: NDArray[np.float64]) -> int:
-    """Where the part begins that looks the way of the last point but two."""
+    """Index where the final straight run begins."""
     i = max(len(yaws) - 3, 0)
     last = yaws[i]
     while i > 0 and abs(math.remainder(yaws[i - 1] - last, math.tau)) <= _SAME_WAY:

@@ -1,11 +1,11 @@
-"""Arrival times over a cost grid, on the whole grid or within chosen blocks of it.
+"""Inner loops that compute arrival times over a cost grid, wholly or within chosen blocks.
 
 The field solves |grad T| = cost (the Eikonal equation; Sethian 1996) with first-order upwind differences, by a
 label-correcting queue of buckets (Yatziv, Bartesaghi, Sapiro 2006).
 
 Grids are divided into blocks of BLOCK x BLOCK cells. `limits[by, bx]` is the latest arrival worth keeping in a block:
-inf where all is wanted, negative where nothing is. Times of blocks without a limit are never written, so a search that
-needs a small part of a large grid touches only that part of its memory.
+inf for all, negative for none. Times of blocks without a limit are never written, so a search in a small part of a
+large grid touches only that part of its memory.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SHIFT = 3
 
 @kernel("void(float32[:, ::1], float32[:, ::1])")
 def open_blocks(limits, times):
-    """Set `times` to inf in all blocks that have a limit, and in those around them."""
+    """Set `times` to inf in all blocks with a limit and in their neighbours."""
     height, width = times.shape
     rows, columns = limits.shape
     for by in range(rows):
@@ -64,7 +64,7 @@ def cheapest_of_blocks(costs, rank):
     "int64(uint8[:, ::1], float32[::1], int64[:, ::1], float32[::1], int64, int64, float32[:, ::1], float32[:, ::1])",
 )
 def propagate(costs, table, sources, source_times, target_x, target_y, limits, times):
-    """Fill `times` from the sources until the target is settled, or everywhere where `target_x` is negative.
+    """Fill `times` from the sources until the target is settled, or everywhere if `target_x` is negative.
 
     Args:
         costs: cost of each cell.
@@ -131,7 +131,7 @@ def propagate(costs, table, sources, source_times, target_x, target_y, limits, t
         cy, cx = cell // width, cell % width
         here = times[cy, cx]
         if here != key[entry]:
-            continue  # a shorter way was found since, and queued
+            continue  # a shorter path was found since, and queued
         for k in range(4):
             nx = cx + (1 if k == 0 else (-1 if k == 1 else 0))
             ny = cy + (1 if k == 2 else (-1 if k == 3 else 0))

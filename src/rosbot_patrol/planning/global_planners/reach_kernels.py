@@ -1,4 +1,4 @@
-"""Which cells can be reached, and through what."""
+"""Flood fill over a costmap: which cells can be reached, and through which kinds of cells."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from rosbot_patrol.kernels import kernel
 
 @kernel("Tuple((uint8[:, ::1], int64))(uint8[:, ::1], uint8[::1], int64, int64, int64, int64, int64, int64)")
 def flood(costs, kinds, start_x, start_y, goal_x, goal_y, worst, enough):
-    """Flood from a cell over its edges, through kind 0 as far as it goes, then through kind 1, and so on.
+    """Flood from a cell over its edges: through kind 0 as far as possible, then through kind 1, and so on.
 
     Args:
         costs: cost of each cell.
         kinds: kind of a cell by its cost, 0 to 3; shape (256,). The start counts as kind 0.
         start_x: column of the start.
         start_y: its row.
-        goal_x: column of the cell to stop at, negative where there is none.
+        goal_x: column of the cell to stop at; negative: none.
         goal_y: its row.
         worst: last kind to flood through.
-        enough: stop once so many cells of kind 0 are reached, negative for never.
+        enough: number of cells of kind 0 after which to stop; negative: never.
 
     Returns:
         Where each cell was entered from, shape of `costs`: 0 not at all, 1 to 4 from -x, +x, -y, +y, 5 the start; cells

@@ -1,4 +1,4 @@
-"""The cheapest way over a cost grid, without looking at most of a large one.
+"""Search for the cheapest path over a cost grid without visiting most of a large one.
 
 On a small grid the whole field of arrival times is solved. On a large one:
 
@@ -9,7 +9,8 @@ On a small grid the whole field of arrival times is solved. On a large one:
    once more, in all blocks that such a way could pass: those where the time from the start and the least time to the
    goal together stay below that cost (the pruning of A*, Hart, Nilsson, Raphael 1968, with a bound from above).
 
-The coarse field is no strict bound, for its ways bend at centres of blocks; `_BENDS` and `_COARSE` allow for that.
+The coarse field is no strict bound, because its paths bend at the centres of blocks; `_BENDS` and `_COARSE` allow for
+that.
 """
 
 from __future__ import annotations
@@ -32,22 +33,22 @@ Times = NDArray[np.float32]
 Points = NDArray[np.float64]
 Descend = Callable[["Field", Point, Point], Points]
 
-SLACK = 0.004  # a way is not looked for where it could not be cheaper by more than this share
-_STEP = 0.5  # cells between the points of a way, as upstream
+SLACK = 0.004  # paths that could be cheaper by at most this share are not searched
+_STEP = 0.5  # cells between the points of a path, as upstream
 _PULLS = 3
 _PULL_WINDOW = 24
 _SMOOTH = 4  # points on each side
-_SMOOTH_PRICE = 1.003  # share of its price that a stretch may then have
+_SMOOTH_PRICE = 1.003  # largest relative price of a stretch after smoothing
 _SMOOTHINGS = 2
-_WHOLE = 256 * 256  # cells of a grid that is solved as a whole
-_CORRIDOR = 4  # blocks on each side of the coarse way
+_WHOLE = 256 * 256  # grids up to this number of cells are solved as a whole
+_CORRIDOR = 4  # blocks on each side of the coarse path
 _COARSE = 0.99  # the coarse field against the fine one, in the open
-_BENDS = 12.0  # blocks that a coarse way may be longer because it bends at their centres
+_BENDS = 12.0  # blocks by which a coarse path may be longer, as it bends at their centres
 
 
 @dataclass(frozen=True)
 class Field:
-    """Arrival times over a costmap: costs, prices by cost, and times, which are inf or unset where none is known."""
+    """Arrival times over a costmap: costs, prices by cost, and times; times are inf or unset where unknown."""
 
     cells: CostCells
     prices: NDArray[np.float32]
@@ -55,7 +56,7 @@ class Field:
 
 
 def descend_smoothly(field: Field, goal: Point, start: Point) -> Points:
-    """Down the gradient of a field, pulled straight; from start to goal, shape (N, 2), N = 0 where it fails."""
+    """Descend the gradient of a field and pull the path straight; start to goal, shape (N, 2), N = 0 if it fails."""
     points, arrived = descent_kernels.descend(field.times, *goal, *start, _STEP)
     if not arrived:
         return np.empty((0, 2))
@@ -69,7 +70,7 @@ def descend_smoothly(field: Field, goal: Point, start: Point) -> Points:
 
 
 def descend_by_cells(field: Field, goal: Point, start: Point) -> Points:
-    """From cell to cell, in eight directions; from the start's cell to the goal's, shape (N, 2), N = 0 if it fails."""
+    """Descend from cell to cell, in eight directions; start's cell to goal's, shape (N, 2), N = 0 if it fails."""
     shape = field.times.shape
     points, arrived = descent_kernels.descend_cells(
         field.times, *_nearest_cell(goal, shape), *_nearest_cell(start, shape)
@@ -84,14 +85,14 @@ def find_way(
     goal: Point,
     descend: Descend = descend_smoothly,
 ) -> Points | None:
-    """The cheapest way between two points, None where there is none.
+    """Find the cheapest path between two points; None if there is none.
 
     Args:
         cells: costs, shape (height, width).
-        prices: what crossing a cell costs, by its cost, inf where it cannot be crossed; shape (256,).
+        prices: price of crossing a cell, by its cost; inf if impassable; shape (256,).
         start: (x, y) in cells with centres at whole numbers, inside.
         goal: the same.
-        descend: makes a way of a field of arrival times.
+        descend: makes a path from a field of arrival times.
 
     Returns:
         Points (x, y) in cells from start to goal, shape (N, 2).
@@ -116,13 +117,13 @@ class _Search:
         self.least_price = float(prices.min())
 
     def in_blocks(self, descend: Descend) -> Points | None:
-        """As the module says."""
+        """Search in blocks, as the module's docstring describes."""
         far = self._times_to_goal()
         ix, iy = (i // kernels.BLOCK for i in self.start_cell)
         if not np.isfinite(far[iy, ix]):
             return None
         field = self.field(self._corridor(far))
-        if field is None:  # a gap that is open block by block, but not cell by cell
+        if field is None:  # a gap may be open block by block, but not cell by cell
             field = self.field(np.where(np.isfinite(far), np.float32(np.inf), np.float32(-1.0)))
             return None if field is None else _points(descend(field, self.goal, self.start))
         points = _points(descend(field, self.goal, self.start))
@@ -135,8 +136,8 @@ class _Search:
         return points if better is None else _points(descend(better, self.goal, self.start))
 
     def field(self, limits: Times) -> Field | None:
-        """Arrival times from the start, as far as the goal, within limits; None where it is not reached."""
-        times = np.empty(self.cells.shape, np.float32)  # only what is touched takes memory
+        """Arrival times from the start up to the goal, within limits; None if the goal is not reached."""
+        times = np.empty(self.cells.shape, np.float32)  # only touched pages take memory
         kernels.open_blocks(limits, times)
         source, zero = np.array([self.start_cell], np.int64), np.zeros(1, np.float32)
         found = kernels.propagate(self.cells, self.prices, source, zero, *self.goal_cell, limits, times)
@@ -164,7 +165,7 @@ class _Search:
         return limits
 
     def _least_times(self, far: Times) -> NDArray[np.float64]:
-        """A time that a way from each block to the goal needs at least."""
+        """Lower bound of the time from each block to the goal."""
         size = kernels.BLOCK
         x, y = (np.arange(n) * size + (size - 1) / 2.0 for n in far.shape[::-1])
         gap = np.hypot((x - self.goal[0])[None, :], (y - self.goal[1])[:, None]) - 0.75 * size

@@ -1,8 +1,8 @@
-"""A way over a cost grid made cheaper and smoother.
+"""Inner loops that make a path over a cost grid cheaper and smoother.
 
-The first-order field is a few per cent off around corners and where costs change within a few cells, so the way that
-descends it is a per cent or two dearer than it need be. Pulling it straight, at the exact price of each line, makes up
-for that. Points are (x, y) in cells, with centres at whole numbers.
+The first-order field is a few per cent off around corners and where costs change within a few cells. A path that
+descends it is therefore one or two per cent too expensive. Pulling it straight, at the exact price of each line,
+corrects that. Points are (x, y) in cells, with centres at whole numbers.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from rosbot_patrol.kernels import kernel
 
 @kernel("float64(uint8[:, ::1], float32[::1], float64, float64, float64, float64)")
 def line_price(costs, table, x0, y0, x1, y1):
-    """The price of a straight line, exactly, cell by cell (Amanatides and Woo 1987); inf where it cannot be taken.
+    """Exact price of a straight line, cell by cell (Amanatides and Woo 1987); inf if it is blocked.
 
-    A line that passes the corner of a cell that cannot be crossed cannot be taken either.
+    A line that passes the corner of an impassable cell is blocked, too.
     """
     height, width = costs.shape
     dx, dy = x1 - x0, y1 - y0
@@ -28,7 +28,7 @@ def line_price(costs, table, x0, y0, x1, y1):
         return np.inf
     sx = 1 if dx > 0.0 else -1
     sy = 1 if dy > 0.0 else -1
-    left = abs(end_x - ix) + abs(end_y - iy)  # edges still to cross
+    left = abs(end_x - ix) + abs(end_y - iy)  # edges left to cross
     step_x = abs(1.0 / dx) if end_x != ix else np.inf
     step_y = abs(1.0 / dy) if end_y != iy else np.inf
     tx = (ix + 0.5 * sx - x0) / dx if end_x != ix else np.inf
@@ -60,16 +60,16 @@ def line_price(costs, table, x0, y0, x1, y1):
 
 @kernel("float64[:, ::1](uint8[:, ::1], float32[::1], float64[:, ::1], int64)")
 def pull(costs, table, points, window):
-    """The cheapest chain of straight lines between points of a way, none over more than `window` of them.
+    """Find the cheapest chain of straight lines between points of a path, none over more than `window` points.
 
     Args:
         costs: cost of each cell.
         table: price of a cell's length by its cost, shape (256,).
-        points: the way, shape (N, 2), N > 0.
-        window: how many points a line may leave out.
+        points: the path, shape (N, 2), N > 0.
+        window: maximum number of points that a line may skip.
 
     Returns:
-        The points kept, shape (M, 2), the first and the last among them; all where the way cannot be taken.
+        The points kept, shape (M, 2), with the first and the last; all points if the path is blocked.
     """
     n = points.shape[0]
     least = np.full(n, np.inf)
@@ -100,7 +100,7 @@ def pull(costs, table, points, window):
 
 @kernel("float64[:, ::1](float64[:, ::1], float64)")
 def cut(points, step):
-    """Points about `step` apart along a polyline of shape (N, 2), N > 0, its corners among them."""
+    """Points about `step` apart along a polyline of shape (N, 2), N > 0, including its corners."""
     count = 1
     for i in range(points.shape[0] - 1):
         gap = math.hypot(points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1])
@@ -120,17 +120,17 @@ def cut(points, step):
 
 @kernel("float64[:, ::1](uint8[:, ::1], float32[::1], float64[:, ::1], int64, float64)")
 def smooth(costs, table, points, reach, most):
-    """Each point moved to the mean of those around it, fewer of them where that would make the way dearer.
+    """Move each point to the mean of its neighbours, fewer of them if the path would become more expensive.
 
     Args:
         costs: cost of each cell.
         table: price of a cell's length by its cost, shape (256,).
-        points: a way that can be taken, evenly spaced, shape (N, 2).
+        points: a passable path, evenly spaced, shape (N, 2).
         reach: points on each side at most; the ends stay.
-        most: price of a stretch that is accepted, as a share of its price before.
+        most: accepted price of a stretch, relative to its price before.
 
     Returns:
-        The way, shape (N, 2).
+        The path, shape (N, 2).
     """
     n = points.shape[0]
     side = np.empty(n, np.int64)

@@ -1,1 +1,1 @@
-"""TrajectoryPlannerROS and DWAPlannerROS: the velocity that follows a plan."""
+"""TrajectoryPlannerROS and DWAPlannerROS: velocities that follow a plan."""

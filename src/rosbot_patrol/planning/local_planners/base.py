@@ -1,4 +1,4 @@
-"""What the local planners that sample velocities have in common."""
+"""Base of both local planners: samples, simulates and scores velocities."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from rosbot_patrol.tunable import changed
 
 P = TypeVar("P")
 
-_LOOKAHEAD = 1.0  # along the plan lies the local goal, at least [m]
+_LOOKAHEAD = 1.0  # minimum distance of the local goal along the plan [m]
 
 
 @dataclass
 class _SpeedLimit:
-    """Speeds [m/s, rad/s] that hold until the robot has moved by `distance` [m] from where it was first seen."""
+    """Speed limit [m/s, rad/s] until the robot has moved by `distance` [m] from where it was first seen."""
 
     trans: float
     rot: float
@@ -41,7 +41,7 @@ class _SpeedLimit:
 
 
 class SamplingPlanner(LocalPlanner, Generic[P]):
-    """Follows a plan by velocities that are sampled, simulated and judged; at the goal it stops and turns.
+    """Follows a plan by velocities that are sampled, simulated and scored; at the goal it stops and turns.
 
     Args:
         params: the planner's own.
@@ -53,7 +53,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
 
     def __init__(self, params: P, footprint: Footprint, *, resolution: float) -> None:
         self.params = params
-        self._driven = params  # what holds now: `params`, or slower
+        self._driven = params  # the parameters in force: `params`, or with lower speeds
         self._limit: _SpeedLimit | None = None
         self._obstacles = ObstacleCritic(footprint, resolution=resolution)
         self._oscillation = OscillationCritic()
@@ -63,7 +63,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         self._local_plan: Array = np.empty((0, 3))
         self._visible: Array = np.empty((0, 3))
 
-    # ---- what a planner has of its own
+    # ---- for subclasses
 
     @property
     @abstractmethod
@@ -73,7 +73,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
     @property
     @abstractmethod
     def _goal_rule(self) -> tuple[float, bool]:
-        """How near to the goal is there [m], and whether it stays so."""
+        """Distance from the goal that counts as reached [m], and whether that is latched."""
 
     @abstractmethod
     def _slowed(self, params: P, trans: float, rot: float) -> P:
@@ -81,12 +81,12 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
 
     @abstractmethod
     def _follow(self, view: LocalView) -> Twist2D:
-        """The velocity for this cycle, away from the goal; raises ControlError."""
+        """Velocity for this cycle away from the goal; raises ControlError."""
 
     # ---- parameters
 
     def set_params(self, params: P) -> None:
-        """Other parameters from the next cycle on; plan, goal and a limit of speed stay.
+        """Use other parameters from the next cycle on; plan, goal and speed limit stay.
 
         Raises:
             TypeError: they belong to another planner.
@@ -106,13 +106,13 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         return self.params
 
     def fit(self, footprint: Footprint, *, resolution: float) -> None:
-        """Drive with another padded outline of the robot, or on cells of another size [m]."""
+        """Use another padded outline of the robot, or cells of another size [m]."""
         self._obstacles = ObstacleCritic(footprint, resolution=resolution)
         self._radius = footprint.circumscribed_radius
         self._stop = StopAndTurn(self._obstacles)
 
     def limit_speed(self, trans: float, rot: float, *, distance: float) -> None:
-        """Drive no faster than this [m/s, rad/s] until the robot has moved by `distance` [m]."""
+        """Limit the speed to this [m/s, rad/s] until the robot has moved by `distance` [m]."""
         self._limit = _SpeedLimit(trans, rot, distance)
         self._apply()
 
@@ -123,24 +123,24 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
     # ---- plan and goal
 
     def reset(self) -> None:
-        """Forget the goal that was worked on."""
+        """Forget the current goal."""
         self._track.xy_reached = False
         self._oscillation.reset()
         self._stop.reset()
 
     def set_plan(self, poses: Array) -> None:
-        """Follow a new plan; raises ControlError where it cannot."""
+        """Follow a new plan; raises ControlError if it cannot."""
         if self._track.take(poses):
             self._stop.reset()
 
     @property
     def local_plan(self) -> Array:
-        """What the last velocity would drive."""
+        """Trajectory of the last velocity."""
         return self._local_plan
 
     @property
     def visible_plan(self) -> Array:
-        """The part of the plan that is followed now."""
+        """Part of the plan that is followed now."""
         return self._visible
 
     def _is_at_goal(self, view: LocalView) -> bool:
@@ -148,7 +148,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         return self._track.is_at_goal(view, tolerance=tolerance, latch=latch)
 
     def is_goal_reached(self, view: LocalView) -> bool:
-        """Whether the robot stands at the goal, turned as it should."""
+        """Whether the robot stands at the goal with the right heading."""
         if len(self._track.poses) == 0 or not self._is_at_goal(view):
             return False
         limits = self._stop_limits
@@ -156,7 +156,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         return abs(error) <= limits.yaw_tolerance and limits.is_standing(view.velocity)
 
     def compute(self, view: LocalView) -> Twist2D:
-        """The velocity for this cycle; raises ControlError."""
+        """Velocity for this cycle; raises ControlError."""
         if not all(map(math.isfinite, (*view.pose, *view.velocity, *view.local_from_plan))):
             raise ControlError("the robot's pose or velocity is not a number")
         if len(self._track.poses) == 0:
@@ -173,7 +173,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         return self._follow(view)
 
     def _ground(self, view: LocalView, lookahead: float) -> Ground:
-        """What is followed now; raises ControlError where something stands on it and nothing leads round."""
+        """Ground to follow now; raises ControlError if something blocks the plan and there is no way round."""
         return survey_ground(
             view, self._visible, behind=self._track.behind, lookahead=max(lookahead, _LOOKAHEAD), radius=self._radius
         )
@@ -188,18 +188,18 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         growth: float = 0.0,
         bare: bool = False,
     ) -> tuple[Array, Array]:
-        """The mean cost of obstacles of two ways in which a base may take to velocities; both have to be free.
+        """Mean obstacle cost of two models of how the base reaches a velocity; both must be free.
 
         Args:
             view: where the robot is and what it sees.
             samples: velocities (vx, vy, wz), shape (K, 3).
-            motion: how it is expected to take to them.
-            other: how it might as well.
-            growth: of the footprint, at most.
-            bare: without its padding.
+            motion: expected response of the base.
+            other: alternative response.
+            growth: largest growth of the footprint.
+            bare: use the footprint without padding.
 
         Returns:
-            Costs, shape (K,), inf for what is not free, and where `motion` ends, shape (K, 3).
+            Costs, shape (K,), inf if blocked, and the final poses of `motion`, shape (K, 3).
         """
         reach = motion.reach(samples, view.velocity)
         around = self._obstacles.survey(view.costmap, view.pose, reach, growth=growth, bare=bare)

@@ -150,7 +150,7 @@ RENAMED = {  # upstream's spelling before Noetic -> now
 
 
 def with_new_names(values: dict[str, Any], renamed: dict[str, str], name: str) -> dict[str, Any]:
-    """Values under the names of today; each old name is told, and counts where the new one is not given."""
+    """Values under the present names; each old name is logged, and used if the new one is not given."""
     found = {key: value for key, value in values.items() if key not in renamed}
     for old, new in renamed.items():
         if old in values:

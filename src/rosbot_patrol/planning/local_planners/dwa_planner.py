@@ -49,13 +49,13 @@ from rosbot_patrol.planning.local_planners.dwa_params import TUNABLE, DWAPlanner
 from rosbot_patrol.planning.local_planners.ground import Ground
 from rosbot_patrol.planning.local_planners.stop import StopLimits
 
-_SHORT = 0.6  # how far ahead slow motions are looked at where it is narrow [s]
-_BEYOND = 0.2  # the local goal lies that much beyond what a trajectory can reach [m]
+_SHORT = 0.6  # duration of slow motions in narrow places [s]
+_BEYOND = 0.2  # distance of the local goal beyond the reach of a trajectory [m]
 _EPS = 1e-4
 
 
 class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
-    """Samples the velocities within reach and drives the best.
+    """Samples the reachable velocities and drives the best.
 
     Args:
         params: as upstream.
@@ -73,7 +73,7 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
         self._twirling = TwirlingCritic()
 
     def reconfigure(self, changes: Mapping[str, Any], *, name: str = "") -> DWAPlannerParams:
-        """Change parameters; `restore_defaults` brings those of the start back. See `SamplingPlanner`."""
+        """Change parameters; `restore_defaults` restores those of the start. See `SamplingPlanner`."""
         if changes.get("restore_defaults"):
             self.set_params(self._at_start)
             return self._at_start
@@ -109,7 +109,7 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
     # ---- following
 
     def _follow(self, view: LocalView) -> Twist2D:
-        """The best velocity within reach; where none is free, a slow one that is looked at less far ahead."""
+        """The best reachable velocity; if none is free, a slow one that is simulated for a shorter time."""
         p = self._driven
         self._visible = self._track.part_in_view(view, prune=p.prune_plan)
         ground = self._ground(view, p.max_vel_trans * p.sim_time + p.forward_point_distance + _BEYOND)
@@ -136,7 +136,7 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
         return best
 
     def _samples(self, view: LocalView) -> Array:
-        """Velocities within reach (vx, vy, wz), shape (K, 3), none too slow or too fast for the base."""
+        """Reachable velocities (vx, vy, wz), shape (K, 3), within the base's limits."""
         p, v = self._driven, view.velocity
         most_x, most_y = min(p.max_vel_x, p.max_vel_trans), min(p.max_vel_y, p.max_vel_trans)
         window = 1.0 / p.controller_frequency if p.use_dwa else p.sim_time
@@ -168,7 +168,7 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
     def _best(
         self, view: LocalView, ground: Ground, samples: Array, horizon: float, *, bare: bool = False
     ) -> Twist2D | None:
-        """The best sample, None where none is free.
+        """The best sample, None if none is free.
 
         Raises:
             ControlError: some are free, but lead nowhere.
@@ -192,7 +192,7 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
         return twist
 
     def _scores(self, situation: Situation) -> Array:
-        """The weighted critics that judge where a velocity leads, shape (K,)."""
+        """Weighted critics of the final poses, shape (K,)."""
         p = self._driven
         cost = p.path_distance_bias * self._path.score(situation)
         cost += p.goal_distance_bias * self._goal.score(situation)
@@ -206,14 +206,14 @@ class DWAPlanner(SamplingPlanner[DWAPlannerParams]):
 
 
 def _within(speed: float, change: float, least: float, most: float, *, start: float, count: int) -> Array:
-    """Speeds that can be had next: within a change and the limits, evenly spaced, and 0 where it lies between.
+    """Speeds reachable next: within a change and the limits, evenly spaced, including 0 if it lies between.
 
     Args:
         speed: now.
-        change: how much faster or slower it may become.
-        least: limit.
-        most: limit.
-        start: what a standing base needs to move at all.
+        change: largest change of speed.
+        least: lower limit.
+        most: upper limit.
+        start: slowest speed that moves a standing base.
         count: how many.
     """
     if most <= least:

@@ -1,4 +1,4 @@
-"""What one control cycle drives over: how far of the plan is followed now, and round what."""
+"""Ground of one control cycle: the part of the plan to follow, and the way round obstacles on it."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from rosbot_patrol.planning.critics import Situation, distances_from, shrink
 from rosbot_patrol.planning.critics import sweep_kernels as kernels
 from rosbot_patrol.planning.interfaces import Array, LocalView
 
-_TOO_NEAR = 0.3  # of a plan that is blocked, less than this ahead is not worth driving [m]
+_TOO_NEAR = 0.3  # a blocked plan with less than this free ahead is not driven [m]
 _NEIGHBOURS = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
 
 @dataclass(frozen=True)
 class Ground:
-    """Costs in coarse cells, the plan as far as it is followed now, and distances to its end [cells]."""
+    """Costs in coarse cells, the part of the plan to follow, and distances to its end [cells]."""
 
     coarse: Grid
     plan: Array
     goal_field: NDArray[np.float32]
 
     def situation(self, view: LocalView, samples: Array, ends: Array, nose: float) -> Situation:
-        """What critics look at."""
+        """Input of the critics."""
         return Situation(
             pose=view.pose,
             samples=samples,
@@ -42,17 +42,17 @@ class Ground:
 
 
 def survey_ground(view: LocalView, plan: Array, *, behind: int, lookahead: float, radius: float) -> Ground:
-    """The plan up to the local goal, led round what stands on it.
+    """Find the plan up to the local goal, and lead it round obstacles.
 
-    The local goal is the first pose that is `lookahead` along the plan and that the robot can get to; where there is
-    none, the last before that. Upstream takes the last in view, and so cuts corners, or stays where it is in a bend.
+    The local goal is the first reachable pose at least `lookahead` along the plan; without one, the last reachable pose
+    before that. Upstream takes the last pose in view, and so cuts corners or gets stuck in a bend.
 
     Args:
         view: where the robot is and what it sees.
         plan: the part in view, shape (N, 3).
         behind: how many of its poses lie behind the robot.
-        lookahead: how far along the plan the local goal is [m].
-        radius: of the robot, corners and all [m]; a way round keeps clear of obstacles by that where it can.
+        lookahead: distance of the local goal along the plan [m].
+        radius: circumscribed radius of the robot [m]; a way round keeps that distance from obstacles if it can.
 
     Raises:
         ControlError: something stands on the plan right ahead, and nothing leads round it.
@@ -75,7 +75,7 @@ def survey_ground(view: LocalView, plan: Array, *, behind: int, lookahead: float
 
 
 def _open_around(coarse: Grid, pose: Pose2D, radius: float) -> Grid:
-    """The same where the robot stands; one that is too near to something can leave it through inscribed cells."""
+    """Costs with the robot's surroundings opened; a robot too close to something can leave through inscribed cells."""
     info = coarse.info
     x0, y0 = info.cell_of_clamped(pose.x, pose.y)
     if coarse.cells[y0, x0] < INSCRIBED:
@@ -89,7 +89,7 @@ def _open_around(coarse: Grid, pose: Pose2D, radius: float) -> Grid:
 
 
 def _local_goal(plan: Array, reachable: NDArray[np.bool_], behind: int, lookahead: float) -> int:
-    """Index of the local goal, -1 where no pose can be reached."""
+    """Index of the local goal, -1 if no pose can be reached."""
     ahead = plan[behind:]
     along = np.zeros(len(ahead))
     np.cumsum(np.hypot(*np.diff(ahead[:, :2], axis=0).T), out=along[1:])
@@ -101,7 +101,7 @@ def _local_goal(plan: Array, reachable: NDArray[np.bool_], behind: int, lookahea
 
 
 def _way_round(coarse: Grid, pose: Pose2D, plan: Array, radius: float) -> Array:
-    """A way to the plan's end that keeps clear of obstacles, shape (M, 3); the plan itself where there is none."""
+    """Path to the plan's end that keeps clear of obstacles, shape (M, 3); the plan itself if there is none."""
     info = coarse.info
     cap = math.ceil(radius / info.resolution) + 2
     clear = kernels.clearances(coarse.cells, 0, 0, info.width, info.height, cap) * info.resolution
@@ -117,7 +117,7 @@ def _way_round(coarse: Grid, pose: Pose2D, plan: Array, radius: float) -> Array:
 
 
 def _descend(info: GridInfo, field: NDArray[np.float32], pose: Pose2D) -> Array:
-    """Centres of the cells from a pose down to where the field ends, shape (M, 2); empty where it does not lead."""
+    """Centres of the cells from a pose down to the field's end, shape (M, 2); empty if it does not lead there."""
     ix, iy = info.cell_of_clamped(pose.x, pose.y)
     way = []
     here = float(field[iy, ix])

@@ -1,6 +1,6 @@
-"""What local planners do at the goal: stop, then turn to its heading (matches LatchedStopRotateController 1.17).
+"""Behaviour at the goal: stop, then turn to its heading (matches LatchedStopRotateController 1.17).
 
-Differs: the turn is twice as fast for its angle, within the same limits, and stops in time for it.
+Differs: the turning speed per angle is twice upstream's, within the same limits, and it stops in time.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, angle_difference
 from rosbot_patrol.planning.critics import SUDDEN, Motion, ObstacleCritic
 from rosbot_patrol.planning.interfaces import LocalView
 
-_GAIN = 2.0  # turning speed by the angle that is left [1/s]
-_AHEAD = 0.5  # how far ahead the turn is checked [s]
+_GAIN = 2.0  # turning speed per remaining angle [1/s]
+_AHEAD = 0.5  # time ahead for which the turn is checked [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +31,12 @@ class StopLimits:
     period: float
 
     def is_standing(self, velocity: Twist2D) -> bool:
-        """Whether a velocity counts as none."""
+        """Whether a velocity counts as zero."""
         return abs(velocity.wz) <= self.rot_stopped and math.hypot(velocity.vx, velocity.vy) <= self.trans_stopped
 
 
 class StopAndTurn:
-    """Stops where it is, then turns to a heading."""
+    """Stops the robot, then turns it to a heading."""
 
     def __init__(self, obstacles: ObstacleCritic) -> None:
         self._obstacles = obstacles
@@ -47,7 +47,7 @@ class StopAndTurn:
         self._is_turning = False
 
     def step(self, view: LocalView, goal: Pose2D, limits: StopLimits) -> Twist2D:
-        """The velocity for this cycle, none once it looks the right way.
+        """Velocity for this cycle, None when the robot has the heading.
 
         Raises:
             ControlError: something is in the way.
@@ -76,7 +76,7 @@ class StopAndTurn:
         fastest = limits.fastest_left if error > 0.0 else limits.fastest_right
         acc = limits.accelerations[2]
         speed = min(fastest, math.sqrt(2.0 * acc * abs(error)), _GAIN * abs(error))
-        speed = min(speed, abs(view.velocity.wz) + 2.0 * acc * limits.period)  # what is measured lags
+        speed = min(speed, abs(view.velocity.wz) + 2.0 * acc * limits.period)  # the measured velocity lags
         speed = min(max(speed, limits.slowest_turn), fastest)
         twist = Twist2D(0.0, 0.0, math.copysign(speed, error))
         ahead = _short(min(_AHEAD, abs(error) / max(speed, 1e-3)))

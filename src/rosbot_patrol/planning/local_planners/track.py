@@ -1,4 +1,4 @@
-"""The plan that a local planner follows, and how much of it lies behind."""
+"""The plan that a local planner follows, and the part of it that lies behind."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from rosbot_patrol.planning.interfaces import Array, LocalView
 
 
 class Track:
-    """A plan, where on it the robot is, and whether it has been at the goal's place."""
+    """A plan, the robot's progress on it, and whether the robot has reached the goal's position."""
 
     def __init__(self) -> None:
         self.poses: Array = np.empty((0, 3))
         self.passed = 0
-        self.behind = 0  # how many poses of the last part in view lie behind
+        self.behind = 0  # number of poses of the last visible part that lie behind
         self.xy_reached = False
 
     def take(self, poses: Array) -> bool:
-        """Follow a new plan, shape (N, 3); returns whether it leads to another goal than the one before.
+        """Follow a new plan, shape (N, 3); returns whether its goal differs from the previous one.
 
         Raises:
             ControlError: it has no poses, or some that are no numbers.
@@ -43,7 +43,7 @@ class Track:
         return view.local_from_plan @ Pose2D(*self.poses[-1].tolist())
 
     def is_at_goal(self, view: LocalView, *, tolerance: float, latch: bool) -> bool:
-        """Whether the robot is at the goal's place, or with `latch` has been."""
+        """Whether the robot is at the goal's position, or with `latch` has been there."""
         goal = self.goal(view)
         near = math.hypot(goal.x - view.pose.x, goal.y - view.pose.y) <= tolerance
         if near and latch:
@@ -51,11 +51,11 @@ class Track:
         return near or self.xy_reached
 
     def part_in_view(self, view: LocalView, *, prune: bool) -> Array:
-        """The plan in the local frame, from where the robot is to where it leaves the local costmap.
+        """Visible part of the plan in the local frame: from the robot to where it leaves the local costmap.
 
         Args:
             view: where the robot is and what it sees.
-            prune: without what lies behind.
+            prune: drop the part behind the robot.
 
         Raises:
             ControlError: it does not pass through the local costmap.

@@ -11,7 +11,7 @@ from rosbot_patrol.params import param
 
 
 def read_speeds(value: Any) -> list[float]:
-    """Speeds of a list, or of upstream's text "-0.3,-0.1,0.1,0.3".
+    """Speeds from a list, or from upstream's text "-0.3,-0.1,0.1,0.3".
 
     Raises:
         ValueError: it is neither.

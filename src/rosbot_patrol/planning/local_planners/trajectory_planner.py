@@ -50,10 +50,10 @@ from rosbot_patrol.planning.local_planners.ground import Ground
 from rosbot_patrol.planning.local_planners.stop import StopLimits
 from rosbot_patrol.planning.local_planners.trajectory_params import TUNABLE, TrajectoryPlannerParams, read_speeds
 
-_SHORT, _SLOW = 0.6, 0.1  # how far ahead [s] slow motions [m/s] are looked at where it is narrow
-_HEADING_WEIGHT = 0.3  # of an angle, with heading_scoring (upstream's)
+_SHORT, _SLOW = 0.6, 0.1  # duration [s] of slow motions [m/s] in narrow places
+_HEADING_WEIGHT = 0.3  # weight of an angle with heading_scoring (upstream's)
 _STRAFE = 0.1  # speed forward and sideways of a holonomic base's two slanting samples [m/s] (upstream's)
-_BEYOND = 0.2  # the local goal lies that much beyond what a trajectory can reach [m]
+_BEYOND = 0.2  # distance of the local goal beyond the reach of a trajectory [m]
 _ESCAPE_TIME = 2.0  # [s]
 _NOTHING_FREE = "no trajectory is free of obstacles"
 
@@ -78,7 +78,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         self._escape_since = 0.0
 
     def reset(self) -> None:
-        """Forget the goal that was worked on."""
+        """Forget the current goal."""
         super().reset()
         self._escape_from = None
 
@@ -120,7 +120,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
     # ---- following
 
     def _follow(self, view: LocalView) -> Twist2D:
-        """The best of all samples; where none is free, of slow ones that are looked at less far ahead."""
+        """The best sample; if none is free, the best slow one, simulated for a shorter time."""
         p = self._driven
         self._visible = self._track.part_in_view(view, prune=p.prune_plan)
         if p.simple_attractor:
@@ -145,7 +145,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         return self._limited(view, best)
 
     def _squeeze(self, view: LocalView, ground: Ground) -> Twist2D | None:
-        """The best slow motion of a robot whose padding touches something, by its bare outline; None: it does not."""
+        """The best slow motion by the bare outline, if the padding touches something; None: it does not."""
         p = self._driven
         if not self._obstacles.is_squeezed(view.costmap, view.pose):
             return None
@@ -158,7 +158,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         return self._best(view, ground, slow, min(p.sim_time, _SHORT), bare=True)
 
     def _attempts(self, view: LocalView) -> list[tuple[Array, float]]:
-        """Samples (vx, vy, wz) that are tried one set after the other, and how far ahead each is looked at [s]."""
+        """Sets of samples (vx, vy, wz) to try in turn, each with the duration of its simulation [s]."""
         p = self._driven
         turns = self._turns()
         if self._is_escaping(view):
@@ -174,11 +174,11 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         return attempts
 
     def _ahead(self, view: LocalView) -> Array:
-        """Velocities that lead ahead, shape (K, 3): all pairs of forward and turning speeds."""
+        """Forward velocities, shape (K, 3): all pairs of forward and turning speeds."""
         p = self._driven
         goal = self._track.goal(view)
         to_goal = math.hypot(goal.x - view.pose.x, goal.y - view.pose.y)
-        # slow down in time to stand at the goal
+        # slow down in time to stop at the goal
         top = min(p.max_vel_x, max(p.min_vel_x, to_goal / p.sim_time, 0.05))
         window = 1.0 / p.controller_frequency if p.dwa else p.sim_time
         fastest = min(top, max(view.velocity.vx, 0.0) + p.acc_lim_x * window)
@@ -201,7 +201,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         return out
 
     def _turns(self) -> Array:
-        """Turns on the spot (0, 0, wz), shape (K, 3), none slower than the base can."""
+        """Turns on the spot (0, 0, wz), shape (K, 3), none slower than the base can turn."""
         p = self._driven
         wz = np.linspace(p.min_vel_theta, p.max_vel_theta, p.vtheta_samples)
         least = p.min_in_place_vel_theta
@@ -224,7 +224,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
     def _best(
         self, view: LocalView, ground: Ground, samples: Array, horizon: float, *, bare: bool = False
     ) -> Twist2D | None:
-        """The cheapest sample, None where none is free.
+        """The cheapest sample, None if none is free.
 
         Raises:
             ControlError: some are free, but lead nowhere.
@@ -242,7 +242,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         cost[self._oscillation.forbidden(samples)] = np.inf
         best = int(np.argmin(cost))
         if leads_on and not math.isfinite(cost[best]):
-            return None  # all that is left is to turn to and fro: back up
+            return None  # only turning to and fro is left: back up
         if not math.isfinite(cost[best]):
             raise ControlError("no free trajectory leads on along the plan")
         twist = Twist2D(*samples[best].tolist())
@@ -254,7 +254,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         return min(self._driven.heading_lookahead, 0.5 * to_goal)
 
     def _distance_costs(self, situation: Situation, resolution: float) -> Array:
-        """What the distances to plan and goal cost, shape (K,)."""
+        """Costs of the distances to plan and goal, shape (K,)."""
         p = self._driven
         if p.simple_attractor:
             return p.goal_distance_bias * self._attraction.score(situation)
@@ -268,7 +268,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         return scale * (p.path_distance_bias * to_plan + p.goal_distance_bias * to_goal)
 
     def _limited(self, view: LocalView, twist: Twist2D) -> Twist2D:
-        """Never faster than an acceleration allows in two cycles (the measured velocity lags)."""
+        """Limit the velocity to what the accelerations allow in two cycles (the measured velocity lags)."""
         p = self._driven
         dt = 2.0 / p.controller_frequency
         vx = min(twist.vx, max(view.velocity.vx, 0.0) + p.acc_lim_x * dt)
@@ -280,19 +280,19 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
     # ---- escape
 
     def _is_escaping(self, view: LocalView) -> bool:
-        """Whether it still backs up: until it has moved or turned enough, or for a while, it does not drive ahead."""
+        """Whether it still backs up: until it has moved or turned enough, or for some time."""
         start, p = self._escape_from, self._driven
         if start is None:
             return False
         gone = math.hypot(view.pose.x - start.x, view.pose.y - start.y)
         turned = abs(angle_difference(view.pose.yaw, start.yaw))
-        is_over = not 0.0 <= view.now - self._escape_since <= _ESCAPE_TIME  # who came too near may have left
+        is_over = not 0.0 <= view.now - self._escape_since <= _ESCAPE_TIME  # a person who came too near may have left
         if gone > p.escape_reset_dist or turned > p.escape_reset_theta or is_over:
             self._escape_from = None
         return self._escape_from is not None
 
     def _escape(self, view: LocalView) -> Twist2D:
-        """Back up a little where that is free."""
+        """Back up a little if the space behind is free."""
         p = self._driven
         if p.escape_vel == 0.0:
             raise ControlError(_NOTHING_FREE)
