@@ -4,9 +4,9 @@
     |- ParamError         a parameter or a key of a configuration file
     |- MapError           a map file or a grid that cannot be used
     |- WorldError         a world, robot or actor description of the simulator
-    |- TransformError     a pose that cannot be had
+    |- TransformError     a pose that is not available
     |  |- TransformNotYet  it may still come
-    |  |- TransformTooOld  what was known of that time is no longer kept
+    |  |- TransformTooOld  that time is no longer stored
     |  `- LaserTilted      a laser whose scan is no plan of the room
     |- BagError           a recorded bag that cannot be used
     |- ResultError        a stored result of a replay that cannot be used
@@ -17,14 +17,14 @@
     |  |- OutOfBounds
     |  `- NoPath
     |- ControlError       no velocity command
-    |- ProtocolError      bytes of a peer that make no sense
+    |- ProtocolError      invalid bytes from a peer
     |- DetectorError      a network, its weights or a picture
-    |- ImageError         the bytes of a picture that make no sense
+    |- ImageError         invalid bytes of a picture
     |- SensorError        a sensor's message that cannot be used
     |- AlertError         a notice that could not be delivered
     `- StoreError         incidents that could not be kept or read
 
-A constructor takes facts and writes the sentence, so that a reader is told what and where.
+A constructor takes facts and writes the sentence, so that every message says what happened and where.
 """
 
 from __future__ import annotations
@@ -75,20 +75,20 @@ class TransformError(PatrolError):
 
 
 class TransformNotYet(TransformError):
-    """The pose may be known later: a frame is not told of yet, or not until that time."""
+    """The pose may become known: a frame, or that time, has not arrived yet."""
 
 
 class TransformTooOld(TransformError):
-    """The pose will never be known: the time lies before all that is kept."""
+    """The pose will never be known: the time is before all that is stored."""
 
 
 class LaserTilted(TransformError):
-    """A laser is mounted so that its scan cannot be laid into the plane of the floor.
+    """A laser is mounted too tilted for its scan to be laid into the plane of the floor.
 
     Args:
         target: frame in which it should be level.
         source: frame of the laser.
-        tilt: of its plane against that of the floor [rad].
+        tilt: angle between its plane and the floor [rad].
     """
 
     def __init__(self, target: str, source: str, tilt: float) -> None:
@@ -110,7 +110,7 @@ class ResultError(_FileError):
 
 
 class StateError(_FileError):
-    """A file that a program of ours wrote and that cannot be used now: which file, and why."""
+    """A file written by one of our programs that cannot be used now: which file, and why."""
 
 
 class PlanningError(PatrolError):
@@ -127,7 +127,7 @@ class _AtPoint(PlanningError):
 
 
 class StartOccupied(_AtPoint):
-    """The robot stands where the costmap says that it cannot."""
+    """The robot stands where the costmap has an obstacle."""
 
     _what = "start"
 
@@ -159,7 +159,7 @@ class OutOfBounds(PlanningError):
 
 
 class NoPath(PlanningError):
-    """Start and goal are free, but nothing connects them; the reason says what is in the way."""
+    """Start and goal are free, but not connected; the reason names the obstacle."""
 
     def __init__(self, start: tuple[float, float], goal: tuple[float, float], reason: str = "") -> None:
         ends = f"no way from ({start[0]:.2f}, {start[1]:.2f}) to ({goal[0]:.2f}, {goal[1]:.2f})"
@@ -169,14 +169,14 @@ class NoPath(PlanningError):
 
 
 class ControlError(PatrolError):
-    """No velocity command that is safe could be found."""
+    """No safe velocity command was found."""
 
 
 class ProtocolError(PatrolError):
     """A peer sent bytes that the protocol does not allow.
 
     Args:
-        peer: who sent them ("" where the caller adds it).
+        peer: sender ("" if the caller adds it).
         problem: what is wrong with them.
     """
 
@@ -199,7 +199,7 @@ class SensorError(PatrolError):
 
 
 class AlertError(PatrolError):
-    """A notice that its transport did not take."""
+    """A transport did not accept a notice."""
 
 
 class StoreError(PatrolError):
@@ -209,7 +209,7 @@ class StoreError(PatrolError):
         path: of the database or the file.
         problem: what is wrong with it.
         is_full: the disk has no room, or no more than it may use.
-        is_corrupt: what is in the database makes no sense; it has to be set aside.
+        is_corrupt: the database is damaged and has to be set aside.
     """
 
     def __init__(self, path: object, problem: str, *, is_full: bool = False, is_corrupt: bool = False) -> None:

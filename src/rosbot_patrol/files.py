@@ -1,4 +1,4 @@
-"""Files of state: whole or not there, JSON objects, and lines that are on the disk before they count."""
+"""State files: atomic writes, JSON objects, and lines that are synced to the disk before they count."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """As `write_atomic`, into a folder that is there and that the caller syncs, once for many files. Raises OSError."""
+    """Like `write_atomic`, in an existing folder that the caller syncs once for many files. Raises OSError."""
     scratch = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with scratch.open("wb") as file:
@@ -42,7 +42,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring the names of a folder to the disk."""
+    """Sync the names in a folder to the disk."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(handle)
@@ -56,7 +56,7 @@ def write_json(path: Path, tree: Mapping[str, Any]) -> None:
 
 
 def read_json(path: Path) -> dict[str, Any] | None:
-    """The object in a JSON file; None if there is no such file.
+    """Read the object in a JSON file; None if there is no such file.
 
     Raises:
         StateError: the file cannot be read, or holds no JSON object.

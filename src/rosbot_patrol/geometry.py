@@ -31,7 +31,7 @@ class Pose2D(NamedTuple):
 
 
 class Transform(NamedTuple):
-    """a_from_b in space: a place [m] and a quaternion of length 1."""
+    """a_from_b in space: a position [m] and a quaternion of length 1."""
 
     x: float = 0.0
     y: float = 0.0
@@ -43,7 +43,7 @@ class Transform(NamedTuple):
 
     @property
     def pose(self) -> Pose2D:
-        """The planar part; roll and pitch are dropped, so that a laser's scan needs `scan.level_scan`."""
+        """The planar part, without roll and pitch; a laser's scan therefore needs `scan.level_scan`."""
         return Pose2D(self.x, self.y, yaw_from_quaternion(self.qx, self.qy, self.qz, self.qw))
 
     @property
@@ -96,7 +96,7 @@ def angle_difference(to: float, start: float) -> float:
 
 
 def compose(a_from_b: Pose2D, b_from_c: Pose2D) -> Pose2D:
-    """a_from_c."""
+    """Chain two poses: a_from_b and b_from_c give a_from_c."""
     c, s = math.cos(a_from_b.yaw), math.sin(a_from_b.yaw)
     return Pose2D(
         a_from_b.x + c * b_from_c.x - s * b_from_c.y,
@@ -106,7 +106,7 @@ def compose(a_from_b: Pose2D, b_from_c: Pose2D) -> Pose2D:
 
 
 def invert(a_from_b: Pose2D) -> Pose2D:
-    """b_from_a."""
+    """Inverse pose: a_from_b gives b_from_a."""
     c, s = math.cos(a_from_b.yaw), math.sin(a_from_b.yaw)
     return Pose2D(
         -c * a_from_b.x - s * a_from_b.y,
@@ -136,7 +136,7 @@ def distance(a: Pose2D, b: Pose2D) -> float:
 
 
 def driven(twist: Twist2D, times: Array) -> tuple[Array, Array, Array]:
-    """How far ahead, to the left and round a velocity that is kept for each of some times brings a base, shape (T,)."""
+    """Motion ahead, to the left and in heading after a constant velocity has held for some times, shape (T,) each."""
     angle = twist.wz * times
     if abs(twist.wz) < 1e-6:
         return twist.vx * times, twist.vy * times, angle
@@ -152,7 +152,8 @@ def quaternion_from_yaw(yaw: float) -> tuple[float, float, float, float]:
 def yaw_from_quaternion(x: float, y: float, z: float, w: float, *, what: str = "an orientation") -> float:
     """Heading of an orientation (roll and pitch are dropped) of any length.
 
-    One of length 0 has heading 0: Python fills new messages with zeros. That is said once for each `what`.
+    A quaternion of length 0 has heading 0, because Python fills new messages with zeros. It is logged once for each
+    `what`.
 
     Args:
         x: part of the quaternion, as are y, z and w.

@@ -1,4 +1,4 @@
-"""A goal that is sent to move_base, and what is known of its progress."""
+"""A goal for move_base, and its progress."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rosbot_patrol.geometry import Pose2D
 
 
 class GoalState(Enum):
-    """How far the goal given last has come."""
+    """Progress of the last goal."""
 
     NONE = "none"
     ACTIVE = "active"
@@ -43,11 +43,11 @@ def ending_text(status: int) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class GoalLink:
-    """What is known of the navigation.
+    """Connection to the navigation: is it up, and how is the last goal.
 
     Attributes:
         is_up: the action server answers.
-        tag: of the goal that was sent last, "" before the first.
+        tag: of the last goal sent, "" before the first.
         state: of that goal.
         text: what the server said about it.
     """
@@ -60,7 +60,7 @@ class GoalLink:
 
 @dataclass(frozen=True, kw_only=True)
 class Goal:
-    """A pose in the frame `map` to drive to; the tag tells it from all others."""
+    """A pose in the frame `map` to drive to; the tag identifies it."""
 
     tag: str
     pose: Pose2D

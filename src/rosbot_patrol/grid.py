@@ -1,4 +1,4 @@
-"""Grids over the plane: world <-> cell, and the record that carries their place.
+"""Grids over the plane: conversion between world and cell, and the record of a grid's place.
 
 Cells are `cells[iy, ix]`; row 0 is the lowest y. A grid's own axes may be turned against the frame by `yaw`, but
 most users require 0 (`GridInfo.require_aligned`).
@@ -40,7 +40,7 @@ class GridInfo:
         return self.width * self.resolution, self.height * self.resolution
 
     def require_aligned(self, who: str) -> None:
-        """Raise MapError where the grid is turned; `who` names what cannot use it."""
+        """Raise MapError if the grid is turned; `who` names the user that cannot handle it."""
         if abs(math.remainder(self.yaw, math.tau)) > 1e-6:
             raise MapError(who, f"a map turned by {self.yaw:.3f} rad is not supported, expected a yaw of 0")
 
@@ -96,7 +96,7 @@ class Grid:
 
 
 def occupancy_grid(info: GridInfo, data: Any, source: str) -> Grid:
-    """An occupancy grid as int8 cells (-1 unknown, 0 to 100) from its cells in one row.
+    """Make an occupancy grid of int8 cells (-1 unknown, 0 to 100) from a flat list of cells.
 
     Args:
         info: its place and size.

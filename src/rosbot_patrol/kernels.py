@@ -1,9 +1,9 @@
-"""The one decorator of all numba kernels, and the folder their machine code is cached in.
+"""Decorator of all numba kernels, and the cache folder of their machine code.
 
-numba's `cache=True` does not notice that a callee in another module changed, and cannot write beside a read-only
-install. So the cache folder is named by a hash of all kernel sources, below `ROSBOT_PATROL_CACHE` (by default
-`$XDG_CACHE_HOME/rosbot_patrol`, `~/.cache/rosbot_patrol`). `python -m rosbot_patrol.kernels` compiles everything
-(set-up does it), after which a node's start only loads.
+numba's `cache=True` does not notice changes of a callee in another module, and cannot write to a read-only install.
+Therefore the name of the cache folder contains a hash of all kernel sources. It lies below `ROSBOT_PATROL_CACHE` (by
+default `$XDG_CACHE_HOME/rosbot_patrol`, `~/.cache/rosbot_patrol`). `python -m rosbot_patrol.kernels` compiles
+everything (the set-up does it); after that a node only loads at its start.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _SOURCE = Path(__file__).resolve().parent
 
 
 def kernel_sources() -> list[Path]:
-    """Files that hold kernels, sorted: every `*_kernels.py` below this package."""
+    """Files with kernels, sorted: every `*_kernels.py` below this package."""
     return sorted(_SOURCE.rglob("*_kernels.py"))
 
 
 @functools.lru_cache(maxsize=1)
 def cache_dir() -> Path:
-    """Folder of the compiled kernels for exactly these sources and this numba."""
+    """Folder of the compiled kernels for these sources and this numba version."""
     digest = hashlib.sha256(numba.__version__.encode())
     for path in kernel_sources():
         digest.update(path.name.encode())
@@ -68,7 +68,7 @@ def kernel(*signatures: str, **options: Any) -> Callable[[F], F]:
 
 
 def warm(say: Callable[[str], None] = print) -> float:
-    """Import every kernel module, so that all is compiled and cached; returns the seconds taken."""
+    """Import every kernel module, so that all is compiled and cached; returns the time taken [s]."""
     start = time.perf_counter()
     sources = kernel_sources()
     for i, path in enumerate(sources, 1):

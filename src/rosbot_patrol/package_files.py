@@ -1,4 +1,4 @@
-"""Where this package's own files lie, without asking ROS: in the source tree, or where catkin installed them.
+"""Paths of this package's own files, without ROS: in the source tree, or where catkin installed them.
 
 move_base's parameters as the launch files load them from the files of a profile.
 """
@@ -16,7 +16,7 @@ _SOURCE = Path(__file__).resolve().parents[2]
 
 
 def package_file(relative: str) -> Path:
-    """A file of the package, such as "config/gmapping.yaml".
+    """Path of a file of the package, such as "config/gmapping.yaml".
 
     Raises:
         ParamError: it is nowhere; names the folders that were tried.
@@ -31,7 +31,7 @@ def package_file(relative: str) -> Path:
 
 
 def read_move_base(folder: Path) -> dict[str, Any]:
-    """move_base's private namespace from a profile's yaml files, such as those of `config/tuned`; raises ParamError."""
+    """Read move_base's private namespace from a profile's yaml files, such as `config/tuned`; raises ParamError."""
 
     def read(name: str, keys: str) -> dict[str, Any]:
         return read_mapping(folder / name, keys=keys)

@@ -1,4 +1,4 @@
-"""Declare parameters as dataclass fields, check them once at the edge.
+"""Declaration of parameters as dataclass fields, checked once at the edge.
 
 One frozen, keyword-only dataclass per node or plug-in declares names (upstream's), defaults, units and bounds:
 
@@ -6,7 +6,8 @@ One frozen, keyword-only dataclass per node or plug-in declares names (upstream'
     class DriveParams:
         max_vel_x: float = param(0.5, unit="m/s", lo=0.0, doc="top forward speed")
 
-    params = load(DriveParams, rospy.get_param("~", {}), name="~")
+Differs from dynamic parameter look-ups: every name, type and bound is checked before a node does anything. An unknown
+name causes a warning with the nearest known one.
 
 Differs from dynamic parameter look-ups: every name, type and bound is checked before a node does anything, and a
 name that no declaration knows is warned of, with the nearest known one.
@@ -38,7 +39,7 @@ Clamps = Literal["", "both", "above"]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ParamInfo:
-    """What a declaration says beyond type and default."""
+    """Metadata of a declaration besides type and default."""
 
     unit: str = ""
     lo: float | None = None
@@ -69,18 +70,18 @@ def param(
     """Declare one parameter as a dataclass field.
 
     Args:
-        default: its value where none is given; without it the parameter must be given. Lists and dicts are copied.
+        default: default value; without it the parameter is required. Lists and dicts are copied.
         unit: SI unit, for the table and the message.
-        lo: smallest value allowed; for a sequence it holds for each element.
+        lo: smallest value allowed; for a sequence, of each element.
         hi: largest value allowed, likewise.
         choices: values allowed.
-        doc: one line for the README's table.
-        name: upstream's name where it is no Python name or differs from the field's.
-        check: returns what is wrong with a value, or None.
-        clamps: which bounds a value beyond them becomes, with a warning, as upstream's dynamic_reconfigure does at
+        doc: its meaning and effect in one line, for docs/parameters.md.
+        name: upstream's name, if it is no Python name or differs from the field's.
+        check: function that returns what is wrong with a value, or None.
+        clamps: bounds to which a value is clamped, with a warning, as upstream's dynamic_reconfigure does at
             start; for the parameters of its .cfg files. "above": less than `lo` is an error, as nothing works there.
         ignores_nan: NaN becomes the default, with a warning.
-        reads_text: a text that holds a whole number is one, as of Python's int().
+        reads_text: accept a text with a whole number, as Python's int() does.
     """
     info = ParamInfo(
         unit=unit, lo=lo, hi=hi, choices=tuple(choices), doc=doc, name=name, check=check,
@@ -94,13 +95,13 @@ def param(
 
 
 def load(cls: type[T], tree: Mapping[str, Any], *, name: str = "~", ignore: Iterable[str] = ()) -> T:
-    """Build `cls` from a tree of plain values, checking each.
+    """Build `cls` from a tree of plain values, and check each value.
 
     Args:
         cls: a dataclass whose fields are declared by `param`, or are such dataclasses themselves.
-        tree: nested dicts, as of `rospy.get_param("~", {})` or a yaml file.
+        tree: nested dicts, such as `rospy.get_param("~", {})` or a yaml file.
         name: prefix of the names in messages: "~", "/move_base/", "FILE: ".
-        ignore: names that belong to somebody else and are not warned of.
+        ignore: names of other users that cause no warning.
 
     Raises:
         ParamError: a value is missing, of the wrong type or out of bounds; names the parameter and what was expected.
@@ -131,7 +132,7 @@ def load(cls: type[T], tree: Mapping[str, Any], *, name: str = "~", ignore: Iter
 
 
 def unknown_name(name: str, known: Iterable[str]) -> str:
-    """What to say of a name that is none of those known."""
+    """Message for an unknown name, with the nearest known one."""
     names = list(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'?" if near else f"expected one of {', '.join(names)}"
@@ -139,10 +140,10 @@ def unknown_name(name: str, known: Iterable[str]) -> str:
 
 
 def load_strict(cls: type[T], tree: Mapping[str, Any], *, name: str) -> T:
-    """As `load`, but a name that is not declared is an error.
+    """Like `load`, but an undeclared name is an error.
 
     Raises:
-        ParamError: as of `load`, and for an unknown name, with the nearest known one.
+        ParamError: as in `load`, and for an unknown name, with the nearest known one.
     """
     if isinstance(tree, Mapping):
         known = [key for key, *_ in declared(cls)]
@@ -195,7 +196,7 @@ def _is_nan(value: Any) -> bool:
 
 
 def _clamped(value: Any, info: ParamInfo, name: str) -> Any:
-    """The value, or the bound that it lies beyond, which is said."""
+    """The value, or the bound that it exceeds, with a warning."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return value
     used = value
@@ -285,7 +286,7 @@ def _describe(hint: Any, info: ParamInfo) -> str:
 
 
 def _kind(hint: Any) -> str:
-    """What a value of this type is, for people."""
+    """Name of a value's type, for people."""
     args = [a for a in typing.get_args(hint) if a not in (type(None), Ellipsis)]
     origin = typing.get_origin(hint)
     if origin in (typing.Union, types.UnionType):

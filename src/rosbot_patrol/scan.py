@@ -1,8 +1,8 @@
-"""A planar laser scan as a plain record: judged, and laid level.
+"""A planar laser scan as a plain record, its check, and its projection to the level.
 
-Every user of scans takes the same two steps. `scan_problem` says why a scan is none. `level_scan` turns the scan of a
-laser that looks backwards, hangs upside down or is a little tilted into the one of an upright laser at a planar pose.
-Nobody after that has to think of roll and pitch.
+Every user of scans takes the same two steps. `scan_problem` says why a scan is unusable. `level_scan` converts the scan
+of a laser that looks backwards, hangs upside down or is slightly tilted to that of an upright laser at a planar pose.
+Nobody after that has to consider roll and pitch.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from rosbot_patrol.geometry import Pose2D, Transform, transform_points
 
 Array = NDArray[np.float64]
 
-MAX_TILT = math.radians(10.0)  # a laser at 0.16 m then sees the floor from 0.9 m on: no plan of the room
-_LEVEL = math.radians(0.5)  # less is noise of the mount: lengths are off by 0.004 %
-_NO_LIMIT = 1e3  # no robot's lidar reaches so far: as inf or the largest float32, it stands for "no limit" [m]
-_ENDLESS = 1e9  # drivers write inf, or the largest float32, where nothing was hit [m]
-_FARTHEST = 100.0  # reach of a scan without a limit; where half of the readings are farther, they are no metres [m]
-_BLIND_TO = 3.0  # a larger range_min is no lidar's [m]
-_SHORTEST = 0.1  # nor is a smaller range_max [m]
+MAX_TILT = math.radians(10.0)  # beyond it a laser at 0.16 m sees the floor from 0.9 m on instead of the room
+_LEVEL = math.radians(0.5)  # a smaller tilt is ignored: lengths are off by 0.004 %
+_NO_LIMIT = 1e3  # a larger range_max, such as inf or the largest float32, means "no limit" [m]
+_ENDLESS = 1e9  # larger ranges mean no hit: drivers write inf, or the largest float32 [m]
+_FARTHEST = 100.0  # reach of a scan without a limit; if half of the readings are farther, the unit is wrong [m]
+_BLIND_TO = 3.0  # largest plausible range_min [m]
+_SHORTEST = 0.1  # smallest plausible range_max [m]
 _LEAST_STEP = 1e-5  # finest angle_increment; the finest lidars have 2e-4 [rad]
-_LARGEST_START = 2.0 * math.tau  # of angle_min: drivers say -pi, 0, or a turn more [rad]
-_TURN = 1.1  # turns that a scan covers at most: real ones stretch by an increment or two
-_BEYOND = 3.0  # codes for "no echo" are at most so many times range_max, such as 65.5 m for 30
+_LARGEST_START = 2.0 * math.tau  # of angle_min: drivers use -pi, 0, or a turn more [rad]
+_TURN = 1.1  # maximum turns in a scan: real ones exceed one by an increment or two
+_BEYOND = 3.0  # codes for "no echo" are at most this many times range_max, such as 65.5 m for 30
 _MARGIN = 5.0  # or so much farther [m]
-_NOTHING = 0.01  # nearer than this is the lidar itself [m]
-_FEW = 0.01  # a smaller share of the beams may be stray readings of a covered lidar
+_NOTHING = 0.01  # nearer points are the lidar itself [m]
+_FEW = 0.01  # a smaller share of hits may be stray readings of a covered lidar
 
 
 @dataclass(frozen=True, kw_only=True)
 class LaserScan:
-    """One sweep (sensor_msgs/LaserScan without its header's frame handling).
+    """One scan (sensor_msgs/LaserScan without a ROS header).
 
     Attributes:
         stamp: time of the first ray [s]; NaN where the message has none.
@@ -68,7 +68,7 @@ class LaserScan:
 
     @property
     def reach(self) -> float:
-        """How far a beam without a hit has looked [m]: range_max, or 100 m for a scan without an upper limit."""
+        """Range up to which a beam without a hit is free [m]: range_max, or 100 m for a scan without an upper limit."""
         return self.range_max if self.range_max < _NO_LIMIT else _FARTHEST
 
 
@@ -80,7 +80,7 @@ def scan_points(scan: LaserScan) -> Array:
 
 
 def is_silent_range(distance: float) -> bool:
-    """Whether a range sensor's reading says nothing: NaN, or the negative number of a broken one (-inf is too near)."""
+    """Whether a range sensor's reading is empty: NaN, or the negative number of a broken one (-inf: too near)."""
     return math.isnan(distance) or (math.isfinite(distance) and distance < 0.0)
 
 
@@ -89,13 +89,13 @@ def is_silent_range(distance: float) -> bool:
 
 @dataclass(frozen=True)
 class LevelScan:
-    """A scan laid into the plane of the floor, as an upright laser would have measured it.
+    """A scan projected to the plane of the floor, as an upright laser would have measured it.
 
     Attributes:
         scan: angles as seen from above, ranges over the floor.
-        pose: of that upright laser, in the frame that was asked for.
+        pose: of that upright laser, in the requested frame.
         height: of the laser in that frame [m].
-        rises: height that each beam gains for a metre over the floor, shape (N,); None where the laser is level.
+        rises: height gain of each beam per metre over the floor, shape (N,); None for a level laser.
     """
 
     scan: LaserScan
@@ -105,20 +105,20 @@ class LevelScan:
 
     @property
     def points(self) -> Array:
-        """What the beams hit, in the frame that was asked for [m], shape (N, 2)."""
+        """Points that the beams hit, in the requested frame [m], shape (N, 2)."""
         return transform_points(self.pose, scan_points(self.scan))
 
 
 def level_scan(scan: LaserScan, frame_from_laser: Transform, frame: str) -> LevelScan:
-    """Lay a scan level in a frame.
+    """Project a scan to the level in a frame.
 
     A laser that hangs upside down sees the same as an upright one with its angles negated. A tilted one has its beams
     projected; their directions are then off by at most a quarter of the squared tilt (0.4 deg at the limit).
 
     Args:
-        scan: that `scan_problem` finds nothing wrong with.
+        scan: a usable scan (see `scan_problem`).
         frame_from_laser: place and orientation of the laser.
-        frame: whose name a refusal says.
+        frame: its name, for the error message.
 
     Raises:
         LaserTilted: by more than 10 deg.
@@ -136,7 +136,7 @@ def level_scan(scan: LaserScan, frame_from_laser: Transform, frame: str) -> Leve
 
 
 def _projected(scan: LaserScan, frame_from_laser: Transform, *, is_upside_down: bool) -> LevelScan:
-    """A tilted scan, with angles seen from above, over the floor."""
+    """A tilted scan, projected to the floor, with angles seen from above."""
     rotation = frame_from_laser.rotation
     if is_upside_down:
         rotation[:, 1] *= -1.0
@@ -157,15 +157,15 @@ def _projected(scan: LaserScan, frame_from_laser: Transform, *, is_upside_down: 
 
 
 def scan_problem(scan: LaserScan) -> str:
-    """Why a scan is none, "" where it can be used.
+    """Reason why a scan is unusable, "" if it can be used.
 
-    A beam at +inf has met nothing (REP 117), so a scan that is all +inf says "nothing is there": a large hall. A
+    A beam at +inf has met nothing (REP 117), so a scan of +inf only means "nothing is there", as in a large hall. A
     covered lidar whose driver writes inf for "no echo" looks the same; only a camera or a map could tell them apart.
-    Readings of 0, -inf, NaN or below range_min say nothing. A few beams that hit make a scan, a hundredth of all at
-    least; where fewer hit, half of them have to be +inf.
+    Readings of 0, -inf, NaN or below range_min are empty. A few hits make a scan usable: at least a hundredth of all
+    beams. With fewer hits, half of the beams must be +inf.
 
     Returns:
-        What is wrong in one sentence, which stays the same from scan to scan.
+        The problem in one sentence, which stays the same from scan to scan.
     """
     if not len(scan.ranges):
         return "it has no beams"

@@ -1,4 +1,4 @@
-"""What a user of scans keeps about them: whether they can be used, and what was said of those that cannot."""
+"""Check of the scans of one topic, which logs each problem once."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from rosbot_patrol.scan import LaserScan, scan_problem
 
 log = logging.getLogger(__name__)
 
-_WELL = 10.0  # after so long without a problem, one is news again [s]
-_SAID = 20  # most problems that are remembered
+_WELL = 10.0  # time without a problem after which it is logged again [s]
+_SAID = 20  # maximum number of problems remembered
 
 
 class ScanCheck:
     """Judges the scans of one topic and logs each problem once. Times [s] are of one clock.
 
     Args:
-        lost: what happens without a scan, such as "the base creeps".
+        lost: effect of missing scans, such as "the base creeps".
 
     Attributes:
-        problem: why the newest scan was left out, "" where it was not.
+        problem: reason why the newest scan was ignored, "" if it was used.
         lost: as given.
     """
 
@@ -31,7 +31,7 @@ class ScanCheck:
         self._bad_at = self._good_at = -math.inf
 
     def accepts(self, scan: LaserScan, now: float) -> bool:
-        """Whether a scan says something; one that does not is refused."""
+        """Whether a scan is usable; refuse it if not."""
         problem = scan_problem(scan)
         if problem:
             self.refuse(f"the scan of frame '{scan.frame_id}' is left out: {problem}", now)
@@ -45,7 +45,7 @@ class ScanCheck:
             log.info("scans can be used again")
 
     def refuse(self, problem: str, now: float) -> None:
-        """Leave the newest scan out for another reason, such as a tilted laser."""
+        """Ignore the newest scan for another reason, such as a tilted laser."""
         self.problem, self._bad_at = problem, now
         if problem in self._said:
             return
@@ -55,5 +55,5 @@ class ScanCheck:
         log.warning("%s; %s", problem, self.lost)
 
     def lasts(self, now: float, patience: float) -> bool:
-        """Whether no scan could be used for some time [s], though they come."""
+        """Whether scans have arrived but none was usable for some time [s]."""
         return bool(self.problem) and abs(now - self._good_at) > patience

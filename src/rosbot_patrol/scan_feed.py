@@ -28,13 +28,13 @@ class ScanFeed:
         odom: frame of the odometry.
         base: frame of the robot.
         lost: what does not happen without scans, such as "nothing is mapped".
-        size: most scans that wait; the oldest goes first.
+        size: maximum number of waiting scans; the oldest is dropped first.
 
     Attributes:
         check: says why scans are left out.
-        heard: number of scans that came.
-        refused: number of scans that say nothing.
-        left_out: why the last such or dropped scan was left out, "" before the first.
+        heard: number of scans that arrived.
+        refused: number of unusable scans.
+        left_out: reason for the last unusable or dropped scan, "" before the first.
     """
 
     def __init__(self, frames: Frames, odom: str, base: str, *, lost: str, size: int = 100) -> None:
@@ -62,7 +62,7 @@ class ScanFeed:
         return self._line.problem
 
     def hear(self, scan: LaserScan, now: float, arrival: float | None = None) -> bool:
-        """Let a scan wait; False if it says nothing and is left out.
+        """Let a scan wait; False if it is unusable and ignored.
 
         Args:
             scan: as measured.
@@ -91,11 +91,11 @@ class ScanFeed:
             yield found
 
     def counts(self) -> dict[str, int]:
-        """How many scans came, and what became of those that were not taken in."""
+        """Number of scans that arrived, and what became of those that were not used."""
         return {"scans": self.heard, "refused": self.refused, "dropped": self.dropped, "waiting": len(self)}
 
     def facts(self) -> dict[str, str]:
-        """Why the last scan was left out, if one was."""
+        """Reason why the last scan was ignored, if one was."""
         return {"left out": self.left_out} if self.left_out else {}
 
     def _watch_beams(self, scan: LaserScan, now: float) -> None:

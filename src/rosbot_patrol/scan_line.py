@@ -1,6 +1,6 @@
-"""Scans that wait until it is known where the robot was when they were taken, and leave in their order.
+"""Queue of scans that wait for the robot's pose at their stamp, and leave in order.
 
-amcl, slam_gmapping and their replay offline decide by it which scan is taken in when.
+It decides for amcl, slam_gmapping and their replay which scan is used, and when.
 """
 
 from __future__ import annotations
@@ -14,13 +14,16 @@ from rosbot_patrol.errors import TransformError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.scan import LaserScan
 
-GIVE_UP_S, GIVE_UP_WAITING_S = 1.0, 2.0  # a scan this much older than the newest, or waiting for so long, is dropped
-FARTHEST_M = 1e6  # from where the odometry began: what says more is a bit fault on the way from the wheels
+GIVE_UP_S, GIVE_UP_WAITING_S = (
+    1.0,
+    2.0,
+)  # a scan this much older than the newest, or waiting longer than the second, is dropped
+FARTHEST_M = 1e6  # from the odometry's origin: a larger distance is a bit error
 
 
 @dataclass(frozen=True)
 class PlacedScan:
-    """A level scan, the robot in the odometry's frame at its time, and the pose of the scan's laser on the robot."""
+    """A level scan, the robot's pose in the odometry frame at its stamp, and the pose of its laser on the robot."""
 
     scan: LaserScan
     odom_from_base: Pose2D
@@ -29,41 +32,41 @@ class PlacedScan:
 
 @dataclass(frozen=True, eq=False)
 class _Entry:
-    """A scan that waits and when it came [s]; known by itself, not by what it holds."""
+    """A waiting scan and the time of its arrival [s]; compared by identity."""
 
     scan: LaserScan
     arrival: float
 
 
 class ScanLine:
-    """Hands out scans in their order, each once it can be placed; one that cannot holds up no other.
+    """Hands out scans in order, each when it can be placed; an unplaceable scan does not hold up others.
 
     One thread may add while another takes.
 
     Args:
-        place: places a scan; raises TransformError or ValueError where that cannot be, or not yet.
-        size: most scans that wait; the oldest goes first.
+        place: function that places a scan; raises TransformError or ValueError if that is impossible now.
+        size: maximum number of waiting scans; the oldest is dropped first.
     """
 
     def __init__(self, place: Callable[[LaserScan], PlacedScan], size: int = 100) -> None:
         self._place = place
         self._waiting: deque[_Entry] = deque(maxlen=size)
         self._newest = -math.inf
-        self.problem = ""  # why the last scan that was dropped could not be placed
+        self.problem = ""  # reason why the last dropped scan could not be placed
         self.dropped = 0
 
     def __len__(self) -> int:
         return len(self._waiting)
 
     def put(self, scan: LaserScan, now: float) -> None:
-        """Add a scan that came at a time [s] of any clock that never goes back."""
-        if scan.stamp < self._newest - GIVE_UP_S:  # the clock was set back: what waits is of another time
+        """Add a scan that arrived at a time [s] of a clock that never goes back."""
+        if scan.stamp < self._newest - GIVE_UP_S:  # the clock was set back: waiting scans have stamps of another time
             self._waiting.clear()
         self._newest = scan.stamp
         self._waiting.append(_Entry(scan, now))
 
     def take(self, now: float) -> PlacedScan | None:
-        """The oldest scan that can be placed, None where none can be; the time [s] is of the clock of `put`."""
+        """Take the oldest scan that can be placed, None if there is none; the time [s] is of the clock of `put`."""
         entries = list(self._waiting)
         for i, entry in enumerate(entries):
             placed = self._try(entry, now)
@@ -98,7 +101,7 @@ class ScanLine:
             self.dropped += 1
 
     def _forget(self, entry: _Entry) -> bool:
-        """Take it out; False where a full queue, a clock set back or an earlier try was faster."""
+        """Remove an entry; False if it has already gone."""
         try:
             if self._waiting[0] is entry:
                 self._waiting.popleft()

@@ -1,4 +1,4 @@
-"""Parameters that can be changed while the robot drives: what a dynamic_reconfigure server needs to know of them."""
+"""Parameters that can change at run time: their description for a dynamic_reconfigure server."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ P = TypeVar("P")
 
 @dataclass(frozen=True, kw_only=True)
 class Tunable:
-    """One of them: name, type ("float", "int", "bool" or "str"), default, bounds (None: none), unit and meaning."""
+    """One such parameter: name, type ("float", "int", "bool" or "str"), default, bounds (None: none), unit, meaning."""
 
     name: str
     type: str
@@ -27,7 +27,7 @@ class Tunable:
 
 
 def tunable(cls: type, names: Iterable[str]) -> tuple[Tunable, ...]:
-    """Those parameters of a class that are named, in that order, as they were declared."""
+    """Descriptions of the named parameters of a class, in that order."""
     rows = {key: (kind, default, info) for key, kind, default, info in declared(cls)}
     found = []
     for name in names:
@@ -40,7 +40,7 @@ def tunable(cls: type, names: Iterable[str]) -> tuple[Tunable, ...]:
 
 
 def changed(params: P, changes: Mapping[str, Any], names: Iterable[str], *, name: str = "") -> P:
-    """Parameters with some of them changed, checked as at start.
+    """Copy of the parameters with some changes, checked as at start.
 
     Raises:
         ParamError: a change is not among `names`, of the wrong type or out of bounds.

@@ -1,4 +1,4 @@
-"""Yaml files that people write: read strictly, with a sentence that names file and line where they are wrong."""
+"""Yaml files written by people: read strictly; errors name file and line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class _StandsTwiceError(yaml.constructor.ConstructorError):
 
 
 class _StrictLoader(yaml.SafeLoader):
-    """A loader for which a key that stands twice is an error, where yaml itself keeps the last."""
+    """A loader that rejects duplicate keys, while yaml itself keeps the last."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[object] = set()
@@ -30,15 +30,15 @@ class _StrictLoader(yaml.SafeLoader):
 
 
 def read_mapping(path: str | Path, *, keys: str, is_secret: bool = False) -> dict[str, Any]:
-    """The keys and values of a yaml file.
+    """Read the keys and values of a yaml file.
 
     Args:
-        path: where it lies.
-        keys: which keys it should have, for the message where it has none at all.
-        is_secret: say nothing of what it holds.
+        path: of the file.
+        keys: expected keys, for the message if it has none.
+        is_secret: keep its contents out of messages.
 
     Raises:
-        ParamError: it cannot be read or is no such yaml; names the file, and the line where there is one.
+        ParamError: it cannot be read or is no mapping; names the file, and the line if there is one.
     """
     path = Path(path)
     try:

@@ -1,1 +1,1 @@
-"""What happens to a velocity command on its way to the wheels: priority, giving way, collision guard."""
+"""Checks of a velocity command on its way to the wheels: priority, giving way, collision guard."""

@@ -1,13 +1,12 @@
-"""The last word before the base: slows and stops for what the lidar sees on the way, whoever commands.
+"""Collision guard: slows and stops the base for obstacles on the commanded arc, whoever commands.
 
-The commanded arc is followed ahead, and the command is scaled down (its shape is kept) until the robot can stop before
-its footprint, with a gap in the direction of motion, meets something seen. What lies in the footprint's margin already
-blocks only a motion that goes deeper, so the robot can always leave. The lidar is blind closer than its minimum range:
-what was last seen there is remembered for a while. Range sensors near the floor see what the lidar passes over: a
-distance that two readings in a row agree on counts as `min_points` points, and is remembered for a while too, since
-their cones are narrow.
+The command is scaled down (its shape is kept) until the robot can stop before its footprint, with a gap in the
+direction of motion, meets a point. Points already inside the footprint's margin block only motion that goes deeper, so
+the robot can always leave. The lidar is blind closer than its minimum range: obstacles last seen there are remembered
+for a while. Range sensors near the floor see what the lidar passes over. A distance that two readings in a row agree on
+counts as `min_points` points; it is remembered for a while, too, because the cones are narrow.
 
-A scan that says nothing (see `scan.scan_problem`) is no scan: it frees nothing, and the base creeps as without one.
+An unusable scan (see `scan.scan_problem`) frees nothing; the base then creeps as without a scan.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ Array = NDArray[np.float64]
 
 _STEP = 0.01  # along the arc [m]
 _TURN_STEP = 0.03  # [rad]
-_DEEPER = 0.002  # a point must sink that much in one glance to count as coming closer [m]
+_DEEPER = 0.002  # a point must go this much deeper within `_GLANCE` to count as coming closer [m]
 _GLANCE = 0.1  # [s]
-_SELF = 0.06  # so deep inside the footprint a point is no obstacle but the robot itself [m]
+_SELF = 0.06  # points deeper inside the footprint than this are the robot itself [m]
 _CREEP = 0.05  # a scale below this is a stop
-_AGREE = 0.15  # two readings of a range sensor that differ by less are of the same thing [m]
-_BESIDE = 0.1  # so far off its axis a range sensor's reading still tells that nothing is there [rad]
+_AGREE = 0.15  # readings of a range sensor that differ by less belong to the same obstacle [m]
+_BESIDE = 0.1  # angle from its axis up to which a range sensor's reading shows free space [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +62,7 @@ class GuardParams:
 
 
 class RangeReading(NamedTuple):
-    """What a range sensor says: distance [m] (inf: nothing, -inf: too near), its limits, and base_from_sensor."""
+    """Reading of a range sensor: distance [m] (inf: nothing, -inf: too near), its limits, and base_from_sensor."""
 
     distance: float
     range_min: float
@@ -72,7 +71,7 @@ class RangeReading(NamedTuple):
 
 
 class _Met(NamedTuple):
-    """A place that a range sensor met: (x, y) in the base's frame at the reading, and odom_from_base then."""
+    """Obstacle of a range sensor: (x, y) in the base's frame at the reading, and odom_from_base then."""
 
     x: float
     y: float
@@ -88,7 +87,7 @@ class _Met(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What the base may do: the command, how much of the wish it is (0 to 1), and why not all ("" if all)."""
+    """Result of the guard: the safe command, its share of the wish (0 to 1), and the reason if it is less than all."""
 
     twist: Twist2D
     scale: float
@@ -96,13 +95,13 @@ class Verdict(NamedTuple):
 
 
 class CollisionGuard:
-    """Holds what was seen, and limits commands. Times [s] are of one clock; poses are odom_from_base, None if unknown.
+    """Stores scans and readings, and limits commands. Times [s] are of one clock; poses are odom_from_base or None.
 
     Args:
         params: sizes, decelerations, limits.
 
     Attributes:
-        problem: why the newest scan was left out, "" where it was not.
+        problem: reason why the newest scan was ignored, "" if it was used.
     """
 
     def __init__(self, params: GuardParams) -> None:
@@ -113,11 +112,11 @@ class CollisionGuard:
         self._pose: Pose2D | None = None
         self._blind: Array = np.empty((0, 2))  # in odom
         self._blind_since: Array = np.empty(0)
-        self._last_met: dict[str, _Met] = {}  # of each range sensor, believed or not
+        self._last_met: dict[str, _Met] = {}  # of each range sensor, confirmed or not
         self._met: list[_Met] = []
 
     def see(self, scan: LaserScan, base_from_laser: Pose2D, now: float, odom_from_base: Pose2D | None = None) -> None:
-        """Take a scan that was laid level; one that says nothing is left out."""
+        """Store a level scan; an unusable one is ignored."""
         self.problem = scan_problem(scan)
         if self.problem:
             return
@@ -131,11 +130,11 @@ class CollisionGuard:
         self._pose, self._stamp = odom_from_base, now
 
     def refuse(self, problem: str) -> None:
-        """Leave the newest scan out for a reason that the guard cannot know, such as a tilted laser."""
+        """Ignore the newest scan for a reason outside the guard, such as a tilted laser."""
         self.problem = problem
 
     def see_range(self, name: str, reading: RangeReading, now: float, odom_from_base: Pose2D | None = None) -> None:
-        """Take a reading of a range sensor; NaN and negative numbers say nothing."""
+        """Store a reading of a range sensor; NaN and negative numbers are ignored."""
         if is_silent_range(reading.distance):
             return
         sensor = reading.base_from_sensor
@@ -155,14 +154,14 @@ class CollisionGuard:
             self._met.append(met)
 
     def _is_past(self, met: _Met, sensor: Pose2D, seen_to: float, now: float, odom_from_base: Pose2D | None) -> bool:
-        """Whether a place is forgotten, or lies where a sensor has just looked: told anew, or nothing there."""
+        """Whether an obstacle is too old, or lies where a sensor has just looked."""
         if abs(now - met.stamp) > self._params.range_memory:
             return True
         x, y = transform_points(invert(sensor), met.now_in(odom_from_base))[0].tolist()
         return math.hypot(x, y) < seen_to + _AGREE and abs(math.atan2(y, x)) < _BESIDE
 
     def limit(self, wish: Twist2D, now: float, odom_from_base: Pose2D | None = None) -> Verdict:
-        """The part of a commanded velocity that is safe."""
+        """Safe part of a commanded velocity."""
         if wish == STOP:
             return Verdict(STOP, 1.0, "")
         reason = self.blind(now)
@@ -172,7 +171,7 @@ class CollisionGuard:
         scale = self._free_part(wish, points)
         if scale >= _CREEP or wish.wz == 0.0:
             return self._verdict(wish, scale)
-        turn = Twist2D(0.0, 0.0, wish.wz)  # cannot go on along the arc, but perhaps turn out of it
+        turn = Twist2D(0.0, 0.0, wish.wz)  # the arc is blocked, but the robot may turn out of it
         return self._verdict(turn, self._free_part(turn, points), wish)
 
     def _verdict(self, wish: Twist2D, scale: float, whole: Twist2D | None = None) -> Verdict:
@@ -184,8 +183,8 @@ class CollisionGuard:
         return Verdict(twist, scale, "" if scale >= 0.999 else "something is near on the way")
 
     def blind(self, now: float) -> str:
-        """Why nothing is seen now, "" where the last scan is fresh."""
-        age = abs(now - self._stamp)  # it may have come after `now` was read
+        """Reason why there is no usable scan now, "" if the last one is fresh."""
+        age = abs(now - self._stamp)  # the scan may have come after `now` was read
         if age <= self._params.stale_after:
             return ""
         what = "usable scan" if self.problem else "scan"
@@ -204,7 +203,7 @@ class CollisionGuard:
         return Verdict(Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale), scale, reason)
 
     def _points(self, now: float, odom_from_base: Pose2D | None) -> Array:
-        """What was seen and what is remembered, in the base's frame now."""
+        """Obstacles seen and remembered, in the base's present frame."""
         p = self._params
         parts = [self._seen]
         if odom_from_base is not None and self._pose is not None:
@@ -218,7 +217,7 @@ class CollisionGuard:
         return np.vstack(parts)
 
     def _remember(self, range_min: float, odom_from_laser: Pose2D, now: float) -> None:
-        """Keep what now lies closer to the lidar than it can see."""
+        """Remember obstacles that are now closer than the lidar can see."""
         known, since = self._blind, self._blind_since
         if self._pose is not None and len(self._seen):
             seen = transform_points(self._pose, self._seen)
@@ -229,7 +228,7 @@ class CollisionGuard:
         self._blind, self._blind_since = known[keep], since[keep]
 
     def _free_part(self, wish: Twist2D, points: Array) -> float:
-        """The factor (0 to 1) at which the robot can still stop before it touches a point."""
+        """Factor (0 to 1) at which the robot can still stop before it touches a point."""
         p = self._params
         speed = math.hypot(wish.vx, wish.vy)
         stopping = max(speed / p.deceleration, abs(wish.wz) / p.turn_deceleration)
@@ -244,7 +243,7 @@ class CollisionGuard:
         return _scale_to_stop(contact, p.latency, stopping)
 
     def _contact_time(self, wish: Twist2D, points: Array, horizon: float) -> float:
-        """When the footprint meets `min_points` of the points at the commanded speed [s], inf for not within sight."""
+        """Time until the footprint meets `min_points` of the points at the commanded speed [s]; inf: not in sight."""
         speed = math.hypot(wish.vx, wish.vy)
         steps = math.ceil(max(speed * horizon / _STEP, abs(wish.wz) * horizon / _TURN_STEP, 1.0))
         times = np.linspace(0.0, horizon, min(steps, 60) + 1)
@@ -262,7 +261,7 @@ class CollisionGuard:
         return float(np.partition(first, self._params.min_points - 1)[self._params.min_points - 1])
 
     def _is_covered(self, scan: LaserScan, points: Array) -> bool:
-        """Whether all that the lidar hits is the robot, and most of its beams hit something."""
+        """Whether most beams hit something, and all hits are the robot itself."""
         is_open = np.count_nonzero(scan.ranges == math.inf) >= 0.5 * len(scan.ranges)
         return bool(len(points)) and not is_open and bool(self._is_self(points).all())
 
@@ -272,7 +271,7 @@ class CollisionGuard:
         return _distance_to_box(points[:, 0], points[:, 1], deep) < 0.0
 
     def _box(self, wish: Twist2D) -> tuple[float, float, float, float]:
-        """The footprint with its gap in the direction of motion: x from, x to, y from, y to."""
+        """Footprint with its gap in the direction of motion: x from, x to, y from, y to."""
         p = self._params
         length, width = p.half_length - p.slack, p.half_width - p.slack
         return (
@@ -292,7 +291,7 @@ def _seen_from(points: Array, twist: Twist2D, times: Array) -> Array:
 
 
 def _distance_to_box(x: Array, y: Array, box: tuple[float, float, float, float]) -> Array:
-    """How far outside a box points are [m]; negative inside."""
+    """Distance of points outside a box [m]; negative inside."""
     x_from, x_to, y_from, y_to = box
     dx = np.maximum(x_from - x, x - x_to)
     dy = np.maximum(y_from - y, y - y_to)

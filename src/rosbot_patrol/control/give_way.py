@@ -1,7 +1,7 @@
-"""Whether the robot should stand still for someone who moves: it waits, and goes on when they have passed.
+"""Giving way: the robot waits for a moving person and goes on after they have passed.
 
-Both are driven ahead, the robot along the arc of its command and the other straight on, and the least gap between them
-decides. A robot that stands can be walked round or into, but never walks into anybody.
+Both are extrapolated, the robot along the arc of its command and the person straight on; the least distance between
+them decides. A person can walk round or into a robot that stands, but the robot never drives into anybody.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ class GiveWayParams:
 
 
 class GiveWay:
-    """Decides, and keeps to it for a moment. Times [s] are of one clock."""
+    """Decides whether to wait, and holds the decision for a moment. Times [s] are of one clock."""
 
     def __init__(self, params: GiveWayParams | None = None) -> None:
         self._params = params or GiveWayParams()
         self._until = -math.inf
 
     def waits(self, wish: Twist2D, movers: Sequence[Mover], odom_from_base: Pose2D, now: float) -> str:
-        """For whom it has to wait with a command, in a few words; "" where the way is free."""
+        """Reason to wait instead of driving a command, in a few words; "" if the way is free."""
         p = self._params
         if wish == STOP or p.horizon == 0.0:
             return ""
@@ -64,7 +64,9 @@ class GiveWay:
             away = math.hypot(mover.x - odom_from_base.x, mover.y - odom_from_base.y)
             if mover.speed < p.least_speed or (mover.age < p.least_age and away > p.near):
                 continue
-            is_sudden = away < p.near and mover.age < _SUDDEN  # where legs that begin to walk will go is not known yet
+            is_sudden = (
+                away < p.near and mover.age < _SUDDEN
+            )  # the direction of legs that begin to walk is not known yet
             if is_sudden or self._meets(wish, mover, odom_from_base, away):
                 self._until = now + (p.hold_near if away < p.near else p.hold)
                 return f"someone comes this way, {away:.1f} m off"
@@ -75,7 +77,7 @@ class GiveWay:
     def _meets(self, wish: Twist2D, mover: Mover, pose: Pose2D, away: float) -> bool:
         p = self._params
         dx, dy = mover.x - pose.x, mover.y - pose.y
-        leaving = (mover.vx * dx + mover.vy * dy) / max(away, 1e-6)  # [m/s], negative: comes nearer by itself
+        leaving = (mover.vx * dx + mover.vy * dy) / max(away, 1e-6)  # [m/s], negative: the person comes nearer
         if away < p.near and leaving < -0.5 * p.least_speed:
             return True
         if away < p.beside and leaving < 0.5 * mover.speed:

@@ -1,10 +1,10 @@
-"""What moves around the robot, as the lidar sees it: people, pets, doors; each with a place and a velocity.
+"""Moving objects around the robot, from lidar scans: people, pets, doors, each with position and velocity.
 
-A beam that ends where, a moment ago, beams passed through has hit something that came there (free-space violation, as
-in Wang, Thorpe, Thrun 2003). Such points are put together to things, a thing is followed from sweep to sweep, and its
-velocity is the slope of a line through its last places. It moves if it has left where it was first seen: a leg of a
-chair or the end of a wall that comes into view bit by bit has not. What stands still for a while becomes an obstacle
-like any other. No map is needed; odometry has to hold for `memory` seconds only.
+A beam that ends where beams recently passed has hit something that has moved there (free-space violation, as in Wang,
+Thorpe, Thrun 2003). Such points are grouped to objects, objects are tracked from scan to scan, and the slope of a line
+through the last positions gives the velocity. An object moves if it has left the place of its first sighting; a chair
+leg or a wall's end that comes into view bit by bit has not. An object that stands still for a while becomes an ordinary
+obstacle. No map is needed; odometry must hold for `memory` seconds only.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from rosbot_patrol.scan import LaserScan
 Array = NDArray[np.float64]
 
 _CELL = 0.1  # [m]
-_PERIOD = 0.045  # scans that follow faster are left out [s]
-_MARGIN = 0.15  # the last of a beam that tells nothing: noise and drift of the odometry [m]
+_PERIOD = 0.045  # minimum time between the scans used [s]
+_MARGIN = 0.15  # end of a beam that is not counted as free, for noise and odometry drift [m]
 _AROUND = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1)]
-_VEIL = 0.1  # a beam that is longer by this than the one before, and shorter than the next, was split by an edge [m]
-_MOSTLY = 7  # of the nine cells around a hit were free: it is no edge of a wall
-_SLIPPED = 0.3  # where so many of the hits are new, it is the odometry that has moved
-_SIGHTINGS = 3  # within the window; less is a flicker
-_THERE = 0.07  # a beam as long as a point is far off, but for this, has hit it again: noise and odometry [m]
-_SAME = 0.3  # so near to a thing, a beam's end is of it [m]
-_STAYS = 0.7  # of the points of a thing; where more are hit again, it is still there
+_VEIL = 0.1  # a beam longer than one neighbour and shorter than the other by this was split by an edge [m]
+_MOSTLY = 7  # of the nine cells around a hit must have been free, else it may be the edge of a wall
+_SLIPPED = 0.3  # share of new hits above which the odometry has slipped instead
+_SIGHTINGS = 3  # minimum number of sightings in the window
+_THERE = 0.07  # a beam within this of a point's distance has hit it again: noise and odometry [m]
+_SAME = 0.3  # beam ends within this distance belong to the object [m]
+_STAYS = 0.7  # share of an object's points that, hit again, show that it is still there
 _NEVER = -math.inf
 
 
@@ -53,7 +53,7 @@ class MoverParams:
 
 
 class Mover(NamedTuple):
-    """A thing that moves, in the frame of the odometry: place [m], velocity [m/s], for how long it was followed [s]."""
+    """A moving object in the odometry frame: position [m], velocity [m/s], time since its first sighting [s]."""
 
     x: float
     y: float
@@ -67,7 +67,7 @@ class Mover(NamedTuple):
         return math.hypot(self.vx, self.vy)
 
     def at(self, seconds: float) -> tuple[float, float]:
-        """Where it will be."""
+        """Predicted position after some time [s]."""
         return self.x + self.vx * seconds, self.y + self.vy * seconds
 
 
@@ -84,21 +84,21 @@ class _Thing:
 @dataclass
 class _Track:
     places: list[tuple[float, float, float]] = field(default_factory=list)  # time, x, y
-    things: list[_Thing] = field(default_factory=list)  # at these places
+    things: list[_Thing] = field(default_factory=list)  # at these positions
     since: float = 0.0
     moved_at: float = _NEVER
 
     def add(self, now: float, thing: _Thing, window: float) -> None:
-        """One more sighting; those that are older than the window are forgotten."""
+        """Add a sighting; drop those older than the window."""
         self.places.append((now, *thing.middle))
         self.things.append(thing)
         while self.places[0][0] <= now - window:
             del self.places[0], self.things[0]
 
     def look_back(self, scan: LaserScan, laser_from_odom: Pose2D, now: float) -> None:
-        """Note whether it has left the oldest of its places: beams now go on there, or end at where it is now.
+        """Note whether the object has left its oldest position: beams continue there, or end at its present one.
 
-        Where they end at something else, or there are none, it may still be there.
+        If they end at something else, or there are none, it may still be there.
         """
         points, is_now = (
             transform_points(laser_from_odom, thing.points) for thing in (self.things[0], self.things[-1])
@@ -127,7 +127,7 @@ class _Track:
         return float(t @ x) / spread, float(t @ y) / spread
 
     def expected(self, now: float) -> tuple[float, float]:
-        """Where the line through its places has it."""
+        """Position on the line through the last positions."""
         t, x, y = np.array(self.places).T
         vx, vy = self.velocity()
         gone = now - float(t.mean())
@@ -135,7 +135,7 @@ class _Track:
 
 
 class MoverWatch:
-    """Follows what moves. Times [s] are those of the scans.
+    """Tracks moving objects. Times [s] are those of the scans.
 
     Args:
         params: sizes and times.
@@ -150,15 +150,17 @@ class MoverWatch:
 
     def _forget(self) -> None:
         shape = (self._side, self._side)
-        self._owner = np.full(shape, np.iinfo(np.int64).min, np.int64)  # which cell of the plane a cell stands for
+        self._owner = np.full(
+            shape, np.iinfo(np.int64).min, np.int64
+        )  # the cell of the plane that an array cell represents
         self._free_at = np.full(shape, _NEVER)
-        self._hit_first = np.full(shape, _NEVER)  # of the hits that have not paused since
+        self._hit_first = np.full(shape, _NEVER)  # time of the first of the uninterrupted hits
         self._hit_last = np.full(shape, _NEVER)
         self._tracks.clear()
         self._now = _NEVER
 
     def see(self, scan: LaserScan, odom_from_laser: Pose2D) -> list[Mover]:
-        """Take a level scan; returns what moves, `movers` later too."""
+        """Add a level scan; returns the moving objects, as `movers` does later."""
         now = scan.stamp
         if now < self._now - 1.0:
             self._forget()
@@ -180,7 +182,7 @@ class MoverWatch:
         return self.movers(now)
 
     def movers(self, now: float) -> list[Mover]:
-        """What moves, where it is at a time not far from the last scan."""
+        """Moving objects, extrapolated to a time close to the last scan."""
         found: list[Mover] = []
         if 0.0 <= now - self._slipped_at < self._params.memory:
             return found
@@ -193,19 +195,19 @@ class MoverWatch:
 
     @property
     def stamp(self) -> float:
-        """Time of the last scan taken."""
+        """Time of the last scan used."""
         return self._now
 
     # Cells: the plane, folded onto an array of `_side` cells ---------------------------------------------------------
 
     def _cells(self, points: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """Row, column and number of the cells of points."""
+        """Row, column and plane cell of points."""
         ij = np.floor(points / _CELL).astype(np.int64)
         rows, columns = ij[:, 1] % self._side, ij[:, 0] % self._side
         return rows, columns, ij[:, 1] * (1 << 32) + ij[:, 0]
 
     def _own(self, rows: NDArray[np.int64], columns: NDArray[np.int64], number: NDArray[np.int64]) -> None:
-        """Let cells stand for these places; those that stood for others forget."""
+        """Assign array cells to these places; cells that represented other places forget them."""
         stale = self._owner[rows, columns] != number
         rows, columns = rows[stale], columns[stale]
         self._owner[rows, columns] = number[stale]
@@ -213,7 +215,7 @@ class MoverWatch:
             table[rows, columns] = _NEVER
 
     def _are_new(self, hits: Array, now: float) -> NDArray[np.bool_]:
-        """Whether each hit lies where it was free a moment ago, and nothing has stood beside it for long."""
+        """Whether each hit lies where it was free a moment ago, with nothing long-standing beside it, shape (N,)."""
         free = np.zeros(len(hits), np.int64)
         stands = np.zeros(len(hits), bool)
         for dx, dy in _AROUND:
@@ -276,9 +278,9 @@ class MoverWatch:
 
 
 def _is_veil(scan: LaserScan) -> NDArray[np.bool_]:
-    """Which beams end in the air between an edge and what is behind it, or graze a wall, shape (N,).
+    """Which beams end in the air behind an edge, or graze a wall, shape (N,).
 
-    Such points wander with the robot; laser_filters' ScanShadowsFilter takes them out by the same sign.
+    Such points wander with the robot; laser_filters' ScanShadowsFilter removes them by the same criterion.
     """
     ranges = np.where(scan.is_hit, scan.ranges, scan.reach)
     steps = np.diff(ranges, prepend=ranges[:1], append=ranges[-1:])
@@ -287,7 +289,7 @@ def _is_veil(scan: LaserScan) -> NDArray[np.bool_]:
 
 
 def _things(points: Array, gap: float, least: int) -> list[_Thing]:
-    """Groups of points that are nearer to each other than a gap."""
+    """Groups of points closer to each other than a gap."""
     found = []
     left = list(range(len(points)))
     while left:

@@ -1,4 +1,4 @@
-"""Which of several commanders drives the base: the one of highest priority that still speaks (twist_mux's rules)."""
+"""Choice between several velocity sources: the active one of the highest priority drives (twist_mux's rules)."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class MuxParams:
 
 @dataclass(frozen=True)
 class Choice:
-    """What the base is told.
+    """Command for the base.
 
     Attributes:
-        source: who is heard, None for nobody.
-        lock: which lock holds while nobody is heard, None for none.
-        fresh: whether the command has not been chosen before.
+        source: the source that drives, None: none.
+        lock: the lock that holds while no source drives, None: none.
+        fresh: whether the command is chosen for the first time.
     """
 
     source: str | None
@@ -60,7 +60,7 @@ class _Input:
         self.stamp = -math.inf
 
     def has_expired(self, now: float) -> bool:
-        if now < self.stamp:  # the clock went back: what came before it is old
+        if now < self.stamp:  # the clock went back: earlier commands are old
             self.stamp = -math.inf
         return self.timeout > 0.0 and now - self.stamp > self.timeout
 
@@ -84,7 +84,7 @@ class _Lock(_Input):
 
 
 class TwistMux:
-    """Chooses between commanders.
+    """Chooses between velocity sources.
 
     Raises:
         ParamError: two sources or locks share a name, or two sources a priority.
@@ -99,25 +99,25 @@ class TwistMux:
         self._taken: tuple[str, int] | None = None
 
     def command(self, name: str, twist: Twist2D, now: float) -> None:
-        """A source commands; values that are not finite count as a stop."""
+        """Store a source's command; values that are not finite count as a stop."""
         source = self._sources[name]
         source.twist = twist if all(map(math.isfinite, twist)) else STOP
         source.stamp = now
         source.count += 1
 
     def forget(self, name: str) -> bool:
-        """Who commanded as this source has gone: it is silent until the next command. Whether it had a say."""
+        """Silence a source whose publisher has gone, until its next command; returns whether it was active."""
         source = self._sources[name]
         had, source.twist = source.twist is not None, None
         return had
 
     def lock(self, name: str, value: bool, now: float) -> None:
-        """A lock is set or released."""
+        """Set or release a lock."""
         self._locks[name].is_set = value
         self._locks[name].stamp = now
 
     def choose(self, now: float) -> Choice:
-        """Who is heard now, and what it says."""
+        """Choose the source that drives now, and its command."""
         barrier = next((lock for lock in self._locks.values() if lock.holds(now)), None)
         for source in self._sources.values():
             if source.twist is None or source.has_expired(now):

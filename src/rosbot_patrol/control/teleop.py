@@ -1,4 +1,4 @@
-"""Keys to velocities, as teleop_twist_keyboard has them."""
+"""Keys to velocities, as in teleop_twist_keyboard."""
 
 from __future__ import annotations
 
@@ -85,8 +85,8 @@ class KeyTeleop:
     """Turns keys into velocities.
 
     Attributes:
-        speed, turn: what the next key commands [m/s], [rad/s].
-        note: what the operator should read now, "" for nothing.
+        speed, turn: speeds that the next key commands [m/s], [rad/s].
+        note: text for the operator, "" for none.
     """
 
     def __init__(self, params: TeleopParams) -> None:
@@ -97,7 +97,7 @@ class KeyTeleop:
         self._direction = (0, 0, 0, 0)
 
     def press(self, key: str) -> Velocity | None:
-        """The velocity after a key; "" stands for a time-out; None where nothing is to be sent."""
+        """Velocity after a key; "" stands for a time-out; None: publish nothing."""
         self.note = ""
         if key in SPEEDS:
             self._change_speed(*SPEEDS[key])

@@ -33,9 +33,7 @@ class View:
     clear: Array
 
     def free_to(self, bearings: Array) -> Array:
-        """Distance that is certainly free in the directions `bearings` [rad]: the shorter of the two neighbouring
-        beams.
-        """
+        """Distance certainly free in the directions `bearings` [rad]: the shorter of the two neighbouring beams."""
         if len(self.clear) == 0 or self.increment == 0.0:
             return np.zeros(len(bearings))
         period = math.tau / abs(self.increment)
