@@ -1,1 +1,1 @@
-"""The protocol of the motion sensors: pure state machines, a server, a device."""
+"""rosserial, the protocol of the motion sensors: protocol state machines, a server, a device."""

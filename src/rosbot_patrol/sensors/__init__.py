@@ -1,1 +1,1 @@
-"""Motion sensors: which there are, what each said last, which is silent or faulty."""
+"""Motion sensors: their list, their last messages, and which of them are silent or faulty."""

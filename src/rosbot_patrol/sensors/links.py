@@ -1,4 +1,4 @@
-"""On which connections a bridge hears which sensor: what it tells the supervision."""
+"""Connections over which a bridge hears its sensors, as it reports them to the supervision."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rosbot_patrol.rosserial.device.device_log import read_stuck_line
 from rosbot_patrol.sensors.problems import Link
 
-MAX_LINKS = 2000  # a gateway may speak for many sensors; beyond that the one not heard for longest is forgotten
+MAX_LINKS = 2000  # a gateway may speak for many sensors; beyond this number the longest silent one is forgotten
 
 
 @dataclass(slots=True)
@@ -20,7 +20,7 @@ class _Heard:
 
 
 class Links:
-    """Counts messages by sensor and connection; cheap, as it is asked for each message."""
+    """Counts messages by sensor and connection; cheap, because it runs for each message."""
 
     def __init__(self) -> None:
         self._heard: dict[tuple[int, str], _Heard] = {}
@@ -29,7 +29,7 @@ class Links:
         return len(self._heard)
 
     def heard(self, sensor_id: int, peer: str, now: float, *, move: bool) -> bool:
-        """Take a message; returns whether it is the first of this sensor on this connection."""
+        """Count a message; returns whether it is this sensor's first on this connection."""
         heard = self._heard.get((sensor_id, peer))
         is_new = heard is None
         if heard is None:
@@ -40,11 +40,11 @@ class Links:
         heard.messages += 1
         if move:
             heard.triggers += 1
-            heard.is_stuck = False  # it fell and rose again
+            heard.is_stuck = False  # the output fell and rose again
         return is_new
 
     def logged(self, peer: str, text: str) -> bool:
-        """Take a log line of the device; returns whether it changes anything."""
+        """Evaluate a log line of the device; returns whether it changes anything."""
         sensor_id = read_stuck_line(text)
         heard = None if sensor_id is None else self._heard.get((sensor_id, peer))
         if heard is None or heard.is_stuck:
@@ -53,14 +53,14 @@ class Links:
         return True
 
     def closed(self, peer: str) -> bool:
-        """The connection has ended; returns whether a sensor was heard on it."""
+        """End a connection; returns whether a sensor was heard on it."""
         ended = [key for key in self._heard if key[1] == peer]
         for key in ended:
             del self._heard[key]
         return bool(ended)
 
     def snapshot(self, now: float, of_peer: Callable[[str], tuple[bool, float | None]]) -> list[Link]:
-        """All of them; `of_peer` tells whether a connection is proven, and how far its clock is ahead [s]."""
+        """All links; `of_peer` returns whether a connection is proven, and how far its clock is ahead [s]."""
         found = []
         for (sensor_id, peer), heard in self._heard.items():
             proven, clock_offset = of_peer(peer)

@@ -1,4 +1,4 @@
-"""Which rooms the robot is asked to look at because their sensor is silent: once for each silence."""
+"""Looks at rooms with a silent sensor: one for each silence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosbot_patrol.sensors.supervisor import SensorStatus, Supervisor
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """A wish: the room of a sensor, and why."""
+    """A request to look at the room of a sensor, with the reason."""
 
     sensor_id: int
     room: int
@@ -20,10 +20,10 @@ class Look:
 
 
 class Looks:
-    """Remembers which silence was answered.
+    """Remembers which silences have been answered.
 
-    Silence behind a bridge that has gone is the bridge's: the robot is not sent through the whole house for it. A
-    sensor that was not heard since the start is no change that would be worth a look.
+    Silence behind a bridge that has gone is the bridge's problem: the robot is not sent through the whole house for it.
+    A sensor that has been silent since the start causes no look, because nothing has changed.
     """
 
     def __init__(self, params: LookTimes) -> None:
@@ -32,7 +32,7 @@ class Looks:
         self._looked: dict[int, float] = {}
 
     def update(self, watch: Supervisor, listed: Sequence[SensorStatus], now: float) -> list[Look]:
-        """What to ask for now; call it about once a second. `listed`: all sensors, as of `watch.statuses`."""
+        """Looks to request now; call it about once a second. `listed`: all sensors, from `watch.statuses`."""
         if not self._params.patrol_silent_sensors:
             return []
         problems = watch.problems()

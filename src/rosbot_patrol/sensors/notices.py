@@ -1,12 +1,12 @@
-"""When the owner is told of motion sensors: once, again when all is well, and everything of one time in one notice.
+"""Notices about motion sensors: one for a problem, one when all is well again, several problems in one.
 
-- A problem is told when it has lasted a while, so that a blip of the Wi-Fi is no mail.
-- What is wrong at that moment goes into the same notice, however many they are; then there is a pause.
-- Sensors that nobody hears because their bridge has gone are the bridge's problem. A sensor that comes and goes is told
-  to flap, and not each time to be silent.
-- What was told outlives the program: who restarts it is not told again.
-- In a room that is not guarded people move as they like: what motion alone says of its sensor is no notice. It is told
-  where it still lasts once the room is guarded again, and the motion of those who leave has come to its end.
+- A problem is reported after it has lasted a while, so that a short Wi-Fi dropout causes no mail.
+- All problems of that moment go into the same notice; then there is a pause.
+- Sensors that nobody hears because their bridge has gone are the bridge's problem. A sensor that comes and goes is
+  reported as flapping, and not each time as silent.
+- The notices sent are stored, so that a restart does not repeat them.
+- In an unguarded room people move as they like, so motion alone causes no notice about its sensor. If the problem
+  lasts, it is reported after the room is guarded again and the motion of those who leave has ended.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from rosbot_patrol.sensors.wording import Item
 
 log = logging.getLogger(__name__)
 
-ALONG = 5.0  # a problem that has lasted so long goes along with a notice that is due [s]
-PATIENCE = 900.0  # a problem told before a restart may need so long to show again [s]
+ALONG = 5.0  # a problem that has lasted this long joins a notice that is due [s]
+PATIENCE = 900.0  # time in which a problem reported before a restart may show again [s]
 _SAID_BY_MOTION = (Kind.STUCK_ON, Kind.NO_MOTION)
 _SHOWN_BY_BEING_HEARD = (Kind.SILENT, Kind.BRIDGE_GONE, Kind.PATROL_GONE)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Notice:
-    """What to send: an id unlike any other's, a line, a text; `items` of it."""
+    """A notice to send: a unique id, a subject line, a text, and the number of `items` in it."""
 
     id: str
     subject: str
@@ -43,7 +43,7 @@ class Notice:
 
 @dataclass
 class _Told:
-    """A problem that the owner knows of: since when [s since 1970]; how long it is over by now [s], None: it is not."""
+    """A problem that the owner knows: its begin [s since 1970]; time since its end [s], None: not over."""
 
     since: float
     well_since: float | None = None
@@ -51,12 +51,12 @@ class _Told:
 
 
 class Notices:
-    """Decides what to tell.
+    """Decides which notices to send.
 
     Args:
-        times: when.
-        now: time, of any monotonic clock [s].
-        memory: what `snapshot` gave before the program ended.
+        times: delays and intervals.
+        now: time of any monotonic clock [s].
+        memory: the last `snapshot` before the program ended.
         is_guarded: whether a room is guarded now; None stands for a sensor without a room.
     """
 
@@ -78,7 +78,7 @@ class Notices:
             self._recall(memory)
 
     def snapshot(self) -> dict[str, Any]:
-        """What has to outlive the program, for JSON."""
+        """State that must survive a restart, for JSON."""
         told = [[key.kind_name, key.sensor_id, key.bridge, told.since] for key, told in self._told.items()]
         return {"count": self._count, "told": told}
 
@@ -93,10 +93,10 @@ class Notices:
             log.warning("what was kept of the notices about sensors makes no sense (%r), starting afresh", err)
 
     def update(self, watch: Supervisor, listed: Sequence[SensorStatus], now: float, wall: float) -> Notice | None:
-        """What to send now, None for nothing; call it about once a second.
+        """Notice to send now, None: none; call it about once a second.
 
         Args:
-            watch: what is wrong.
+            watch: the supervisor with the present problems.
             listed: all sensors, as of `watch.statuses`.
             now: time [s].
             wall: seconds since 1970.
@@ -124,11 +124,11 @@ class Notices:
         return self._notice(tuple(items), statuses, watch, wall)
 
     def _is_calm(self, key: Key, watch: Supervisor) -> bool:
-        """Whether a problem may be people who are at home."""
+        """Whether the cause of a problem may be people at home."""
         return key.kind in _SAID_BY_MOTION and not self._is_guarded(watch.sensors.room_of(key.sensor_id))
 
     def _is_covered(self, problem: Problem, problems: Mapping[Key, Problem]) -> bool:
-        """Whether another problem says it already."""
+        """Whether another problem already says it."""
         if problem.key.kind is not Kind.SILENT:
             return False
         gone = Key(Kind.BRIDGE_GONE.value, bridge=problem.bridge)
@@ -137,7 +137,7 @@ class Notices:
     def _well(
         self, problems: Mapping[Key, Problem], statuses: Mapping[int, SensorStatus], watch: Supervisor, now: float
     ) -> list[Key]:
-        """What was told and is over, for sensors and bridges with which nothing else is wrong."""
+        """Reported problems that are over, for sensors and bridges without other problems."""
         bad = {(key.sensor_id, key.bridge) for key in problems}
         found = []
         for key, told in self._told.items():
@@ -155,7 +155,7 @@ class Notices:
     def _may_be_well(
         self, key: Key, told: _Told, statuses: Mapping[int, SensorStatus], watch: Supervisor, now: float
     ) -> bool:
-        """Whether its absence means anything: after a restart nothing is known yet."""
+        """Whether a missing problem means anything: after a restart nothing is known yet."""
         if not told.is_recalled:
             return True
         if key.kind not in _SHOWN_BY_BEING_HEARD:

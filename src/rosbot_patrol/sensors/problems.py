@@ -1,4 +1,4 @@
-"""What can be wrong with a motion sensor or its bridge, and the record of one such thing."""
+"""Kinds of problems of motion sensors and bridges, and the record of one problem."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class Kind(Enum):
-    """Values are those of SensorEvent; the worst comes first."""
+    """Kind of a problem, the worst first; values are those of SensorEvent."""
 
     PATROL_GONE = "patrol_gone"
     SILENT = "silent"
@@ -26,7 +26,7 @@ SERIOUS = frozenset({Kind.PATROL_GONE, Kind.SILENT, Kind.BRIDGE_GONE, Kind.DUPLI
 
 @dataclass(frozen=True, order=True)
 class Key:
-    """What it is about: a kind, and a sensor's id, or -1 and a node: a bridge, the patrol."""
+    """Identity of a problem: its kind, and a sensor's id, or -1 and a node (a bridge, the patrol)."""
 
     kind_name: str
     sensor_id: int = -1
@@ -34,7 +34,7 @@ class Key:
 
     @property
     def kind(self) -> Kind:
-        """The kind."""
+        """Kind of the problem."""
         return Kind(self.kind_name)
 
     def __str__(self) -> str:
@@ -42,24 +42,24 @@ class Key:
 
 
 def sensor_key(kind: Kind, sensor_id: int) -> Key:
-    """The key of a sensor's problem."""
+    """Key of a sensor's problem."""
     return Key(kind.value, sensor_id)
 
 
 def bridge_key(kind: Kind, bridge: str) -> Key:
-    """The key of a bridge's problem."""
+    """Key of a bridge's problem."""
     return Key(kind.value, bridge=bridge)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """One thing that is wrong.
+    """One problem.
 
     Attributes:
-        key: what it is about.
-        since: begin, on the supervisor's own clock [s]; of a silence, when it was last heard.
+        key: its identity.
+        since: begin on the supervisor's own clock [s]; of a silence, the last message.
         what: in words that follow "sensor 3 ...": "is silent: nothing heard for 12 s".
-        bridge: that the sensor was last heard through, "" where no bridge says.
+        bridge: over which the sensor was last heard, "" if unknown.
     """
 
     key: Key
@@ -70,7 +70,7 @@ class Problem:
 
 @dataclass(frozen=True, kw_only=True)
 class Event:
-    """A problem has begun (`active`) or is over; `lasted` [s]; `text` is one sentence for people."""
+    """Begin (`active`) or end of a problem; `lasted` [s]; `text` is one sentence for people."""
 
     problem: Problem
     active: bool
@@ -80,13 +80,13 @@ class Event:
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """One connection on which a bridge hears a sensor.
+    """One connection over which a bridge hears a sensor.
 
     Attributes:
         sensor_id: that it reports; peer: "ADDRESS:PORT"; proven: it has shown its key.
         heard: seconds since its last message; messages, triggers: how many came.
-        is_stuck: the device says that its sensor's output has been high for long.
-        clock_offset: how far the device's clock is ahead of the bridge's [s], None where it does not tell.
+        is_stuck: the device reports that its sensor's output has been high for long.
+        clock_offset: lead of the device's clock over the bridge's [s], None if unknown.
     """
 
     sensor_id: int
@@ -107,7 +107,7 @@ class Link:
 
 
 def duration(seconds: float) -> str:
-    """For people: "40 s", "12 min", "3 h 5 min", "2 days"."""
+    """Duration for people: "40 s", "12 min", "3 h 5 min", "2 days"."""
     seconds = max(seconds, 0.0)
     if seconds < 120.0:
         return f"{seconds:.0f} s"

@@ -1,4 +1,4 @@
-"""Which motion sensors there are, and which of them is silent: a heartbeat that stays out is the only sign of it."""
+"""Motion sensors that have been heard, and which of them are silent: a missing heartbeat is the only sign."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import Enum
 
 
 class Change(Enum):
-    """What has become different about a sensor."""
+    """Kind of a change of a sensor."""
 
     NEW = "new"
     SILENT = "silent"
@@ -19,7 +19,7 @@ class SensorEvent:
     """One change of one sensor.
 
     Attributes:
-        seconds: how long it had been (or has been) unheard of [s], 0 for a new one.
+        seconds: duration of its silence [s], 0 for a new sensor.
     """
 
     change: Change
@@ -38,10 +38,10 @@ class SensorEvent:
 
 @dataclass(frozen=True)
 class SensorStatus:
-    """One sensor as it is now.
+    """Present state of one sensor.
 
     Attributes:
-        seconds: since it was last heard of [s]; messages: how many came; triggers: how many of them told of motion.
+        seconds: since its last message [s]; messages: how many came; triggers: how many of them reported motion.
     """
 
     sensor_id: int
@@ -62,10 +62,10 @@ class _Sensor:
 
 
 class MotionSensors:
-    """Keeps the sensors that were ever heard of; ids are bytes, so there are at most 256.
+    """All sensors ever heard; ids are bytes, so there are at most 256.
 
     Args:
-        timeout: a sensor not heard of for longer is silent [s]; they send a heartbeat every 0.5 s.
+        timeout: silence after which a sensor is silent [s]; they send a heartbeat every 0.5 s.
     """
 
     def __init__(self, timeout: float = 10.0) -> None:
@@ -73,7 +73,7 @@ class MotionSensors:
         self._sensors: dict[int, _Sensor] = {}
 
     def heard(self, sensor_id: int, peer: str, now: float, *, move: bool = False) -> list[SensorEvent]:
-        """A sensor sent a heartbeat or a trigger."""
+        """Record a heartbeat or a trigger of a sensor."""
         sensor = self._sensors.get(sensor_id)
         events = []
         if sensor is None:
@@ -88,7 +88,7 @@ class MotionSensors:
         return events
 
     def tick(self, now: float) -> list[SensorEvent]:
-        """Which sensors have just become silent. A clock that went back starts the wait anew."""
+        """Sensors that have just become silent. If the clock goes back, the wait starts again."""
         events = []
         for sensor_id, sensor in self._sensors.items():
             sensor.heard = min(sensor.heard, now)

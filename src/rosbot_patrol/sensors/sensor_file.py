@@ -1,11 +1,11 @@
-"""The file that names the motion sensors: which id hangs in which room, and what is expected of it.
+"""The sensors file: which sensor id hangs in which room, and what is expected of it.
 
     sensors:
       - {id: 3, room: 5, name: hall door, peers: [192.168.1.23]}
 
-A file that says where the simulated sensors hang is such a file too: its keys port, x, y, z, yaw and angle_unit are the
-simulator's and say nothing here, as name, heartbeat, peers and enabled say nothing to the simulator. So one file can
-serve both, and cannot contradict itself; two files are held against each other by `check_places`.
+A file with the positions of simulated sensors is also such a file. Its keys port, x, y, z, yaw and angle_unit are for
+the simulator and are ignored here; the simulator ignores name, heartbeat, peers and enabled. So one file can serve both
+and cannot contradict itself; `check_places` compares two files.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class SensorSpec:
     peers: tuple[str, ...] = param((), doc="addresses and networks that it may connect from; empty: any")
 
     def may_speak_from(self, host: str) -> bool:
-        """Whether an address is one of `peers`; what is no address, such as a serial device, is."""
+        """Whether an address is one of `peers`; a serial device, which has no address, always is."""
         try:
             address = ipaddress.ip_address(host.partition("%")[0])
         except ValueError:
@@ -56,10 +56,10 @@ class SensorSpec:
 
 
 class SensorList:
-    """The sensors of a file, or those that the tutorial implies: each room's sensor has the room's number as its id.
+    """The sensors of a file, or those that the tutorial implies: a sensor's id is the number of its room.
 
     Args:
-        specs: of the file; None where there is no file.
+        specs: of the file; None: no file.
         room_names: name of each room by number.
         source: the file, for messages.
     """
@@ -79,18 +79,18 @@ class SensorList:
         return len(self._specs)
 
     def find(self, sensor_id: int) -> SensorSpec | None:
-        """What is expected of an id; None where it is not known."""
+        """Entry of an id; None if unknown."""
         if self.has_file or sensor_id not in self._room_names:
             return self._specs.get(sensor_id)
         return SensorSpec(id=sensor_id, room=sensor_id)
 
     def room_of(self, sensor_id: int) -> int | None:
-        """Number of the room that a sensor watches; None where it is not known or out of service."""
+        """Number of the room that a sensor watches; None if it is unknown or out of service."""
         spec = self.find(sensor_id)
         return spec.room if spec is not None and spec.enabled else None
 
     def refusal(self, sensor_id: int) -> str:
-        """Why `room_of` gives none, in one sentence."""
+        """Reason in one sentence why `room_of` returns None."""
         if not self.has_file:
             return f"there is no room {sensor_id}, and no file of sensors that gives this id another"
         if sensor_id in self._specs:
@@ -98,11 +98,11 @@ class SensorList:
         return f"{self.source} has no sensor with id {sensor_id}"
 
     def room_name(self, room: int) -> str:
-        """Name of a room, "" where it is not known."""
+        """Name of a room, "" if unknown."""
         return self._room_names.get(room, "")
 
     def title(self, sensor_id: int) -> str:
-        """For people, as in `sensor 3 "hall door" in room 5 (corridor hall)`."""
+        """Name of a sensor for people, such as `sensor 3 "hall door" in room 5 (corridor hall)`."""
         spec = self.find(sensor_id)
         if spec is None:
             return f"sensor {sensor_id}"
@@ -110,7 +110,7 @@ class SensorList:
         return f"sensor {sensor_id}{name} in room {spec.room} ({self.room_name(spec.room)})"
 
     def check_places(self, places: Iterable[tuple[int, int]], source: str) -> None:
-        """Hold the file against another one that gives (id, room).
+        """Compare the file with another one that gives (id, room).
 
         Raises:
             ParamError: an id watches another room there.
@@ -125,7 +125,7 @@ class SensorList:
 
 
 def load_sensors(path: str | Path, room_names: Mapping[int, str], *, rooms_source: str) -> SensorList:
-    """Read the file.
+    """Read the sensors file.
 
     Args:
         path: of the file; "" or "none" (roslaunch takes no empty argument) for none: ids are numbers of rooms.

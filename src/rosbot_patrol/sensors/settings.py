@@ -1,4 +1,4 @@
-"""Parameters of the supervision: how long is long."""
+"""Parameters of the supervision: time limits of problems, notices and looks."""
 
 from __future__ import annotations
 

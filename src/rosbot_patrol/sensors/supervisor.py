@@ -1,8 +1,8 @@
-"""Which motion sensors are well, which are not, and since when: a function of time and of what is heard.
+"""Supervision of motion sensors: which are well, which are not, since when; a function of time and messages.
 
-Time is any monotonic clock of the wall. Where the caller itself was stopped for a while (a suspended machine, SIGSTOP),
-the supervisor's own clock stands still with it, so that nobody is taken for silent whom it could not hear; likewise
-where the clock goes back.
+Time is any monotonic wall clock. If the caller itself was stopped for a while (a suspended machine, SIGSTOP) or the
+clock goes back, the supervisor's own clock stands still as well. So no sensor counts as silent while nobody could hear
+it.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from rosbot_patrol.sensors.sensor_file import SensorList
 from rosbot_patrol.sensors.settings import WatchTimes
 from rosbot_patrol.sensors.tracked import Tracked, clock_words
 
-ASLEEP = 5.0  # a longer pause between two calls, or step back: the caller was stopped, or its clock was set [s]
-SETTLING = 15.0  # so long after a bridge began, new connections say nothing of the sensors [s]
+ASLEEP = 5.0  # a longer pause between calls, or a step back, means that the caller was stopped or its clock set [s]
+SETTLING = 15.0  # time after a bridge's start in which new connections are no drop-outs [s]
 MAX_BRIDGES = 64
 
-# A condition counts when it has held for the first time, and is over when it has not for the second [s].
+# Times [s] for which a condition must hold to begin, and must not hold to be over.
 _DELAYS: dict[Kind, tuple[float, float]] = {
     Kind.PATROL_GONE: (0.0, 3.0),
-    Kind.SILENT: (0.0, 0.0),  # has its own
-    Kind.FLAPPING: (0.0, 0.0),  # has its own, too
+    Kind.SILENT: (0.0, 0.0),  # has its own times
+    Kind.FLAPPING: (0.0, 0.0),  # has its own times, too
     Kind.STUCK_ON: (0.0, 0.0),
     Kind.NO_MOTION: (0.0, 0.0),
     Kind.UNKNOWN_ID: (0.0, 0.0),
@@ -46,7 +46,7 @@ _DELAYS: dict[Kind, tuple[float, float]] = {
 
 @dataclass
 class _Bridge:
-    """A bridge: heard last, there without a break since [s]; when it came back, lately."""
+    """A bridge: last heard and uninterruptedly present since [s]; time of its last return."""
 
     heard: float
     since: float
@@ -56,7 +56,7 @@ class _Bridge:
 
 @dataclass
 class _Condition:
-    """Something that may be wrong: since when it holds, or no longer holds, without a break."""
+    """A possible problem: since when it has held, or has not held, without interruption."""
 
     problem: Problem
     true_since: float
@@ -66,15 +66,15 @@ class _Condition:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorStatus:
-    """One sensor now.
+    """Present state of one sensor.
 
     Attributes:
         problems: the worst first.
-        waiting: it was not heard yet, and need not have been.
+        waiting: it has not been heard yet, within start_grace.
         enabled: it is not out of service.
         watched: its silence would be noticed.
-        link: on which it was heard last, None where no bridge says; bridge: of it.
-        heard, motion: seconds since, None for never.
+        link: over which it was last heard, None if unknown; bridge: of that link.
+        heard, motion: seconds since the last, None: never.
     """
 
     sensor_id: int
@@ -91,11 +91,11 @@ class SensorStatus:
 
 
 class Supervisor:
-    """Keeps all sensors and bridges; ids are bytes and bridges are bounded, so memory is too.
+    """Tracks all sensors and bridges; both are bounded in number, so memory is too.
 
     Args:
-        sensors: who is expected.
-        times: when something is a problem.
+        sensors: the expected sensors.
+        times: limits of problems.
         now: time [s].
     """
 
@@ -109,10 +109,10 @@ class Supervisor:
         self._conditions: dict[Key, _Condition] = {}
         self._tracked = {spec.id: Tracked(spec, times, now, is_listed=True) for spec in sensors}
 
-    # -- what is heard
+    # -- messages
 
     def heard(self, sensor_id: int, sender: str, now: float, *, move: bool) -> None:
-        """A message of a sensor came, published by a node."""
+        """Record a message of a sensor, published by a node."""
         tracked = self._tracked.get(sensor_id)
         if tracked is None:
             spec = self.sensors.find(sensor_id)
@@ -121,13 +121,13 @@ class Supervisor:
         tracked.hear(sender, self._own(now), move=move)
 
     def linked(self, bridge: str, links: Iterable[Link], now: float, *, clock_offset: float = 0.0) -> None:
-        """A bridge told what it hears.
+        """Record a bridge's report of its links.
 
         Args:
             bridge: its node name.
             links: all of its connections on which a sensor was heard.
             now: time [s].
-            clock_offset: how far its clock is ahead of ours [s].
+            clock_offset: lead of its clock over ours [s].
         """
         t = self._own(now)
         known = self._bridges.get(bridge)
@@ -147,11 +147,11 @@ class Supervisor:
             tracked.link(bridge, by_sensor.get(sensor_id, []), t, is_settled=settled)
 
     def patrol_heard(self, node: str, now: float) -> None:
-        """The patrol's node gave a sign of life."""
+        """Record a sign of life of the patrol's node."""
         self._patrol = node, self._own(now)
 
     def _own(self, now: float) -> float:
-        """The supervisor's own clock; a message that waited in a queue may be a little late."""
+        """Time on the supervisor's own clock; a message that waited in a queue may be slightly late."""
         step = now - self._last
         if step < -ASLEEP or step > ASLEEP:
             self._slept += step
@@ -160,10 +160,10 @@ class Supervisor:
         self._now = max(now - self._slept, self._now)
         return self._now
 
-    # -- what it means
+    # -- evaluation
 
     def tick(self, now: float) -> list[Event]:
-        """What has changed; call it a few times a second."""
+        """Changes since the last call; call it a few times a second."""
         t = self._own(now)
         events: list[Event] = []
         held: set[Key] = set()
@@ -221,7 +221,7 @@ class Supervisor:
         began = condition.problem.since
         condition.problem = problem
         condition.false_since = None
-        if condition.is_active:  # it goes on: since its first begin
+        if condition.is_active:  # it continues: since its first begin
             condition.problem = Problem(key=problem.key, since=began, what=problem.what, bridge=problem.bridge)
             return []
         if t - condition.true_since < _DELAYS[problem.key.kind][0]:
@@ -247,39 +247,39 @@ class Supervisor:
             text = f"{who} is well again: {problem.key.kind_name.replace('_', ' ')} for {duration(lasted)}"
         return Event(problem=problem, active=active, lasted=lasted, text=text)
 
-    # -- what people are told
+    # -- reports
 
     def title(self, key: Key) -> str:
-        """Whom a problem is about, for people."""
+        """Name of a problem's sensor or bridge, for people."""
         if key.kind is Kind.PATROL_GONE:
             return f"the patrol ({key.bridge.strip('/')})"
         return f"bridge {key.bridge}" if key.sensor_id < 0 else self.sensors.title(key.sensor_id)
 
     def problems(self) -> dict[Key, Problem]:
-        """Everything that is wrong now."""
+        """All present problems."""
         return {key: c.problem for key, c in self._conditions.items() if c.is_active}
 
     def age(self, since: float) -> float:
-        """How long ago a time of a problem was, on this clock [s]."""
+        """Age of a problem's time on this clock [s]."""
         return max(self._now - since, 0.0)
 
     @property
     def motion_pause(self) -> float:
-        """So long after the last motion of somebody who leaves a sensor is no longer taken for stuck [s]."""
+        """Time after the last motion of a leaving person at which a sensor no longer counts as stuck [s]."""
         return self._times.motion_pause
 
     @property
     def patrol(self) -> str:
-        """The patrol's node, "" where it was never heard."""
+        """Name of the patrol's node, "" if it was never heard."""
         return self._patrol[0] if self._patrol is not None else ""
 
     def bridges(self) -> Mapping[str, bool]:
-        """Every bridge that was heard of, and whether it is there."""
+        """Every bridge heard so far, and whether it is present."""
         gone = {key.bridge for key in self.problems() if key.kind is Kind.BRIDGE_GONE}
         return {name: name not in gone for name in self._bridges}
 
     def statuses(self) -> list[SensorStatus]:
-        """All sensors that a file names or that were heard, by id."""
+        """All sensors in the file or heard so far, by id."""
         wrong: dict[int, list[Problem]] = {}
         order = list(Kind)
         for key, problem in self.problems().items():

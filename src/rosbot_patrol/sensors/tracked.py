@@ -1,4 +1,4 @@
-"""One motion sensor as it is heard, and what is wrong with it now."""
+"""State of one motion sensor, and its present problems."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from rosbot_patrol.sensors.problems import Kind, Link, duration
 from rosbot_patrol.sensors.sensor_file import SensorSpec
 from rosbot_patrol.sensors.settings import WatchTimes
 
-FRESH = 3.0  # a peer heard within that time speaks now [s]
-REGULAR = 10  # messages without a gap after which a sensor of no file is known to send heartbeats
-TALKER = 5  # messages without a gap that make a sender more than somebody's single test
+FRESH = 3.0  # a peer heard within this time is active [s]
+REGULAR = 10  # messages without a gap after which an unlisted sensor is known to send heartbeats
+TALKER = 5  # messages without a gap after which a sender is more than a manual test
 MAX_SENDERS = 8
-BEATS = 4  # missed heartbeats that make a gap
+BEATS = 4  # number of missed heartbeats that make a gap
 
 
 @dataclass
 class _Run:
-    """Messages of one sender, without a gap."""
+    """Uninterrupted messages of one sender."""
 
     heard: float
     count: int = 1
@@ -26,7 +26,7 @@ class _Run:
 
 @dataclass
 class _Peer:
-    """A connection on a bridge; `since` it was known, `heard` last [s]."""
+    """A connection on a bridge; known `since`, last `heard` [s]."""
 
     link: Link
     since: float
@@ -34,10 +34,10 @@ class _Peer:
 
 
 class Tracked:
-    """What is known of one id.
+    """State of one sensor id.
 
     Args:
-        spec: what is expected of it, None for an unknown id.
+        spec: its entry in the file, None for an unknown id.
         began: when it was first expected or heard [s].
         is_listed: a file names it.
     """
@@ -63,10 +63,10 @@ class Tracked:
         self._senders: dict[str, _Run] = {}
         self._peers: dict[tuple[str, str], _Peer] = {}
 
-    # -- what is heard
+    # -- messages
 
     def hear(self, sender: str, now: float, *, move: bool) -> None:
-        """A message came, published by the node `sender`."""
+        """Record a message, published by the node `sender`."""
         if self.heard is None or now - self.heard > self._gap:
             self.steady_since, self._run = now, 0
         self.heard = now
@@ -89,13 +89,13 @@ class Tracked:
             run.heard = now
 
     def link(self, bridge: str, links: list[Link], now: float, *, is_settled: bool = True) -> None:
-        """Say on which connections a bridge hears this sensor now.
+        """Record the connections over which a bridge hears this sensor now.
 
         Args:
             bridge: its name.
             links: all of this sensor's on it.
             now: time [s].
-            is_settled: False where the bridge has just begun: new connections are no fault of the sensor's.
+            is_settled: False shortly after the bridge's start: new connections are then no fault of the sensor.
         """
         kept = {key: peer for key, peer in self._peers.items() if key[0] != bridge}
         for link in links:
@@ -109,7 +109,7 @@ class Tracked:
                 self.bridge = bridge
         if kept or not self._peers:
             self._peers = kept
-        else:  # remember the last one, so that the next is known to be new
+        else:  # remember the last connection, to recognise the next one as new
             self._peers = dict([max(self._peers.items(), key=lambda item: item[1].heard)])
 
     def _is_heard_elsewhere(self, key: tuple[str, str], now: float) -> bool:
@@ -129,36 +129,36 @@ class Tracked:
 
     @property
     def silence(self) -> float:
-        """So long without a word is a silence [s]."""
+        """Time without a message after which it is silent [s]."""
         return max(self._times.silent_after, BEATS * self._heartbeat)
 
-    # -- what it is now
+    # -- evaluation
 
     @property
     def is_watched(self) -> bool:
-        """Whether its silence says anything: a file names it, or it was heard to send heartbeats."""
+        """Whether its silence means anything: a file lists it, or it has sent heartbeats."""
         expected = self.spec is not None and self.spec.enabled and self.spec.heartbeat > 0.0
         return expected and (self.is_listed or self._is_regular)
 
     def is_waiting(self, now: float) -> bool:
-        """Whether it was not heard yet, and need not have been."""
+        """Whether it has not been heard yet, within start_grace."""
         return self.heard is None and now - self.began <= self._times.start_grace
 
     def peers(self, now: float) -> list[_Peer]:
-        """Connections on which it speaks now, the longest known first."""
+        """Active connections, the oldest first."""
         return sorted((p for p in self._peers.values() if now - p.heard < FRESH), key=lambda p: p.since)
 
     @property
     def last_link(self) -> Link | None:
-        """The connection on which it was heard last."""
+        """Connection of the last message."""
         return max(self._peers.values(), key=lambda p: p.heard).link if self._peers else None
 
     def tick(self, now: float, *, bridge_is_there: bool) -> dict[Kind, tuple[float, str]]:
-        """What is wrong now: kind -> (since, in words).
+        """Present problems: kind -> (since, text).
 
         Args:
             now: time [s].
-            bridge_is_there: False where the bridge that it was heard through says nothing: no fault of the sensor's.
+            bridge_is_there: False if its bridge is silent, which is no fault of the sensor.
         """
         if self.spec is None or not self.spec.enabled:
             return {}
@@ -246,5 +246,5 @@ class Tracked:
 
 
 def clock_words(offset: float) -> str:
-    """How far a clock is off, for people."""
+    """Clock offset for people."""
     return f"{duration(abs(offset))} {'ahead' if offset > 0.0 else 'behind'}"

@@ -1,4 +1,4 @@
-"""What the owner is told of motion sensors, in words: what is wrong, since when, and what to do."""
+"""Texts for the owner about motion sensors: what is wrong, since when, and what to do."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ _MANY_SILENT = (
 
 @dataclass(frozen=True, kw_only=True)
 class Item:
-    """One thing to tell.
+    """One item of a notice.
 
     Attributes:
-        kind: what; None: all is well again.
-        title: whom it is about; what: in words that follow it.
+        kind: of the problem; None: all is well again.
+        title: name of the sensor or bridge; what: the words that follow it.
         since: begin, seconds since 1970; lasted: how long [s].
     """
 
@@ -67,7 +67,7 @@ class Item:
 
 
 def subject(items: Sequence[Item]) -> str:
-    """One line for all of it."""
+    """One line for all items."""
     wrong = [item for item in items if item.kind is not None]
     well = [item for item in items if item.kind is None]
     parts = []

@@ -1,1 +1,1 @@
-"""A motion sensor in software, as its firmware speaks."""
+"""A motion sensor in software, which behaves as the firmware does."""

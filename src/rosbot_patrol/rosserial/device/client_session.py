@@ -1,7 +1,7 @@
 """The device's side of rosserial, without sockets: bytes in, events out, frames to send.
 
-Behaves as rosserial_client's NodeHandle: answers a topic request with a time request and its topics, asks for the time
-every 2.5 s, and takes itself for disconnected after 11 s without an answer.
+Behaves as rosserial_client's NodeHandle: it answers a topic request with a time request and its topics, asks for the
+time every 2.5 s, and counts as disconnected after 11 s without an answer.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from rosbot_patrol.rosserial.protocol.topics import (
 
 SYNC_PERIOD = 2.5
 SYNC_TIMEOUT = 11.0
-FRAME_TIMEOUT = 1.0  # a frame that stalls for longer is given up
+FRAME_TIMEOUT = 1.0  # time after which a stalled frame is given up [s]
 
 
 @dataclass(frozen=True)
 class Message:
-    """The server sent a message on a topic that the device subscribes."""
+    """The server sent a message on a subscribed topic."""
 
     topic_id: int
     data: bytes
@@ -36,12 +36,12 @@ class Message:
 
 @dataclass(frozen=True)
 class Configured:
-    """The server asked for the topics and was told them."""
+    """The server asked for the topics and received them."""
 
 
 @dataclass(frozen=True)
 class Unconfigured:
-    """The server stopped the traffic, or it is gone: it has not answered for long."""
+    """The server stopped the traffic, or has not answered for too long."""
 
     reason: str
     is_gone: bool = False
@@ -49,7 +49,7 @@ class Unconfigured:
 
 @dataclass(frozen=True)
 class NotTrusted:
-    """The server is not the one that the device wants, or will not take the device; hang up and try again later."""
+    """The server lacks the key or refuses the device; disconnect and try again later."""
 
     reason: str
 
@@ -61,10 +61,10 @@ class DeviceSession:
     """One connection of a device.
 
     Args:
-        publishers: topics that it publishes; subscribers: topics that it listens to.
+        publishers: topics that it publishes; subscribers: topics that it subscribes to.
         max_payload: longest message taken from the server [bytes].
-        prover: answers the challenge of a server with keys, a new one each time; None for a device without a key.
-        insist: whether to talk only to a server that has shown that it has the key.
+        prover: makes a prover for each challenge of a server with keys; None: a device without a key.
+        insist: talk only to a server that has proved that it has the key.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class DeviceSession:
         self._last_bytes = 0.0
         self._last_request = 0.0
         self._last_answer = 0.0
-        self._asked = self._answered = 0  # how often for the time
+        self._asked = self._answered = 0  # time requests sent and answered
         self._prover = prover
         self._is_trusted = not insist
         self._awaits_answer = False
@@ -97,18 +97,18 @@ class DeviceSession:
         return None if self._offset is None else now + self._offset
 
     def receive(self, data: bytes, now: float) -> list[DeviceEvent]:
-        """Take bytes of the server; return what they mean."""
+        """Process bytes from the server; returns events."""
         self._last_bytes = now
         return self._packets(self._parser.feed(data), now)
 
     def closed(self) -> list[DeviceEvent]:
-        """The server ended the connection; what that means where it says more."""
+        """The server ended the connection; returns events, if there are more."""
         if self._awaits_answer:
             return [NotTrusted("the bridge did not take the proof, it has another key of this sensor or none")]
         return []
 
     def tick(self, now: float) -> list[DeviceEvent]:
-        """Ask for the time where it is due; notice that the server is gone, or a frame of it cut off."""
+        """Ask for the time when it is due; detect a lost server or a truncated frame."""
         events: list[DeviceEvent] = []
         while self._parser.pending and now - self._last_bytes > FRAME_TIMEOUT:
             events += self._packets(self._parser.give_up(), now)
@@ -122,26 +122,26 @@ class DeviceSession:
         return events
 
     def publish(self, topic_id: int, data: bytes) -> bool:
-        """Queue a message; False where the topics have not been negotiated."""
+        """Queue a message; False if the topics have not been negotiated."""
         if not self.configured:
             return False
         self._output.append(encode(topic_id, data))
         return True
 
     def request_receipt(self, now: float) -> int:
-        """Ask the server to show that it has what was published so far; give the number to `has_receipt`.
+        """Ask the server for a receipt of everything published so far; pass the number to `has_receipt`.
 
-        It asks for the time: the server answers frames in their order, and publishes before it answers.
+        The request asks for the time: the server answers frames in order, and publishes before it answers.
         """
         self._request_time(now)
         return self._asked
 
     def has_receipt(self, number: int) -> bool:
-        """Whether the server has shown that."""
+        """Whether the server has sent that receipt."""
         return self._answered >= number
 
     def log(self, level: int, text: str) -> bool:
-        """Queue a line for the server's log, level 0 (debug) to 4 (fatal); False where nobody listens."""
+        """Queue a line for the server's log, level 0 (debug) to 4 (fatal); False without a connection."""
         if not self.configured:
             return False
         self._output.append(encode(TopicId.LOG, pack_log(level, text)))
@@ -204,5 +204,5 @@ class DeviceSession:
     def _request_time(self, now: float) -> None:
         self._last_request = now
         self._asked += 1
-        known = self.server_time(now) or 0.0  # as far as it knows, so that the server can see a clock that is off
+        known = self.server_time(now) or 0.0  # its own estimate, so that the server can detect a wrong clock
         self._output.append(encode(TopicId.TIME, pack_time(int(known), int(known % 1.0 * 1e9))))

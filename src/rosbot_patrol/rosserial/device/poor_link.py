@@ -1,6 +1,6 @@
-"""A link that is not what it should be: frames come late, in their order, or not at all, and the link breaks.
+"""A simulated poor link: frames are delayed (in order) or lost, and the link breaks.
 
-The caller gives the time; the seed makes the choices the same again.
+The caller passes the time; with the same seed the choices are the same.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class LinkQuality:
-    """What a link does to frames; the defaults are a perfect one.
+    """Quality of a link; the defaults are a perfect one.
 
     Attributes:
-        loss: part of the frames that get lost, 0 to 1.
-        delay: time that each frame takes [s]; jitter: longest time on top of it [s].
-        drop_every: mean time between two breaks of the link [s], 0: it holds.
+        loss: share of frames that are lost, 0 to 1.
+        delay: delay of each frame [s]; jitter: maximum additional delay [s].
+        drop_every: mean time between two breaks of the link [s]; 0: none.
     """
 
     loss: float = 0.0
@@ -32,7 +32,7 @@ PERFECT = LinkQuality()
 
 
 class PoorLink:
-    """Frames on their way.
+    """Frames under way on a poor link.
 
     Args:
         quality: of the link.
@@ -47,12 +47,12 @@ class PoorLink:
         self._plan_break(now)
 
     def begin(self, now: float) -> None:
-        """Be a new connection: nothing is on its way."""
+        """Start a new connection: no frame is under way."""
         self._frames.clear()
         self._plan_break(now)
 
     def change(self, quality: LinkQuality, now: float) -> None:
-        """Be another link from now on; what is on its way stays so."""
+        """Change the quality from now on; frames under way keep their arrival times."""
         if quality != self.quality:
             self.quality, self._random = quality, random.Random(quality.seed)
             self._plan_break(now)
@@ -68,14 +68,14 @@ class PoorLink:
         self._frames.append((due, frame))
 
     def take(self, now: float) -> list[bytes]:
-        """Frames that have arrived by now, in the order in which they were sent."""
+        """Frames that have arrived by now, in the order of sending."""
         arrived = []
         while self._frames and self._frames[0][0] <= now:
             arrived.append(self._frames.popleft()[1])
         return arrived
 
     def breaks(self, now: float) -> bool:
-        """Whether the link breaks, since this was last asked; what was on its way is lost."""
+        """Whether the link has broken since the last call; frames under way are lost."""
         if now < self._breaks_at:
             return False
         self.begin(now)
@@ -83,7 +83,7 @@ class PoorLink:
 
     @property
     def next_event(self) -> float:
-        """When the next frame arrives or the link breaks [s], inf for never."""
+        """Time of the next arrival or break [s], inf: never."""
         return min(self._frames[0][0] if self._frames else math.inf, self._breaks_at)
 
     def _plan_break(self, now: float) -> None:

@@ -3,7 +3,7 @@
 Publishes `motion_trigger` under id 125 (100 + the 25 subscribers that the sketch reserves): a heartbeat
 `{id, move: false}` at 2 Hz, and `{id, move: true}` at once when motion begins.
 
-What it sends may go over a poor link (`set_link`): frames come late or never, in real time, and the link breaks.
+Its frames may pass a poor link (`set_link`): they are delayed or lost, in real time, and the link breaks.
 
 Differs: the sketch reports motion with the next heartbeat, up to 0.5 s late, and publishes before it has negotiated.
 """
@@ -38,7 +38,7 @@ SEND_TIMEOUT = 5.0
 
 
 def _readable(timeout: float, *sockets: socket.socket) -> list[socket.socket]:
-    """Which of some sockets have something to read within `timeout` [s]; poll, as select knows 1024 files only."""
+    """Sockets that are readable within `timeout` [s]; uses poll, because select is limited to 1024 files."""
     poll = select.poll()
     by_fd = {sock.fileno(): sock for sock in sockets}
     for fd in by_fd:
@@ -47,16 +47,16 @@ def _readable(timeout: float, *sockets: socket.socket) -> list[socket.socket]:
 
 
 class EspClient:
-    """One sensor on its own thread; every method may be called from any thread and none blocks.
+    """One sensor on its own thread; every method may be called from any thread, and none blocks.
 
     Args:
         host: name or address of the bridge, IPv4 or IPv6; port: its TCP port.
         sensor_id: 0 to 255, the room that it watches.
         message_type: "rosbot_patrol/EspTrigger" or another package's message of the same definition.
         heartbeat_period: wall time between two heartbeats [s].
-        stuck_after: an output that is high for longer is told in the log [s].
-        key: 32 bytes that prove to a bridge with keys that this is that sensor.
-        insist: whether to talk only to a bridge that has shown that it has the key.
+        stuck_after: time after which a high output is logged as stuck [s].
+        key: 32 bytes that prove the sensor's identity to a bridge with keys.
+        insist: talk only to a bridge that has proved that it has the key.
         source: address to connect from, empty: the system's choice.
     """
 
@@ -88,8 +88,8 @@ class EspClient:
         self._stuck_told = False  # on this connection
         self._lock = threading.Lock()
         self._motion = False
-        self._pending = False  # a motion that has not been sent
-        self._receipt: int | None = None  # of a motion that was sent, until the bridge shows that it has it
+        self._pending = False  # a motion not sent yet
+        self._receipt: int | None = None  # of a sent motion, until the bridge has acknowledged it
         self._stopping = False
         self._reboot = False
         self._quality = PERFECT
@@ -101,7 +101,7 @@ class EspClient:
         self._thread = threading.Thread(target=self._run, name=f"esp{sensor_id}", daemon=True)
 
     def start(self) -> EspClient:
-        """Begin to connect; return self."""
+        """Start connecting; return self."""
         self._thread.start()
         return self
 
@@ -114,7 +114,7 @@ class EspClient:
 
     @property
     def connected(self) -> bool:
-        """Whether the bridge knows the sensor's topic, so that a trigger goes through at once."""
+        """Whether the bridge knows the sensor's topic, so that a trigger is sent at once."""
         return self._connected.is_set()
 
     def wait_connected(self, timeout: float) -> bool:
@@ -122,7 +122,7 @@ class EspClient:
         return self._connected.wait(timeout)
 
     def set_motion(self, active: bool) -> None:
-        """Tell the level of the sensor's output; a rising edge is reported at once, or as soon as connected."""
+        """Set the level of the sensor's output; a rising edge is reported at once, or when connected."""
         with self._lock:
             rising = active and not self._motion
             self._motion = active
@@ -134,13 +134,13 @@ class EspClient:
             self._wake()
 
     def trigger(self) -> None:
-        """Report one motion, whatever the level was."""
+        """Report one motion, whatever the level is."""
         with self._lock:
             self._pending = True
         self._wake()
 
     def reboot(self) -> None:
-        """Drop the link without a goodbye and forget everything but the id, as a reset does."""
+        """Drop the link without closing it and forget everything but the id, as a reset does."""
         with self._lock:
             self._pending = self._motion = False
             self._receipt = None
@@ -156,7 +156,7 @@ class EspClient:
         try:
             self._wake_write.send(b"\0")
         except (BlockingIOError, OSError):
-            return  # a wake-up is under way already, or the client has stopped
+            return  # a wake-up is already pending, or the client has stopped
 
     def _drain_wake(self) -> None:
         try:
@@ -190,7 +190,7 @@ class EspClient:
         self._wake_write.close()
 
     def _pause(self, seconds: float) -> None:
-        """Wait, but end at once when the client is stopped."""
+        """Wait, but return at once when the client is stopped."""
         until = time.monotonic() + seconds
         while not self._stopping and (left := until - time.monotonic()) > 0:
             if _readable(left, self._wake_read):
@@ -199,7 +199,7 @@ class EspClient:
                     return
 
     def _serve(self, link: socket.socket) -> None:
-        """Talk until the link ends, the client is stopped or rebooted."""
+        """Communicate until the link ends, or the client is stopped or rebooted."""
         self._reboot = False
         link.settimeout(SEND_TIMEOUT)
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -235,7 +235,7 @@ class EspClient:
                 return
 
     def _send(self, link: socket.socket, session: DeviceSession, now: float) -> None:
-        """Send what has come through the line."""
+        """Send the frames that have passed the link."""
         self._line.change(self._quality, now)
         for frame in session.take_output():
             self._line.put(frame, now)
@@ -243,13 +243,13 @@ class EspClient:
             link.sendall(frame)
 
     def _report_again(self) -> None:
-        """A motion that was sent just before the link ended: better twice than never."""
+        """Repeat a motion sent just before the link ended: better twice than never."""
         with self._lock:
             self._pending = self._pending or self._receipt is not None
             self._receipt = None
 
     def _publish_due(self, session: DeviceSession, now: float, heartbeat_due: float) -> float:
-        """Send what is due; return when the next heartbeat is."""
+        """Send what is due; return the time of the next heartbeat."""
         if not session.configured:
             return now
         with self._lock:
@@ -267,25 +267,25 @@ class EspClient:
         return now + self._heartbeat_period
 
     def _tell_stuck(self, session: DeviceSession, now: float) -> None:
-        """Say once a connection that the output does not fall any more."""
+        """Log a stuck output once per connection."""
         lasted = now - self._high_since
         if self._motion and not self._stuck_told and lasted > self._stuck_after:
             self._stuck_told = session.log(WARN, stuck_line(self.sensor_id, lasted))
 
     def _note(self, events: list[DeviceEvent]) -> bool:
-        """Whether to go on with this bridge."""
+        """Process an event; returns whether to keep this connection."""
         for event in events:
             if isinstance(event, Configured):
                 self._connected.set()
                 self._told = ""
             elif isinstance(event, NotTrusted):
-                if event.reason != self._told:  # it will be so at the next attempt too
+                if event.reason != self._told:  # log it once, as the next attempt will fail in the same way
                     self._told = event.reason
                     log.warning("sensor %d: %s:%d: %s", self.sensor_id, self.host, self.port, event.reason)
                 return False
             elif isinstance(event, Unconfigured):
                 self._connected.clear()
                 log.info("sensor %d: %s", self.sensor_id, event.reason)
-                if event.is_gone:  # what this link still holds goes out on the next one
+                if event.is_gone:  # frames still held are sent on the next link
                     return False
         return True

@@ -1,1 +1,1 @@
-"""The bytes of rosserial: framing, topic negotiation, keys."""
+"""Bytes of rosserial: framing, topic negotiation, keys."""

@@ -1,6 +1,6 @@
 """The key file of the sensors: `keys: {1: "64 hexadecimal digits", 2: ...}`, readable by its owner alone.
 
-The keys themselves are never on the parameter server, in a log or in a message of an error.
+Keys never appear on the parameter server, in a log or in an error message.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from rosbot_patrol.errors import ParamError
 from rosbot_patrol.rosserial.protocol.proof import KEY_SIZE
 from rosbot_patrol.yaml_files import read_mapping
 
-_MIN_DISTINCT = 8  # bytes; 32 random ones have hardly ever fewer than 24
+_MIN_DISTINCT = 8  # distinct bytes; 32 random ones hardly ever have fewer than 24
 
 
 def new_key() -> bytes:
-    """A random key."""
+    """Make a random key."""
     return secrets.token_bytes(KEY_SIZE)
 
 
 def yaml_line(sensor_id: int, key: bytes) -> str:
-    """What the bridge's key file says of a sensor, below `keys:`."""
+    """Line for a sensor in the bridge's key file, below `keys:`."""
     return f'  {sensor_id}: "{key.hex()}"'
 
 
 def c_define(sensor_id: int, key: bytes) -> str:
-    """What the firmware's header of credentials says."""
+    """Line for the firmware's header of credentials."""
     return f'#define SENSOR_ID {sensor_id}\n#define SENSOR_KEY "{key.hex()}"'
 
 
 def read_keys(path: str | Path) -> dict[int, bytes]:
-    """The keys of a file, by sensor id.
+    """Read the keys of a file, by sensor id.
 
     Raises:
         ParamError: it cannot be used; names the file and the sensor, never a key.
@@ -62,7 +62,7 @@ def read_keys(path: str | Path) -> dict[int, bytes]:
 
 
 def key_of(path: str | Path, sensor_id: int) -> bytes:
-    """The key of one sensor; raises ParamError where the file cannot be used or has none."""
+    """Read the key of one sensor; raises ParamError if the file cannot be used or lacks it."""
     keys = read_keys(path)
     if sensor_id not in keys:
         raise ParamError(
@@ -72,7 +72,7 @@ def key_of(path: str | Path, sensor_id: int) -> bytes:
 
 
 def add_key(path: str | Path, sensor_id: int, key: bytes, *, is_replacing: bool = False) -> None:
-    """Put a key into a file, which is made where it is not there yet; nobody else may read it.
+    """Add a key to a file, which is created if missing; nobody else may read it.
 
     Raises:
         ParamError: the file cannot be used, or has a key of that sensor already.

@@ -1,8 +1,8 @@
-"""Message types whose definition changed between ROS melodic and noetic, as old firmware still has them.
+"""Message types of old firmware whose definition changed between ROS melodic and noetic.
 
-A device tells the MD5 sum of the definition that it was built with. Its bytes are rewritten to the newer definition,
-and those that go to it to the older one. sensor_msgs/BatteryState is the only such type that a ROSbot sends: noetic
-added `temperature` after `voltage`, and `cell_temperature` after `cell_voltage`.
+A device announces the MD5 sum of the definition that it was built with. Its bytes are rewritten to the newer
+definition, and those sent to it to the older one. sensor_msgs/BatteryState is the only such type that a ROSbot sends:
+noetic added `temperature` after `voltage`, and `cell_temperature` after `cell_voltage`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import NamedTuple
 from rosbot_patrol.errors import ProtocolError
 
 _NAN = struct.pack("<f", float("nan"))
-_TEXT_AT = 12  # a header's frame_id, behind seq and stamp
+_TEXT_AT = 12  # offset of a header's frame_id, after seq and stamp
 _LEVELS = 24  # current to percentage, status to present [bytes]
 
 
@@ -24,7 +24,7 @@ class OldType(NamedTuple):
     Attributes:
         name: "package/Type".
         old, new: MD5 sums of the definitions.
-        upgrade: makes the newer bytes of older ones; downgrade: the other way round. Both raise ProtocolError.
+        upgrade: converts older bytes to newer ones; downgrade: the reverse. Both raise ProtocolError.
     """
 
     name: str
@@ -35,7 +35,7 @@ class OldType(NamedTuple):
 
 
 def find_old_type(message_type: str, theirs: str, ours: str) -> OldType | None:
-    """The older definition that a device has of a type, None where its definition is none known here.
+    """Find the older definition that a device has of a type; None if it is unknown here.
 
     Args:
         message_type: "package/Type".
@@ -49,7 +49,7 @@ def find_old_type(message_type: str, theirs: str, ours: str) -> OldType | None:
 
 
 def _after_numbers(data: bytes, at: int) -> tuple[int, int]:
-    """Length of an array of 4-byte numbers, and where it ends."""
+    """Length of an array of 4-byte numbers, and the offset of its end."""
     try:
         (count,) = struct.unpack_from("<I", data, at)
     except struct.error as err:

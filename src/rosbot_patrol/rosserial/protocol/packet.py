@@ -2,10 +2,10 @@
 
     ff fe | length, int16 LE | 255 - sum(length bytes) % 256 | topic id, uint16 LE | data | 255 - sum(id, data) % 256
 
-The parser takes bytes in pieces of any size and gives whole frames. Whatever is no frame is counted and skipped: it
-looks for the next sync bytes right behind the ones that failed, so a frame that was cut off costs itself only.
+The parser takes bytes in pieces of any size and returns whole frames. Invalid bytes are counted and skipped: it looks
+for the next sync bytes right after the failed ones, so a truncated frame costs only itself.
 
-Differs: rosserial_python reads the length that a damaged header claims and loses the good frames behind it.
+Differs: rosserial_python reads the length in a damaged header and loses the good frames after it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MAX_PAYLOAD = 0x7FFF
 
 
 class Packet(NamedTuple):
-    """One frame: which topic, and its serialised message."""
+    """One frame: topic id and serialised message."""
 
     topic_id: int
     data: bytes
@@ -35,10 +35,10 @@ def checksum(data: bytes | bytearray | memoryview) -> int:
 
 
 def encode(topic_id: int, data: bytes = b"") -> bytes:
-    """One frame.
+    """Make the bytes of one frame.
 
     Raises:
-        ProtocolError: the data are longer than the format can say.
+        ProtocolError: the data are too long for the format.
     """
     if len(data) > MAX_PAYLOAD:
         raise ProtocolError("", f"{len(data)} bytes for topic id {topic_id}, a frame holds {MAX_PAYLOAD}")
@@ -48,15 +48,15 @@ def encode(topic_id: int, data: bytes = b"") -> bytes:
 
 
 class Parser:
-    """Turns a stream of bytes into frames; never raises, and holds at most one frame of `max_payload` bytes.
+    """Converts a stream of bytes to frames; never raises, and holds at most one frame of `max_payload` bytes.
 
     Attributes:
         frames: good frames so far.
-        garbage: bytes skipped so far because they belonged to none.
-        bad_checksums: frames whose data did not add up.
+        garbage: bytes skipped so far that belonged to no frame.
+        bad_checksums: frames with a wrong checksum.
         oversized: headers that announced more than `max_payload` bytes.
         garbage_run: bytes skipped since the last good frame.
-        fault: what was wrong with the first frame that did not add up or was too long, "" before there was one.
+        fault: description of the first frame with a wrong checksum or length, "" before the first.
     """
 
     def __init__(self, max_payload: int = MAX_PAYLOAD) -> None:
@@ -71,11 +71,11 @@ class Parser:
 
     @property
     def pending(self) -> int:
-        """Bytes of a frame that has begun and not ended."""
+        """Number of bytes of an incomplete frame."""
         return len(self._buffer)
 
     def feed(self, data: bytes) -> list[Packet]:
-        """Take bytes as they came; return the frames that they complete."""
+        """Add received bytes; returns the frames that they complete."""
         stream: bytes | bytearray = data
         if self._buffer:
             self._buffer += data
@@ -89,7 +89,7 @@ class Parser:
         return packets
 
     def give_up(self) -> list[Packet]:
-        """Stop waiting for the rest of the frame that has begun; return whole frames found behind its first byte."""
+        """Give up the incomplete frame; returns whole frames found after its first byte."""
         if not self._buffer:
             return []
         self._skip(1)
@@ -97,7 +97,7 @@ class Parser:
         return self.feed(b"")
 
     def _scan(self, stream: bytes | bytearray, packets: list[Packet]) -> int:
-        """Append the frames in `stream`; return where the first undecided byte is."""
+        """Append the frames in `stream`; returns the index of the first undecided byte."""
         start, length = 0, len(stream)
         while True:
             found = stream.find(SYNC, start)

@@ -1,12 +1,12 @@
-"""How a sensor with a pre-shared key proves who it is, before anything else is said on its connection.
+"""Proof of a sensor's identity with a pre-shared key, before anything else on its connection.
 
     bridge -> device  topic id 8   01 | server nonce (32)
     device -> bridge  topic id 9   01 | sensor id (1) | device nonce (16) | HMAC(key, SENSOR + both nonces + id) (32)
     bridge -> device  topic id 9   01 | HMAC(key, BRIDGE + both nonces + id) (32)
 
-HMAC is that of RFC 2104 with SHA-256; the nonces are random and new on each connection, so that what was overheard is
-worth nothing on another. The labels differ by direction, so that a proof cannot be sent back as the other's. Upstream
-rosserial uses neither topic id. The proof says who connects; what follows is neither encrypted nor signed.
+HMAC is that of RFC 2104 with SHA-256. The nonces are random and new on each connection, so that a recorded proof is
+worthless on another one. The labels differ by direction, so that a proof cannot be reflected. Upstream rosserial uses
+neither topic id. The proof authenticates the connection; what follows is neither encrypted nor signed.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ _PROOF_SIZE = 1 + 1 + DEVICE_NONCE_SIZE + MAC_SIZE
 
 
 def sensor_mac(key: bytes, server_nonce: bytes, device_nonce: bytes, sensor_id: int) -> bytes:
-    """What proves that a device has the key of that sensor."""
+    """MAC that proves that a device has the key of that sensor."""
     return hmac.digest(key, _SENSOR + server_nonce + device_nonce + bytes((sensor_id,)), hashlib.sha256)
 
 
 def bridge_mac(key: bytes, server_nonce: bytes, device_nonce: bytes, sensor_id: int) -> bytes:
-    """What proves to the device that this is its bridge."""
+    """MAC that proves to the device that this is its bridge."""
     return hmac.digest(key, _BRIDGE + device_nonce + server_nonce + bytes((sensor_id,)), hashlib.sha256)
 
 
 class Gate:
-    """The bridge's side of one connection that has not proved itself.
+    """The bridge's side of one unproven connection.
 
     Args:
         keys: by sensor id.
@@ -62,16 +62,16 @@ class Gate:
         self.challenge = encode(TopicId.CHALLENGE, VERSION + self._nonce)
 
     def check(self, data: bytes) -> tuple[int, bytes]:
-        """The sensor id that a proof proves, and the frame that answers it.
+        """Check a proof; returns the sensor id and the answering frame.
 
         Raises:
-            ProtocolError: it proves nothing.
+            ProtocolError: the proof is invalid.
         """
         if len(data) != _PROOF_SIZE or data[:1] != VERSION:
             raise ProtocolError("", f"{count_of(len(data), 'byte that is', 'bytes that are')} no proof of version 1")
         sensor_id, device_nonce, mac = data[1], data[2 : 2 + DEVICE_NONCE_SIZE], data[2 + DEVICE_NONCE_SIZE :]
         key = self._keys.get(sensor_id)
-        # without a key the same is computed in vain: how long it takes does not tell which ids there are
+        # without a key the MAC is computed all the same, so that the time taken does not reveal which ids exist
         expected = sensor_mac(key or bytes(KEY_SIZE), self._nonce, device_nonce, sensor_id)
         is_good = hmac.compare_digest(mac, expected)
         if key is None:
@@ -83,7 +83,7 @@ class Gate:
 
 
 class Prover:
-    """The device's side of one connection: answers the challenge and checks the bridge's answer to that.
+    """The device's side of one connection: answers the challenge and checks the bridge's answer.
 
     Args:
         sensor_id: 0 to 255; key: its 32 bytes.
@@ -97,7 +97,7 @@ class Prover:
         self._expected: bytes | None = None
 
     def answer(self, challenge: bytes, nonce: bytes | None = None) -> bytes:
-        """The frame that answers a challenge (`nonce`: only tests give one).
+        """Frame that answers a challenge (`nonce`: for tests only).
 
         Raises:
             ProtocolError: it is no challenge.
@@ -113,5 +113,5 @@ class Prover:
         return encode(TopicId.PROOF, VERSION + bytes((self._sensor_id,)) + nonce + mac)
 
     def confirms(self, answer: bytes) -> bool:
-        """Whether the bridge's answer to the last proof shows that it has the key too."""
+        """Whether the bridge's answer to the last proof shows that it has the key, too."""
         return self._expected is not None and hmac.compare_digest(answer, self._expected)

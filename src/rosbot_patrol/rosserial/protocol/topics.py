@@ -1,6 +1,6 @@
-"""What the frames below topic id 100 carry: topic negotiation, time, log and parameter requests.
+"""Frames with topic ids below 100: topic negotiation, time, log and parameter requests.
 
-Serialised as ROS 1 does (little endian, strings with a uint32 length), by struct, so that no message class is needed.
+Serialised as in ROS 1 (little endian, strings with a uint32 length) by struct, so that no message class is needed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ FIRST_USER_ID = 100
 
 
 class TopicId(IntEnum):
-    """Topic ids with a meaning of their own (rosserial_msgs/TopicInfo; 8 and 9 are ours, see `proof`)."""
+    """Reserved topic ids (rosserial_msgs/TopicInfo; 8 and 9 are ours, see `proof`)."""
 
     PUBLISHER = 0
     SUBSCRIBER = 1
@@ -145,7 +145,7 @@ def pack_esp_trigger(sensor_id: int, move: bool) -> bytes:
 
 
 def unpack_esp_trigger(data: bytes) -> tuple[int, bool]:
-    """Read rosbot_patrol/EspTrigger: sensor id, and whether something moves; raises ProtocolError."""
+    """Read rosbot_patrol/EspTrigger: sensor id, and whether there is motion; raises ProtocolError."""
     if len(data) != 2:
         raise ProtocolError("", f"an EspTrigger of {count_of(len(data), 'byte')}, expected 2")
     return data[0], data[1] != 0
@@ -153,7 +153,7 @@ def unpack_esp_trigger(data: bytes) -> tuple[int, bool]:
 
 @dataclass(frozen=True, kw_only=True)
 class ParamValues:
-    """The answer to a parameter request (rosserial_msgs/RequestParam): at most one of the lists is filled."""
+    """Answer to a parameter request (rosserial_msgs/RequestParam): at most one of the lists is filled."""
 
     ints: tuple[int, ...] = field(default=())
     floats: tuple[float, ...] = field(default=())
@@ -161,10 +161,10 @@ class ParamValues:
 
 
 def param_values(value: object) -> ParamValues:
-    """A ROS parameter as the answer carries it: bool and int as ints, lists of one kind.
+    """Convert a ROS parameter to the answer's form: bool and int as ints, lists of one type.
 
     Raises:
-        ProtocolError: the value is a group, empty of type, of mixed kinds, or an integer beyond 32 bits.
+        ProtocolError: the value is a group, an empty list, of mixed types, or an integer beyond 32 bits.
     """
     items: list[Any] = list(value) if isinstance(value, (list, tuple)) else [value]
     if all(isinstance(item, int) for item in items):
@@ -179,7 +179,7 @@ def param_values(value: object) -> ParamValues:
 
 
 def unpack_param_request(data: bytes) -> str:
-    """Read the name of the parameter asked for; raises ProtocolError."""
+    """Read the name of the requested parameter; raises ProtocolError."""
     return _Reader(data).string()
 
 

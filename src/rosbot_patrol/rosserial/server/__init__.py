@@ -1,1 +1,1 @@
-"""The bridge: connections, sessions, what each device may do."""
+"""The bridge: connections, sessions, and permissions of devices."""

@@ -1,7 +1,7 @@
-"""Who is let in: how many connections there may be, in all and of one address, and who leaves for a newcomer.
+"""Admission of connections: limits in total and per address, and which one leaves for a newcomer.
 
-A stranger is a connection that has neither proved itself nor announced a topic that it may have. Strangers never keep a
-sensor out: the oldest of them leaves for a newcomer, first of the newcomer's own address.
+A stranger is a connection that has neither proved its identity nor announced a permitted topic. Strangers never keep a
+sensor out: the oldest of them leaves for a newcomer, first one of the newcomer's own address.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from rosbot_patrol.rosserial.server.budget import Budget
 from rosbot_patrol.rosserial.server.client import Client
 
 CONNECTION_COST = 4.0  # of an address's budget, in frames
-BURST = 0.25  # [s] of an address's frames at once: what comes between is not delayed by more
-KEPT_ADDRESSES = 1000  # without a connection, whose budgets are remembered
-MAX_PER_SENSOR = 4  # connections that have proved to be one sensor
+BURST = 0.25  # [s] worth of an address's frames at once: other frames are not delayed by more
+KEPT_ADDRESSES = 1000  # addresses without a connection with remembered budgets
+MAX_PER_SENSOR = 4  # connections that have proved the same sensor
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """How many may come, and how much those of one address may send.
+    """Limits on connections, and on the frames from one address.
 
     Attributes:
         clients: TCP connections on all ports together.
         per_address: of one address, 0 for no limit of its own.
         strangers: of one address, at least 1.
-        rate: frames a second of one address, beyond which its clients are read more slowly; 0 for no limit.
+        rate: frames per second from one address; faster clients are read more slowly; 0: no limit.
     """
 
     clients: int = 600
@@ -36,7 +36,7 @@ class Limits:
 
 
 class _Crowd:
-    """The connections of one address; strangers in the order in which they came."""
+    """Connections of one address; strangers in the order of their arrival."""
 
     def __init__(self, rate: float, now: float) -> None:
         self.count = 0
@@ -45,7 +45,7 @@ class _Crowd:
 
 
 class Door:
-    """Keeps count."""
+    """Counts connections and decides on admission."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
@@ -56,11 +56,11 @@ class Door:
 
     @property
     def strangers(self) -> int:
-        """How many connections are strangers."""
+        """Number of strangers."""
         return len(self._strangers)
 
     def ask(self, address: str, now: float) -> tuple[str | None, Client | None]:
-        """Why no further connection of an address is taken (None where it is), and the stranger that leaves for it."""
+        """Reason why an address gets no further connection (None if it does), and the stranger that leaves for it."""
         limits, crowd = self._limits, self._crowd(address, now)
         if crowd.budget.spend(0.0, now) > 0.0:
             return "its address connects or sends too often", None
@@ -78,7 +78,7 @@ class Door:
         return (None, stranger) if stranger is not None else (f"{many} connected", None)
 
     def enter(self, client: Client, now: float) -> None:
-        """A connection has been taken; it is a stranger."""
+        """Count a new connection, as a stranger."""
         crowd = self._crowd(client.address, now)
         client.shared = crowd.budget
         crowd.count += 1
@@ -87,19 +87,19 @@ class Door:
         self._count += 1
 
     def prove(self, client: Client, sensor_id: int) -> bool:
-        """It has proved to be a sensor; return whether there may be one more of it (a stolen key is worth few)."""
+        """Count a proved connection; returns whether its sensor may have one more (limits a stolen key)."""
         clients = self._proven.setdefault(sensor_id, set())
         clients.add(client)
         self.settle(client)
         return len(clients) <= MAX_PER_SENSOR
 
     def settle(self, client: Client) -> None:
-        """It is no stranger any more."""
+        """Count a connection as no stranger any more."""
         if self._strangers.pop(client, self) is None:
             self._crowds[client.address].strangers.pop(client, None)
 
     def leave(self, client: Client) -> None:
-        """Its connection has ended."""
+        """Remove an ended connection."""
         self.settle(client)
         self._crowds[client.address].count -= 1
         self._count -= 1

@@ -1,15 +1,15 @@
-"""How much a client, or all clients of one address, may ask for in a second."""
+"""Rate limit of a client, or of all clients of one address."""
 
 from __future__ import annotations
 
 
 class Budget:
-    """Fills with `rate` a second; may be overdrawn, and then one has to wait.
+    """Token bucket that fills with `rate` per second; it may be overdrawn, and then the client waits.
 
     Args:
         rate: units a second, 0 for no limit.
         now: time at which it is full [s].
-        seconds: how many seconds' worth it holds.
+        seconds: capacity, in seconds of `rate`.
     """
 
     __slots__ = ("_at", "_credit", "_most", "_rate")
@@ -21,11 +21,11 @@ class Budget:
 
     @property
     def debt(self) -> float:
-        """How much of it was used up when it was last asked, 0 without a limit."""
+        """Amount used at the last call, 0 without a limit."""
         return self._most - self._credit
 
     def spend(self, cost: float, now: float) -> float:
-        """Take `cost` units (0 to only ask); return how long nothing more may be taken [s]."""
+        """Take `cost` units (0: only ask); returns how long nothing more may be taken [s]."""
         rate = self._rate
         if rate <= 0.0:
             return 0.0

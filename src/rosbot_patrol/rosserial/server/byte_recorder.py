@@ -1,4 +1,4 @@
-"""Listening to what devices send, byte for byte, so that it can be recorded and replayed."""
+"""Recording of the bytes that devices send, to store and replay them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from rosbot_patrol.rosserial.server.client import Client
 
 
 class Tap(Protocol):
-    """Told of each connection by the server's thread; it must not block."""
+    """Observer of connections, called on the server's thread; it must not block."""
 
     def opened(self, client: Client) -> None:
         """A connection began."""
 
     def data(self, client: Client, data: bytes) -> None:
-        """Bytes came."""
+        """Bytes arrived."""
 
     def closed(self, client: Client) -> None:
-        """It ended."""
+        """A connection ended."""

@@ -1,4 +1,4 @@
-"""One connection of the server: a link, its session, and the frames that wait to be sent."""
+"""One connection of the server: a link, its session, and the frames to be sent."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from rosbot_patrol.rosserial.server.session import Session
 
 MAX_WAITING = 256  # frames
 UNLIMITED = Budget(0.0, 0.0)
-STUCK_AFTER = 15.0  # a client that takes nothing of what waits for it [s]
+STUCK_AFTER = 15.0  # time after which a client that reads nothing is stuck [s]
 SOCKET_BUFFER = 32768  # of a restricted client, each way [bytes]
 
 
 class Link(Protocol):
-    """What the server needs of a socket or a serial device, both without waiting."""
+    """Interface of a non-blocking socket or serial device."""
 
     def fileno(self) -> int: ...  # noqa: D102
     def recv(self, size: int, /) -> bytes: ...  # noqa: D102
@@ -34,15 +34,15 @@ class Client:
     """A connected device.
 
     Attributes:
-        peer: "ADDRESS:PORT" or the path of the serial device; address: the part that stays at a reconnect.
+        peer: "ADDRESS:PORT" or the path of the serial device; address: the part that survives a reconnect.
         on_tcp: whether it came over the network.
-        sensor_id: the id that it last reported in its EspTriggers, None before the first.
-        refused: things that it wanted and was not given; last_refusal: the last of them; last_refused: when [s].
-        discarded: frames for it that were thrown away because it took none.
-        read_from: no bytes are read before that time [s].
-        shared: the budget of frames that it shares with the others of its address.
-        older: connections of the same sensor, closed when they have fallen silent.
-        watched: the selector's events that the server waits for, 0 for none.
+        sensor_id: the id in its last EspTrigger, None before the first.
+        refused: number of refused requests; last_refusal: the last of them; last_refused: its time [s].
+        discarded: frames for it that were dropped because it read none.
+        read_from: time before which no bytes are read [s].
+        shared: the budget of frames shared by all clients of its address.
+        older: connections of the same sensor, to be closed when silent.
+        watched: the selector's events that the server waits for, 0: none.
     """
 
     def __init__(self, link: Link, session: Session, peer: str, address: str, *, on_tcp: bool = True) -> None:
@@ -65,12 +65,12 @@ class Client:
         self._waiting: deque[bytes] = deque()
         self._waiting_bytes = 0
         self._sent = 0
-        self._last_sent = (-1, 0.0)  # how much, and when that was first seen
+        self._last_sent = (-1, 0.0)  # bytes sent, and when that number was first seen
         self._lock = threading.Lock()
 
     @property
     def sensor(self) -> tuple[object, ...] | None:
-        """Which sensor this is: address, topics and sensor id; None before they are known."""
+        """Identity of the sensor: address, topics and sensor id; None before they are known."""
         if self.sensor_id is None:
             return None
         topics = frozenset((i, info.name, info.message_type) for i, (_, info) in self.session.incoming.items())
@@ -78,16 +78,16 @@ class Client:
 
     @property
     def wants_write(self) -> bool:
-        """Whether frames wait."""
+        """Whether frames wait to be sent."""
         return bool(self._waiting)
 
     def has_to_do(self, now: float) -> bool:
-        """Whether there is something to send, or reading is to begin again."""
+        """Whether there is something to send, or reading is to resume."""
         paused = not self.watched & selectors.EVENT_READ
         return bool(self._waiting) or self.session.has_output or (paused and self.read_from <= now)
 
     def note_message(self, md5: str, data: bytes) -> bool:
-        """Learn the sensor's id from an EspTrigger; return whether it came on this connection for the first time."""
+        """Read the sensor's id from an EspTrigger; returns whether it is new on this connection."""
         if md5 != ESP_TRIGGER_MD5 or len(data) != 2 or data[0] == self.sensor_id:
             return False
         self.sensor_id = data[0]
@@ -97,13 +97,13 @@ class Client:
         return True
 
     def note_refusal(self, what: str, now: float) -> None:
-        """It wanted something that it was not given."""
+        """Record a refused request."""
         self.refused += 1
         self.last_refusal = what[:200]
         self.last_refused = now
 
     def is_stuck(self, now: float) -> bool:
-        """Whether it has taken nothing for long of what waits for it; ask all the time."""
+        """Whether it has read nothing for long although frames wait; call it regularly."""
         if not self._waiting or self._last_sent[0] != self._sent:
             self._last_sent = self._sent, now
         return now - self._last_sent[1] > STUCK_AFTER
@@ -121,7 +121,7 @@ class Client:
         self._queue(encode(topic_id, data))
 
     def flush(self) -> None:
-        """Send what the link takes, each frame in one piece.
+        """Send as much as the link accepts, each frame in one piece.
 
         Raises:
             OSError: the link is gone.
@@ -152,7 +152,7 @@ class Client:
                 len(self._waiting) >= MAX_WAITING or self._waiting_bytes + len(frame) > most
             ):
                 self._waiting_bytes -= len(self._waiting[1])
-                del self._waiting[1]  # the first may be half sent
+                del self._waiting[1]  # the first may be partly sent
                 self.discarded += 1
             self._waiting.append(frame)
             self._waiting_bytes += len(frame)
@@ -166,7 +166,7 @@ def peer_names(address: tuple[object, ...]) -> tuple[str, str]:
 
 
 def listen(port: int, host: str = "") -> socket.socket:
-    """A listening socket for IPv4 and IPv6, or for IPv4 alone where the machine has no IPv6.
+    """Listening socket for IPv4 and IPv6, or for IPv4 alone on a machine without IPv6.
 
     Raises:
         ProtocolError: the port is taken or may not be used.
@@ -201,7 +201,7 @@ def _why_not(port: int, problem: OSError | None) -> str:
 
 
 def tune(link: socket.socket, *, restricted: bool) -> None:
-    """No delay for small frames, a dead peer is noticed within about 11 s, and a stranger fills no large buffers."""
+    """Send small frames at once, detect a dead peer within about 11 s, and keep a stranger's buffers small."""
     link.setblocking(False)
     if restricted:
         link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SOCKET_BUFFER)

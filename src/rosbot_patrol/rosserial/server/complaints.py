@@ -1,4 +1,4 @@
-"""Say a thing once to each, not in a flood."""
+"""Messages that are logged once each, and never in a flood."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Hashable
 
 
 def printable(text: str, limit: int = 200) -> str:
-    """What a stranger said, in one line without control characters, as it may go into a log."""
+    """Text from a stranger in one line without control characters, fit for a log."""
     shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text[:limit])
     return shown + ("..." if len(text) > limit else "")
 
 
 class Complaints:
-    """Remembers what has been said; a thing is said again after `period` [s], and memory is bounded.
+    """Remembers messages; each is repeated only after `period` [s], and memory is bounded.
 
     Args:
         period: how long a complaint is not repeated [s].
-        capacity: how many are remembered; the oldest is forgotten first.
+        capacity: number of remembered messages; the oldest is forgotten first.
     """
 
     def __init__(self, period: float = 600.0, capacity: int = 1000) -> None:
@@ -28,7 +28,7 @@ class Complaints:
         self._minutes: OrderedDict[Hashable, tuple[float, int]] = OrderedDict()
 
     def is_new(self, key: Hashable, now: float) -> bool:
-        """Whether this should be said now; if so it counts as said."""
+        """Whether a message should be logged now; if so it counts as logged."""
         said = self._said.get(key)
         if said is not None and 0.0 <= now - said < self._period:
             return False
@@ -39,9 +39,9 @@ class Complaints:
         return True
 
     def may_speak(self, group: Hashable, now: float, limit: int = 60) -> bool:
-        """Count a line about `group`; whether it is among the first `limit` of its minute.
+        """Count a line about `group`; returns whether it is among the first `limit` of its minute.
 
-        `left_out` tells that the line just counted was the first that is not.
+        `left_out` tells that this line is the first one beyond the limit.
         """
         began, count = self._minutes.get(group, (now, 0))
         if not 0.0 <= now - began < 60.0:

@@ -1,4 +1,4 @@
-"""What follows from what a device says: events go to the handler, answers back to it, refusals to the log."""
+"""Reactions to a device's events: messages go to the handler, answers to the device, refusals to the log."""
 
 from __future__ import annotations
 
@@ -30,42 +30,42 @@ from rosbot_patrol.rosserial.server.policy import Policy
 
 
 class Handler(Protocol):
-    """Where messages go to and come from; called on the server's thread, must not wait."""
+    """Source and destination of messages; called on the server's thread, must not block."""
 
     def open(self, client: Client, kind: TopicId, info: TopicInfo) -> None:
-        """A topic or service is announced; raises ProtocolError where it cannot be had."""
+        """A topic or service is announced; raises ProtocolError if it is not available."""
 
     def receive(self, client: Client, kind: TopicId, info: TopicInfo, data: bytes) -> None:
-        """A message came; raises ProtocolError where it makes no sense."""
+        """A message arrived; raises ProtocolError if it is invalid."""
 
     def flush(self) -> None:
-        """No more messages for now: hand on those that came, before the device is answered."""
+        """No more messages for now: pass on those received, before the device is answered."""
 
     def tick(self) -> None:
-        """A quarter of a second has gone by."""
+        """A quarter of a second has passed."""
 
     def closed(self, client: Client) -> None:
-        """The client has gone, and all its topics with it."""
+        """The client has gone, with all its topics."""
 
     def time(self) -> tuple[int, int]:
-        """The time told to devices: seconds, nanoseconds."""
+        """Time for devices: seconds, nanoseconds."""
 
     def device_log(self, client: Client, level: int, text: str) -> None:
         """The device logs something, level 0 (debug) to 4 (fatal)."""
 
     def parameter(self, name: str) -> object:
-        """The value of a parameter; raises ProtocolError where it is not set."""
+        """Value of a parameter; raises ProtocolError if it is not set."""
 
 
 class Dispatcher:
-    """Serves all clients of a server.
+    """Handles the events of all clients of a server.
 
     Args:
         handler: the other side.
         policy: what devices may do.
-        door: who was let in; journal: what is logged of them.
-        hang_up: ends a connection, with the reason to log, None where it is logged already.
-        on_new_sensor: a client speaks for a sensor for the first time.
+        door: admission; journal: log about clients.
+        hang_up: ends a connection, with the reason to log; None: already logged.
+        on_new_sensor: called when a client first speaks for a sensor.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Dispatcher:
         self._names: set[str] = set()
 
     def take(self, client: Client, events: list[Event], now: float) -> None:
-        """Do what the events of a client's session ask for."""
+        """Handle the events of a client's session."""
         for event in events:
             if client.closed:
                 return
@@ -99,7 +99,7 @@ class Dispatcher:
 
     def _event(self, client: Client, event: Event, now: float) -> None:
         if isinstance(event, Received):
-            if not client.session.accepts(event):  # refused since, in the same piece of data
+            if not client.session.accepts(event):  # meanwhile refused, in the same piece of data
                 return
             if client.note_message(event.info.md5, event.data):
                 self._on_new_sensor(client)

@@ -1,4 +1,4 @@
-"""What the bytes of a device mean to the server's side of rosserial (`session`)."""
+"""Events of the server's side of rosserial, made from a device's bytes (`session`)."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from rosbot_patrol.rosserial.protocol.topics import TopicId, TopicInfo
 
 @dataclass(frozen=True)
 class Announced:
-    """A topic that the policy allows; answer with `Session.reject` where it cannot be had."""
+    """A permitted topic; answer with `Session.reject` if it is not available."""
 
     kind: TopicId
     info: TopicInfo
 
 
-class Received(NamedTuple):  # comes by the thousand
+class Received(NamedTuple):  # there are thousands of these
     """A message of the device on a topic that it announced."""
 
     kind: TopicId
@@ -26,7 +26,7 @@ class Received(NamedTuple):  # comes by the thousand
 
 @dataclass(frozen=True)
 class Refused:
-    """A topic, or what was sent on none, is not accepted."""
+    """A topic, or a message without one, was refused."""
 
     what: str
     reason: str
@@ -34,7 +34,7 @@ class Refused:
 
 @dataclass(frozen=True)
 class LogLine:
-    """The device logs, level 0 (debug) to 4 (fatal)."""
+    """A log line of the device, level 0 (debug) to 4 (fatal)."""
 
     level: int
     text: str
@@ -47,14 +47,14 @@ class TimeAsked:
 
 @dataclass(frozen=True)
 class ParamAsked:
-    """The device asks for a parameter that it may know; answer with `Session.answer_param`."""
+    """The device asks for a permitted parameter; answer with `Session.answer_param`."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class Garbled:
-    """Bytes came that are no frame; told once a connection, with what is wrong where they look like one."""
+    """Bytes arrived that are no frame; reported once per connection, with the fault of what looks like a frame."""
 
     sample: bytes
     fault: str = ""
@@ -62,24 +62,24 @@ class Garbled:
 
 @dataclass(frozen=True)
 class SyncLost:
-    """Nothing was heard for some time; the topics are asked for again."""
+    """Nothing arrived for some time; the topics are requested again."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class Proven:
-    """The device has the key of that sensor."""
+    """The device has proved that it has the key of that sensor."""
 
     sensor_id: int
 
 
 @dataclass(frozen=True)
 class HangUp:
-    """The connection is not worth keeping.
+    """The connection should be closed.
 
     Attributes:
-        is_refusal: a stranger is turned away, which is said once and not at each of its attempts.
+        is_refusal: a stranger is turned away, which is logged once and not at each attempt.
     """
 
     reason: str

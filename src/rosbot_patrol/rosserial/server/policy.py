@@ -1,7 +1,7 @@
-"""Who may do what over rosserial: allow-lists of topics, services, parameters and peers, and limits.
+"""Permissions over rosserial: allow-lists of topics, services, parameters and peers, and limits.
 
-A wire of the robot's own (a serial device) is trusted; whoever reaches a TCP port is a stranger, who may tell that
-something moves and nothing else.
+A serial device, a wire of the robot itself, is trusted. Anyone on a TCP port is a stranger, who may report motion and
+nothing else.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
 @dataclass(frozen=True)
 class Rule:
-    """A topic or service name, and the one type that it may have; "*" stands for any.
+    """A topic or service name and its permitted type; "*" stands for any.
 
     Attributes:
-        verb: "offer" or "call" where a rule of services is about one of them only.
+        verb: "offer" or "call" if a service rule permits only one of them.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Rule:
 
 
 def parse_rules(texts: Iterable[str], param_name: str, *, verbs: tuple[str, ...] = ()) -> tuple[Rule, ...]:
-    """Rules from texts "NAME TYPE", as "/motion_trigger rosbot_patrol/EspTrigger"; one of the verbs may go before it.
+    """Parse rules "NAME TYPE", such as "/motion_trigger rosbot_patrol/EspTrigger", with an optional verb before.
 
     Raises:
         ParamError: one of them has another form.
@@ -60,7 +60,7 @@ def parse_rules(texts: Iterable[str], param_name: str, *, verbs: tuple[str, ...]
 
 
 def parse_networks(texts: Iterable[str], param_name: str) -> tuple[Network, ...]:
-    """Addresses and networks ("192.168.1.7", "fc94::/16"); raises ParamError."""
+    """Parse addresses and networks ("192.168.1.7", "fc94::/16"); raises ParamError."""
     networks = []
     for text in texts:
         try:
@@ -72,14 +72,14 @@ def parse_networks(texts: Iterable[str], param_name: str) -> tuple[Network, ...]
 
 @dataclass(frozen=True)
 class SensorRule:
-    """Which sensors the peers of a network may be; None for any."""
+    """Sensor ids permitted to the peers of a network; None: any."""
 
     network: Network
     sensor_ids: frozenset[int] | None
 
 
 def parse_sensors(texts: Iterable[str], param_name: str) -> tuple[SensorRule, ...]:
-    """Rules from texts "NETWORK IDS", as "192.168.1.12 2", "10.0.0.0/24 1-4 7" or "fc94::/16 *"; raises ParamError."""
+    """Parse rules "NETWORK IDS", such as "192.168.1.12 2", "10.0.0.0/24 1-4 7", "fc94::/16 *"; raises ParamError."""
     rules = []
     for text in texts:
         network, *parts = text.split() or [""]
@@ -108,22 +108,22 @@ def _address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
 
 @dataclass(frozen=True, kw_only=True)
 class Policy:
-    """What one kind of link is allowed.
+    """Permissions of one kind of link.
 
     Attributes:
         restricted: whether the lists count; if not, everything is allowed.
         publish, subscribe, services: rules of what a device may do.
-        parameters: parameters that it is told.
+        parameters: parameters that it may read.
         peers: networks that may connect; empty: all.
-        keys: of the sensors, by id; where there are any, each device must prove that it has one of them.
-        sensors: which sensors peers may be, the rule of the smallest network counts; empty: any.
+        keys: of the sensors, by id; if there are any, each device must prove that it has one.
+        sensors: sensors permitted to peers; the rule of the smallest network counts; empty: any.
         max_payload: longest message [bytes]; max_topics: most topics of one client; max_sensors: for how many motion
             sensors it may speak.
-        max_names: most topics that all clients together may make, as they stay advertised when a client goes.
-        max_rate: frames a second beyond which a client is read more slowly, 0 for no limit.
-        max_garbage: bytes without a frame in them after which a client is hung up on, 0 for never.
-        max_frame_time: how long a frame may take from its first byte to its last [s], 0 for any time.
-        max_waiting: bytes that wait for a client before the oldest frames are thrown away.
+        max_names: most topics that all clients together may create; they stay advertised after a client has gone.
+        max_rate: frames per second beyond which a client is read more slowly; 0: no limit.
+        max_garbage: bytes without a frame after which a client is disconnected; 0: never.
+        max_frame_time: longest time from the first byte of a frame to its last [s]; 0: no limit.
+        max_waiting: queued bytes for a client beyond which the oldest frames are dropped.
     """
 
     restricted: bool = True
@@ -144,7 +144,7 @@ class Policy:
     max_waiting: int = 65536
 
     def refusal(self, kind: TopicId, info: TopicInfo) -> str | None:
-        """Why a topic is not allowed, None where it is."""
+        """Reason why a topic is not permitted, None if it is."""
         if not _GRAPH_NAME.fullmatch(info.name) or not _TYPE_NAME.fullmatch(info.message_type):
             return "the name or the type is none that ROS allows"
         if not self.restricted:
@@ -162,7 +162,7 @@ class Policy:
         return f"not on the list of what it may {does}"
 
     def may_read(self, parameter: str) -> bool:
-        """Whether a device is told that parameter."""
+        """Whether a device may read that parameter."""
         return not self.restricted or parameter in self.parameters
 
     def may_connect(self, address: str) -> bool:
@@ -173,7 +173,7 @@ class Policy:
         return found is not None and any(found in n for n in self.peers if n.version == found.version)
 
     def sensor_ids(self, address: str) -> frozenset[int] | None:
-        """The sensors that a peer may be, None for any. A serial device, whose address is a path, may be any."""
+        """Sensors permitted to a peer, None: any. A serial device, with a path for an address, may be any."""
         found = _address(address)
         if not self.sensors or found is None:
             return None

@@ -1,4 +1,4 @@
-"""What there is to tell of the clients of a server, bounded: the few that matter in full, the others in a line each."""
+"""Report on the clients of a server, bounded: the important ones in full, the others in one line each."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from enum import IntEnum
 from rosbot_patrol.rosserial.server.client import Client
 
 IN_SYNC = 5.0  # [s] since the last frame
-RECENT = 60.0  # a refusal counts as a fault for that long [s]
-MOST = 20  # clients that are told of in full
+RECENT = 60.0  # time for which a refusal counts as a fault [s]
+MOST = 20  # number of clients reported in full
 
 
 class Level(IntEnum):
@@ -23,10 +23,10 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class ClientState:
-    """One client as it is now.
+    """Present state of one client.
 
     Attributes:
-        values: who it is and what came of it, by name, ready to be shown.
+        values: its identity and statistics, by name, ready to be shown.
     """
 
     peer: str
@@ -36,14 +36,14 @@ class ClientState:
 
     @property
     def line(self) -> str:
-        """All of it that fits into a line."""
+        """Summary in one line."""
         v = self.values
         who = f"sensor {v['sensor']}, {v['proven']}, " if v["sensor"] != "" else ""
         return f"{who}{self.text}, {v['messages']} messages, {v['dropped']} dropped, {v['last heard']} s ago"
 
 
 def look_at(client: Client, now: float) -> ClientState:
-    """How a client is at `now` [s]."""
+    """State of a client at `now` [s]."""
     session = client.session
     quiet = now - session.last_frame
     level, text = Level.OK, "in sync"
@@ -70,6 +70,6 @@ def look_at(client: Client, now: float) -> ClientState:
 
 
 def choose(clients: Iterable[Client], now: float, most: int = MOST) -> tuple[list[ClientState], list[ClientState]]:
-    """The clients to tell of in full, faults first, and the others."""
+    """The clients to report in full, faults first, and the others."""
     states = sorted((look_at(client, now) for client in clients), key=lambda state: -state.level)
     return states[:most], states[most:]

@@ -1,4 +1,4 @@
-"""For which motion sensors a device may speak: those of the list, or the one that it has proved to be."""
+"""Motion sensors for which a device may speak: those of the list, or the one it has proved to be."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from rosbot_patrol.counts import count_of
 
 
 class Voice:
-    """The sensors of one connection.
+    """Permitted sensors of one connection.
 
     Args:
-        allowed: sensor ids that its peer may be, None for any.
-        most: for how many it may speak.
+        allowed: sensor ids permitted to its peer, None: any.
+        most: maximum number of sensors that it may speak for.
 
     Attributes:
-        proven_id: the sensor that it has proved to be, None where it has not.
+        proven_id: the sensor that it has proved to be, None if it has not.
     """
 
     def __init__(self, allowed: frozenset[int] | None, most: int) -> None:
@@ -23,7 +23,7 @@ class Voice:
         self._heard: set[int] = set()
 
     def prove(self, sensor_id: int) -> bool:
-        """It has the key of that sensor, and speaks for it alone; return False where the list does not let it."""
+        """Restrict it to the sensor that it has proved to be; False if the list forbids that."""
         if self._allowed is not None and sensor_id not in self._allowed:
             return False
         self.proven_id = sensor_id
@@ -42,7 +42,7 @@ class Voice:
         return True
 
     def why_not(self, trigger: bytes) -> str:
-        """Why it may not."""
+        """Reason why it may not."""
         if self.proven_id is not None:
             return f"it has proved to be sensor {self.proven_id}"
         if self._allowed is not None and trigger[0] not in self._allowed:

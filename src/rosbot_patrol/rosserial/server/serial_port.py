@@ -1,4 +1,4 @@
-"""A serial device as a link that reads and writes without waiting, at any speed (Linux)."""
+"""A serial device as a non-blocking link, at any speed (Linux)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TERMIOS2 = struct.Struct("<4IB19s2I")  # c_iflag, c_oflag, c_cflag, c_lflag, c_
 
 
 def _set_speed(fd: int, baud: int) -> None:
-    """Any speed, such as the 525000 baud of the ROSbot's base, which termios has no constant for."""
+    """Set any speed, such as the 525000 baud of the ROSbot's base; termios has no constant for it."""
     fields = list(_TERMIOS2.unpack(fcntl.ioctl(fd, _TCGETS2, bytes(_TERMIOS2.size))))
     fields[2] = (fields[2] & ~_CBAUD) | _BOTHER | termios.CLOCAL | termios.CREAD
     fields[6] = fields[7] = baud
@@ -22,7 +22,7 @@ def _set_speed(fd: int, baud: int) -> None:
 
 
 class SerialPort:
-    """An open serial device, 8N1 and raw; has the few methods of a socket that the server uses.
+    """An open serial device, 8N1 and raw, with the methods of a socket that the server uses.
 
     Raises:
         OSError: the device is not there, is no serial device, or may not be opened.
@@ -43,11 +43,11 @@ class SerialPort:
         return self._fd
 
     def recv(self, size: int) -> bytes:
-        """What has come; raises BlockingIOError where nothing has."""
+        """Bytes that have arrived; raises BlockingIOError if there are none."""
         return os.read(self._fd, size)
 
     def send(self, data: bytes) -> int:
-        """Write what fits; return how much; raises BlockingIOError where nothing does."""
+        """Write as much as fits; returns how much; raises BlockingIOError if nothing fits."""
         return os.write(self._fd, data)
 
     def close(self) -> None:

@@ -1,8 +1,8 @@
 """The rosserial server: many devices on TCP ports, or one on a serial device, in one thread. Knows no ROS.
 
-Differs from rosserial_python's RosSerialServer: any number of clients a port, IPv4 and IPv6, topics are asked for at
-once, half-open links are noticed (keepalive, silence), and nothing that one client sends or fails to read delays
-another.
+Differs from rosserial_python's RosSerialServer: any number of clients per port, IPv4 and IPv6, topics are requested at
+once, half-open links are detected (keepalive, silence), and no client can delay another by what it sends or fails to
+read.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from rosbot_patrol.rosserial.server.session import Session
 log = logging.getLogger(__name__)
 
 READ_SIZE = 4096
-READ_SIZE_LIMITED = 1024  # of a client with a limit: so much at a time that the others do not notice
+READ_SIZE_LIMITED = 1024  # from a restricted client at a time, so that the others are not delayed
 NO_LIMITS = Limits()
 TICK = 0.25
-ROUND = 0.002  # of work between two looks at who is ready [s]
+ROUND = 0.002  # maximum work between two polls [s]
 REOPEN_PERIOD = 3.0
-REPLACE_AFTER = 1.5  # silence after which an old connection gives way to a new one of the same sensor [s]
+REPLACE_AFTER = 1.5  # silence after which an old connection is closed for a new one of the same sensor [s]
 
 
 def _has_sent(ready: tuple[selectors.SelectorKey, int]) -> float:
@@ -43,15 +43,15 @@ class SerialServer:
     """Serves devices until closed: call `run`, or `poll` in a loop.
 
     Attributes:
-        clients: connected devices by their links; door: who was let in; journal: what was said of them.
+        clients: connected devices by their links; door: admission; journal: log about clients.
 
     Args:
         handler: the other side.
         policy: what devices may do.
-        silence_timeout: hang up on a TCP client not heard of for that long [s].
-        limits: how many TCP clients may come.
+        silence_timeout: silence after which a TCP client is disconnected [s].
+        limits: on TCP clients.
         clock: monotonic time [s].
-        tap: told of every byte that comes.
+        tap: observer of all received bytes.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class SerialServer:
         self._tick_due = 0.0
         self._accept_from = 0.0
         self._stopping = False
-        self._left: list[tuple[selectors.SelectorKey, int]] = []  # ready at the last poll, without a turn
+        self._left: list[tuple[selectors.SelectorKey, int]] = []  # ready at the last poll, but not served yet
         self._selector = selectors.DefaultSelector()
         self._wake_read, self._wake_write = socket.socketpair()
         self._wake_read.setblocking(False)
@@ -90,7 +90,7 @@ class SerialServer:
         self._selector.register(self._wake_read, selectors.EVENT_READ)
 
     def listen(self, ports: Sequence[int], host: str = "") -> list[int]:
-        """Open TCP ports (0 for any free one); return them. Raises ProtocolError where one cannot be had."""
+        """Open TCP ports (0: any free one); returns them. Raises ProtocolError if one is not available."""
         for port in ports:
             listener = listen(port, host)
             self._listeners.append(listener)
@@ -98,7 +98,7 @@ class SerialServer:
         return [listener.getsockname()[1] for listener in self._listeners]
 
     def attach(self, path: str, baud: int) -> None:
-        """Serve a serial device; where it is not there (yet), it is tried again every 3 s."""
+        """Serve a serial device; if it is missing, try again every 3 s."""
         self._serial = (path, baud)
 
     def run(self) -> None:
@@ -107,12 +107,12 @@ class SerialServer:
             self.poll(TICK)
 
     def stop(self) -> None:
-        """Make `run` return; from any thread."""
+        """Make `run` return; callable from any thread."""
         self._stopping = True
         self._wake()
 
     def send(self, client: Client, topic_id: int, data: bytes) -> None:
-        """Queue a message for a device, from any thread; raises ProtocolError where it is too long."""
+        """Queue a message for a device, from any thread; raises ProtocolError if it is too long."""
         client.put(topic_id, data)
         self._wake()
 
@@ -132,10 +132,10 @@ class SerialServer:
         self._wake_write.close()
 
     def poll(self, timeout: float) -> None:
-        """Wait for at most `timeout` [s], and do what is to do.
+        """Wait for at most `timeout` [s], and serve the clients that are ready.
 
-        Whose address has sent least comes first. After some milliseconds it looks anew who is there, so that a flood
-        of some delays the others by no more; who had no turn comes before those that have asked for as much.
+        Clients of the address that has sent least come first. After a few milliseconds the sockets are polled again, so
+        that a flood delays the others by no more. Clients not served yet come before others with the same count.
         """
         ready = self._selector.select(0.0 if self._left else timeout)
         if self._left:
@@ -187,7 +187,7 @@ class SerialServer:
         try:
             self._wake_write.send(b"\0")
         except (BlockingIOError, OSError):
-            return  # a wake-up is under way, or the server is closed
+            return  # a wake-up is pending, or the server is closed
 
     def _woken(self) -> None:
         try:
@@ -216,7 +216,7 @@ class SerialServer:
             link, address = listener.accept()
         except (BlockingIOError, ConnectionError):
             return
-        except OSError as err:  # no file descriptors left: the listener would report itself again and again
+        except OSError as err:  # no file descriptors left: the listener would be reported as ready again and again
             if self.journal.is_new("accept", now):
                 log.error("no further sensor can connect for now: %s", err)
             self._accept_from = now + 1.0
@@ -236,7 +236,7 @@ class SerialServer:
         self._add(client, now)
 
     def _turn_away(self, host: str, now: float) -> str | None:
-        """Why a new connection is not taken; makes room for it where there is none."""
+        """Reason why a new connection is refused, or "" after making room for it."""
         if not self._policy.may_connect(host):
             return "its address is not on the list (~allow_peers)"
         reason, leaver = self.door.ask(host, now)
@@ -256,7 +256,7 @@ class SerialServer:
 
     def _read(self, client: Client) -> None:
         now = self._clock()
-        if wait := client.shared.spend(0.0, now):  # the others of its address have sent too much
+        if wait := client.shared.spend(0.0, now):  # the other clients of its address have sent too much
             client.read_from = now + wait
             return
         try:
@@ -278,7 +278,7 @@ class SerialServer:
             client.read_from = now + max(client.session.pause(now), of_address)
 
     def _flush(self, client: Client) -> None:
-        """Send what can be sent, and tell the selector what to wait for."""
+        """Send what can be sent, and update the selector's events."""
         if client.closed:
             return
         try:
@@ -325,7 +325,7 @@ class SerialServer:
         client.older = [c for c in same_id if c is not client and c.sensor == sensor]
 
     def _replace_older(self, client: Client, now: float) -> None:
-        """Close what the same sensor has left behind, as it does when it loses power or its network."""
+        """Close stale connections of the same sensor, left after a loss of power or network."""
         for older in client.older:
             if not older.closed and now - older.session.last_frame > REPLACE_AFTER:
                 self._lose(older, f"its sensor {older.sensor_id} came back as {client.peer}")

@@ -1,8 +1,8 @@
 """The server's side of rosserial, without sockets: bytes in, events out, frames to send.
 
-One `Session` serves one connected device. Where the `Policy` has keys, the device must prove that it has one before
-anything else (`proof`). What it announces is checked against the policy; whether a message type exists and its MD5 fits
-is found by the session's owner, who calls `reject`.
+One `Session` serves one connected device. If the `Policy` has keys, the device must first prove that it has one
+(`proof`). Its announcements are checked against the policy. The session's owner checks whether a message type exists
+and its MD5 sum fits, and calls `reject` if not.
 """
 
 from __future__ import annotations
@@ -42,27 +42,27 @@ from rosbot_patrol.rosserial.server.events import (
 from rosbot_patrol.rosserial.server.policy import Policy
 from rosbot_patrol.rosserial.server.sensor_permissions import Voice
 
-FRAME_TIMEOUT = 1.0  # a frame that stalls for longer is given up
+FRAME_TIMEOUT = 1.0  # time after which a stalled frame is given up [s]
 RETRY_PERIOD = 3.0  # between two requests for topics
-GARBAGE_PER_FRAME = 32  # bytes that are no frame cost as much as a frame
-TOPIC_COST = 10.0  # of a new topic or a parameter, in frames
-QUIET = 5.0  # without a frame a device counts as out of sync
+GARBAGE_PER_FRAME = 32  # bytes of garbage that cost as much as one frame
+TOPIC_COST = 10.0  # cost of a new topic or a parameter, in frames
+QUIET = 5.0  # silence after which a device counts as out of sync [s]
 INCOMING = frozenset({TopicId.PUBLISHER, TopicId.SERVICE_SERVER_PUBLISHER, TopicId.SERVICE_CLIENT_PUBLISHER})
 
 
 class Session:
-    """One device.
+    """State of one device's connection.
 
     Args:
-        policy: what it may do.
+        policy: its permissions.
         now: time of the connection [s], any monotonic clock; the same clock in all calls.
         address: of the device, for the list of sensors that peers may be.
-        silence_timeout: hang up on a device not heard of for that long [s], None for never.
+        silence_timeout: silence after which the device is disconnected [s], None: never.
         nonce: of the challenge; only tests give one.
 
     Attributes:
-        cost: what came since the last `pause`, in frames; garbage and topics count too.
-        clock_offset: how far the device takes the time to be ahead of ours [s], None where it does not say.
+        cost: received since the last `pause`, in frames; garbage and topics count, too.
+        clock_offset: lead of the device's clock over ours [s], None if unknown.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class Session:
         self.sync_losses = 0
         self._silence_timeout = silence_timeout
         self._refused_ids: set[int] = set()
-        self._refused_topics: set[int] = set()  # hashes, so that a device that is asked again is not told again
+        self._refused_topics: set[int] = set()  # hashes, to refuse each topic once although topics are requested again
         self._last_bytes = now
         self._last_request = now
         self._in_sync = True
@@ -111,12 +111,12 @@ class Session:
 
     @property
     def proven_id(self) -> int | None:
-        """The sensor that the device has proved to be, None where it has not."""
+        """The sensor that the device has proved to be, None if it has not."""
         return self._voice.proven_id
 
     @property
     def needs_proof(self) -> bool:
-        """Whether the device has yet to prove that it has a key."""
+        """Whether the device must still prove that it has a key."""
         return self._gate is not None
 
     @property
@@ -130,7 +130,7 @@ class Session:
         return frames
 
     def receive(self, data: bytes, now: float) -> list[Event]:
-        """Take bytes of the device; return what they mean."""
+        """Process bytes from the device; returns events."""
         parser = self.parser
         garbage = parser.garbage
         self._last_bytes = now
@@ -150,7 +150,7 @@ class Session:
         return events
 
     def tick(self, now: float) -> list[Event]:
-        """Notice what did not come; call it every half second or so."""
+        """Detect missing frames; call it about every half second."""
         if self._gate is not None:
             if now - self._began > proof.PROOF_TIMEOUT:
                 return [HangUp(f"no proof within {proof.PROOF_TIMEOUT:.0f} s; has it a key?", is_refusal=True)]
@@ -174,27 +174,27 @@ class Session:
         return events
 
     def pause(self, now: float) -> float:
-        """How long to read nothing more from this device [s], so that it keeps to its rate; settles the `cost`."""
+        """Time for which nothing more is read from this device [s], so that it keeps its rate; settles the `cost`."""
         cost, self.cost = self.cost, 0.0
         return self._budget.spend(cost, now)
 
     def reject(self, kind: TopicId, info: TopicInfo) -> None:
-        """Take back the acceptance of a topic."""
+        """Withdraw the acceptance of a topic."""
         (self.incoming if kind in INCOMING else self.outgoing).pop(info.topic_id, None)
         self._note_refused(info.topic_id)
 
     def accepts(self, message: Received) -> bool:
-        """Whether the topic of a message has not been rejected since it came."""
+        """Whether the topic of a message has not been rejected since it arrived."""
         return self.incoming.get(message.info.topic_id) == (message.kind, message.info)
 
     def answer_time(self, seconds: int, nanoseconds: int) -> None:
-        """Tell the time; a device that said in its request what time it takes it for is compared with it."""
+        """Send the time; compare it with the device's own time, if its request holds one."""
         if self._claimed:
             self.clock_offset = self._claimed - (seconds + nanoseconds * 1e-9)
         self._output.append(encode(TopicId.TIME, pack_time(seconds, nanoseconds)))
 
     def answer_param(self, values: ParamValues) -> None:
-        """Tell a parameter."""
+        """Send a parameter."""
         self._output.append(encode(TopicId.PARAMETER_REQUEST, pack_param_values(values)))
 
     def _packets(self, packets: list[Packet], now: float) -> list[Event]:
@@ -296,7 +296,7 @@ class Session:
         return [Refused(f"parameter {name[:100]!r}", "not on the list of what it may know")]
 
     def _unknown(self, topic_id: int, now: float) -> list[Event]:
-        """A message before negotiation, as the sketch sends after a reconnect, or on a topic that was refused."""
+        """Handle a message before negotiation, as the sketch sends after a reconnect, or on a refused topic."""
         self.dropped += 1
         if topic_id not in self._refused_ids and now - self._last_request >= 1.0:
             self._request_topics(now)

@@ -1,4 +1,4 @@
-"""Parameters of `serial_node`: upstream's names and defaults, and those of the limits that upstream lacks."""
+"""Parameters of `serial_node`: upstream's names and defaults, and limits that upstream lacks."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class SerialNodeParams:
         return (self.tcp_port, *(port for port in self.tcp_ports if port != self.tcp_port))
 
     def policy(self, prefix: str) -> Policy:
-        """What devices may do, with the keys read; `prefix` names the parameters in messages. Raises ParamError."""
+        """Permissions of devices, with the keys read; `prefix` names the parameters in messages. Raises ParamError."""
         restricted = self.restrict == "always" or (self.restrict == "tcp" and self.is_tcp)
         base = Policy() if restricted else TRUSTED
         return replace(
@@ -102,7 +102,7 @@ class SerialNodeParams:
 
     @property
     def limits(self) -> Limits:
-        """How many TCP clients may come, and how much those of one address may send."""
+        """Limits on TCP clients, and on the frames from one address."""
         return Limits(
             clients=self.max_clients,
             per_address=self.max_clients_per_address,
@@ -111,7 +111,7 @@ class SerialNodeParams:
         )
 
     def _keys(self, prefix: str) -> dict[int, bytes]:
-        """A serial device is a trusted wire, which needs no key unless it is restricted too."""
+        """Read the keys; a serial device is a trusted wire and needs none unless it is restricted, too."""
         if not self.key_file or not (self.is_tcp or self.restrict == "always"):
             return {}
         try:
