@@ -1,4 +1,4 @@
-"""What a pose that somebody clicked means to amcl: on /initialpose or with a map, held against the motion since."""
+"""Poses given by a person, on /initialpose or with a map, moved on by the odometry since."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class PoseRecord(NamedTuple):
 
 @dataclass(frozen=True)
 class InitialPose:
-    """Where to start from.
+    """Pose to start from.
 
     Attributes:
         pose: map_from_base now.
         covariance: of x, y, yaw, shape (3, 3).
-        odom_from_base: the odometry now, None where it is not known.
-        notes: what had to be assumed, a sentence each.
+        odom_from_base: the odometry now, None if unknown.
+        notes: assumptions made, a sentence each.
     """
 
     pose: Pose2D
@@ -45,12 +45,12 @@ class InitialPose:
 def taken_pose(
     pose: Pose2D, covariance: Array, *, frame: str, stamp: float, global_frame: str, odometry: OdometryAt
 ) -> InitialPose:
-    """A given pose, moved on as the robot moved since.
+    """A given pose, moved on by the robot's motion since.
 
     Args:
         pose: of the robot in `frame` at `stamp`.
         covariance: of x, y, z, roll, pitch, yaw, shape (6, 6) or (36,).
-        frame: without a leading slash; "" is taken for the map's.
+        frame: without a leading slash; "" stands for the map's.
         stamp: [s]; 0 for now.
         global_frame: of the map.
         odometry: of the robot.

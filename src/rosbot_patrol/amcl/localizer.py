@@ -1,8 +1,8 @@
-"""amcl without ROS: fed with odometry and scans, it says where on the map the robot is.
+"""amcl without ROS: odometry and scans in, pose on the map out.
 
-The decisions are upstream's: an update once the odometry moved by `update_min_d` in x or in y or turned by
-`update_min_a`, once for each laser; every `resample_interval`-th update resamples, and only then (and after a start) is
-a pose given out. Beyond upstream it says whether the estimate is to be believed, and searches where it is not.
+The decisions are upstream's. An update runs after the odometry has moved by `update_min_d` in x or in y or turned by
+`update_min_a`, once for each laser. Every `resample_interval`-th update resamples; only then, and after a start, is a
+pose published. Beyond upstream, it judges whether the estimate can be trusted, and searches the map if not.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from rosbot_patrol.scan import LaserScan
 
 Array = NDArray[np.float64]
 
-WATCH_S = 0.2  # how often the estimate is compared with a scan
+WATCH_S = 0.2  # time between comparisons of the estimate with a scan
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one scan brought.
+    """Result of one scan.
 
     Attributes:
         updated: the particles were moved and weighed.
-        resampled: they were drawn anew.
-        estimate: the pose to give out, or None where there is no news.
+        resampled: they were resampled.
+        estimate: the pose to publish, None if there is no new one.
         is_blind: the particles were moved, but no beam of the scan could weigh them.
-        is_late: a newer scan came before; this one was left out.
+        is_late: a newer scan came before; this one was ignored.
         is_found: the search has found the robot, and the estimate has moved there.
     """
 
@@ -57,7 +57,7 @@ class Localizer:
 
     Args:
         params: of amcl.
-        rng: source of all chance; a seeded one makes every result repeatable.
+        rng: source of random numbers; a seeded one makes every result repeatable.
     """
 
     def __init__(self, params: AmclParams, rng: np.random.Generator) -> None:
@@ -67,11 +67,11 @@ class Localizer:
         self._odometry: Pose2D | None = None  # at the last update
         self._is_start = True
         self._frames: set[str] = set()  # of the lasers
-        self._due: set[str] = set()  # of those that have not weighed the last motion
+        self._due: set[str] = set()  # lasers that have not weighed the particles since the last motion
         self._updates = 0
         self._forced = False
         self._seeker: Seeker | None = None
-        self._was_asked = False  # to search, whatever the estimate is worth
+        self._was_asked = False  # a search was requested, whatever the trust
         self._watched = -math.inf
         self.estimate: Estimate | None = None
         self.map_from_odom: Pose2D | None = None
@@ -104,16 +104,16 @@ class Localizer:
 
     @property
     def trust(self) -> Trust:
-        """Whether the estimate is to be believed."""
+        """Trust in the estimate."""
         return self._witness.trust
 
     @property
     def is_seeking(self) -> bool:
-        """Whether the whole map is searched for the robot."""
+        """Whether a search of the whole map is running."""
         return self._seeker is not None
 
     def reconfigure(self, params: AmclParams) -> None:
-        """Other parameters from now on; the particles stay where they are, and so does where the robot started.
+        """Use other parameters from now on; the particles and the robot's start stay.
 
         Raises:
             MapError: the map cannot be used with them.
@@ -124,7 +124,7 @@ class Localizer:
         self.filter.configure(self._rule, alpha_slow=self._slow, alpha_fast=self._fast)
 
     def set_map(self, grid: Grid) -> None:
-        """Take a map; the particles stay where they are.
+        """Use a map; the particles stay.
 
         Raises:
             MapError: the map is turned, empty, or its place makes no sense.
@@ -133,7 +133,7 @@ class Localizer:
         self._witness.forget()
 
     def set_pose(self, pose: Pose2D, covariance: Array, odom_from_base: Pose2D | None = None) -> None:
-        """Start anew about a pose.
+        """Restart around a pose.
 
         Args:
             pose: map_from_base.
@@ -149,7 +149,7 @@ class Localizer:
         self._witness.forget()
 
     def localize_globally(self) -> bool:
-        """Start anew from anywhere on the free floor; False where the map has none."""
+        """Restart with particles anywhere on the free floor; False if the map has none."""
         if self._map is None or not self._map.floor.area:
             return False
         self.filter.spread_over(self._map.floor.random_poses)
@@ -158,9 +158,9 @@ class Localizer:
         return True
 
     def seek(self) -> bool:
-        """Search the whole map, whatever the estimate is worth; False where that cannot be.
+        """Start a search of the whole map, whatever the trust; False if that is impossible.
 
-        The estimate in use stays until the search has found a place that the scans of several updates speak for.
+        The present estimate stays until the search has found a place that the scans of several updates support.
         """
         if self._map is None or not self._map.floor.area or self._params.seek == "never":
             return False
@@ -177,10 +177,10 @@ class Localizer:
         self._forced = True
 
     def update(self, scan: LaserScan, odom_from_base: Pose2D, base_from_laser: Pose2D) -> Outcome:
-        """Take in a scan and the odometry at its time.
+        """Process a scan and the odometry at its time.
 
         Args:
-            scan: one sweep.
+            scan: a level scan.
             odom_from_base: the robot in the odometry's frame at the scan's stamp.
             base_from_laser: of the level scan.
         """
@@ -201,7 +201,7 @@ class Localizer:
         return self._search(known, beams, odom_from_base) or outcome
 
     def _is_due(self, frame: str, odometry: Pose2D) -> bool:
-        """Whether this laser has to weigh a motion; each does once."""
+        """Whether this laser must still weigh the last motion; each does once."""
         self._frames.add(frame)
         if self._is_start or self._forced or self._has_moved(odometry):
             self._due = set(self._frames)
@@ -220,7 +220,7 @@ class Localizer:
         is_blind = weighing is None
         if weighing is not None:
             self.filter.weigh(weighing)
-        estimate = self.filter.estimate()  # before the draw, which forgets how well each particle fits
+        estimate = self.filter.estimate()  # before resampling, which discards the fit of each particle
         resampled = self._resample_when_due(known)
         if not (resampled or is_start):
             return Outcome(updated=True, is_blind=is_blind)
@@ -254,7 +254,7 @@ class Localizer:
         )
 
     def _restart(self, odometry: Pose2D) -> None:
-        """Go on from here with an odometry that began anew: the jump is not believed, the way until then is."""
+        """Continue after the odometry has restarted: the jump is ignored, the motion before it is kept."""
         last = self._track.last
         if last is None:
             return
@@ -282,7 +282,7 @@ class Localizer:
             self._seeker = None
 
     def _search(self, known: KnownMap, beams: Beams, odometry: Pose2D) -> Outcome | None:
-        """Go on with a search; what it has found is the estimate from then on."""
+        """Continue a search; its result becomes the estimate."""
         seeker = self._seeker
         if seeker is None or not seeker.update(beams, odometry, self._move):
             return None
@@ -300,7 +300,7 @@ class Localizer:
 
 
 def start_of(params: AmclParams) -> tuple[Pose2D, Array]:
-    """Where the parameters say that the robot starts, and the covariance of that, shape (3, 3)."""
+    """Initial pose from the parameters, and its covariance, shape (3, 3)."""
     p = params
     pose = Pose2D(p.initial_pose_x, p.initial_pose_y, p.initial_pose_a)
     return pose, np.diag([p.initial_cov_xx, p.initial_cov_yy, p.initial_cov_aa])

@@ -1,4 +1,4 @@
-"""Particles moved by noisy odometry (Thrun, Burgard, Fox: Probabilistic Robotics, table 5.6)."""
+"""Inner loops that move particles by noisy odometry (Thrun, Burgard, Fox: Probabilistic Robotics, table 5.6)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @kernel("void(float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])")
 def move_turn_drive_turn(poses: Array, step: Array, sigma: Array, noise: Array) -> None:
-    """Move each particle by a turn, a drive and a turn, each with its own Gaussian error.
+    """Move each particle by a turn, a translation and a turn, each with Gaussian noise.
 
     Args:
         poses: x, y, yaw of the particles, changed in place, shape (N, 3).

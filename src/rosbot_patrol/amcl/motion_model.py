@@ -1,6 +1,6 @@
-"""How far the wheels may lie: the four odometry models of amcl.
+"""The four odometry models of amcl.
 
-`diff` and `omni` take the variances for standard deviations, as upstream's deprecated models do; `diff-corrected` and
+`diff` and `omni` use variances as standard deviations, as upstream's deprecated models do. `diff-corrected` and
 `omni-corrected` are the models of Probabilistic Robotics, section 5.4.
 """
 
@@ -21,13 +21,13 @@ Array = NDArray[np.float64]
 MotionModelName = Literal["diff", "omni", "diff-corrected", "omni-corrected"]
 MOTION_MODELS = ("diff", "omni", "diff-corrected", "omni-corrected")
 
-_STILL = 0.01  # m; a shorter way has no direction to speak of
+_STILL = 0.01  # m; a shorter motion has no meaningful direction
 
 
 @dataclass(frozen=True, kw_only=True)
 class OdometryNoise:
-    """alpha 1: turning from turning, 2: turning from driving, 3: driving from driving, 4: driving from turning, 5:
-    sliding from driving (only `omni`).
+    """alpha 1: rotation from rotation, 2: rotation from translation, 3: translation from translation, 4: translation
+    from rotation, 5: sideways motion from translation (only `omni`).
     """
 
     alpha1: float = 0.2
@@ -40,7 +40,7 @@ class OdometryNoise:
 def move_particles(
     poses: Array, start: Pose2D, end: Pose2D, name: str, alphas: OdometryNoise, rng: np.random.Generator
 ) -> None:
-    """Move particles in place as the odometry moved from `start` to `end`, each with its own error."""
+    """Move particles in place by the odometry from `start` to `end`, each with its own noise."""
     move = _slide if name.startswith("omni") else _turn_drive_turn
     deviation = math.sqrt if name.endswith("-corrected") else float
     move(poses, start, end, alphas, rng, deviation)
@@ -57,7 +57,7 @@ def _turn_drive_turn(
     way = math.hypot(end.x - start.x, end.y - start.y)
     first = 0.0 if way < _STILL else angle_difference(math.atan2(end.y - start.y, end.x - start.x), start.yaw)
     second = angle_difference(angle_difference(end.yaw, start.yaw), first)
-    turn1, turn2 = _turn_size(first), _turn_size(second)  # driving backwards is no half turn
+    turn1, turn2 = _turn_size(first), _turn_size(second)  # driving backwards is not a half turn
     sigma = np.array(
         [
             deviation(a.alpha1 * turn1**2 + a.alpha2 * way**2),

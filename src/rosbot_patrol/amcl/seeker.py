@@ -1,8 +1,8 @@
-"""Finds a robot that is lost: a second filter over the whole map, beside the one that is believed.
+"""Search for a lost robot: a second filter over the whole map, beside the active one.
 
-The filter in use is left alone while this one searches, so that nothing jumps about the house meanwhile; what was found
-is handed over once. The seeker begins with the poses that one scan speaks for, weighs them more sharply than amcl does,
-and mixes in fresh ones from every scan, in case the right one was not among them.
+The active filter is left alone during the search, so that the pose does not jump about the house; the result is handed
+over once. The search starts with poses that one scan supports. It weighs them more sharply than amcl does, and adds new
+ones from every scan, in case the right one was missing.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ Array = NDArray[np.float64]
 Move = Callable[[Array, Pose2D, Pose2D], None]
 
 LEAST, MOST = 500, 3000  # particles
-TRIED_PER_M2, MOST_TRIED = 600.0, 400_000  # random poses of which the first ones are picked
-FRESH_TRIED, FRESH_SHARE = 5000, 0.1  # likewise, and their share of each draw
-SHARPNESS = 10.0  # how much a better fit counts
+TRIED_PER_M2, MOST_TRIED = 600.0, 400_000  # random poses from which the first particles are picked
+FRESH_TRIED, FRESH_SHARE = 5000, 0.1  # the same for later scans, and their share in each resampling
+SHARPNESS = 10.0  # weight of a particle's fit
 STEP_M, STEP_RAD = 0.1, 0.15  # of motion between updates, however seldom amcl updates
 FOUND_AGREEMENT, FOUND_CLUSTER = 0.7, 0.8
-FOUND_UPDATES = 6  # in a row that a place must hold
-KEEPS = 0.5  # share of the old average of the agreement, an update
-NEAR_M, NEAR_RAD = 0.5, 0.4  # what belongs to the place that was found
+FOUND_UPDATES = 6  # consecutive updates for which a place must hold
+KEEPS = 0.5  # weight of the previous average of the agreement in an update
+NEAR_M, NEAR_RAD = 0.5, 0.4  # extent of the place that was found
 
 
 class Seeker:
@@ -40,10 +40,10 @@ class Seeker:
 
     Args:
         model: weighs poses.
-        wide: one of a wide spread, for the random poses.
+        wide: a more tolerant one, for the random poses.
         obstacles: distance to the nearest obstacle [m], for the verdict.
-        floor: where the robot may be.
-        rng: source of all chance.
+        floor: the free floor.
+        rng: source of random numbers.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Seeker:
         self.estimate: Estimate | None = None
 
     def update(self, beams: Beams, odometry: Pose2D, move: Move) -> bool:
-        """Take in a scan, where the robot has moved enough; whether it has.
+        """Process a scan if the robot has moved enough; returns whether it has.
 
         Args:
             beams: of the scan.
@@ -78,7 +78,7 @@ class Seeker:
         return True
 
     def restart(self, last: Pose2D, odometry: Pose2D, move: Move) -> None:
-        """The odometry began anew at a pose, after a last one."""
+        """Continue after the odometry has restarted at a pose."""
         if self._odometry is not None:
             move(self.filter.poses, self._odometry, last)
             self._odometry = odometry
@@ -104,7 +104,7 @@ class Seeker:
         self._held = self._held + 1 if is_good else 0
 
     def _freshen(self, beams: Beams) -> None:
-        """Put fresh poses in place of some particles."""
+        """Replace some particles by new poses."""
         poses = self.filter.poses
         count = int(FRESH_SHARE * len(poses))
         if count:
@@ -112,7 +112,7 @@ class Seeker:
             poses[places] = self._floor.likely_poses(self._wide, beams, tried=FRESH_TRIED, count=count)
 
     def found(self, believed: float) -> Estimate | None:
-        """Where the robot is, once that is clear.
+        """Pose of the robot when it is clear, else None.
 
         Args:
             believed: agreement at the estimate in use, 0 to 1, nan where there is none; the new one must beat it.
@@ -124,7 +124,7 @@ class Seeker:
         return self.estimate
 
     def near(self, pose: Pose2D) -> Array:
-        """The particles about a pose, shape (N, 3); those of other places are left out."""
+        """Particles around a pose, shape (N, 3)."""
         poses = self.filter.poses
         off = np.hypot(poses[:, 0] - pose.x, poses[:, 1] - pose.y)
         turn = np.abs(wrap_angles(poses[:, 2] - pose.yaw))

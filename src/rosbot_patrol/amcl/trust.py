@@ -1,9 +1,9 @@
-"""Is the estimate to be believed? Judged by the scans against the map, not by how sure the particles are of themselves.
+"""Trust in the estimate, from the agreement of scans and map instead of the particles' spread.
 
-A beam that ends where the map has an obstacle is explained. One that ends early may have met a chair or somebody, which
-the map does not know: it counts little. One that went through a wall of the map counts twice, for walls stay. The share
-of what is explained, averaged over a few seconds, is the agreement. In our three houses it is 0.93 to 1 at the right
-pose and mostly below 0.3 a metre off; with half of the beams cut short at the right pose it would be 0.67.
+A beam that ends at an obstacle of the map is explained. A beam that ends early may have hit a chair or a person that
+the map does not show: it counts little. A beam through a wall of the map counts twice, because walls stay. The share of
+explained beams, averaged over a few seconds, is the agreement. In our three houses it is 0.93 to 1 at the right pose
+and mostly below 0.3 a metre away; with half of the beams cut short at the right pose it would be 0.67.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from rosbot_patrol.amcl.scan_model.likelihood_field import Field
 from rosbot_patrol.amcl.scan_model.sensor_model import Beams
 from rosbot_patrol.geometry import Pose2D, compose
 
-NEAR_M = 0.2  # from an obstacle: a beam that ends there is explained
-FEWEST = 8  # beams that say something, or the scan is no witness
+NEAR_M = 0.2  # distance from an obstacle at which a beam's end is explained
+FEWEST = 8  # minimum number of usable beams in a scan
 SHORT_COUNTS, THROUGH_COUNTS, UNRETURNED_COUNTS = 0.5, 2.0, 0.5
 MEMORY_S = 2.0  # of the average
-WIDE_M = 1.0  # spread of the best cluster from which on the estimate is unsure
+WIDE_M = 1.0  # spread of the best cluster above which the estimate is unsure
 FEW = 0.5  # share of the weight below which a cluster is one guess among others
 
 
 class State(enum.Enum):
-    """What to think of the estimate."""
+    """Verdict on the estimate."""
 
     UNKNOWN = "nothing is known yet"
     LOCALISED = "localised"
@@ -39,13 +39,13 @@ class State(enum.Enum):
 
 @dataclass(frozen=True)
 class Trust:
-    """The figure and what it is made of.
+    """Verdict on the estimate, with its figures.
 
     Attributes:
-        state: in a word.
-        belief: 0 to 1: the agreement times the share of the particles' weight that stands behind the estimate.
+        state: the verdict.
+        belief: 0 to 1: the agreement times the share of the particles' weight in the estimate's cluster.
         agreement: of scans and map at the estimate, 0 to 1, nan before there is one.
-        reason: why the state is what it is, in a sentence, "" where all is well.
+        reason: the reason for the state in one sentence, "" if all is well.
     """
 
     state: State = State.UNKNOWN
@@ -55,7 +55,7 @@ class Trust:
 
 
 def agreement(pose: Pose2D, beams: Beams, obstacles: Field) -> float | None:
-    """How well a scan agrees with the map at a pose of the robot, 0 to 1; None where it says too little.
+    """Agreement of a scan with the map at a pose of the robot, 0 to 1; None if the scan has too few beams.
 
     Args:
         pose: map_from_base.
@@ -84,11 +84,11 @@ def agreement(pose: Pose2D, beams: Beams, obstacles: Field) -> float | None:
 
 
 class Witness:
-    """Averages the agreement over time and says what to think of the estimate.
+    """Averages the agreement over time and judges the estimate.
 
     Args:
-        lost_below: an agreement below this is lost.
-        sure_above: one above this is localised again.
+        lost_below: agreement below which the robot is lost.
+        sure_above: agreement above which it is localised again.
     """
 
     def __init__(self, *, lost_below: float, sure_above: float) -> None:
@@ -98,16 +98,16 @@ class Witness:
         self.trust = Trust()
 
     def forget(self) -> None:
-        """Begin anew: the pose has been set."""
+        """Start again after the pose has been set."""
         self._average = math.nan
         self.trust = Trust()
 
     def hear(self, stamp: float, found: float | None, estimate: Estimate) -> Trust:
-        """Take in what one scan says.
+        """Add the agreement of one scan.
 
         Args:
             stamp: of the scan [s].
-            found: its agreement, None where it says nothing.
+            found: its agreement, None if unknown.
             estimate: the newest.
         """
         if found is not None:

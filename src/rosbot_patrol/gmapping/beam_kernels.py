@@ -1,4 +1,4 @@
-"""Which way the walls face that a scan hits, told from the neighbouring beams."""
+"""Inner loops that estimate the direction of walls from neighbouring beams."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 @kernel()
 def _gather(ends: Array, at: int, step: int, span: float, gap: float, sums: Array) -> int:
-    """Add the ends to one side of a beam up to `span` away, but never across a gap; how many there were."""
+    """Add the ends up to `span` away on one side of a beam, but never across a gap; returns their number."""
     k, found = at, 0
     while True:
         following = k + step
@@ -36,15 +36,15 @@ def _gather(ends: Array, at: int, step: int, span: float, gap: float, sums: Arra
 
 @kernel("void(float64[:, ::1], float64[::1], float64, float64, float64, float64[:, ::1])")
 def find_normals(ends: Array, gaps: Array, span: float, straight: float, thin: float, out: Array) -> None:
-    """Unit vectors across the lines that neighbouring ends form.
+    """Unit normals of the lines formed by neighbouring ends.
 
     Args:
-        ends: of the beams that hit, in their order [m], shape (K, 2).
-        gaps: neighbours farther apart than this are of two things [m], shape (K,).
-        span: how far to each side the line is looked at [m]; one neighbour always is.
-        straight: largest share of the spread across a line in that along it.
+        ends: of the beams that hit, in order [m], shape (K, 2).
+        gaps: neighbours farther apart than this belong to two objects [m], shape (K,).
+        span: distance to each side from which ends are used [m]; one neighbour always is.
+        straight: largest spread across a line, relative to the spread along it.
         thin: largest spread across a line [m].
-        out: becomes the vectors, 0 where there is no line, shape (K, 2).
+        out: filled with the normals, 0 without a line, shape (K, 2).
     """
     out[:] = 0.0
     sums = np.empty(5)

@@ -1,4 +1,4 @@
-"""The beams of a scan that count, in the robot's frame."""
+"""Usable beams of a scan, in the robot's frame."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from rosbot_patrol.scan import LaserScan
 
 Array = NDArray[np.float64]
 
-SPAN = 0.15  # m to each side of a beam's end that tell how the wall runs
-STRAIGHT = 0.25  # largest spread across a wall, as a share of that along it
+SPAN = 0.15  # m to each side of a beam's end that give the wall's direction
+STRAIGHT = 0.25  # largest spread across a wall, relative to the spread along it
 THIN = 0.03  # m; largest spread across a wall
-GRAZING = 8.0  # ends farther apart than this many times what a wall seen square would show are of two things
+GRAZING = 8.0  # ends farther apart than this many times the spacing on a wall seen square belong to two objects
 LEAST_GAP = 0.1  # m
 
 
 @dataclass(frozen=True)
 class Beams:
-    """Beams that hit something or showed that nothing is there.
+    """Beams that hit something or showed free space.
 
     Attributes:
         ends: where they end, or are cut at the usable range, in the robot's frame [m], shape (K, 2).
         directions: unit vectors from the sensor, shape (K, 2).
         is_hit: whether the end is a wall, shape (K,).
-        sensor: place of the sensor in the robot's frame [m], shape (2,).
+        sensor: position of the sensor in the robot's frame [m], shape (2,).
         spacing: angle from beam to beam [rad].
     """
 
@@ -42,7 +42,7 @@ class Beams:
 
     @property
     def hits(self) -> Array:
-        """End, direction, and the unit vector across the wall (0 where no line is seen) of each hit, shape (H, 6)."""
+        """End, direction, and the wall's unit normal (0 without a visible line) of each hit, shape (H, 6)."""
         ends = np.ascontiguousarray(self.ends[self.is_hit])
         lengths = np.hypot(*(ends - self.sensor).T)
         gaps = np.maximum(GRAZING * self.spacing * lengths, LEAST_GAP)
@@ -52,16 +52,16 @@ class Beams:
 
     @property
     def reach(self) -> float:
-        """Farthest from the robot that a beam comes [m]."""
+        """Largest distance of a beam's end from the robot [m]."""
         return float(np.hypot(*self.ends.T).max(initial=0.0))
 
 
 def pick_beams(scan: LaserScan, base_from_laser: Pose2D, params: GmappingParams) -> Beams:
-    """The beams of a level scan that the parameters let through.
+    """Select the beams of a level scan by the parameters.
 
-    A beam that is no number or shorter than `range_min` says nothing. One that met nothing (inf, or `range_max` and
-    more) shows free space up to `maxUrange` where `maxRange` is set to `range_max` or more, and says nothing else.
-    A scan without an upper limit counts as one with a `range_max` of 100 m.
+    A beam that is NaN or shorter than `range_min` is ignored. A beam without a hit (inf, or `range_max` and more) shows
+    free space up to `maxUrange` if `maxRange` is at least `range_max`; otherwise it is ignored. A scan without an upper
+    limit counts as one with a `range_max` of 100 m.
     """
     longest = params.maxRange if params.maxRange > 0.0 else scan.reach - 0.01
     usable = min(params.maxUrange, longest) if params.maxUrange > 0.0 else longest

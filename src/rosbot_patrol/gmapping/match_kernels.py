@@ -1,9 +1,10 @@
-"""Where in its map a scan fits best: a search from the odometry's guess, refined by Gauss-Newton, and how sure that is.
+"""Inner loops of scan matching: search from the odometry's guess, Gauss-Newton refinement, and covariance.
 
-The objective is the sum over the beams of exp(-d2 / sigma), d the distance of a beam's end to the nearest wall cell's
-mean within a few cells (the score of Grisetti, Stachniss, Burgard 2007 as gmapping takes it: the cell before the end,
-seen from the sensor, must be no wall), and the odometry's Gaussian as a prior. The refinement measures the distance
-across the wall where the wall forms a line, so that a corridor holds a scan only across it.
+The objective is the sum over the beams of exp(-d2 / sigma), plus the odometry's Gaussian as a prior. Here d is the
+distance of a beam's end to the mean of the nearest wall cell within a few cells. This is the score of Grisetti,
+Stachniss, Burgard 2007 as gmapping implements it: the cell before the end, seen from the sensor, must be no wall. The
+refinement measures the distance across the wall if the wall forms a line, so that a corridor constrains a scan only
+across it.
 """
 
 from __future__ import annotations
@@ -20,34 +21,34 @@ Array = NDArray[np.float64]
 Table = NDArray[np.int32]
 Cells = NDArray[np.uint16]
 
-FREE_RATIO = 1.4143  # cells before a beam's end where the cell must be free
-NULL = 0.5  # squared distance [m2] that a beam which found no wall counts as
+FREE_RATIO = 1.4143  # distance before a beam's end at which the cell must be free [cells]
+NULL = 0.5  # squared distance [m2] of a beam that found no wall
 MOST_MOVES = 200
-LONELY = 0.5  # what a beam counts in both directions whose wall's direction is not known, however good the lidar is
-FIRST_BEAMS = 120  # about so many beams begin a refinement
-NEAR, NEAR_TURN = 0.05, 5e-4  # steps of a refinement [cells, rad] from which on all of them take part
-DONE, DONE_TURN = 0.01, 1e-4  # and those at which it ends
-WIDEST = 1.0  # variance of the beams' distances from the walls, at most [cells2]
-LOSS = 0.8  # a refinement that brings less than this share of the score before is not taken
+LONELY = 0.5  # weight in both directions of a beam whose wall has no known direction, however good the lidar is
+FIRST_BEAMS = 120  # approximate number of beams at the start of a refinement
+NEAR, NEAR_TURN = 0.05, 5e-4  # steps of a refinement [cells, rad] below which all beams are used
+DONE, DONE_TURN = 0.01, 1e-4  # steps at which it ends
+WIDEST = 1.0  # largest variance of the beams' distances from the walls [cells2]
+LOSS = 0.8  # a refinement with less than this share of the previous score is rejected
 
 
 @kernel()
 def nearest_wall(
     table: Table, cells: Cells, gx: float, gy: float, back_x: float, back_y: float, reach: int
 ) -> tuple[float, float, float]:
-    """The nearest wall cell's mean within `reach` cells of a beam's end.
+    """Find the mean of the nearest wall cell within `reach` cells of a beam's end.
 
     Args:
         table: of the map.
         cells: of all maps.
         gx: the end [cells].
         gy: likewise.
-        back_x: from the end back to the place that must be free [cells].
+        back_x: offset from the end to the place that must be free [cells].
         back_y: likewise.
-        reach: how many cells to look to each side.
+        reach: search radius [cells].
 
     Returns:
-        Squared distance [cells2], -1 where there is none; from the mean to the end in x and y.
+        Squared distance [cells2], -1 if there is none; offset from the mean to the end in x and y.
     """
     ix, iy = math.floor(gx), math.floor(gy)
     free_x, free_y = math.floor(gx + back_x) - ix, math.floor(gy + back_y) - iy
@@ -78,7 +79,7 @@ def nearest_wall(
 def score_of(
     table: Table, cells: Cells, x: float, y: float, yaw: float, beams: Array, every: int, reach: int, sigma: float
 ) -> float:
-    """Sum of exp(-d2 / sigma) over every so many-th beam."""
+    """Sum of exp(-d2 / sigma) over every `every`-th beam."""
     c, s = math.cos(yaw), math.sin(yaw)
     total = 0.0
     for k in range(0, beams.shape[0], every):
@@ -103,7 +104,7 @@ def fit_of(
     lsigma: float,
     null: float,
 ) -> tuple[float, float]:
-    """Score and log-likelihood of a pose, from one look at the beams.
+    """Score and log-likelihood of a pose, in one pass over the beams.
 
     Returns:
         Sum of exp(-d2 / sigma) over the beams; sum of -d2 / lsigma over every `skip`-th, `null` / lsigma for each that
@@ -146,7 +147,7 @@ def climb(
     sigma: float,
     gain: float,
 ) -> None:
-    """Move a pose (in place) by steps to the side that fits best, and halve the steps where none does.
+    """Move a pose (in place) by steps to the best neighbour, and halve the steps if none is better.
 
     Args:
         table: of the map.
@@ -157,10 +158,10 @@ def climb(
         lstep: first step [cells].
         astep: first turn [rad].
         halvings: how often the steps are halved.
-        every: use every so many-th beam.
+        every: use every n-th beam.
         reach: of `nearest_wall`.
         sigma: of `score_of`.
-        gain: what a beam's score counts against the prior.
+        gain: weight of a beam's score against the prior.
     """
     x0, y0, yaw0 = pose[0], pose[1], pose[2]
     best = gain * every * score_of(table, cells, x0, y0, yaw0, beams, every, reach, sigma)
@@ -234,17 +235,17 @@ def add_beams(
     information: Array,
     slope: Array,
 ) -> float:
-    """Add what every so many-th beam says to the normal equations of a pose: information (3, 3) and slope (3,).
+    """Add every n-th beam to the normal equations of a pose: information (3, 3) and slope (3,).
 
-    It counts for those left out, too.
+    Each beam also counts for the ones skipped.
 
     Returns:
-        Variance [cells2] of the distances to the walls, as of a Gaussian: what lies far off hardly counts. At most
-        `WIDEST`, which is also where no beam found a wall.
+        Variance [cells2] of the distances to the walls, as of a Gaussian: outliers hardly count. At most `WIDEST`,
+        which is also the value if no beam found a wall.
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
     a00, a01, a02, a11, a12, a22, g0, g1, g2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    count, squares = 0.0, 0.0  # of the beams whose wall's direction is known
+    count, squares = 0.0, 0.0  # of the beams with a known wall direction
     weight *= every
     for k in range(0, beams.shape[0], every):
         bx, by, ux, uy = beams[k, 0], beams[k, 1], -FREE_RATIO * beams[k, 2], -FREE_RATIO * beams[k, 3]
@@ -308,21 +309,21 @@ def refine(
     lonely: float,
     lower: Array,
 ) -> float:
-    """Gauss-Newton on the distances to the walls and the prior about `guess`.
+    """Gauss-Newton on the distances to the walls, with the prior about `guess`.
 
     Args:
         table: of the map.
         cells: of all maps.
-        pose: where to begin, changed in place, shape (3,).
+        pose: initial pose, changed in place, shape (3,).
         guess: the odometry's, shape (3,).
         beams: see `match_particles`.
         prior: information of the guess, shape (3, 3).
-        rounds: most steps.
-        every: begin with every so many-th beam, and take all of them near the end.
+        rounds: maximum number of steps.
+        every: start with every n-th beam, and use all near the end.
         reach: of `nearest_wall`.
         weight: information of one beam [1/cells2].
-        lonely: share of it that a beam has in both directions whose wall's direction is not known.
-        lower: becomes the Cholesky factor of the information at the last step, shape (3, 3).
+        lonely: share of it in both directions for a beam whose wall has no known direction.
+        lower: filled with the Cholesky factor of the information at the last step, shape (3, 3).
 
     Returns:
         Variance of the distances at the last step, see `add_beams`.

@@ -1,4 +1,4 @@
-"""How far the wheels may lie: standard deviations of a move, as gmapping's parameters give them."""
+"""Odometry noise: standard deviations of a move from gmapping's parameters."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from rosbot_patrol.gmapping.parameters import GmappingParams
 
 Array = NDArray[np.float64]
 
-SIDEWAYS = 0.3  # share of srr by which driving ahead errs to the side, and the other way round
-LEAST = (0.005, 0.005, 0.004)  # m, m, rad: what a scan's time and a wheel's play leave open of the smallest move
+SIDEWAYS = 0.3  # share of srr that is sideways noise from forward motion, and vice versa
+LEAST = (0.005, 0.005, 0.004)  # m, m, rad: least noise of any move, from the scan's timing and the wheels' play
 
 
 def move_deviation(move: Pose2D, params: GmappingParams) -> Array:

@@ -1,4 +1,4 @@
-"""The maps of all particles: grids of 16 x 16 tiles, shared until a particle writes (copy on write)."""
+"""Maps of all particles: grids of 16 x 16 tiles, shared until a particle writes (copy on write)."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from rosbot_patrol.maps.occupancy import FREE, OCCUPIED, UNKNOWN
 
 Array = NDArray[np.float64]
 
-PATCH = 32  # cells: upstream rounds the first extent down to so many
-MARGIN = 10.0  # m that a map grows by
+PATCH = 32  # cells: upstream rounds the initial extent down to a multiple of this
+MARGIN = 10.0  # m by which a map grows
 GROWTH = 1.25
-SEED_BEAMS = 20  # what a cell of a saved map counts as
+SEED_BEAMS = 20  # number of beams that a cell of a saved map stands for
 
 
 class ParticleMaps:
     """One map for each particle.
 
     Args:
-        lows: lower left corner of the first extent [m].
+        lows: lower left corner of the initial extent [m].
         highs: upper right corner [m].
         resolution: edge of a cell [m].
         count: number of particles.
 
     Raises:
-        MapError: the extent makes no sense.
+        MapError: the extent is invalid.
     """
 
     def __init__(self, lows: tuple[float, float], highs: tuple[float, float], resolution: float, count: int) -> None:
@@ -50,7 +50,7 @@ class ParticleMaps:
         self.cells = np.zeros((0, ROWS, FIELDS), dtype=np.uint16)
         self.refs = np.zeros(0, dtype=np.int32)
         self.free = np.zeros(1, dtype=np.int32)
-        self._scans = 0  # number of the last one, 1 to 65535
+        self._scans = 0  # number of the last scan, 1 to 65535
 
     @property
     def count(self) -> int:
@@ -59,12 +59,12 @@ class ParticleMaps:
 
     @property
     def tiles_used(self) -> int:
-        """Tiles that hold something."""
+        """Number of tiles in use."""
         return len(self.refs) - int(self.free[0])
 
     @property
     def megabytes(self) -> float:
-        """What all maps take together [MB]."""
+        """Memory of all maps together [MB]."""
         return (self.tables.nbytes + self.cells.nbytes + self.refs.nbytes + self.free.nbytes) / 1e6
 
     @property
@@ -80,19 +80,19 @@ class ParticleMaps:
         )
 
     def to_cells(self, poses: Array) -> Array:
-        """Poses with their place in cells from the lower left corner, shape (N, 3)."""
+        """Convert poses to cells from the lower left corner, shape (N, 3)."""
         moved = np.array(poses, dtype=np.float64)
         moved[:, :2] = (moved[:, :2] - self.origin) / self.resolution
         return moved
 
     def from_cells(self, poses: Array) -> Array:
-        """The way back."""
+        """Convert poses from cells to metres, shape (N, 3)."""
         moved = np.array(poses, dtype=np.float64)
         moved[:, :2] = moved[:, :2] * self.resolution + self.origin
         return moved
 
     def register(self, poses: Array, beams: Beams) -> None:
-        """Write a scan into each map, seen from that particle's pose; poses of shape (N, 3) [m, rad]."""
+        """Write a scan into each map, seen from its particle's pose; poses of shape (N, 3) [m, rad]."""
         self._cover(poses, beams.reach)
         placed = self.to_cells(poses)
         self._scans = self._scans % FULL + 1
@@ -109,7 +109,7 @@ class ParticleMaps:
             table: of the map.
             start: the sensor [cells], shape (2,).
             ends: of the beams [cells], shape (K, 2).
-            is_hit: whether the beams ended there, shape (K,).
+            is_hit: whether the beams hit something there, shape (K,).
         """
         arrays = (table, self.cells, self.refs, self.free)
         done, stamp = 0, self._scans
@@ -120,17 +120,17 @@ class ParticleMaps:
             self._grow(int(np.abs(ends - start).sum(axis=1).max()) // TILE + 4)
 
     def _grow(self, least: int) -> None:
-        """More unused tiles."""
+        """Add unused tiles."""
         old, unused = len(self.refs), int(self.free[0])
         new = int(old * GROWTH) + max(least, 256)
-        self.cells.resize((new, ROWS, FIELDS), refcheck=False)  # in place where the system can
+        self.cells.resize((new, ROWS, FIELDS), refcheck=False)  # in place if the system can
         self.refs.resize(new, refcheck=False)
         self.free.resize(new + 1, refcheck=False)
         self.free[1 + unused : 1 + unused + new - old] = np.arange(new - 1, old - 1, -1)
         self.free[0] = unused + new - old
 
     def _cover(self, poses: Array, reach: float) -> None:
-        """Grow the tables so that scans from these poses lie within."""
+        """Grow the tables so that they cover scans from these poses."""
         _, rows, columns = self.tables.shape
         edge = TILE * self.resolution
         far = reach + 2.0 * self.resolution
@@ -147,19 +147,19 @@ class ParticleMaps:
             self.origin = self.origin - np.array(before) * edge
 
     def select(self, indices: NDArray[np.int64]) -> None:
-        """Keep the maps of these particles, some several times, others not."""
+        """Keep the maps of these particles, some of them several times, and drop the others."""
         self.tables = np.ascontiguousarray(self.tables[indices])
         kernels.count_references(self.tables, self.refs, self.free)
 
     def grid(self, index: int, threshold: float) -> Grid:
-        """One map as int8 cells: 100 where more than `threshold` of the beams ended, 0 where fewer, -1 unknown."""
+        """One map as int8 cells: 100 if more than `threshold` of the beams ended there, 0 if fewer, -1 unknown."""
         info = self.info
         out = np.empty(info.shape, dtype=np.int8)
         kernels.render(self.tables[index], self.cells, threshold, out)
         return Grid(info, out)
 
     def seed(self, grid: Grid) -> None:
-        """Begin all maps with a saved one.
+        """Initialise all maps with a saved one.
 
         Raises:
             MapError: it is turned, or its cells are of another size.

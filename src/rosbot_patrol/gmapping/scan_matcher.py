@@ -1,9 +1,9 @@
-"""Matches scans into the particles' maps and draws their poses from the improved proposal.
+"""Scan matching into the particles' maps; poses are drawn from the improved proposal.
 
 Grisetti, Stachniss, Burgard: Improved techniques for grid mapping with Rao-Blackwellized particle filters (2007). The
-Gaussian of the proposal is taken from the curvature at the match and the odometry's prior, not from samples about it.
-How much a beam says is learned from how far the matched beams ended from the walls: the better lidar and map are, the
-narrower the poses are drawn.
+proposal's Gaussian comes from the curvature at the match and the odometry's prior, not from samples around it. The
+weight of a beam is learned from the distances of matched beams to the walls: the better lidar and map are, the narrower
+is the proposal.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from rosbot_patrol.gmapping.particle_map import ParticleMaps
 
 Array = NDArray[np.float64]
 
-SEARCH_BEAMS = 90  # about so many beams take part in the search
+SEARCH_BEAMS = 90  # approximate number of beams in the search
 HALVINGS = 2  # of the search's steps; the refinement does the rest
-INDEPENDENT = 90  # beams beyond these say nothing new about the pose: their errors hang together
-LEARNING = 0.05  # what a match counts for the variance of the beams
+INDEPENDENT = 90  # number of beams with independent errors; more beams add no information about the pose
+LEARNING = 0.05  # weight of one match in the beams' variance
 NARROWEST = 0.04  # of that variance [cells2]: a fifth of a cell
 
 
 @dataclass(frozen=True)
 class Matches:
-    """What a scan says about each particle.
+    """Result of matching one scan for each particle.
 
     Attributes:
         poses: drawn from the proposal, shape (N, 3).
-        modes: where the scan fits best, shape (N, 3).
-        scores: of the matches, 0 where one failed, shape (N,).
+        modes: best-fitting poses, shape (N, 3).
+        scores: of the matches, 0 for a failed one, shape (N,).
         log_likelihoods: of the scan there, shape (N,).
     """
 
@@ -45,7 +45,7 @@ class Matches:
 
 
 class ScanMatcher:
-    """Matches scans by the parameters of gmapping.
+    """Matches scans with gmapping's parameters.
 
     Args:
         params: of slam_gmapping.
@@ -73,7 +73,7 @@ class ScanMatcher:
         hits[:, :2] /= maps.resolution
         sigmas = deviation / np.array([maps.resolution, maps.resolution, 1.0])
         given = maps.to_cells(guesses), hits, np.ascontiguousarray(headings), sigmas, noise
-        if self._matched == 0:  # once to learn how good the beams are: the first draws turn the whole map
+        if self._matched == 0:  # match once to learn the beams' variance, because the first draws turn the whole map
             self._match(maps, *given)
         poses, fits = self._match(maps, *given)
         return Matches(maps.from_cells(poses), maps.from_cells(fits[:, 2:5]), fits[:, 0], fits[:, 1])
@@ -81,7 +81,7 @@ class ScanMatcher:
     def _match(
         self, maps: ParticleMaps, guesses: Array, hits: Array, headings: Array, sigmas: Array, noise: Array
     ) -> tuple[Array, Array]:
-        """Poses and fits of `match_particles`, and what the variance of the beams is after it."""
+        """Poses and fits from `match_particles`; updates the beams' variance."""
         poses, fits = np.empty_like(guesses), np.empty((len(guesses), 6))
         tuning = self._tuning(len(hits), maps.resolution)
         kernels.match_particles(maps.tables, maps.cells, guesses, hits, headings, sigmas, noise, tuning, poses, fits)

@@ -1,9 +1,9 @@
-"""slam_gmapping without ROS: fed with odometry and scans, it says where the robot is and what the house looks like.
+"""slam_gmapping without ROS: odometry and scans in, pose and map out.
 
 A Rao-Blackwellised particle filter with improved proposals and adaptive resampling (Grisetti, Stachniss, Burgard 2007).
-The decisions are upstream's: an update once the robot drove `linearUpdate` or turned `angularUpdate` in all, or after
-`temporalUpdate`; resampling where the effective share of the particles is less than `resampleThreshold`; the map is
-that of the particle whose line gathered the most likelihood.
+The decisions are upstream's. An update runs after the robot has driven `linearUpdate` or turned `angularUpdate` in all,
+or after `temporalUpdate`. Particles are resampled when their effective share is less than `resampleThreshold`. The
+published map is that of the particle whose ancestry has the highest likelihood.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ RESTART_S = 1.0  # time that goes back by more than this is a restart; by less, 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one scan brought.
+    """Result of one scan.
 
     Attributes:
         updated: the maps were written.
-        resampled: the particles were drawn anew.
-        failed: particles whose scan match failed and who followed the odometry.
-        is_blind: the robot moved, but no beam of the scan measured anything.
+        resampled: the particles were resampled.
+        failed: number of particles that followed the odometry after a failed match.
+        is_blind: the robot moved, but no beam of the scan is usable.
         effective: effective number of particles at this update.
     """
 
@@ -57,8 +57,8 @@ class Slam:
 
     Args:
         params: of slam_gmapping.
-        saved: a map to go on with, None for an empty one.
-        start: where the robot is on it; None: where the odometry says.
+        saved: a map to extend, None: an empty one.
+        start: pose of the robot on it; None: the odometry's.
 
     Raises:
         MapError: the extent or the saved map makes no sense.
@@ -77,7 +77,7 @@ class Slam:
         self._trajectories = Trajectories()
         self.poses: Array = np.empty((0, 3))
         self._log_weights = np.zeros(p.particles)  # since the last resampling
-        self._totals = np.zeros(p.particles)  # of the whole line
+        self._totals = np.zeros(p.particles)  # of the whole ancestry
         self._odometry: Pose2D | None = None  # at the last scan
         self._updated_at = Pose2D()  # odometry at the last update
         self._way = self._turn = 0.0
@@ -87,25 +87,25 @@ class Slam:
 
     @property
     def best(self) -> int:
-        """The particle whose line gathered the most likelihood."""
+        """Index of the particle whose ancestry has the highest likelihood."""
         return int(np.argmax(self._totals))
 
     @property
     def weights(self) -> Array:
-        """Of the particles, adding up to 1, shape (N,)."""
+        """Weights of the particles, with sum 1, shape (N,)."""
         gain = 1.0 / (self._params.ogain * self._params.particles)
         weights = np.exp(gain * (self._log_weights - self._log_weights.max()))
         return np.asarray(weights / weights.sum())
 
     @property
     def entropy(self) -> float:
-        """Of the particles' weights: 0 where one is right for sure, log(N) where none is better than another."""
+        """Entropy of the particle weights: 0 if one particle has all the weight, log(N) if all are equal."""
         weights = self.weights
         return float(-np.sum(weights * np.log(np.maximum(weights, 1e-300))))
 
     @property
     def trajectory(self) -> Array:
-        """The best particle's pose at each update, shape (U, 3)."""
+        """Poses of the best particle at each update, shape (U, 3)."""
         return self._trajectories.of(self.best)
 
     def grid(self) -> Grid:
@@ -113,10 +113,10 @@ class Slam:
         return self.maps.grid(self.best, self._params.occ_thresh)
 
     def update(self, scan: LaserScan, odom_from_base: Pose2D, base_from_laser: Pose2D) -> Outcome:
-        """Take in a scan and the odometry at its time.
+        """Add a scan and the odometry at its time.
 
         Args:
-            scan: one sweep.
+            scan: a level scan.
             odom_from_base: the robot in the odometry's frame at the scan's stamp.
             base_from_laser: of the level scan.
         """
@@ -147,7 +147,7 @@ class Slam:
         return Outcome(updated=True, effective=float(len(self.poses)))
 
     def _resume(self, stamp: float, odometry: Pose2D, beams: Beams) -> Outcome:
-        """The first scan on a saved map is matched, from anywhere near the start."""
+        """Match the first scan on a saved map, from anywhere near the start."""
         outcome = self._step(Pose2D(), beams, deviation=np.array([0.25, 0.25, 0.25]))
         self._note(stamp, odometry)
         return outcome
@@ -183,7 +183,7 @@ class Slam:
         return Outcome(updated=True, resampled=resampled, failed=failed, effective=effective)
 
     def _resample_when_due(self) -> tuple[NDArray[np.int64], float]:
-        """Which particle each goes on from, and how many were effective."""
+        """Index of each particle's parent, and the effective number of particles."""
         weights = self.weights
         count = len(weights)
         effective = float(1.0 / np.sum(weights**2))
@@ -198,7 +198,7 @@ class Slam:
         return parents, effective
 
     def _note(self, stamp: float, odometry: Pose2D) -> None:
-        """An update is done."""
+        """Record an update."""
         self._updated_at, self._updated_stamp, self._stamp = odometry, stamp, stamp
         self._way = self._turn = 0.0
         self.stamps.append(stamp)
@@ -209,7 +209,7 @@ class Slam:
         self.map_from_odom = compose(Pose2D(x, y, wrap_angle(yaw)), invert(self._updated_at))
 
     def _check_restart(self, stamp: float, odometry: Pose2D) -> None:
-        """Where time or odometry jumped, go on from here without believing the jump."""
+        """After a jump of time or odometry, continue without applying the jump."""
         assert self._odometry is not None
         elapsed = stamp - self._stamp
         way = math.hypot(odometry.x - self._odometry.x, odometry.y - self._odometry.y)
@@ -227,6 +227,6 @@ class Slam:
 
 
 def _in_map(errors: Array, headings: Array) -> Array:
-    """Errors ahead, to the left and in turning, turned to the map's axes, shape (N, 3)."""
+    """Rotate errors ahead, to the left and in turning to the map's axes, shape (N, 3)."""
     c, s = np.cos(headings), np.sin(headings)
     return np.column_stack((c * errors[:, 0] - s * errors[:, 1], s * errors[:, 0] + c * errors[:, 1], errors[:, 2]))

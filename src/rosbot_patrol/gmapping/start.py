@@ -1,4 +1,4 @@
-"""How slam_gmapping begins: with an empty map, or on a saved one."""
+"""Start of slam_gmapping: with an empty map, or on a saved one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 
 def started(params: GmappingParams) -> Slam:
-    """A Slam, on a saved map where the parameters name one.
+    """Make a Slam, on a saved map if the parameters name one.
 
     Raises:
         MapError: the saved map cannot be read or does not fit.

@@ -1,7 +1,7 @@
-"""Cells of many maps in tiles of 16 x 16 that the maps share until one of them writes.
+"""Inner loops over maps in tiles of 16 x 16 cells; maps share tiles until one of them writes.
 
-A map is a table of tile numbers, shape (TY, TX), -1 where nothing was seen yet. All maps take their tiles from one
-array `cells` of shape (T, 272, 5). Of each cell it keeps
+A map is a table of tile numbers, shape (TY, TX), -1 for unseen tiles. All maps take their tiles from one array `cells`
+of shape (T, 272, 5). For each cell it keeps
 
     HITS     beams that ended here
     VISITS   beams that ended here or went through
@@ -9,12 +9,12 @@ array `cells` of shape (T, 272, 5). Of each cell it keeps
     MEAN_Y   likewise
     STAMP    number of the scan that hit it last
 
-and of each of its 16 rows, from number 256 on,
+and for each of its 16 rows, from number 256 on,
 
     WALLS    which of its cells are walls, as bits from the lowest column
 
-`refs` counts the maps that use a tile, shape (T,). `free` is a stack of unused tiles: free[0] of them, their numbers
-follow, shape (T + 1,). Coordinates are in cells from the lower left corner of the table.
+`refs` counts the maps that use a tile, shape (T,). `free` is a stack of unused tiles, shape (T + 1,): free[0] is their
+number, then follow their indices. Coordinates are in cells from the lower left corner of the table.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ BITS, TILE, MASK, AREA = 4, 16, 15, 256
 HITS, VISITS, MEAN_X, MEAN_Y, STAMP, FIELDS = 0, 1, 2, 3, 4, 5
 WALLS, ROWS = 4, AREA + TILE
 FULL = 65535
-FULL_SHARE = 10  # a cell is taken for a wall where more than one in so many beams ended in it
+FULL_SHARE = 10  # a cell is a wall if more than one in this many beams ended in it
 
 
 @kernel()
 def walls_from(table: Table, cells: Cells, x: int, y: int, count: int) -> int:
-    """Which of the `count` cells (48 at most) from column x on in row y are walls, as bits; they may lie anywhere."""
+    """Bits of the walls among `count` cells (48 at most) from column x on in row y; cells may lie outside."""
     ty, bits = y >> BITS, np.int64(0)
     if ty < 0 or ty >= table.shape[0]:
         return 0
@@ -52,7 +52,7 @@ def walls_from(table: Table, cells: Cells, x: int, y: int, count: int) -> int:
 
 @kernel()
 def _tell_wall(cells: Cells, tile: int, cell: int) -> None:
-    """Keep whether a cell counts as a wall for the matching of scans."""
+    """Record whether a cell counts as a wall for scan matching."""
     row, bit = AREA + (cell >> BITS), np.int64(1) << np.int64(cell & MASK)
     before = np.int64(cells[tile, row, WALLS])
     is_wall = np.int64(cells[tile, cell, HITS]) * FULL_SHARE > np.int64(cells[tile, cell, VISITS])
@@ -61,7 +61,7 @@ def _tell_wall(cells: Cells, tile: int, cell: int) -> None:
 
 @kernel()
 def own_tile(table: Table, cells: Cells, refs: Table, free: Table, ty: int, tx: int) -> int:
-    """A tile of the table that no other map uses: fresh, or a copy of the shared one."""
+    """Get a tile of the table that no other map uses: a new one, or a copy of the shared one."""
     tile = table[ty, tx]
     if tile >= 0 and refs[tile] == 1:
         return int(tile)
@@ -79,7 +79,7 @@ def own_tile(table: Table, cells: Cells, refs: Table, free: Table, ty: int, tx: 
 
 @kernel()
 def _count_hit(cells: Cells, tile: int, cell: int, x: float, y: float) -> None:
-    """One more beam that ended at (x, y) within the cell."""
+    """Count a beam that ended at (x, y) within the cell."""
     n = int(cells[tile, cell, HITS]) + 1
     cells[tile, cell, HITS] = n
     for field, at in ((MEAN_X, x), (MEAN_Y, y)):
@@ -90,7 +90,7 @@ def _count_hit(cells: Cells, tile: int, cell: int, x: float, y: float) -> None:
 
 @kernel()
 def _count_visit(cells: Cells, tile: int, cell: int) -> None:
-    """One more beam; before the counts overflow both are halved."""
+    """Count a beam; both counts are halved before they overflow."""
     visits = int(cells[tile, cell, VISITS])
     if visits >= FULL:
         visits >>= 1
@@ -119,12 +119,12 @@ def register_hits(
         refs: of the tiles.
         free: unused tiles.
         ends: of the beams, shape (K, 2).
-        is_hit: whether a beam ended there, or was only cut there, shape (K,).
+        is_hit: whether a beam hit something there, or was only cut there, shape (K,).
         stamp: number of the scan, 1 to 65535.
-        first: number of the beam to begin with.
+        first: index of the first beam to write.
 
     Returns:
-        The beam before which the unused tiles might run out, K where all are written.
+        Index of the beam before which the unused tiles might run out, K if all are written.
     """
     for k in range(first, ends.shape[0]):
         if free[0] < 1:
@@ -143,9 +143,9 @@ def register_hits(
 def register_rays(
     table: Table, cells: Cells, refs: Table, free: Table, start: Array, ends: Array, stamp: int, first: int
 ) -> int:
-    """Count a visit for each cell that a beam goes through before its end.
+    """Count a visit for each cell that a beam crosses before its end.
 
-    A cell that a beam of the same scan hit is left out: beams that graze a wall would wear it away.
+    Cells hit by a beam of the same scan are skipped: beams that graze a wall would erode it.
 
     Args:
         table: of the map; its tiles must cover the scan.
@@ -155,10 +155,10 @@ def register_rays(
         start: the sensor, x and y, shape (2,).
         ends: of the beams, shape (K, 2).
         stamp: number of the scan, 1 to 65535.
-        first: number of the beam to begin with.
+        first: index of the first beam to write.
 
     Returns:
-        The beam before which the unused tiles might run out, K where all are written.
+        Index of the beam before which the unused tiles might run out, K if all are written.
     """
     x0, y0 = start[0], start[1]
     low_x, high_x, low_y, high_y = x0, x0, y0, y0
@@ -167,7 +167,7 @@ def register_rays(
         low_y, high_y = min(low_y, ends[k, 1]), max(high_y, ends[k, 1])
     low_tx, low_ty = (math.floor(low_x) >> BITS) - 1, (math.floor(low_y) >> BITS) - 1
     shape = (math.floor(high_y) >> BITS) - low_ty + 2, (math.floor(high_x) >> BITS) - low_tx + 2
-    owned = np.full(shape, -1, dtype=np.int32)  # tiles about the rays that are this map's own by now
+    owned = np.full(shape, -1, dtype=np.int32)  # tiles around the rays that already belong to this map alone
     for k in range(first, ends.shape[0]):
         dx, dy = ends[k, 0] - x0, ends[k, 1] - y0
         if free[0] < int(abs(dx) + abs(dy)) // TILE + 4:
@@ -198,7 +198,7 @@ def register_rays(
 
 @kernel("void(int32[:, :, ::1], int32[::1], int32[::1])")
 def count_references(tables: Table, refs: Table, free: Table) -> None:
-    """Count anew which tiles are used how often, and stack those that are not."""
+    """Recount the references of all tiles, and rebuild the stack of unused ones."""
     refs[:] = 0
     count, height, width = tables.shape
     for i in range(count):
@@ -216,7 +216,7 @@ def count_references(tables: Table, refs: Table, free: Table) -> None:
 
 @kernel("void(int32[:, ::1], uint16[:, :, ::1], float64, int8[:, ::1])")
 def render(table: Table, cells: Cells, threshold: float, out: NDArray[np.int8]) -> None:
-    """A map as occupancy: 100 where more than `threshold` of the beams ended, 0 where fewer, -1 where none came.
+    """A map as occupancy: 100 if more than `threshold` of the beams ended there, 0 if fewer, -1 if none came.
 
     `out` has 16 rows and columns for each of the table's.
     """

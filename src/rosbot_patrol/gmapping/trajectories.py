@@ -1,4 +1,4 @@
-"""Where each particle came from: poses and parents, whose common past is kept once."""
+"""Ancestry of the particles: poses and parents; the common past is stored once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-TIDY = 256  # updates after which the common past is looked for
+TIDY = 256  # number of updates between searches for the common past
 
 
 class Trajectories:
@@ -23,14 +23,14 @@ class Trajectories:
         return len(self._settled) + len(self._poses)
 
     def add(self, poses: Array, parents: Indices) -> None:
-        """One update: the poses, and which particle of the update before each goes on from."""
+        """Add an update: the poses, and the parent of each particle in the previous update."""
         self._poses.append(poses.copy())
         self._parents.append(parents.copy())
         if len(self._poses) > TIDY:
             self._settle()
 
     def of(self, index: int) -> Array:
-        """The way of one particle, a pose for each update, shape (U, 3)."""
+        """Trajectory of one particle: a pose for each update, shape (U, 3)."""
         way: list[Array] = []
         for poses, parents in zip(reversed(self._poses), reversed(self._parents), strict=True):
             way.append(poses[index])
@@ -38,13 +38,13 @@ class Trajectories:
         return np.array([*self._settled, *reversed(way)]).reshape(-1, 3)
 
     def _settle(self) -> None:
-        """Move the past that all particles have in common out of the way."""
+        """Move the common past of all particles to a single list."""
         alive = np.arange(len(self._poses[-1]))
         lines = [alive]
         for parents in reversed(self._parents):
             alive = np.unique(parents[alive])
             lines.append(alive)
-        lines.reverse()  # lines[k + 1]: who of update k has a descendant now
+        lines.reverse()  # lines[k + 1]: particles of update k with a living descendant
         common = 0
         while common < len(self._poses) - 1 and len(lines[common + 1]) == 1:
             self._settled.append(self._poses[common][lines[common + 1][0]])

@@ -1,1 +1,1 @@
-"""The particle filter: moved by odometry, weighed, drawn anew."""
+"""Particle filter: moves particles by odometry, weighs and resamples them."""

@@ -1,4 +1,4 @@
-"""Fox's rule for the number of particles, and its parameters."""
+"""Number of particles by KLD sampling (Fox), and its parameters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosbot_patrol.amcl.particles.resample_kernels import kld_size
 class KldRule:
     """Fewest and most particles, largest error, upper quantile z.
 
-    Differs from upstream: all particles in one bin ask for the fewest, not for the most.
+    Differs from upstream: particles that are all in one bin need the fewest, not the most.
     """
 
     least: int = 100
@@ -20,5 +20,5 @@ class KldRule:
     z: float = 0.99
 
     def size(self, bins: int) -> int:
-        """How many particles a spread over `bins` bins asks for."""
+        """Number of particles for a spread over `bins` bins."""
         return int(kld_size(bins, self.error, self.z, self.least, self.most))

@@ -1,8 +1,8 @@
-"""Whether what scan and odometry say follows from what they said before.
+"""Continuity of scan stamps and odometry: in order, late, or restarted.
 
-A scan that comes after a newer one (threads and networks under load do that) is late and says nothing new. Taken for a
-clock set back, it would cost the motion since the last update: with the tutorial's 0.5 m and 1 rad between updates that
-is enough to lose the robot.
+A scan that arrives after a newer one (threads and networks under load cause that) is late and adds nothing. If it
+counted as a clock set back, the motion since the last update would be lost. With the tutorial's 0.5 m and 1 rad between
+updates that is enough to lose the robot.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from rosbot_patrol.geometry import Pose2D
 
 log = logging.getLogger(__name__)
 
-LATE_S = 1.0  # older than the newest by more than this is no late scan: the clock was set back, or a bag began anew
+LATE_S = 1.0  # a scan older by more than this is not late: the clock was set back, or a bag restarted
 JUMP_M, JUMP_SPEED = 1.0, 5.0  # odometry that moves farther than this and faster is a restart, not a motion
 
 
 class Reading(enum.Enum):
-    """What a scan's stamp and odometry are against the last ones."""
+    """Relation of a scan's stamp and odometry to the previous ones."""
 
     USUAL = enum.auto()
     LATE = enum.auto()
@@ -28,7 +28,7 @@ class Reading(enum.Enum):
 
 
 class OdometryTrack:
-    """Remembers the newest scan's stamp and odometry.
+    """Stores the newest scan's stamp and odometry.
 
     Attributes:
         last: odom_from_base at the newest scan, None before the first.
@@ -39,7 +39,7 @@ class OdometryTrack:
         self._stamp = -math.inf
 
     def judge(self, stamp: float, odometry: Pose2D) -> Reading:
-        """What a scan is; `follow` it unless it is late.
+        """Classify a scan; call `follow` unless it is late.
 
         Args:
             stamp: of the scan [s].
@@ -49,7 +49,7 @@ class OdometryTrack:
         if -LATE_S <= elapsed < 0.0:
             return Reading.LATE
         way = 0.0 if self.last is None else math.hypot(odometry.x - self.last.x, odometry.y - self.last.y)
-        if way <= JUMP_M + JUMP_SPEED * max(elapsed, 0.0):  # a clock that was set does not move the robot
+        if way <= JUMP_M + JUMP_SPEED * max(elapsed, 0.0):  # a changed clock does not move the robot
             return Reading.USUAL
         if elapsed < 0.0:
             log.warning("time went back by %.3f s, and the odometry with it: going on from the last pose", -elapsed)
@@ -58,5 +58,5 @@ class OdometryTrack:
         return Reading.RESTART
 
     def follow(self, stamp: float, odometry: Pose2D) -> None:
-        """This is the newest scan now."""
+        """Make this the newest scan."""
         self._stamp, self.last = stamp, odometry

@@ -1,4 +1,4 @@
-"""The particles: where the robot may be, moved, weighed and drawn anew (Probabilistic Robotics, tables 8.2 and 8.3)."""
+"""Particle filter over the robot's pose (Probabilistic Robotics, tables 8.2 and 8.3)."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from rosbot_patrol.geometry import Pose2D, wrap_angles
 Array = NDArray[np.float64]
 RandomPoses = Callable[[int], Array]
 
-CORE_SHARE = 0.1  # of the heaviest bin's weight: lighter bins do not chain clusters together
+CORE_SHARE = 0.1  # share of the heaviest bin's weight: lighter bins do not link clusters
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """The best guess.
+    """Best estimate of the pose.
 
     Attributes:
         pose: mean of the heaviest cluster of particles.
         covariance: of all particles, x, y, yaw, shape (3, 3).
         cluster_weight: share of the weight in that cluster, 0 to 1.
-        cluster_spread: standard deviation of the place within it [m].
+        cluster_spread: standard deviation of the position within it [m].
         particles: how many there are.
     """
 
@@ -40,13 +40,13 @@ class Estimate:
 
 
 class ParticleFilter:
-    """Weighted poses.
+    """Weighted pose particles.
 
     Args:
-        rule: how many particles there shall be.
-        alpha_slow, alpha_fast: decay of the averages of the fit; where the fast one falls below the slow one, random
+        rule: number of particles.
+        alpha_slow, alpha_fast: decay of the averages of the fit; if the fast one falls below the slow one, random
             poses are mixed in. 0 turns that off.
-        rng: source of all chance.
+        rng: source of random numbers.
     """
 
     def __init__(self, rule: KldRule, *, alpha_slow: float, alpha_fast: float, rng: np.random.Generator) -> None:
@@ -59,22 +59,22 @@ class ParticleFilter:
         self._evidence: Array = np.zeros(1)
 
     def configure(self, rule: KldRule, *, alpha_slow: float, alpha_fast: float) -> None:
-        """Other rules from now on; the particles stay."""
+        """Use other rules from now on; the particles stay."""
         self._rule = rule
         self._alpha_slow, self._alpha_fast = alpha_slow, alpha_fast
 
     def spread_about(self, pose: Pose2D, covariance: Array) -> None:
-        """Start anew from a Gaussian about a pose; covariance of x, y, yaw, shape (3, 3), symmetrised and clipped."""
+        """Restart from a Gaussian around a pose; covariance of x, y, yaw, shape (3, 3), symmetrised and clipped."""
         values, vectors = np.linalg.eigh((covariance + covariance.T) / 2.0)
         scaled = self._rng.standard_normal((self._rule.most, 3)) * np.sqrt(np.maximum(values, 0.0))
         self.set_particles(np.array(pose) + scaled @ vectors.T)
 
     def spread_over(self, random_poses: RandomPoses) -> None:
-        """Start anew from anywhere."""
+        """Restart with poses anywhere."""
         self.set_particles(random_poses(self._rule.most))
 
     def set_particles(self, poses: Array) -> None:
-        """Start anew from given poses, shape (N, 3), all of one weight."""
+        """Restart from given poses, shape (N, 3), with equal weights."""
         poses[:, 2] = wrap_angles(poses[:, 2])
         self.poses = np.ascontiguousarray(poses)
         self._level()
@@ -85,7 +85,7 @@ class ParticleFilter:
         self.weights = np.full(len(self.poses), 1.0 / len(self.poses))
 
     def weigh(self, weighing: Weighing) -> None:
-        """Take a scan's word on each particle."""
+        """Weigh the particles by a scan."""
         fit = float((self.weights * weighing.fit).sum())
         weights = self.weights * weighing.likelihood
         total = weights.sum()
@@ -99,18 +99,18 @@ class ParticleFilter:
 
     @property
     def effective_share(self) -> float:
-        """Share of the particles that carry the weight, 0 to 1."""
+        """Effective share of the particles, 0 to 1."""
         return float(1.0 / (np.square(self.weights).sum() * len(self.weights)))
 
     @property
     def stranger_share(self) -> float:
-        """Share of random poses that the next resampling mixes in."""
+        """Share of random poses in the next resampling."""
         if self._alpha_slow <= 0.0 or self._alpha_fast <= 0.0 or self._slow <= 0.0:
             return 0.0
         return max(0.0, 1.0 - self._fast / self._slow)
 
     def resample(self, random_poses: RandomPoses) -> None:
-        """Draw the particles anew by their weights, with as many as their spread asks for."""
+        """Resample the particles, with as many as their spread requires."""
         strangers = self._strangers(random_poses)
         drawn = np.empty((self._rule.most, 3))
         cumulative = np.cumsum(self.weights)
@@ -134,16 +134,16 @@ class ParticleFilter:
         share = self.stranger_share
         if share <= 0.0:
             return np.empty((0, 3))
-        self._slow = self._fast = 0.0  # or randomness would feed on itself
+        self._slow = self._fast = 0.0  # else random poses would cause more random poses
         strangers = random_poses(self._rule.most)
         strangers[self._rng.random(len(strangers)) >= share] = np.nan
         return strangers
 
     def estimate(self) -> Estimate:
-        """The heaviest cluster's mean and the spread of all.
+        """Mean of the heaviest cluster and covariance of all particles.
 
-        Within the cluster each particle counts by how well it fits the newest scan: the weights of upstream's sensor
-        model are so soft that their plain mean is half a metre off where updates are few.
+        Within the cluster, particles are weighted by their fit to the newest scan. The weights of upstream's sensor
+        model are so soft that their plain mean is half a metre off when updates are rare.
         """
         labels = np.empty(len(self.poses), dtype=np.int64)
         numbers = kernels.label_clusters(self.poses, self.weights, CORE_SHARE, labels)

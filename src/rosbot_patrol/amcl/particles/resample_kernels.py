@@ -1,4 +1,4 @@
-"""Resampling with as many particles as their spread asks for (Fox 2003, KLD sampling), and clusters of particles."""
+"""Inner loops of resampling with an adaptive number of particles (Fox 2003, KLD sampling), and of clustering."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TURNS = 36  # bins in a full turn
 
 @kernel("int64(int64, float64, float64, int64, int64)")
 def kld_size(bins: int, error: float, z: float, least: int, most: int) -> int:
-    """How many particles keep the error against the true distribution below a bound (Fox 2003, equation 7).
+    """Number of particles that bounds the error against the true distribution (Fox 2003, equation 7).
 
     Args:
         bins: bins that hold particles.
@@ -39,14 +39,14 @@ def kld_size(bins: int, error: float, z: float, least: int, most: int) -> int:
 
 @kernel("int64(float64, float64, float64)")
 def bin_key(x: float, y: float, yaw: float) -> int:
-    """The bin of a pose as one number: 0.5 m x 0.5 m x 10 degrees, the turn closed."""
+    """Bin of a pose as one number: 0.5 m x 0.5 m x 10 degrees, closed over the full turn."""
     turn = math.floor(yaw / BIN_RAD) % TURNS
     return ((math.floor(x / BIN_M) + (1 << 24)) * (1 << 25) + math.floor(y / BIN_M) + (1 << 24)) * 64 + turn
 
 
 @kernel("int64(int64[::1], int64)")
 def find_slot(slots: Wholes, key: int) -> int:
-    """Where a key is in an open hash table of 2^n slots, or the empty slot where it would go."""
+    """Slot of a key in an open hash table of 2^n slots, or the empty slot for it."""
     mask = slots.shape[0] - 1
     mixed = key * 0x1E3779B97F4A7C15
     at = ((mixed >> 32) ^ mixed) & mask
@@ -69,15 +69,15 @@ def draw(
     most: int,
     out: Array,
 ) -> int:
-    """Draw particles by weight until their spread asks for no more; returns how many.
+    """Draw particles by weight until their spread needs no more; returns their number.
 
-    The draws follow the golden ratio's additive sequence, which covers the weights evenly however many are drawn.
+    The draws follow the golden ratio's additive sequence, which covers the weights evenly for any number of draws.
 
     Args:
         poses: x, y, yaw, shape (N, 3).
         cumulative: running sum of the weights up to 1, shape (N,).
         offset: start of the sequence, 0 to 1.
-        strangers: x, y, yaw of random poses that stand in for the draws, NaN where none does, shape (most or 0, 3).
+        strangers: x, y, yaw of random poses that replace draws, NaN for none, shape (most or 0, 3).
         error: as for `kld_size`.
         z: as for `kld_size`.
         least: fewest particles.
@@ -112,10 +112,10 @@ def draw(
 
 @kernel("float64[:, ::1](float64[:, ::1], float64[::1], int64[::1], int64)")
 def moments(poses: Array, weights: Array, labels: Wholes, label: int) -> Array:
-    """Weighted moments of the particles of one cluster, or of all where `label` is negative.
+    """Weighted moments of the particles of one cluster, or of all if `label` is negative.
 
     Returns:
-        Row 0: mean x, y, yaw (on the circle); rows 1 to 3: covariance, that of yaw alone the circular one; row 4: the
+        Row 0: mean x, y, yaw (circular); rows 1 to 3: covariance, with yaw's own being circular; row 4: the
         weight, 0, 0. Shape (5, 3). Plain sums in order, so that the same particles give the same bits.
     """
     out = np.zeros((5, 3))
@@ -147,7 +147,7 @@ def moments(poses: Array, weights: Array, labels: Wholes, label: int) -> Array:
 
 @kernel("int64(int64[::1], int64)")
 def root_of(parents: Wholes, i: int) -> int:
-    """The representative of a set, with its path halved (disjoint sets)."""
+    """Representative of a set, with path halving (disjoint sets)."""
     while parents[i] != i:
         parents[i] = parents[parents[i]]
         i = parents[i]
@@ -156,7 +156,7 @@ def root_of(parents: Wholes, i: int) -> int:
 
 @kernel("void(int64[::1], int64[::1], int64[::1], int64[::1], float64[::1], float64)")
 def join_bins(keys: Wholes, slots: Wholes, index: Wholes, parents: Wholes, mass: Array, least: float) -> None:
-    """Join each bin that holds `least` of the weight with the bins about it.
+    """Join each bin of at least `least` weight with its neighbours.
 
     Args:
         keys: of the bins, shape (B,).
@@ -185,10 +185,10 @@ def join_bins(keys: Wholes, slots: Wholes, index: Wholes, parents: Wholes, mass:
 
 @kernel("int64(float64[:, ::1], float64[::1], float64, int64[::1])")
 def label_clusters(poses: Array, weights: Array, share: float, labels: Wholes) -> int:
-    """Number the clusters of particles whose bins touch; returns how many numbers are in use.
+    """Number the clusters of particles in touching bins; returns how many numbers are in use.
 
     Only bins with at least `share` of the heaviest bin's weight link others (as the core points of DBSCAN, Ester et al.
-    1996): random poses that recovery strews over the map would otherwise chain the whole house to one cluster.
+    1996). Otherwise random poses from the recovery would link the whole house to one cluster.
 
     Args:
         poses: x, y, yaw, shape (N, 3).

@@ -1,1 +1,1 @@
-"""How well a scan fits the map at a pose."""
+"""Sensor models: fit of a scan to the map at a pose."""

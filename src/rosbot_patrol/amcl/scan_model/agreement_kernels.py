@@ -1,4 +1,4 @@
-"""What each beam of a scan says about one pose: explained by the map, too short, through a wall, or not returned."""
+"""Inner loop that classifies a scan's beams at one pose: explained by the map, short, through a wall, no return."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def count_beams(
     near: float,
     out: NDArray[np.int64],
 ) -> None:
-    """Count the beams of each kind, seen from one pose.
+    """Count the beams of each class, seen from one pose.
 
     Args:
         sensor: x, y, yaw of the sensor on the map, shape (3,).
@@ -43,7 +43,7 @@ def count_beams(
         origin_y: likewise.
         resolution: edge of a cell [m].
         reach: largest range of the sensor [m].
-        near: how far from an obstacle a beam may end and be explained [m].
+        near: largest distance from an obstacle at which a beam's end is explained [m].
         out: beams that are explained, that end early, that went through a wall, that hit nothing where the map has a
             wall, that hit nothing where there is none, shape (5,).
     """

@@ -1,4 +1,4 @@
-"""What a scan says about each particle: sums over a table on the grid, and rays on the map."""
+"""Inner loops that weigh particles by a scan: sums over a grid table, and rays on the map."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def sum_over_beams(
         poses: x, y, yaw of the particles, shape (N, 3).
         xs: end points in the robot's frame [m], shape (K,).
         ys: likewise.
-        table: value of each cell; its border cells stand for all that lies beyond, shape (H, W).
+        table: value of each cell; its border cells also stand for everything beyond, shape (H, W).
         origin_x: lower left corner of the table [m].
         origin_y: likewise.
         resolution: edge of a cell [m].
@@ -61,7 +61,7 @@ def count_agreement(
     near: float,
     out: NDArray[np.int64],
 ) -> None:
-    """For each beam, how many particles see its end point nearer than `near` [m] to an obstacle, shape (K,)."""
+    """Number of particles, for each beam, that see its end closer than `near` [m] to an obstacle, shape (K,)."""
     height, width = distances.shape
     out[:] = 0
     for i in range(poses.shape[0]):
@@ -90,7 +90,7 @@ def cast_ray(
 ) -> float:
     """Length of a ray [m] from a point to the first cell of distance 0, at most `reach` (sphere tracing).
 
-    `distances` [m] is the distance of each cell to the nearest blocked one; beyond the grid nothing blocks.
+    `distances` [m] holds the distance of each cell to the nearest blocked one; beyond the grid nothing blocks.
     """
     height, width = distances.shape
     gx, gy = (x - origin_x) / resolution, (y - origin_y) / resolution

@@ -1,4 +1,4 @@
-"""Where on a map the robot may be at all, and which of those places a scan speaks for."""
+"""Free floor of a map, and the places on it that a scan supports."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from rosbot_patrol.maps.occupancy import FREE
 
 Array = NDArray[np.float64]
 
-SHARPNESS = 20.0  # how much a better fit counts for a candidate
-JITTER = (0.08, 0.08, 0.06)  # about a candidate, which lies on no finer raster than it was drawn on [m, m, rad]
+SHARPNESS = 20.0  # weight of a candidate's fit
+JITTER = (0.08, 0.08, 0.06)  # added to a candidate, because candidates are drawn on a raster [m, m, rad]
 
 
 class Floor:
@@ -22,7 +22,7 @@ class Floor:
 
     Args:
         grid: the map.
-        rng: source of all chance.
+        rng: source of random numbers.
     """
 
     def __init__(self, grid: Grid, rng: np.random.Generator) -> None:
@@ -45,13 +45,13 @@ class Floor:
         return poses
 
     def likely_poses(self, model: SensorModel, beams: Beams, *, tried: int, count: int) -> Array:
-        """Poses that a scan speaks for: the better of many random ones (sensor resetting, Lenser and Veloso 2000).
+        """Poses that a scan supports: the best of many random ones (sensor resetting, Lenser and Veloso 2000).
 
         Args:
-            model: weighs poses; one of a wide spread finds more, for few random poses are near the right one.
+            model: weighs poses; a wide one finds more, because few random poses are close to the right one.
             beams: of the scan.
-            tried: random poses.
-            count: poses wanted.
+            tried: number of random poses.
+            count: number of poses to return.
         """
         poses = self.random_poses(tried)
         weighing = model.weigh(poses, beams)

@@ -1,4 +1,4 @@
-"""What amcl makes of a map: the sensor models on it, the free floor, and how far each place is from an obstacle."""
+"""A map prepared for amcl: sensor models, free floor, and distances to obstacles."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from rosbot_patrol.amcl.scan_model.sensor_model import MODELS, LikelihoodFieldMo
 from rosbot_patrol.errors import MapError
 from rosbot_patrol.grid import Grid
 
-WIDE_M = 0.4  # spread of hits by which random poses are judged: few of them are near the right one
+WIDE_M = 0.4  # spread of hits for weighing random poses: few of them are close to the right one
 
 
 class KnownMap:
-    """A map to localise on.
+    """A map for localisation.
 
     Args:
         grid: the map.
         params: of amcl.
-        rng: source of all chance.
+        rng: source of random numbers.
 
     Raises:
         MapError: the map is turned, empty, or its place makes no sense.
@@ -41,7 +41,7 @@ class KnownMap:
 
     @cached_property
     def wide(self) -> SensorModel:
-        """A sensor model that forgives more; made when it is first asked for."""
+        """A more tolerant sensor model; made when first needed."""
         forgiving = replace(
             self._params, laser_sigma_hit=WIDE_M, laser_likelihood_max_dist=3.0 * WIDE_M, laser_z_hit=0.95
         )

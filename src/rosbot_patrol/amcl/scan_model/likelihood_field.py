@@ -1,4 +1,4 @@
-"""How far each place is from the nearest obstacle of the map, cut to where there are any."""
+"""Distances to the nearest obstacle of the map, cropped to the part with obstacles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Table = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Field:
-    """A table on the grid; its border cells stand for all that lies beyond.
+    """A table on the grid; its border cells also stand for everything beyond.
 
     Attributes:
         values: shape (H, W).
@@ -31,25 +31,25 @@ class Field:
     resolution: float
 
     def mapped(self, values: NDArray[np.float64]) -> Field:
-        """The same place with other values."""
+        """A copy with the same geometry and other values."""
         table = np.ascontiguousarray(values, dtype=np.float32)
         return Field(table, self.origin_x, self.origin_y, self.resolution)
 
 
 def obstacle_distances(grid: Grid, max_dist: float) -> Field:
-    """Distance to the nearest occupied cell [m], at most `max_dist`; cut to the occupied part and a margin."""
+    """Distance to the nearest occupied cell [m], at most `max_dist`; cropped to the occupied part and a margin."""
     occupied = grid.cells == OCCUPIED
     margin = max(math.ceil(max_dist / grid.info.resolution), 1) + 1
     return _distances(grid, occupied, occupied, margin, max_dist)
 
 
 def blocked_distances(grid: Grid, max_dist: float) -> Field:
-    """Distance to the nearest cell that is not free [m], at most `max_dist`; cut to the known part."""
+    """Distance to the nearest cell that is not free [m], at most `max_dist`; cropped to the known part."""
     return _distances(grid, grid.cells != FREE, grid.cells != UNKNOWN, 0, max_dist)
 
 
 def _distances(grid: Grid, marked: NDArray[np.bool_], shown: NDArray[np.bool_], margin: int, max_dist: float) -> Field:
-    """Distances to the marked cells, on the smallest box about the shown ones and a margin [cells]."""
+    """Distances to the marked cells, in the smallest box around the shown ones and a margin [cells]."""
     info = grid.info
     rows, columns = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
     if not len(rows):

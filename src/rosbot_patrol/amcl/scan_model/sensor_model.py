@@ -1,10 +1,10 @@
-"""How well a scan fits a map, seen from many poses (Probabilistic Robotics, chapter 6).
+"""Sensor models: fit of a scan to a map, seen from many poses (Probabilistic Robotics, chapter 6).
 
-`likelihood_field` and `beam` add the cubed probabilities of the beams, as upstream does: that is softer than their
-product, and forgives what is not on the map. But it is too soft where updates are few: with the tutorial's parameters
-somebody who took 30 % of the view led it astray by metres, in each of four drives. So the sum counts to the third
-power, which is still far softer than a product, and with which none of the four was off by more than 0.2 m.
-`likelihood_field_prob` multiplies the probabilities.
+`likelihood_field` and `beam` add the cubed probabilities of the beams, as upstream does. The sum is softer than their
+product and tolerates obstacles that are not on the map. It is too soft when updates are rare: with the tutorial's
+parameters a person who filled 30 % of the view led it astray by metres, in each of four drives. Therefore the sum
+counts to the third power. That is still far softer than a product, and none of the four drives was off by more than 0.2
+m. `likelihood_field_prob` multiplies the probabilities.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ CONVERGED_M = 0.5  # upstream's
 
 @dataclass(frozen=True)
 class Beams:
-    """The beams of a scan that count.
+    """Usable beams of a scan.
 
     Attributes:
         xs, ys: end points of those that hit, in the robot's frame [m], shapes (K,).
         mount: pose of the sensor on the robot.
-        angles, ranges: all beams in the sensor's frame [rad, m], `reach` where nothing was hit, shapes (L,).
+        angles, ranges: all beams in the sensor's frame [rad, m], `reach` without a hit, shapes (L,).
         reach: largest range [m].
         frame: of the laser.
     """
@@ -50,7 +50,7 @@ class Beams:
 
 @dataclass(frozen=True)
 class Weighing:
-    """What a scan says about particles.
+    """Weights of particles from a scan.
 
     Attributes:
         likelihood: factors of their weights, shape (N,).
@@ -67,11 +67,11 @@ class SensorModel(Protocol):
     """Weighs poses by a scan."""
 
     def weigh(self, poses: Array, beams: Beams) -> Weighing | None:
-        """Likelihood and fit of each pose, shape (N, 3); None where the scan says nothing."""
+        """Likelihood and fit of each pose, shape (N, 3); None if the scan is empty."""
 
 
 def pick_beams(scan: LaserScan, base_from_laser: Pose2D, params: AmclParams) -> Beams:
-    """The evenly spread beams of a level scan that the parameters ask for.
+    """Select evenly spread beams of a level scan, as many as the parameters ask for.
 
     Readings at or below the least range count as misses; NaN and readings beyond the largest range are no hits.
     """
@@ -98,7 +98,7 @@ def pick_beams(scan: LaserScan, base_from_laser: Pose2D, params: AmclParams) -> 
 
 
 class LikelihoodFieldModel:
-    """Each beam's end point against the distance to the nearest obstacle: sum of cubed probabilities.
+    """Scores each beam's end by its distance to the nearest obstacle: sum of cubed probabilities.
 
     Args:
         grid: the map.
@@ -119,7 +119,7 @@ class LikelihoodFieldModel:
 
 
 class LikelihoodFieldProbModel:
-    """As `LikelihoodFieldModel`, but the product of the probabilities, with beams skipped that few particles see.
+    """As `LikelihoodFieldModel`, but a product of probabilities that skips beams which few particles see.
 
     Args:
         grid: the map.
@@ -158,13 +158,13 @@ class LikelihoodFieldProbModel:
             counts,
         )
         kept = counts > p.beam_skip_threshold * len(poses)
-        if 1.0 - kept.mean() > p.beam_skip_error_threshold:  # the filter is wrong, not the beams
+        if 1.0 - kept.mean() > p.beam_skip_error_threshold:  # then the filter is wrong, not the beams
             return beams.xs, beams.ys
         return beams.xs[kept], beams.ys[kept]
 
 
 class BeamModel:
-    """Each beam's length against a ray on the map: hits, early ends, misses and noise; sum of cubed probabilities.
+    """Scores each beam's length by a ray on the map: hits, early ends, misses and noise; sum of cubed probabilities.
 
     Args:
         grid: the map.
@@ -207,13 +207,13 @@ class BeamModel:
 
 
 def _sharpened(sums: Array) -> Array:
-    """What sums of cubed probabilities count."""
+    """Likelihood from sums of cubed probabilities."""
     factor = 1.0 + sums
     return factor * factor * factor
 
 
 def _is_converged(poses: Array) -> bool:
-    """Whether all particles are at one place, as upstream asks before it skips beams."""
+    """Whether all particles are at one place, upstream's condition for skipping beams."""
     off = np.abs(poses[:, :2] - poses[:, :2].mean(axis=0))
     return bool(off.max() <= CONVERGED_M)
 
@@ -230,7 +230,7 @@ def _log(p: Array, _power: float) -> Array:
 
 
 class _Table:
-    """The value of each cell for one beam; made anew when the sensor's reach changes."""
+    """Value of each cell for one beam; recomputed when the sensor's reach changes."""
 
     def __init__(self, distances: Field, params: AmclParams, shape: object, power: float) -> None:
         self._distances = distances

@@ -236,7 +236,7 @@ class SerialServer:
         self._add(client, now)
 
     def _turn_away(self, host: str, now: float) -> str | None:
-        """Reason why a new connection is refused, or "" after making room for it."""
+        """Reason why a new connection is refused; None if it is accepted, after making room for it."""
         if not self._policy.may_connect(host):
             return "its address is not on the list (~allow_peers)"
         reason, leaver = self.door.ask(host, now)
