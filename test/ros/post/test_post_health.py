@@ -1,6 +1,6 @@
 """What /diagnostics says of a channel."""
 
-from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus
+from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus
 from rosbot_patrol.ros.post.health import judge
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN
 

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError, Pace
-from rosbot_patrol.alerts.dispatch.dispatcher import Clocks, Dispatcher
+from rosbot_patrol.alerts.dispatch.delivery import Clocks
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.dispatch.spare_post import SparePost
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox

@@ -14,7 +14,7 @@ import random
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rosbot_patrol.alerts.channels.channel import Pace
+from rosbot_patrol.alerts.channels.channel import DeliveryError, Pace
 from rosbot_patrol.alerts.outbox.outbox import Waiting
 
 DIGEST_FROM = 3  # so many that are not urgent become one message
@@ -122,49 +122,43 @@ class ChannelQueue:
             self._last_urgent = now
         self._is_up()
 
-    def failed(
-        self,
-        batch: Sequence[Waiting],
-        now: float,
-        error: str,
-        *,
-        permanent: bool = False,
-        answered: bool = False,
-        delay: float | None = None,
-        of_recipient: bool = False,
-    ) -> float:
-        """A message was not taken; returns how long it is put off [s].
+    def failed(self, batch: Sequence[Waiting], now: float, err: DeliveryError) -> float:
+        """Note that a message was not taken.
 
         Args:
-            batch: that was tried.
+            batch: the notices of the message.
             now: time [s].
-            error: why.
-            permanent: the fault is this message's, the others may pass.
-            answered: the other side was there and did not want it now.
-            delay: that the other side asked for [s].
-            of_recipient: with `permanent`: the fault is the recipient's. So a digest is not taken apart, and the next
-                message waits for `interval`: servers lock out who asks for unknown users again and again.
+            err: why it was not taken.
+
+        Returns:
+            Time until the next attempt [s].
         """
         self._last_try = now
-        self.error = error
-        is_final = permanent
-        if answered:
+        self.error = str(err)
+        is_refused = err.permanent
+        if err.answered:
             for entry in batch:
                 self._unwanted[entry.id] = self._unwanted.get(entry.id, 0) + 1
-            permanent = permanent or any(entry.id in self._refused for entry in batch)
-        if permanent:
-            self._is_up(error)
-            if of_recipient:
-                self._blocked_until = now + self._pace.interval
-                return max(self._refuse([entry], now, error, is_final=is_final) for entry in batch)
-            return self._refuse(batch, now, error, is_final=is_final)
+            is_refused = is_refused or any(entry.id in self._refused for entry in batch)
+        if not is_refused:
+            return self._back_off(now, err.delay)
+        self._is_up(str(err))
+        if err.of_recipient:
+            # A digest is not taken apart, and the next message waits: servers lock out a peer that asks for unknown
+            # users again and again.
+            self._blocked_until = now + self._pace.interval
+            return max(self._refuse([entry], now, err) for entry in batch)
+        return self._refuse(batch, now, err)
+
+    def _back_off(self, now: float, asked: float | None) -> float:
+        """Try nothing for a while that doubles each time; at least as long as the other side `asked` for [s]."""
         self._failures += 1
         if self.down_since is None:
             self.down_since = now
         put_off = self._jittered(self._pace.first_delay * 2.0 ** min(self._failures - 1, 30))
-        if delay is not None:
-            put_off = max(put_off, min(delay, self._pace.max_delay))
-            self._asked_until = now + min(delay, self._pace.max_delay)
+        if asked is not None:
+            put_off = max(put_off, min(asked, self._pace.max_delay))
+            self._asked_until = now + min(asked, self._pace.max_delay)
         self._blocked_until = now + put_off
         return put_off
 
@@ -192,13 +186,13 @@ class ChannelQueue:
     def _is_doubtful(self, entry: Waiting) -> bool:
         return self._unwanted.get(entry.id, 0) >= DOUBTFUL and entry.id not in self._refused
 
-    def _refuse(self, batch: Sequence[Waiting], now: float, error: str, *, is_final: bool) -> float:
+    def _refuse(self, batch: Sequence[Waiting], now: float, err: DeliveryError) -> float:
         if len(batch) > 1:  # one of them is to blame: each by itself, then
             self._alone |= {entry.id for entry in batch}
             return 0.0
         state = self._refused.setdefault(batch[0].id, _Refusal())
         state.times += 1
-        state.error, state.is_final = error, is_final
+        state.error, state.is_final = str(err), err.permanent
         put_off = min(RARELY[0] * 2.0 ** min(state.times - 1, 20), RARELY[1])
         state.due = now + put_off
         return put_off

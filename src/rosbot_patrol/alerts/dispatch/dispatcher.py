@@ -1,83 +1,37 @@
-"""Brings what waits in the outbox to its channels. Of all processes that could, one does at a time.
+"""The dispatcher brings what waits in the outbox to the channels. Of all programs that could, one does at a time.
 
-Whoever holds the outbox's lock delivers for everybody; the system takes the lock back however that process ends, and
-the next that asks has it. One that hangs loses it to the next when it has given no sign of life for a while; if it goes
-on, it sees that before it sends anything more. A notice is crossed out for a channel once that took it: after a crash
-or a hang between the two it goes to that channel again, with the same id (as Message-ID, file name or idempotency key).
+The holder of the outbox's lock delivers for all programs. The system takes the lock back when that program ends, and
+the next one that asks has it. A program that hangs loses the lock to the next one after a while without a sign of life.
+If it goes on, it sees that before it sends anything more.
+
+A notice is crossed out for a channel once that took it. After a crash or a hang between the two, the notice goes to
+that channel again, with the same id (as Message-ID, file name or idempotency key).
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 import random
 import threading
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
 from rosbot_patrol.alerts.dispatch.channel_queue import ChannelQueue
+from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus, Clocks, Delivery, send, title_of
+from rosbot_patrol.alerts.dispatch.fault_notices import down_notice, refused_notice
 from rosbot_patrol.alerts.dispatch.file_lock import STALE, FileLock, NoLock
 from rosbot_patrol.alerts.outbox.digest import merge
 from rosbot_patrol.alerts.outbox.memory_outbox import MemoryOutbox
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox, Waiting
 from rosbot_patrol.alerts.outbox.receipts import Receipt, Receipts
-from rosbot_patrol.alerts.safe_text import token
-from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import write_atomic
 
 log = logging.getLogger(__name__)
 
 STATUS = "status.json"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Delivery:
-    """What became of a message: taken at `where`, or put off; `text` says so."""
-
-    channel: str
-    transport: str
-    ids: tuple[str, ...]
-    delivered: bool
-    permanent: bool = False
-    where: str = ""
-    text: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChannelStatus:
-    """How a channel does.
-
-    Attributes:
-        name: of the channel; describe: where it goes.
-        waiting: how many it has still to take; since: when the oldest of them happened, seconds since 1970.
-        refused: how many of them it refused for good.
-        down_for: so long it has not taken what it should [s]; None: it does.
-        error: what it said last, "" where all is well.
-        refusal: why it refused for good what it was asked for last, "" where it took that.
-        next_try: in so long [s], None where nothing waits.
-    """
-
-    name: str
-    describe: str
-    waiting: int
-    since: float | None
-    refused: int
-    down_for: float | None
-    error: str
-    next_try: float | None
-    refusal: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Clocks:
-    """The times of day and of the machine [s]; tests give their own."""
-
-    now: Callable[[], float] = time.monotonic
-    wall: Callable[[], float] = lambda: time.clock_gettime(time.CLOCK_REALTIME)
 
 
 class Dispatcher:
@@ -184,7 +138,14 @@ class Dispatcher:
                 queue.offer(e for e in self._waiting if self._is_open(e, receipt.channel))
 
     def deliver(self, name: str) -> Delivery | None:
-        """Send what is due on a channel, None where nothing is; waits for the transport. Raises OSError."""
+        """Send what is due on a channel; waits for the transport.
+
+        Returns:
+            The outcome, None if nothing was due.
+
+        Raises:
+            OSError: the disk cannot be read.
+        """
         with self._guard:
             self._mind_the_lock()
             queue = self._queues.get(name)
@@ -196,36 +157,11 @@ class Dispatcher:
             self.refresh()
             return None
         channel = self.channels[name]
-        ids = tuple(entry.id for entry in batch)
         try:
-            where = _send(channel, notice)
+            where = send(channel, notice)
         except DeliveryError as err:
-            with self._guard:
-                put_off = queue.failed(
-                    batch,
-                    self._clocks.now(),
-                    str(err),
-                    permanent=err.permanent,
-                    answered=err.answered,
-                    delay=err.delay,
-                    of_recipient=err.of_recipient,
-                )
-                rest = self._what_next(name, ids, put_off, err)
-            text = f"{_told(batch)} not taken by '{name}'{rest}: {err}"
-            log.error("%s", text)
-            return Delivery(
-                channel=name,
-                transport=channel.transport.name,
-                ids=ids,
-                delivered=False,
-                permanent=err.permanent,
-                text=text,
-            )
-        with self._guard:
-            self._cross_out(channel, queue, batch, where)
-        text = f"{_told(batch)} delivered by {channel.transport.name}: {where}"
-        log.info("%s", text)
-        return Delivery(channel=name, transport=channel.transport.name, ids=ids, delivered=True, where=where, text=text)
+            return self._note_failure(channel, queue, batch, err)
+        return self._note_success(channel, queue, batch, where)
 
     def pause(self, name: str, most: float = 60.0) -> float:
         """How long until `deliver` may have something to do [s]."""
@@ -253,7 +189,7 @@ class Dispatcher:
                 if not others:
                     continue
                 if queue.oldest is not None and self._is_down(name):
-                    self._tell_down(name, queue, queue.oldest, others)
+                    self._tell(down_notice(self.channels[name], queue, queue.oldest, others, self._clocks.wall()))
                 for entry, error in queue.refused:
                     self._tell_refused(name, entry, error, others)
 
@@ -349,17 +285,46 @@ class Dispatcher:
             return None
         return notices[0] if len(notices) == 1 else merge(notices)
 
-    def _cross_out(self, channel: Channel, queue: ChannelQueue, batch: list[Waiting], where: str) -> None:
-        receipt = self._receipt(channel, batch, where=where)
-        queue.delivered(batch, self._clocks.now())
-        self.receipts.note(receipt)
-        self._unwritten.append(receipt)
-        try:
-            self._write_receipts()
-            self._settle_refusals()
-            self._finish()
-        except OSError as err:
-            log.error("the delivery of %s cannot be written down: %s; trying on", ", ".join(receipt.ids), err)
+    def _note_success(self, channel: Channel, queue: ChannelQueue, batch: list[Waiting], where: str) -> Delivery:
+        with self._guard:
+            receipt = self._receipt(channel, batch, where=where)
+            queue.delivered(batch, self._clocks.now())
+            self.receipts.note(receipt)
+            self._unwritten.append(receipt)
+            try:
+                self._write_receipts()
+                self._settle_refusals()
+                self._finish()
+            except OSError as err:
+                log.error("the delivery of %s cannot be written down: %s; trying on", ", ".join(receipt.ids), err)
+        text = f"{title_of(batch)} delivered by {channel.transport.name}: {where}"
+        log.info("%s", text)
+        return Delivery(
+            channel=channel.name,
+            transport=channel.transport.name,
+            ids=receipt.ids,
+            delivered=True,
+            where=where,
+            text=text,
+        )
+
+    def _note_failure(
+        self, channel: Channel, queue: ChannelQueue, batch: list[Waiting], err: DeliveryError
+    ) -> Delivery:
+        ids = tuple(entry.id for entry in batch)
+        with self._guard:
+            put_off = queue.failed(batch, self._clocks.now(), err)
+            rest = self._what_next(channel.name, ids, put_off, err)
+        text = f"{title_of(batch)} not taken by '{channel.name}'{rest}: {err}"
+        log.error("%s", text)
+        return Delivery(
+            channel=channel.name,
+            transport=channel.transport.name,
+            ids=ids,
+            delivered=False,
+            permanent=err.permanent,
+            text=text,
+        )
 
     def _receipt(self, channel: Channel, batch: Sequence[Waiting], *, where: str = "", refused: str = "") -> Receipt:
         return Receipt(
@@ -394,57 +359,10 @@ class Dispatcher:
         since = self._queues[name].down_since
         return since is not None and self._clocks.now() - since >= self._down_after
 
-    def _tell_down(self, name: str, queue: ChannelQueue, oldest: Waiting, others: tuple[str, ...]) -> None:
-        when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(oldest.wall))
-        text = (
-            f"The channel '{name}' ({self.channels[name].transport.describe()}) takes nothing: {queue.error}\n\n"
-            f"{count_of(len(queue), 'notice waits', 'notices wait')} for it, the oldest of {when}. "
-            f"{'It is' if len(queue) == 1 else 'They are'} kept and tried on."
-        )
-        self._tell(f"{oldest.id[:90]}-down-{_mark(name)}", f"the channel '{name}' is down", text, others)
-
     def _tell_refused(self, name: str, entry: Waiting, error: str, others: tuple[str, ...]) -> None:
-        if name in self.receipts.refusals:  # told with the first, and it has taken nothing since
-            return
-        channel = self.channels[name]
-        rest = "It is kept and tried again now and then; the others pass."
-        if channel.group:
-            rest += " What it refused for good is not sent to it again once another recipient has it."
-        text = (
-            f"The channel '{name}' ({channel.transport.describe()}) refused the notice {entry.id}"
-            f" ({entry.kind}): {error}\n\n{rest}"
-        )
-        self._tell(f"{entry.id[:90]}-refused-{_mark(name)}", f"the channel '{name}' refused a notice", text, others)
+        if name not in self.receipts.refusals:  # the first one was told, and the channel has taken nothing since
+            self._tell(refused_notice(self.channels[name], entry, error, others, self._clocks.wall()))
 
-    def _tell(self, notice_id: str, subject: str, text: str, others: tuple[str, ...]) -> None:
-        notice = Notice(
-            id=notice_id,
-            wall=self._clocks.wall(),
-            kind="fault",
-            subject=f"rosbot patrol: {subject}",
-            text=text,
-            channels=others,
-        )
+    def _tell(self, notice: Notice) -> None:
         if self.outbox.put(notice):
-            log.error("told on %s: %s", ", ".join(others), subject)
-
-
-def _send(channel: Channel, notice: Notice) -> str:
-    try:
-        return channel.transport.send(notice)
-    except DeliveryError:
-        raise
-    except Exception as err:  # whatever one notice does to a channel, the others have to pass
-        log.error("channel '%s' stumbled over notice %s", channel.name, notice.id, exc_info=True)
-        raise DeliveryError(f"the channel stumbled over it: {err!r}", permanent=True) from err
-
-
-def _mark(name: str) -> str:
-    """A channel's name as a part of a notice's id."""
-    if len(name) <= 40 and token(name) == name:
-        return name
-    return f"{token(name)[:31]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-
-
-def _told(batch: Sequence[Waiting]) -> str:
-    return f"notice {batch[0].id}" if len(batch) == 1 else f"a digest of {len(batch)} notices"
+            log.error("told on %s: %s", ", ".join(notice.channels), notice.subject)

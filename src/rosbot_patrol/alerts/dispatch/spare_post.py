@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from rosbot_patrol.alerts.channels.channel import Channel
-from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Clocks, Delivery, Dispatcher
+from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus, Clocks, Delivery
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.memory_outbox import MemoryOutbox
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox

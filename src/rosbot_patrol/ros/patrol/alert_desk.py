@@ -12,7 +12,7 @@ from functools import partial
 
 import rospy
 
-from rosbot_patrol.alerts.dispatch.dispatcher import Delivery
+from rosbot_patrol.alerts.dispatch.delivery import Delivery
 from rosbot_patrol.alerts.outbox.damaged_notices import replacement
 from rosbot_patrol.alerts.outbox.delayed_notices import DelayedNotices
 from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from rosbot_patrol.alerts.channels.config import MailParams
-from rosbot_patrol.alerts.dispatch.dispatcher import ChannelStatus, Dispatcher
+from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.dispatch.settings_file import differences, state_of
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health

@@ -43,7 +43,8 @@ def main() -> None:
     """Run the program."""
     use_private_umask()
     arguments = [a for a in sys.argv[1:] if not a.startswith("__") and ":=" not in a]
-    logging.getLogger("rosbot_patrol.alerts.dispatch.dispatcher").disabled = True  # what it says is printed
+    for name in ("dispatcher", "delivery"):  # their words are printed
+        logging.getLogger(f"rosbot_patrol.alerts.dispatch.{name}").disabled = True
     try:
         sys.exit(run(arguments))
     except (ParamError, OSError) as err:

@@ -22,7 +22,8 @@ import rospy
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
 from rosbot_patrol.alerts.channels.network_state import network_mark
 from rosbot_patrol.alerts.channels.secrets_on_disk import refuse_secrets
-from rosbot_patrol.alerts.dispatch.dispatcher import Delivery, Dispatcher
+from rosbot_patrol.alerts.dispatch.delivery import Delivery
+from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.dispatch.settings_file import Settings, write_settings
 from rosbot_patrol.alerts.dispatch.spare_post import SparePost
 from rosbot_patrol.alerts.outbox.damaged_notices import replacement

@@ -2,7 +2,7 @@ import random
 
 import pytest
 
-from rosbot_patrol.alerts.channels.channel import Pace
+from rosbot_patrol.alerts.channels.channel import DeliveryError, Pace
 from rosbot_patrol.alerts.dispatch.channel_queue import ChannelQueue
 from rosbot_patrol.alerts.outbox.outbox import Waiting
 
@@ -45,7 +45,7 @@ def test_the_interval_delays_and_never_drops():
 def test_a_channel_that_is_down_is_tried_ever_more_seldom_and_keeps_the_order():
     made, now, delays = queue("a", "b", first_delay=5.0, max_delay=60.0), 0.0, []
     for _ in range(7):
-        delays.append(made.failed(made.due(now), now, "down"))
+        delays.append(made.failed(made.due(now), now, DeliveryError("down")))
         assert made.due(now + delays[-1] - 0.01) == []
         now += delays[-1]
     assert delays == [5, 10, 20, 40, 60, 60, 60]
@@ -57,7 +57,7 @@ def test_a_channel_that_is_down_is_tried_ever_more_seldom_and_keeps_the_order():
 def test_delays_are_left_to_chance_a_little_and_bounded():
     made, delays = queue("a", first_delay=100.0, jitter=0.2), []
     for _ in range(30):
-        delays.append(made.failed(made.due(1e9), 1e9, "down"))
+        delays.append(made.failed(made.due(1e9), 1e9, DeliveryError("down")))
         made.nudge(1e9, all_=True)
     assert 80 <= delays[0] <= 120
     assert len(set(delays)) > 3
@@ -66,36 +66,36 @@ def test_delays_are_left_to_chance_a_little_and_bounded():
 
 def test_the_other_sides_wish_is_heeded_within_bounds():
     made = queue("a")
-    assert made.failed(made.due(0.0), 0.0, "503", delay=120.0) == 120.0
-    assert made.failed(made.due(120.0), 120.0, "503", delay=1e9) == 900.0
+    assert made.failed(made.due(0.0), 0.0, DeliveryError("503", delay=120.0)) == 120.0
+    assert made.failed(made.due(120.0), 120.0, DeliveryError("503", delay=1e9)) == 900.0
 
 
 def test_the_other_sides_wish_outlasts_a_new_notice_but_not_somebody_who_asks():
     made = queue("a", first_delay=5.0)
-    made.failed(made.due(0.0), 0.0, "429", delay=64.57)
+    made.failed(made.due(0.0), 0.0, DeliveryError("429", delay=64.57))
     made.nudge(10.0)
     assert made.due(64.5) == []
     assert [e.id for e in made.due(64.57)] == ["a"]
     made.nudge(11.0, all_=True)
     assert [e.id for e in made.due(11.0)] == ["a"]
-    made.failed(made.due(65.0), 65.0, "no server")  # the old wish is over
+    made.failed(made.due(65.0), 65.0, DeliveryError("no server"))  # the old wish is over
     made.nudge(70.0)
     assert made.due(70.0)
 
 
 def test_a_wish_shorter_than_our_own_pause_changes_nothing():
     made = queue("a", first_delay=5.0)
-    assert made.failed(made.due(0.0), 0.0, "429", delay=0.0) == 5.0
-    assert made.failed(made.due(5.0), 5.0, "429", delay=3.0) == 10.0
+    assert made.failed(made.due(0.0), 0.0, DeliveryError("429", delay=0.0)) == 5.0
+    assert made.failed(made.due(5.0), 5.0, DeliveryError("429", delay=3.0)) == 10.0
 
 
 def test_a_new_notice_tries_again_but_does_not_hammer():
     made, now = queue("a", first_delay=5.0), 0.0
     for _ in range(8):
-        now += made.failed(made.due(now), now, "down")
+        now += made.failed(made.due(now), now, DeliveryError("down"))
     made.nudge(now - 1.0)  # the last try is 300 s ago
     assert made.due(now - 1.0)
-    made.failed(made.due(now), now, "down")
+    made.failed(made.due(now), now, DeliveryError("down"))
     made.nudge(now + 1.0)
     assert made.due(now + 1.0) == []
     assert made.due(now + 5.0)
@@ -103,11 +103,11 @@ def test_a_new_notice_tries_again_but_does_not_hammer():
 
 def test_what_is_refused_for_good_lets_the_others_pass_and_is_tried_rarely():
     made = queue("bad", "good")
-    assert made.failed(made.due(0.0), 0.0, "550 no", permanent=True) == 900.0
+    assert made.failed(made.due(0.0), 0.0, DeliveryError("550 no", permanent=True)) == 900.0
     assert drain(made, 1.0) == ["good"]
     assert made.wait(1.0) == pytest.approx(899.0)
     assert [(e.id, error) for e, error in made.refused] == [("bad", "550 no")]
-    assert made.failed(made.due(900.0), 900.0, "550 no", permanent=True) == 1800.0
+    assert made.failed(made.due(900.0), 900.0, DeliveryError("550 no", permanent=True)) == 1800.0
     made.nudge(901.0, all_=True)
     assert [e.id for e in made.due(901.0)] == ["bad"]
 
@@ -145,17 +145,29 @@ def test_of_two_sensor_notices_each_is_a_message():
 
 def test_a_digest_that_is_refused_is_taken_apart():
     made = queue("s1", "s2", "s3")
-    assert made.failed(made.due(0.0), 0.0, "552 too large", permanent=True) == 0.0
+    assert made.failed(made.due(0.0), 0.0, DeliveryError("552 too large", permanent=True)) == 0.0
     assert drain(made) == ["s1", "s2", "s3"]
 
 
 def test_a_digest_to_a_recipient_that_is_refused_is_one_try_and_the_next_waits_for_the_interval():
     made = queue("s1", "s2", "s3", interval=10.0)
-    assert made.failed(made.due(0.0), 0.0, "550 no such user", permanent=True, of_recipient=True) == 900.0
+    refusal = DeliveryError("550 no such user", permanent=True, of_recipient=True)
+    assert made.failed(made.due(0.0), 0.0, refusal) == 900.0
     assert len(made.refused_for_good) == 3
     made.offer(entries("s1", "s2", "s3", "i1"))
     assert made.due(9.0) == []
     assert [e.id for e in made.due(10.0)] == ["i1"]
+
+
+def test_a_digest_that_a_refusing_recipient_does_not_want_now_is_not_taken_apart_either():
+    made = queue("s1")
+    made.failed(made.due(0.0), 0.0, DeliveryError("550 no such user", permanent=True, of_recipient=True))
+    made.offer(entries("s1", "s2", "s3"))
+    batch = made.due(900.0)
+    assert len(batch) == 3
+    assert made.failed(batch, 900.0, DeliveryError("450 later", answered=True, of_recipient=True)) == 1800.0
+    assert len(made.refused) == 3
+    assert made.refused_for_good == []
 
 
 def test_nothing_to_do_is_no_time():
@@ -176,7 +188,7 @@ def serve(made, now, wants, patience=1000.0):
             taken += [entry.id for entry in batch]
             made.delivered(batch, now)
         else:
-            made.failed(batch, now, "500 no", answered=True)
+            made.failed(batch, now, DeliveryError("500 no", answered=True))
     return taken, now
 
 
@@ -200,5 +212,5 @@ def test_a_server_that_is_not_there_never_changes_the_order():
     made, now = queue("a", "b", first_delay=1.0), 0.0
     for _ in range(20):
         assert made.due(now)[0].id == "a"
-        now += made.failed(made.due(now), now, "refused")
+        now += made.failed(made.due(now), now, DeliveryError("refused"))
     assert drain(made, now) == ["a", "b"]
