@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import shutil
+import time
 
 import pytest
 
@@ -13,8 +14,8 @@ from post import Box, channel, notice
 from rosbot_patrol.alerts.channels.config import MailParams
 from rosbot_patrol.alerts.dispatch.delivery import Clocks
 from rosbot_patrol.alerts.outbox.outbox import Outbox
-from rosbot_patrol.ros.post import outbox_owner as owner_mail
-from rosbot_patrol.ros.post.outbox_owner import OwnerPost
+from rosbot_patrol.ros.post import owner_post
+from rosbot_patrol.ros.post.owner_post import OwnerPost
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK
 
 
@@ -45,19 +46,21 @@ class Clock:
 
 
 class House:
-    def __init__(self, folder, boxes):
+    def __init__(self, folder, boxes, clock):
         self.folder, self.boxes, self.health = folder, boxes, Health()
-        self.post = OwnerPost(MailParams(), folder, self.health)
+        self.clock = clock
+        clocks = Clocks(now=clock.monotonic, wall=clock.time)
+        self.post = OwnerPost(MailParams(), folder, self.health, clocks=clocks)
 
     def run(self, seconds):
         """As its threads do, for some time."""
-        end = self.post.clock.now + seconds
-        while self.post.clock.now < end:
+        end = self.clock.now + seconds
+        while self.clock.now < end:
             pause = self.post._pass()
             for name in self.boxes:
                 while self.post._send(name)[0] is not None:
                     pass
-            self.post.clock.now += min(pause, 0.5)
+            self.clock.now += min(pause, 0.5)
 
     @property
     def ids(self):
@@ -71,19 +74,14 @@ class House:
 @pytest.fixture
 def make(tmp_path, monkeypatch):
     clock = Clock()
-    Clock.real = owner_mail.time
-    monkeypatch.setattr(owner_mail, "time", clock)
+    Clock.real = time
     monkeypatch.setattr("rosbot_patrol.ros.post.health.time", clock)
     boxes = {"mail": Box(), "phone": Box()}
     channels = [channel(name, box, first_delay=0.1) for name, box in boxes.items()]
-    monkeypatch.setattr(owner_mail, "make_channels", lambda *_, **__: channels)
+    monkeypatch.setattr(owner_post, "make_channels", lambda *_, **__: channels)
 
     def build(folder=tmp_path / "state"):
-        house = House(folder, boxes)
-        house.post.clock = clock
-        for part in (house.post._dispatcher, house.post._spare._dispatcher):
-            part._clocks = Clocks(now=clock.monotonic, wall=clock.time)
-        return house
+        return House(folder, boxes, clock)
 
     return build
 

@@ -30,7 +30,7 @@ from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, Rel
 from rosbot_patrol.patrol.story.mission_log import Entry, person_room
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.patrol.pictures import PictureRing
-from rosbot_patrol.ros.post.outbox_owner import OwnerPost
+from rosbot_patrol.ros.post.owner_post import OwnerPost
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, Health
 from rosbot_patrol.ros.runtime.node import Worker
 

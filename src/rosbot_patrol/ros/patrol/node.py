@@ -69,7 +69,7 @@ from rosbot_patrol.ros.patrol.settings import (
     load_manager_params,
     load_or_say,
 )
-from rosbot_patrol.ros.post.outbox_owner import OwnerPost, refuse_passwords
+from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import Health
 from rosbot_patrol.ros.runtime.node import Loop, now, run_node
 from rosbot_patrol.ros.runtime.private_files import keep_private

@@ -23,6 +23,7 @@ import rospy
 from std_msgs.msg import Empty
 
 from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.dispatch.safe_outbox import RETRY
 from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StateError
@@ -32,7 +33,7 @@ from rosbot_patrol.msg import EspTrigger, SensorEvent, SensorLinks, SensorStates
 from rosbot_patrol.params import declared, param
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.ros.bridge.links import links_from_msg
-from rosbot_patrol.ros.post.outbox_owner import RETRY, OwnerPost, refuse_passwords
+from rosbot_patrol.ros.post.owner_post import OwnerPost, refuse_passwords
 from rosbot_patrol.ros.runtime.diagnostics import Health
 from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node, sender_of
 from rosbot_patrol.ros.runtime.private_files import keep_private
