@@ -10,28 +10,24 @@ that channel again, with the same id (as Message-ID, file name or idempotency ke
 
 from __future__ import annotations
 
-import json
 import logging
 import random
 import threading
 from collections.abc import Sequence
-from dataclasses import asdict
 
 from rosbot_patrol.alerts.channels.channel import Channel, DeliveryError
 from rosbot_patrol.alerts.dispatch.channel_queue import ChannelQueue
 from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus, Clocks, Delivery, send, title_of
 from rosbot_patrol.alerts.dispatch.fault_notices import down_notice, refused_notice
 from rosbot_patrol.alerts.dispatch.file_lock import STALE, FileLock, NoLock
+from rosbot_patrol.alerts.dispatch.status_file import write_status
 from rosbot_patrol.alerts.outbox.digest import merge
 from rosbot_patrol.alerts.outbox.memory_outbox import MemoryOutbox
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.outbox.outbox import Outbox, Waiting
 from rosbot_patrol.alerts.outbox.receipts import Receipt, Receipts
-from rosbot_patrol.files import write_atomic
 
 log = logging.getLogger(__name__)
-
-STATUS = "status.json"
 
 
 class Dispatcher:
@@ -195,12 +191,7 @@ class Dispatcher:
 
     def write_status(self) -> None:
         """Leave for others how the channels do. Raises OSError."""
-        tree = {
-            "wall": self._clocks.wall(),
-            "who": self.lock.holder(),
-            "channels": [asdict(s) for s in self.statuses()],
-        }
-        write_atomic(self.outbox.folder / STATUS, json.dumps(tree, indent=1).encode())
+        write_status(self.outbox.folder, wall=self._clocks.wall(), who=self.lock.holder(), channels=self.statuses())
 
     # -- inside
 

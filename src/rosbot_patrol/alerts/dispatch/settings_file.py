@@ -6,18 +6,15 @@ theirs, as one of them delivers for all.
 
 from __future__ import annotations
 
-import json
 import logging
 import os
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from rosbot_patrol.alerts.channels.config import MailParams
 from rosbot_patrol.alerts.safe_text import token
-from rosbot_patrol.errors import ParamError
-from rosbot_patrol.files import write_atomic
+from rosbot_patrol.errors import ParamError, StateError
+from rosbot_patrol.files import read_json, write_json
 from rosbot_patrol.params import load
 
 log = logging.getLogger(__name__)
@@ -48,7 +45,7 @@ class Settings:
 def write_settings(folder: Path, settings: Settings) -> None:
     """Leave them in the outbox. Raises OSError."""
     tree = {"who": settings.who, "pid": settings.pid, "wall": settings.wall, "mail": asdict(settings.mail)}
-    write_atomic(folder / f"settings-{token(settings.who)}.json", json.dumps(tree, indent=1).encode())
+    write_json(folder / f"settings-{token(settings.who)}.json", tree)
 
 
 def read_settings(folder: Path) -> list[Settings]:
@@ -56,10 +53,10 @@ def read_settings(folder: Path) -> list[Settings]:
     found = []
     for path in folder.glob("settings-*.json"):
         try:
-            tree = json.loads(path.read_bytes())
+            tree = read_json(path) or {}
             mail = load(MailParams, tree["mail"], name=f"{path}: mail/")
             found.append(Settings(who=str(tree["who"]), pid=int(tree["pid"]), wall=float(tree["wall"]), mail=mail))
-        except (OSError, ValueError, KeyError, TypeError, ParamError) as err:
+        except (StateError, ValueError, KeyError, TypeError, ParamError) as err:
             log.warning("%s cannot be used: %s", path, err)
     return sorted(found, key=lambda settings: -settings.wall)
 
@@ -75,12 +72,3 @@ def differences(folder: Path, who: str, mail: MailParams) -> list[str]:
         if names:
             sentences.append(f"{other.who} has other values than {who} for {', '.join(names)}: one delivers for both")
     return sentences
-
-
-def state_of(folder: Path) -> Mapping[str, Any] | None:
-    """What the program that delivers last wrote about its channels; None where there is nothing."""
-    try:
-        tree = json.loads((folder / "status.json").read_bytes())
-    except (OSError, ValueError):
-        return None
-    return tree if isinstance(tree, dict) else None

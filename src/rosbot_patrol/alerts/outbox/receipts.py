@@ -8,7 +8,6 @@ Only the process that delivers writes it; others read it along. A line that a cr
 
 from __future__ import annotations
 
-import errno
 import json
 import logging
 import os
@@ -16,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rosbot_patrol.files import write_atomic
+from rosbot_patrol.files import append_line, write_atomic
 
 log = logging.getLogger(__name__)
 
@@ -95,17 +94,7 @@ class Receipts:
             return
         tree = {name: value for name, value in asdict(receipt).items() if name != "refused" or value}
         line = json.dumps(tree).encode("ascii") + b"\n"
-        handle = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
-        try:
-            size = os.fstat(handle).st_size
-            cut = size > 0 and os.pread(handle, 1, size - 1) != b"\n"
-            written = os.write(handle, b"\n" + line if cut else line)  # a cut line stays, and is read as none
-            if written != len(line) + cut:
-                os.ftruncate(handle, size)
-                raise OSError(errno.ENOSPC, "No space left on device", str(self.path))
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        append_line(self.path, b"\n" + line if _is_cut(self.path) else line)  # a cut line stays, and is read as none
 
     def compact(self, keep: Iterable[str], *, lines: int = 500) -> None:
         """Write the file anew with the last `lines` and what was taken of `keep`. Raises OSError."""
@@ -132,6 +121,16 @@ class Receipts:
             self.refusals.pop(receipt.channel, None)
             self.last[receipt.channel] = max(receipt.wall, self.last.get(receipt.channel, 0.0))
         return fresh
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether the last line of a file has no end. Raises OSError."""
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            return size > 0 and os.pread(file.fileno(), 1, size - 1) != b"\n"
+    except FileNotFoundError:
+        return False
 
 
 def _parse(line: bytes) -> Receipt | None:

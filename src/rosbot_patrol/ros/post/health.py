@@ -9,7 +9,8 @@ from typing import Any
 from rosbot_patrol.alerts.channels.config import MailParams
 from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
-from rosbot_patrol.alerts.dispatch.settings_file import differences, state_of
+from rosbot_patrol.alerts.dispatch.settings_file import differences
+from rosbot_patrol.alerts.dispatch.status_file import read_status
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 
@@ -78,8 +79,8 @@ class PostHealth:
             self._health.drop(part)
         self._parts &= {"outbox"}
         late = [entry for entry in outbox.waiting() if time.time() - entry.wall > OVERDUE]
-        told = state_of(outbox.folder) or {} if late else {}
-        if late and time.time() - float(told.get("wall", 0.0)) > OVERDUE:
+        status = read_status(outbox.folder) if late else None
+        if late and (status is None or time.time() - status.wall > OVERDUE):
             waits = count_of(len(late), "notice waits", "notices wait")
             text = f"{waits}, and {holder}, which has to deliver them, does nothing"
             self._set("outbox", ERROR, text)

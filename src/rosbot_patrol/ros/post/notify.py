@@ -16,18 +16,18 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from rosgraph.names import get_ros_namespace
 
 from rosbot_patrol.alerts.channels.channel import Channel
 from rosbot_patrol.alerts.channels.channel_test import make_test_notice, try_channel
 from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, load_channels, make_channels
+from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
-from rosbot_patrol.alerts.dispatch.settings_file import read_settings, state_of
+from rosbot_patrol.alerts.dispatch.settings_file import read_settings
+from rosbot_patrol.alerts.dispatch.status_file import PostStatus, read_status
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError
@@ -84,10 +84,10 @@ def show(folder: Path) -> int:
         print(f"There is no outbox at {folder}: no node has used it yet (--state-dir names another place).")
         return 0
     waiting = Outbox(folder).waiting()
-    told = state_of(folder) or {}
-    print(f"{_count(len(waiting))} in {folder}. Last delivered for by {told.get('who', 'nobody')}.")
-    for channel in _told_channels(told):
-        print(f"  {_channel_line(channel, time.time() - float(told.get('wall', 0.0)))}")
+    status = read_status(folder)
+    print(f"{_count(len(waiting))} in {folder}. Last delivered for by {status.who if status else 'nobody'}.")
+    if status:
+        _print_channels(status, time.time())
     for entry in waiting:
         print(f"{_when(entry.wall)}  {entry.kind:9} {entry.id}  {Outbox(folder).read(entry).subject[:60]}")
     return 0
@@ -129,15 +129,15 @@ def _flush_there(folder: Path) -> int:
         return 0  # the node rewrites its status once a minute only
     (folder / "flush").touch()
     while time.time() - began < FLUSH_WAIT:
-        told = state_of(folder) or {}
-        has_tried = not (folder / "flush").exists() and float(str(told.get("wall", 0.0))) > began + 1.0
+        status = read_status(folder)
+        has_tried = not (folder / "flush").exists() and status is not None and status.wall > began + 1.0
         if has_tried and not outbox.waiting():
             return 0
-        if has_tried and all(c.get("error") or not c.get("waiting") for c in _told_channels(told)):
+        if has_tried and status and all(c.error or not c.waiting for c in status.channels):
             break
         time.sleep(0.2)
-    for channel in _told_channels(state_of(folder) or {}):
-        print(f"  {_channel_line(channel, 0.0)}")
+    if status := read_status(folder):
+        _print_channels(status, status.wall)
     return len(outbox.waiting())
 
 
@@ -169,22 +169,22 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _told_channels(told: Mapping[str, Any]) -> list[dict[str, Any]]:
-    channels = told.get("channels")
-    return [c for c in channels if isinstance(c, dict)] if isinstance(channels, list) else []
+def _print_channels(status: PostStatus, now: float) -> None:
+    for channel in status.channels:
+        print(f"  {_channel_line(channel, now - status.wall)}")
 
 
-def _channel_line(channel: Mapping[str, Any], age: float) -> str:
-    line = f"{channel.get('name')}: {channel.get('describe')}"
-    if not channel.get("waiting"):
-        refusal = channel.get("refusal")
-        return f"{line}: refused the last notice for good: {refusal}" if refusal else f"{line}: took all"
-    waits = count_of(int(channel["waiting"]), "waits", "wait")
-    line += f": {waits} since {_when(channel.get('since') or 0.0)}"
-    if channel.get("error"):
-        line += f", because {channel['error']}"
-    if channel.get("next_try") is not None:
-        line += f"; next try in {max(channel['next_try'] - age, 0.0):.0f} s"
+def _channel_line(channel: ChannelStatus, age: float) -> str:
+    line = f"{channel.name}: {channel.describe}"
+    if not channel.waiting:
+        return (
+            f"{line}: refused the last notice for good: {channel.refusal}" if channel.refusal else f"{line}: took all"
+        )
+    line += f": {count_of(channel.waiting, 'waits', 'wait')} since {_when(channel.since or 0.0)}"
+    if channel.error:
+        line += f", because {channel.error}"
+    if channel.next_try is not None:
+        line += f"; next try in {max(channel.next_try - age, 0.0):.0f} s"
     return line
 
 

@@ -6,7 +6,7 @@ from post import Box, Time, channel, deliver_all, dispatcher, notice
 
 from rosbot_patrol.alerts.channels.mail import make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
-from rosbot_patrol.alerts.dispatch.dispatcher import STATUS
+from rosbot_patrol.alerts.dispatch.status_file import NAME
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 
 
@@ -358,7 +358,7 @@ def test_how_it_goes_lies_on_disk(tmp_path):
     post.take_over()
     deliver_all(post)
     post.write_status()
-    (told,) = json.loads((tmp_path / STATUS).read_text())["channels"]
+    (told,) = json.loads((tmp_path / NAME).read_text())["channels"]
     assert (told["waiting"], told["error"], told["describe"]) == (1, "no server", "a box")
 
 
