@@ -1,4 +1,4 @@
-"""What a channel is: a name, a way out, and what it is asked to take."""
+"""A channel to the owner: its name, its transport, and the notices that it takes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosbot_patrol.errors import AlertError
 
 
 class FailureCause(Enum):
-    """Why a transport did not take a notice, as far as somebody can do something about it."""
+    """Why a transport did not take a notice; each but OTHER has its own advice in the channel test."""
 
     UNKNOWN_HOST = "unknown host"
     CONNECTION_REFUSED = "connection refused"
@@ -34,11 +34,11 @@ class DeliveryError(AlertError):
 
     Args:
         problem: what happened, and where.
-        permanent: it is this notice's fault: others may pass.
-        answered: the other side was there and did not want it now: it may be this notice's fault after all.
-        delay: that the other side asked for [s].
-        of_recipient: with `permanent`: it is the recipient's fault, whatever the notice is.
-        cause: what kind of failure it is.
+        permanent: the fault is this notice's, and others may pass.
+        answered: the other side answered and did not want it now; the fault may be this notice's after all.
+        delay: pause that the other side asked for [s].
+        of_recipient: the fault is the recipient's, whatever the notice is.
+        cause: kind of the failure.
     """
 
     def __init__(
@@ -74,8 +74,9 @@ class Pace:
 
     Attributes:
         interval: least time between two messages [s].
-        first_delay: after the first failure [s]; doubles with each to at most max_delay.
-        jitter: part of a delay that is left to chance, so that robots do not come all at once.
+        first_delay: delay after the first failure [s]; doubles with each further one.
+        max_delay: longest delay [s].
+        jitter: part of a delay that is left to chance, so that several robots do not come at once.
     """
 
     interval: float = 10.0
@@ -92,9 +93,9 @@ class Channel:
         name: for people, and in the receipts.
         transport: how notices leave.
         kinds: of notices that it takes; empty: all.
-        pace: how fast.
-        recipient: address that it carries to, where its channel in the configuration may have several.
-        group: what it is called in the configuration, where that gives several recipients, each a channel; else empty.
+        pace: intervals and delays.
+        recipient: its address, for kinds of channels that may have several.
+        group: its name in the configuration, if several recipients became a channel each; otherwise "".
     """
 
     name: str
@@ -106,7 +107,7 @@ class Channel:
 
     @property
     def names(self) -> frozenset[str]:
-        """What it is called now, and with other recipients beside it: NAME and NAME:ADDRESS."""
+        """Its name now, and those that it has with and without other recipients: NAME and NAME:ADDRESS."""
         base = self.group or self.name
         return frozenset((self.name, base, f"{base}:{self.recipient}" if self.recipient else base))
 
@@ -117,5 +118,5 @@ class Channel:
         return not self.kinds or entry.kind in self.kinds
 
     def is_beside(self, other: Channel) -> bool:
-        """Whether both carry to recipients of one channel of the configuration."""
+        """Whether both belong to one channel of the configuration, with several recipients."""
         return self.name != other.name and bool(self.group) and self.group == other.group

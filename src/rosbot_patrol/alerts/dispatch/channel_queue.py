@@ -1,11 +1,11 @@
 """One channel's queue: what leaves when. Order is kept, nothing is dropped.
 
-- A channel that is down is tried ever more seldom, with jitter, up to a quarter of an hour; all wait for the oldest.
-- A notice that the channel refuses for good lets the others pass and is tried again rarely. So does one that it did not
-  want "now" again and again, once it is seen to take the next one.
-- Between two messages lies `interval`. What is not urgent gathers meanwhile and leaves as one digest. An urgent notice
-  (an intruder) is never merged, and waits for no interval but that of the urgent one before it: what stands in front of
-  it leaves at once.
+- A channel that is down is tried ever more rarely, with jitter, up to a quarter of an hour; all wait for the oldest.
+- A notice that the channel refuses for good lets the others pass and is tried again rarely. So does one that the
+  channel did not want "now" several times, once the channel takes the next one.
+- Between two messages lies `interval`. Notices that are not urgent gather meanwhile and leave as one digest.
+- An urgent notice (an intruder) is never merged. It waits only for the interval after the urgent one before it; what
+  stands in front of it leaves at once.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from rosbot_patrol.alerts.channels.channel import DeliveryError, Pace
 from rosbot_patrol.alerts.outbox.outbox import Waiting
 
-DIGEST_FROM = 3  # so many that are not urgent become one message
-DIGEST_MOST = 500
-DOUBTFUL = 6  # so many times not wanted, though the other side was there
+DIGEST_FROM = 3  # fewer notices than this leave one by one
+DIGEST_MOST = 500  # notices of one digest
+DOUBTFUL = 6  # times that a server did not want a notice "now" until the notice may be at fault
 RARELY = (900.0, 21600.0)  # first and longest pause for a notice that was refused [s]
 
 
@@ -28,16 +28,16 @@ class _Refusal:
     times: int = 0
     due: float = 0.0
     error: str = ""
-    is_final: bool = False  # the other side said so; else it is our guess
+    is_final: bool = False  # the other side said so; otherwise it is our guess
 
 
 class ChannelQueue:
-    """What one channel has still to take.
+    """The notices that one channel has still to take.
 
     Args:
-        pace: how fast.
-        rng: for the jitter.
-        last: when it took the last message before the program began [s].
+        pace: intervals and delays.
+        rng: of the jitter.
+        last: time of the channel's last message before the program began [s].
     """
 
     def __init__(self, pace: Pace, rng: random.Random, *, last: float = float("-inf")) -> None:
@@ -49,7 +49,7 @@ class ChannelQueue:
         self._last = self._last_urgent = last
         self._failures = 0
         self._blocked_until = self._last_try = float("-inf")
-        self._asked_until = float("-inf")  # by the other side, which wants to hear nothing before
+        self._asked_until = float("-inf")  # the other side asked for a pause until then
         self.down_since: float | None = None
         self.error = ""
 
@@ -58,21 +58,21 @@ class ChannelQueue:
 
     @property
     def oldest(self) -> Waiting | None:
-        """The first that waits."""
+        """The first notice that waits."""
         return self._queue[0] if self._queue else None
 
     @property
     def refused(self) -> list[tuple[Waiting, str]]:
-        """Those that the channel refused for good, and what it said."""
+        """Notices that the channel refused for good, each with its words."""
         return [(entry, self._refused[entry.id].error) for entry in self._queue if entry.id in self._refused]
 
     @property
     def refused_for_good(self) -> list[tuple[Waiting, str]]:
-        """Of `refused` those that the other side called final; the others it did not want "now" too often."""
+        """Those of `refused` that the other side called final; it did not want the others "now" too often."""
         return [(entry, error) for entry, error in self.refused if self._refused[entry.id].is_final]
 
     def offer(self, waiting: Iterable[Waiting]) -> None:
-        """Say what the channel has to take now, oldest first."""
+        """Set what the channel has to take now, oldest first."""
         self._queue = list(waiting)
         ids = {entry.id for entry in self._queue}
         self._refused = {name: state for name, state in self._refused.items() if name in ids}
@@ -80,14 +80,14 @@ class ChannelQueue:
         self._unwanted = {name: times for name, times in self._unwanted.items() if name in ids}
 
     def due(self, now: float) -> list[Waiting]:
-        """What to send now as one message: nothing, one notice, or several for a digest."""
+        """The notices to send now as one message: none, one, or several for a digest."""
         if now < self._blocked_until:
             return []
         open_ = [e for e in self._queue if e.id not in self._refused or self._refused[e.id].due <= now]
         if not open_:
             return []
         if len(open_) > 1 and self._is_doubtful(open_[0]) and self._failures % 2:
-            return open_[1:2]  # does it take any?
+            return open_[1:2]  # to see whether the channel takes any
         may_urgent = now >= self._last_urgent + self._pace.interval
         if open_[0].is_urgent:
             return open_[:1] if may_urgent else []
@@ -97,7 +97,7 @@ class ChannelQueue:
         return self._together(open_)
 
     def wait(self, now: float) -> float | None:
-        """How long until `due` may give something [s], None where nothing waits."""
+        """Time until `due` may give something [s]; None if nothing waits."""
         if not self._queue:
             return None
         refused = self._refused
@@ -107,11 +107,11 @@ class ChannelQueue:
         return max(max(first, self._blocked_until, gate) - now, 0.0)
 
     def delivered(self, batch: Sequence[Waiting], now: float) -> None:
-        """A message was taken."""
+        """Note that a message was taken."""
         for entry in self._queue:
             if entry.id == batch[0].id:
                 break
-            if self._is_doubtful(entry):  # it took a younger one: once more, and then rarely
+            if self._is_doubtful(entry):  # the channel took a younger one: try this one once more, then rarely
                 self._refused.setdefault(entry.id, _Refusal(due=now, error=self.error))
         ids = {entry.id for entry in batch}
         self._queue = [entry for entry in self._queue if entry.id not in ids]
@@ -163,11 +163,11 @@ class ChannelQueue:
         return put_off
 
     def nudge(self, now: float, *, all_: bool = False) -> None:
-        """Something speaks for trying again at once: a new notice, a network that came back.
+        """Try again soon: there is a new notice, or the network came back.
 
         Args:
             now: time [s].
-            all_: what was refused, too, and without a pause since the last try, even one that the other side asked for.
+            all_: try refused notices too, and respect no pause, not even one that the other side asked for.
         """
         soonest = now if all_ else max(now, self._last_try + self._pace.first_delay, self._asked_until)
         self._blocked_until = min(self._blocked_until, soonest)
@@ -187,7 +187,7 @@ class ChannelQueue:
         return self._unwanted.get(entry.id, 0) >= DOUBTFUL and entry.id not in self._refused
 
     def _refuse(self, batch: Sequence[Waiting], now: float, err: DeliveryError) -> float:
-        if len(batch) > 1:  # one of them is to blame: each by itself, then
+        if len(batch) > 1:  # one of them is at fault: try each by itself
             self._alone |= {entry.id for entry in batch}
             return 0.0
         state = self._refused.setdefault(batch[0].id, _Refusal())

@@ -31,16 +31,16 @@ log = logging.getLogger(__name__)
 
 
 class Dispatcher:
-    """Owns the channels, and, where it holds the lock, the deliveries.
+    """Owns the channels, and delivers while it holds the lock.
 
     Args:
-        outbox: notices on disk; those in memory are this process's alone.
-        channels: ways out.
-        who: this process, for people.
+        outbox: notices on disk, or this process's own in memory.
+        channels: to the owner.
+        who: name of this process, for people.
         clocks: time.
-        seed: for the jitter.
-        down_after: a channel that is down for so long is told on the others [s].
-        stale_after: who gave no sign of life for so long delivers no more [s].
+        seed: of the jitter.
+        down_after: time after which a channel that is down is told on the others [s].
+        stale_after: time without a sign of life after which another process takes over [s].
     """
 
     def __init__(
@@ -81,9 +81,15 @@ class Dispatcher:
             return any(queue.down_since is not None for queue in self._queues.values())
 
     def take_over(self) -> bool:
-        """Become the one that delivers, where nobody is, or who is hangs; else say that this one lives.
+        """Take the lock if nobody has it or its holder hangs; give a sign of life if this process has it.
 
-        Call it again and again. Raises OSError.
+        Call it again and again.
+
+        Returns:
+            Whether this process delivers.
+
+        Raises:
+            OSError: the disk does not take it, or files cannot be locked there.
         """
         with self._guard:
             self._mind_the_lock()
@@ -106,28 +112,28 @@ class Dispatcher:
             return True
 
     def hand_over(self) -> None:
-        """Stop delivering; another process may."""
+        """Stop delivering and give the lock back."""
         with self._guard:
             self._queues.clear()
             self.lock.release()
 
     def refresh(self) -> None:
-        """Look at what waits on disk; only where this process delivers. Raises OSError."""
+        """Look at what waits on disk; for the process that delivers. Raises OSError."""
         with self._guard:
             before = {entry.name for entry in self._waiting}
             self._waiting = self.outbox.waiting()
-            self._read_receipts()  # after the look at the folder: another program writes receipts before the notice
+            self._read_receipts()  # after the look at the folder, as others write receipts before the notice
             for name, queue in self._queues.items():
                 self._offer(name)
                 if any(entry.name not in before for entry in self._waiting):
                     queue.nudge(self._clocks.now())
-            self._write_receipts()  # the queues first: they need no disk that takes anything
+            self._write_receipts()  # after the queues, which do without the disk
             self._settle_refusals()
             self._finish()
             self.outbox.tidy()
 
     def learn(self, receipt: Receipt) -> None:
-        """Notices went to a channel past this object: it sends them there no more."""
+        """Note that notices went to a channel past this object."""
         with self._guard:
             self.receipts.note(receipt)
             if queue := self._queues.get(receipt.channel):
@@ -160,20 +166,20 @@ class Dispatcher:
         return self._note_success(channel, queue, batch, where)
 
     def pause(self, name: str, most: float = 60.0) -> float:
-        """How long until `deliver` may have something to do [s]."""
+        """Time until `deliver` may have something to do, `most` at most [s]."""
         with self._guard:
             queue = self._queues.get(name)
             wait = queue.wait(self._clocks.now()) if queue else None
         return most if wait is None else min(wait + 0.01, most)
 
     def nudge(self, *, all_: bool = False) -> None:
-        """Try again at once: the network came back; `all_`: somebody asks for it, refused ones too."""
+        """Try again soon, as the network came back; with `all_` at once and refused notices too, as somebody asked."""
         with self._guard:
             for queue in self._queues.values():
                 queue.nudge(self._clocks.now(), all_=all_)
 
     def statuses(self) -> list[ChannelStatus]:
-        """How the channels do; only where this process delivers."""
+        """States of the channels; for the process that delivers."""
         with self._guard:
             return [self._status(name, queue) for name, queue in self._queues.items()]
 
@@ -190,13 +196,13 @@ class Dispatcher:
                     self._tell_refused(name, entry, error, others)
 
     def write_status(self) -> None:
-        """Leave for others how the channels do. Raises OSError."""
+        """Leave the states of the channels for other programs. Raises OSError."""
         write_status(self.outbox.folder, wall=self._clocks.wall(), who=self.lock.holder(), channels=self.statuses())
 
     # -- inside
 
     def _mind_the_lock(self) -> None:
-        """Deliver no more where another has taken over, as this process hung, or where the lock's file was removed."""
+        """Deliver no more if another process took over while this one hung, or if the lock's file was removed."""
         if not self.lock.is_lost:
             return
         if holder := self.lock.holder():
@@ -208,7 +214,7 @@ class Dispatcher:
     def _read_receipts(self) -> None:
         try:
             self.receipts.read_new()
-        except OSError as err:  # rather twice than never
+        except OSError as err:  # a notice twice is better than none
             log.error("%s cannot be read: %s; what was taken before may be sent again", self.receipts.path, err)
 
     def _is_open(self, entry: Waiting, name: str) -> bool:
@@ -230,8 +236,8 @@ class Dispatcher:
         return f"{rest} {self.outbox.folder}, next try in {put_off:.0f} s"
 
     def _settle_refusals(self) -> None:
-        """Ask no recipient again for what it refused for good while another of the same channel took it."""
-        if self._unwritten:  # the disk takes nothing: first what is known already
+        """Give up a notice for a recipient that refused it for good, once another of the same channel has it."""
+        if self._unwritten:  # the disk takes nothing: what is known already goes first
             return
         for name, queue in self._queues.items():
             channel = self.channels[name]
@@ -247,7 +253,7 @@ class Dispatcher:
             self._offer(name)
 
     def _others(self, name: str) -> tuple[str, ...]:
-        """Channels that can tell of a fault: those that take something at the moment."""
+        """Names of the channels that can tell of this one's fault, since they take something at the moment."""
         return tuple(
             other
             for other in self._queues
@@ -259,7 +265,7 @@ class Dispatcher:
         return bool(self.channels[name].group) and refuses
 
     def _finish(self) -> None:
-        """Cross out for good what every channel took that is asked."""
+        """Move each notice that every channel took to the delivered ones."""
         for entry in list(self._waiting):
             if not any(self._is_open(entry, name) for name in self.channels):
                 if not self.receipts.done(entry.id):

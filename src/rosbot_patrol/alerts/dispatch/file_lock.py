@@ -1,8 +1,8 @@
-"""A lock that one process of a machine holds, and that it loses when it ends, however it ends, or when it hangs.
+"""A lock that one process of a machine holds until it ends, however it ends, or hangs.
 
-The system takes back the lock of a process that ends, not that of one that is stopped or stuck. So who holds it gives
-signs of life, by the file's time, and who waits for it may put a new file in its place when they have stayed away. The
-old holder, if it goes on, finds that the file it has locked is no longer the one at the path.
+The system takes back the lock of a process that ends, but not of one that is stopped or stuck. So the holder gives
+signs of life: it renews the file's time. If they stay away, a process that waits puts a new file in the place of the
+old one. If the old holder goes on, it finds that its locked file is no longer the one at the path.
 """
 
 from __future__ import annotations
@@ -24,10 +24,13 @@ class FileLock:
     """A lock on a file.
 
     Args:
-        path: of the file; is made where missing and never removed. `PATH.seize` beside it guards a change of hands.
-        who: what to write into it while it is held.
-        stale_after: a holder that gave no sign of life for so long has lost it [s].
-        clock: any monotonic one [s].
+        path: file of the lock; made if missing, never removed. `PATH.seize` beside it guards a change of hands.
+        who: text for the file while the lock is held.
+        stale_after: time without a sign of life after which the holder loses the lock [s].
+        clock: monotonic time [s].
+
+    Attributes:
+        seized_from: the holder that lost the lock to this object, "" if it was free.
     """
 
     def __init__(
@@ -40,11 +43,11 @@ class FileLock:
         self._beaten = float("-inf")
         self._seen: tuple[int, int] | None = None  # of another's file: inode, and time of its last sign of life
         self._quiet, self._looked = 0.0, 0.0
-        self.seized_from = ""  # who lost it to this object, "" where it was free
+        self.seized_from = ""
 
     @property
     def is_held(self) -> bool:
-        """Whether this object holds it, and has not lost it while its process hung."""
+        """Whether this object holds the lock, and did not lose it while its process hung."""
         return self._handle is not None and self._is_at_path(self._handle)
 
     @property
@@ -53,9 +56,13 @@ class FileLock:
         return self._handle is not None and not self._is_at_path(self._handle)
 
     def take(self) -> bool:
-        """Take it where nobody has it; returns whether it is held now.
+        """Take the lock if nobody has it.
 
-        Call it again and again: where it is held it gives a sign of life, else it looks for those of the holder.
+        Call it again and again. If this object holds the lock, it gives a sign of life. Otherwise it looks for those of
+        the holder.
+
+        Returns:
+            Whether this object holds it now.
 
         Raises:
             OSError: files cannot be locked there.
@@ -68,7 +75,7 @@ class FileLock:
         if not _try_lock(handle):
             os.close(handle)
             return can_beat and self._is_stale() and self._seize()
-        if not self._is_at_path(handle):  # another has put a new one in its place at this moment
+        if not self._is_at_path(handle):  # another process has just put a new file in its place
             os.close(handle)
             return False
         self._begin(handle)
@@ -80,12 +87,12 @@ class FileLock:
             if self._handle is None or 0.0 <= self._clock() - self._beaten < BEAT:
                 return
             self._beaten = self._clock()
-            with contextlib.suppress(OSError):  # a disk that takes no time of a file takes no other's lock either
+            with contextlib.suppress(OSError):  # if the time cannot be written, nobody else can take the lock either
                 os.utime(self._handle)
 
     @contextlib.contextmanager
     def beating(self) -> Iterator[None]:
-        """Give signs of life from a thread, for a program that is busy with one thing for long."""
+        """Give signs of life from a thread meanwhile, for a program that is busy with one thing for long."""
         over = threading.Event()
 
         def work() -> None:
@@ -101,14 +108,14 @@ class FileLock:
             thread.join()
 
     def release(self) -> None:
-        """Give it back."""
+        """Give the lock back."""
         with self._guard:
             if self._handle is not None:
                 os.close(self._handle)
                 self._handle = None
 
     def holder(self) -> str:
-        """Who wrote into it last, "" where nobody did."""
+        """The last holder's text, "" if there is none."""
         try:
             return self.path.read_text(encoding="utf-8", errors="replace").strip()
         except OSError:
@@ -121,12 +128,12 @@ class FileLock:
             return False
 
     def _is_stale(self) -> bool:
-        """Whether its holder has given no sign of life for too long, as this process saw it with its own clock."""
+        """Whether the holder has given no sign of life for too long, by this process's own clock."""
         now, mark = self._clock(), self._mark()
         if mark is None or mark != self._seen:
             self._seen, self._quiet = mark, 0.0
         else:
-            self._quiet += min(max(now - self._looked, 0.0), BEAT)  # what this process slept through counts for little
+            self._quiet += min(max(now - self._looked, 0.0), BEAT)  # gaps in our own calls are not counted as silence
         self._looked = now
         return self._quiet >= self._stale_after
 
@@ -138,7 +145,7 @@ class FileLock:
         return found.st_ino, found.st_mtime_ns
 
     def _seize(self) -> bool:
-        """Put a new file, locked by this process, in the place of the one whose holder hangs."""
+        """Put a new file, locked by this process, in the place of the hanging holder's."""
         guard = os.open(self.path.with_name(f"{self.path.name}.seize"), os.O_RDWR | os.O_CREAT, 0o644)
         try:
             if not _try_lock(guard) or self._mark() != self._seen:
@@ -165,7 +172,7 @@ class FileLock:
         self.beat()
 
     def _sign(self, handle: int) -> None:
-        try:  # for people only: a full disk does not matter
+        try:  # the text is for people only: a full disk does not matter
             os.ftruncate(handle, 0)
             os.pwrite(handle, f"{self._who} (process {os.getpid()})\n".encode(), 0)
         except OSError:
@@ -173,7 +180,7 @@ class FileLock:
 
 
 class NoLock:
-    """The lock of what no other process can reach: always held."""
+    """Lock for data that no other process can reach: always held."""
 
     path, seized_from = Path("memory"), ""
     is_held, is_lost = True, False
@@ -198,10 +205,10 @@ class NoLock:
 
 
 def _open(path: Path) -> tuple[int, bool]:
-    """Open the lock's file, for reading only where the disk takes nothing: it can be locked all the same.
+    """Open the lock's file; for reading only if the disk takes nothing, which is enough for a lock.
 
     Returns:
-        The handle, and whether its holder could give signs of life.
+        The handle, and whether a holder can give signs of life.
     """
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT, 0o644), True
@@ -214,7 +221,7 @@ def _open(path: Path) -> tuple[int, bool]:
 
 
 def _try_lock(handle: int) -> bool:
-    """Lock an open file where nobody has; raises OSError where files cannot be locked."""
+    """Lock an open file; returns whether nobody else had it. Raises OSError if files cannot be locked there."""
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as err:

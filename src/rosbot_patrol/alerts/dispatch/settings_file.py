@@ -1,7 +1,7 @@
-"""What each program that uses an outbox was told about channels, left beside the notices: no passwords are in it.
+"""Channel settings of each program that uses an outbox, left beside the notices without passwords.
 
-`rosrun rosbot_patrol notify` reads it, so that it tries the very channels that the robot uses; and the programs compare
-theirs, as one of them delivers for all.
+`rosrun rosbot_patrol notify` reads them to try the same channels as the robot. The programs compare theirs, since one
+of them delivers for all.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """One program's.
+    """Settings of one program.
 
     Attributes:
-        who: its name.
+        who: name of the program.
         pid: its process.
-        wall: when it started, seconds since 1970.
-        mail: what it was told.
+        wall: time of its start, seconds since 1970.
+        mail: its channels.
     """
 
     who: str
@@ -38,18 +38,18 @@ class Settings:
 
     @property
     def is_running(self) -> bool:
-        """Whether its process is there."""
+        """Whether its process exists."""
         return Path(f"/proc/{self.pid}").exists()
 
 
 def write_settings(folder: Path, settings: Settings) -> None:
-    """Leave them in the outbox. Raises OSError."""
+    """Write the settings into the outbox. Raises OSError."""
     tree = {"who": settings.who, "pid": settings.pid, "wall": settings.wall, "mail": asdict(settings.mail)}
     write_json(folder / f"settings-{token(settings.who)}.json", tree)
 
 
 def read_settings(folder: Path) -> list[Settings]:
-    """Those of all programs, the youngest first; what makes no sense is left out and said."""
+    """Settings of all programs, the latest start first; a file that makes no sense is left out and logged."""
     found = []
     for path in folder.glob("settings-*.json"):
         try:
@@ -62,7 +62,7 @@ def read_settings(folder: Path) -> list[Settings]:
 
 
 def differences(folder: Path, who: str, mail: MailParams) -> list[str]:
-    """A sentence for each program that runs and was told something else."""
+    """A sentence for each running program with other channels than this one."""
     sentences = []
     for other in read_settings(folder):
         if other.who == who or other.pid == os.getpid() or not other.is_running:

@@ -1,8 +1,8 @@
-"""The way out for notices that the disk does not take: from memory, by every channel, at once.
+"""Delivery of notices that the disk does not take: from memory, by every channel, at once.
 
-What a channel took of them is kept in memory, too. When the disk takes something again, `settle` writes the receipts
-first and then the notice: whoever delivers from the disk sends it only to those channels that did not take it yet. What
-dies with the process before that is the knowledge of what was taken, and the notices that no channel took.
+Receipts stay in memory, too. When the disk takes something again, `settle` writes first the receipts and then the
+notices. So the program that delivers from the disk sends them only to the channels that did not take them yet. If the
+process ends before that, the receipts are lost, and the notices that no channel took.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class SparePost:
     """Keeps notices in memory and sends them from there.
 
     Args:
-        channels: ways out.
+        channels: to the owner.
         clocks: time.
-        seed: for the jitter.
+        seed: of the jitter.
     """
 
     def __init__(self, channels: Sequence[Channel], *, clocks: Clocks | None = None, seed: int | None = None) -> None:
@@ -40,36 +40,39 @@ class SparePost:
 
     @property
     def ids(self) -> list[str]:
-        """Of the notices that are here."""
+        """Ids of the notices in memory."""
         return [notice.id for notice in self._box.all()]
 
     def find(self, notice_id: str) -> Notice | None:
-        """A notice that is not on the disk yet, None where it is or is not known."""
+        """A notice that is not on the disk yet; None if it is there or unknown."""
         return self._box.find(notice_id)
 
     def put(self, notice: Notice) -> bool:
-        """Take a notice; returns False where it is here already."""
+        """Take a notice; returns False if it is in memory already."""
         is_new = self._box.put(notice)
         self._dispatcher.refresh()
         return is_new
 
     def deliver(self, name: str) -> Delivery | None:
-        """Send what is due on a channel, None where nothing is; waits for the transport."""
+        """Send what is due on a channel; waits for the transport. Returns None if nothing was due."""
         with self._sending[name]:
             return self._dispatcher.deliver(name)
 
     def learn(self, receipt: Receipt) -> None:
-        """A channel took something from the disk."""
+        """Note that a channel took something from the disk."""
         self._dispatcher.learn(receipt)
 
     def pause(self, name: str) -> float:
-        """How long until `deliver` may have something to do [s]."""
+        """Time until `deliver` may have something to do [s]."""
         return self._dispatcher.pause(name)
 
     def settle(self, outbox: Outbox, receipts: Receipts) -> bool:
-        """Bring everything to the disk; returns whether nothing is left here.
+        """Write everything to the disk.
 
-        While a channel is busy with a notice, nobody knows whether it takes it: then nothing is brought.
+        While a channel is busy with a notice, nobody knows whether it takes it. Then nothing is written.
+
+        Returns:
+            Whether nothing is left in memory.
 
         Raises:
             OSError: the disk does not take it.
@@ -87,18 +90,18 @@ class SparePost:
         return not len(self._box)
 
     def write_receipts(self, receipts: Receipts) -> None:
-        """Write down what channels took from here. Raises OSError."""
+        """Write the receipts of what channels took from memory. Raises OSError."""
         added = self._dispatcher.receipts.added
         while added:
             receipts.add(added[0])
             added.pop(0)
 
     def statuses(self) -> list[ChannelStatus]:
-        """How the channels do with what they have still to take."""
+        """States of the channels that have still something to take from memory."""
         return [status for status in self._dispatcher.statuses() if status.waiting]
 
     def nudge(self) -> None:
-        """The network came back."""
+        """Try again soon: the network came back."""
         self._dispatcher.nudge()
 
     def tell_faults(self) -> None:

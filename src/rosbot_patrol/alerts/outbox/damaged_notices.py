@@ -1,4 +1,4 @@
-"""What becomes of a notice that waited and was damaged on the disk: it is made again of its record, or told as lost."""
+"""Replacement of notices that were damaged on the disk: made again from the incident's record, or told as lost."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_PICTURE = "none: the notice was damaged on the disk, and the record has no p
 
 
 def replacement(state_dir: Path, notice_id: str, wall: float) -> Notice:
-    """A notice in the place of a damaged one, with the same id, so that no channel takes it twice.
+    """A notice in place of a damaged one, with the same id, so that no channel takes it twice.
 
     Args:
         state_dir: holds the incidents.

@@ -1,4 +1,4 @@
-"""Several notices in one message."""
+"""Digests: several notices in one message."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Sequence
 
 from rosbot_patrol.alerts.outbox.notice import Notice
 
-WHOLE = 10  # up to so many are told in full
-LISTED = 300
+WHOLE = 10  # largest number of notices that are told in full
+LISTED = 300  # largest number of notices that are listed
 
 
 def merge(notices: Sequence[Notice]) -> Notice:
-    """One notice that tells several, oldest first; the same ones always give the same id."""
+    """One notice that tells several, oldest first; the same notices always give the same id."""
     names = hashlib.sha256("\n".join(notice.id for notice in notices).encode()).hexdigest()[:12]
     return Notice(
         id=f"{notices[-1].id[:120]}-digest-{names}",

@@ -1,4 +1,4 @@
-"""Whether the disk of the state folder takes what is written, and what the owner has to know about it."""
+"""Watch on the disk of the state folder: does it take what is written, and what has the owner to know about it?"""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rosbot_patrol.alerts.outbox.notice import Notice
 
-PATIENCE = 10.0  # [s] without a success until the owner is told: a disk that is full for a moment is none of theirs
+PATIENCE = 10.0  # [s] without a success until the owner is told; a disk that is full for a moment is no news
 
 
 class DiskWatch:
@@ -27,21 +27,21 @@ class DiskWatch:
 
     @property
     def error(self) -> OSError | None:
-        """What the disk said last, None while it takes everything."""
+        """The disk's last error, None while it takes everything."""
         return self._error
 
     def failed(self, error: OSError, now: float, wall: float) -> None:
-        """Something could not be written at `now` [s], `wall` seconds since 1970."""
+        """Note that something could not be written at `now` [s], `wall` seconds since 1970."""
         if self._failed_at is None:
             self._failed_at, self._wall = now, wall
         self._error = error
 
     def worked(self) -> None:
-        """Something was written."""
+        """Note that something was written."""
         self._failed_at = self._error = None
 
     def notice(self, now: float, wall: float) -> Notice | None:
-        """What is to be told now, None where there is nothing new."""
+        """The notice that is due now, None if there is nothing new."""
         if self._error is not None and self._failed_at is not None:
             if self._is_told or now - self._failed_at < self._patience:
                 return None

@@ -11,7 +11,7 @@ from rosbot_patrol.alerts.outbox.outbox import Waiting, waiting_of
 
 
 class MemoryOutbox:
-    """As `Outbox`, without files. A notice that every channel took stays until `forget`, to be written then."""
+    """As `Outbox`, without files. A notice that every channel took stays until `forget`, so that it can be written."""
 
     folder = Path("memory")
 
@@ -24,10 +24,10 @@ class MemoryOutbox:
         return len(self._notices)
 
     def make(self) -> None:
-        """There is nothing to make."""
+        """Do nothing: there is no folder."""
 
     def find(self, notice_id: str) -> Notice | None:
-        """The notice of this id, waiting or delivered; None where there is none."""
+        """The notice of this id, waiting or delivered; None if there is none."""
         return self._notices.get(notice_id)
 
     def all(self) -> list[Notice]:
@@ -36,35 +36,35 @@ class MemoryOutbox:
             return list(self._notices.values())
 
     def put(self, notice: Notice) -> bool:
-        """Keep a notice; returns False where one of its id is here already."""
+        """Keep a notice; returns False if one of its id is known already."""
         with self._guard:
             is_new = notice.id not in self._notices
             self._notices.setdefault(notice.id, notice)
             return is_new
 
     def waiting(self) -> list[Waiting]:
-        """What waits now, oldest first."""
+        """The notices that wait, oldest first."""
         return [waiting_of(n.id, n) for n in self.all() if n.id not in self._finished]
 
     def read(self, entry: Waiting) -> Notice:
-        """A notice. Raises ValueError where it is gone."""
+        """A notice. Raises ValueError if it is gone."""
         notice = self._notices.get(entry.id)
         if notice is None:
             raise ValueError(f"{entry.id} is no longer in memory")
         return notice
 
     def doubt(self, entries: Iterable[Waiting]) -> None:
-        """Nothing is read ahead."""
+        """Do nothing: nothing is read ahead."""
 
     def finish(self, entry: Waiting) -> None:
-        """Every channel took it."""
+        """Note that every channel took a notice."""
         self._finished.add(entry.id)
 
     def forget(self, notice_id: str) -> None:
-        """It is on the disk now."""
+        """Drop a notice that is on the disk now."""
         with self._guard:
             self._notices.pop(notice_id, None)
             self._finished.discard(notice_id)
 
     def tidy(self) -> None:
-        """Nothing is left over."""
+        """Do nothing: nothing is left over."""

@@ -1,12 +1,12 @@
-"""The spool of notices: a folder in which any process puts, and from which one delivers.
+"""The folder of notices: any process puts them there, and one delivers them.
 
     outbox/000000000012-ID.notice   waits (alerts/outbox/notice.py), written whole and synced before `put` returns
     outbox/taken.jsonl              which channel took what (alerts/outbox/receipts.py)
-    outbox/sent/                    the last that every channel took
-    outbox/reserve                  room for some notices where the disk is full
+    outbox/sent/                    the last notices that every channel took
+    outbox/reserve                  room for some notices on a full disk
     outbox/lock                     held by the process that delivers (alerts/dispatch/dispatcher.py)
 
-Numbers give the order; two processes that put at the same moment may take the same number, their ids then decide.
+Numbers give the order. Two processes that put at the same moment may take the same number; then the ids decide.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ log = logging.getLogger(__name__)
 _NAME = re.compile(r"(?P<order>\d{12})-(?P<id>[A-Za-z0-9._+-]+)\.notice")
 _BROKEN = re.compile(r"\d{12}-(?P<id>[A-Za-z0-9._+-]+)\.(?:notice|(?P<set_aside>broken))")
 _SCRATCH = re.compile(r"\..*\.(?P<pid>\d+)\.tmp")
-_BAD_FILE = (errno.EIO, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EBADMSG, errno.ELOOP)  # holds up no other
+_BAD_FILE = (errno.EIO, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EBADMSG, errno.ELOOP)  # faults of one file
 RESERVE = 2 << 20  # [bytes]
-_PROBE = 4096  # [bytes]: an empty file finds its place on a full disk
+_PROBE = 4096  # [bytes]; not 0, as a full disk still takes an empty file
 
 
 @dataclass(frozen=True, kw_only=True)
 class Waiting:
-    """One notice that waits, without its text and picture.
+    """A notice that waits, without its text and picture.
 
     Attributes:
         name: of its file; names sort by order.
         id, kind, wall: of the notice.
         is_urgent: it leaves as a message of its own.
-        channels: that are asked by name; empty: all of its kind.
+        channels: names of the channels that are asked; empty: all that take its kind.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Waiting:
 
 
 def waiting_of(name: str, notice: Notice) -> Waiting:
-    """What a queue has to know of a notice in the file of this name."""
+    """What a queue has to know of the notice in the file of this name."""
     return Waiting(
         name=name,
         id=notice.id,
@@ -68,8 +68,8 @@ class Outbox:
     """The folder of waiting notices.
 
     Args:
-        folder: is made by the first `put`, or by `make`.
-        keep: so many delivered notices stay in `sent`.
+        folder: made by the first `put`, or by `make`.
+        keep: number of delivered notices that stay in `sent`.
     """
 
     def __init__(self, folder: Path, *, keep: int = 200) -> None:
@@ -77,12 +77,12 @@ class Outbox:
         self._keep = keep
         self._known: dict[str, Waiting] = {}
         self._left_alone: set[str] = set()
-        self._stuck: list[str] = []  # those of them whose notice has to be made again
+        self._stuck: list[str] = []  # those of them with a notice that has to be made again
         self._mended: set[str] = set()
         self._order = 0
 
     def make(self) -> None:
-        """Make the folder where it is missing. Raises OSError."""
+        """Make the folder if it is missing. Raises OSError."""
         self.sent.mkdir(parents=True, exist_ok=True)
 
     def has(self, notice_id: str) -> bool:
@@ -90,7 +90,7 @@ class Outbox:
         return any(found["id"] == notice_id for found in self._all_names())
 
     def waits(self, notice_id: str) -> bool | None:
-        """Whether a notice waits, whole or damaged, or was delivered (False); None: it is not here. Raises OSError."""
+        """True if a notice waits, whole or damaged; False if delivered; None if unknown. Raises OSError."""
         if any(broken_id == notice_id for _, broken_id in self.broken()):
             return True
         for folder, answer in ((self.folder, True), (self.sent, False)):
@@ -100,7 +100,7 @@ class Outbox:
         return None
 
     def find(self, notice_id: str) -> Notice | None:
-        """The notice of this id, waiting or delivered; None where there is none.
+        """The notice of this id, waiting or delivered; None if there is none.
 
         Raises:
             OSError: its file cannot be read.
@@ -116,10 +116,13 @@ class Outbox:
         return None
 
     def put(self, notice: Notice) -> bool:
-        """Keep a notice until it is delivered; returns False where one of its id is known already.
+        """Keep a notice until it is delivered.
+
+        Returns:
+            False if one of its id is known already.
 
         Raises:
-            OSError: the disk does not take it: nothing is kept then.
+            OSError: the disk does not take it; nothing is kept.
         """
         self.make()
         names = self._all_names()
@@ -133,18 +136,18 @@ class Outbox:
         except OSError as err:
             if not path.exists():
                 raise
-            log.error("%s may not outlive a power cut: %s", path, err)  # whoever delivers sees it from now on
+            log.error("%s may not outlive a power cut: %s", path, err)  # but the file is there, so it will be delivered
         return True
 
     def probe(self) -> None:
-        """Write something and take it away again. Raises OSError where the disk does not take it."""
+        """Write something and remove it again. Raises OSError: the disk does not take it."""
         self.make()
         path = self.folder / "probe"
         write_atomic(path, bytes(_PROBE))
         path.unlink(missing_ok=True)
 
     def waiting(self) -> list[Waiting]:
-        """What waits now, oldest first. A file that is no notice is set aside. Raises OSError."""
+        """The notices that wait, oldest first. A file that is no notice is set aside. Raises OSError."""
         names = sorted(e.name for e in _scan(self.folder) if e.name.endswith(".notice"))
         self._known = {name: self._known[name] for name in names if name in self._known}
         for name in names:
@@ -153,11 +156,11 @@ class Outbox:
         return [self._known[name] for name in names if name in self._known]
 
     def read(self, entry: Waiting) -> Notice:
-        """A notice. Raises OSError where its file cannot be read, ValueError where it is none."""
+        """A notice. Raises OSError if its file cannot be read, ValueError if it is none."""
         return Notice.from_bytes((self.folder / entry.name).read_bytes())
 
     def doubt(self, entries: Iterable[Waiting]) -> None:
-        """Look at these files anew in the next `waiting`: one of them could not be read."""
+        """Look at these files anew in the next `waiting`, as one of them could not be read."""
         for entry in entries:
             self._known.pop(entry.name, None)
 
@@ -171,25 +174,25 @@ class Outbox:
         self._known.pop(entry.name, None)
 
     def set_aside(self, name: str) -> Path:
-        """Take a file that is no notice out of the way; it stays under another name. Raises OSError."""
+        """Rename a file that is no notice; returns its new path. Raises OSError."""
         aside = (self.folder / name).with_suffix(".broken")
         (self.folder / name).replace(aside)
         return aside
 
     def broken(self) -> list[tuple[str, str]]:
-        """Name and notice's id of each file set aside that nobody has made good for yet. Raises OSError."""
+        """File name and notice id of each damaged notice that was not replaced yet. Raises OSError."""
         names = dict.fromkeys(self._stuck + sorted(e.name for e in _scan(self.folder)))
         found = ((name, _BROKEN.fullmatch(name)) for name in names if name not in self._mended)
         return [(name, match["id"]) for name, match in found if match and (match["set_aside"] or name in self._stuck)]
 
     def mended(self, name: str) -> None:
-        """A file of `broken` was made good for: it is none of them any more. Raises OSError."""
+        """Note that a file of `broken` was replaced. Raises OSError."""
         self._mended.add(name)
         if name not in self._stuck:
             (self.folder / name).replace(self.folder / f"{name}-told")
 
     def tidy(self) -> None:
-        """Remove old notices and scratch files, keep the reserve; for the process that delivers. Raises OSError."""
+        """Remove old notices and scratch files, keep up the reserve; for the process that delivers. Raises OSError."""
         self.make()
         for name in sorted(e.name for e in _scan(self.sent))[: -self._keep]:
             (self.sent / name).unlink(missing_ok=True)
@@ -201,7 +204,7 @@ class Outbox:
     # -- inside
 
     def _all_names(self) -> list[re.Match[str]]:
-        # those that wait first: a notice that moves to `sent` meanwhile is seen at least once
+        # The waiting ones first, so that a notice that moves to `sent` meanwhile is seen at least once.
         waiting = [entry.name for entry in _scan(self.folder)]
         names = waiting + [entry.name for entry in _scan(self.sent)]
         return [found for name in names if (found := _NAME.fullmatch(name))]
@@ -241,11 +244,11 @@ class Outbox:
         except OSError as err:
             if err.errno not in DISK_FULL or not self._make_room(len(data)):
                 raise
-            log.error("the disk is full: the notice took of what is kept free for it")
+            log.error("the disk is full: the notice took some of the room that is kept free for it")
             write_atomic(path, data)
 
     def _make_room(self, size: int) -> bool:
-        """Free space on a full disk: of what was delivered, then of the reserve; returns whether there was some."""
+        """Free space on a full disk: old delivered notices, then the reserve. Returns whether there was some."""
         freed = 0
         for name in sorted(e.name for e in _scan(self.sent))[:-20]:
             freed += (self.sent / name).stat().st_size
@@ -272,7 +275,7 @@ class Outbox:
 
 
 def _scan(folder: Path) -> list[os.DirEntry[str]]:
-    """What is in a folder; nothing where it was not made yet."""
+    """The entries of a folder; none if it was not made yet."""
     try:
         return list(os.scandir(folder))
     except FileNotFoundError:
@@ -280,7 +283,7 @@ def _scan(folder: Path) -> list[os.DirEntry[str]]:
 
 
 def _is_left_over(scratch: Path) -> bool:
-    """Whether a crash left it: its process has gone, and it is not of this moment."""
+    """Whether a crash left a scratch file: it is older than a minute and its process has gone."""
     found = _SCRATCH.fullmatch(scratch.name)
     try:
         age = time.clock_gettime(time.CLOCK_REALTIME) - scratch.stat().st_mtime

@@ -1,9 +1,10 @@
-"""Who took what: a file to which each delivery adds one line, synced before the next begins.
+"""Receipts: a file to which each delivery adds one line, synced before the next delivery begins.
 
-A recipient that refused a notice for good, while another of the same channel took it, leaves a line too: it is not
-asked again, even after a restart.
+A recipient that refused a notice for good, while another of the same channel took it, gets a line too. So it is not
+asked again, not even after a restart.
 
-Only the process that delivers writes it; others read it along. A line that a crash cut short counts as not written.
+Only the process that delivers writes the file; others read what is new. A line that a crash cut short counts for
+nothing.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ class Receipt:
     """One delivery, or a refusal that is final.
 
     Attributes:
-        channel: that took it, or refused it.
+        channel: that took or refused the notices.
         transport: of the channel: smtp, maildir, ...
-        ids: of the notices, several where they left as one digest.
-        wall: when, seconds since 1970.
-        where: the place, for people.
-        refused: why it was refused for good, "" where it was taken.
+        ids: of the notices, several for a digest.
+        wall: time, seconds since 1970.
+        where: their place, for people.
+        refused: why they were refused for good, "" if they were taken.
     """
 
     channel: str
@@ -45,13 +46,13 @@ class Receipts:
     """The file of deliveries.
 
     Args:
-        path: of the file; need not be there. None: deliveries are kept in `added` only.
+        path: of the file, which need not exist; None: receipts stay in `added`.
 
     Attributes:
-        taken: the channels that took a notice, by its id.
-        refused: the channels that refused it for good, likewise.
-        refusals: why a channel refused the last notice that it was asked for, by its name.
-        last: when a channel took something last, seconds since 1970.
+        taken: names of the channels that took a notice, by its id.
+        refused: names of the channels that refused it for good, by its id.
+        refusals: why a channel refused its last notice, by the channel's name.
+        last: time of a channel's last delivery, by its name, seconds since 1970.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -68,7 +69,7 @@ class Receipts:
         return self.taken.get(notice_id, set()) | self.refused.get(notice_id, set())
 
     def read_new(self) -> list[Receipt]:
-        """What was added since the last call, the whole file in the first. Raises OSError."""
+        """Receipts that were added since the last call; in the first call all. Raises OSError."""
         if self.path is None:
             return []
         try:
@@ -77,7 +78,7 @@ class Receipts:
             return []
         with file:
             found = os.fstat(file.fileno())
-            if found.st_ino != self._inode or found.st_size < self._offset:  # the first time, or it was written anew
+            if found.st_ino != self._inode or found.st_size < self._offset:  # the first call, or it was shortened
                 self._inode, self._offset = found.st_ino, 0
             file.seek(self._offset)
             data = file.read()
@@ -87,17 +88,17 @@ class Receipts:
         return [r for r in receipts if self.note(r)]
 
     def add(self, receipt: Receipt) -> None:
-        """Write a delivery down. Raises OSError where the disk does not take it."""
+        """Write a receipt. Raises OSError: the disk does not take it."""
         self.note(receipt)
         if self.path is None:
             self.added.append(receipt)
             return
         tree = {name: value for name, value in asdict(receipt).items() if name != "refused" or value}
         line = json.dumps(tree).encode("ascii") + b"\n"
-        append_line(self.path, b"\n" + line if _is_cut(self.path) else line)  # a cut line stays, and is read as none
+        append_line(self.path, b"\n" + line if _is_cut(self.path) else line)  # a cut line stays, and counts for nothing
 
     def compact(self, keep: Iterable[str], *, lines: int = 500) -> None:
-        """Write the file anew with the last `lines` and what was taken of `keep`. Raises OSError."""
+        """Shorten the file to the last `lines` and those of the notices `keep`. Raises OSError."""
         wanted = set(keep)
         if self.path is None:
             return
@@ -111,7 +112,7 @@ class Receipts:
             write_atomic(self.path, b"".join(line + b"\n" for line in kept + found[-lines:]))
 
     def note(self, receipt: Receipt) -> bool:
-        """Remember a delivery; returns whether it is news."""
+        """Remember a receipt without writing it; returns whether it is news."""
         fresh = any(receipt.channel not in self.done(name) for name in receipt.ids)
         for name in receipt.ids:
             (self.refused if receipt.refused else self.taken).setdefault(name, set()).add(receipt.channel)

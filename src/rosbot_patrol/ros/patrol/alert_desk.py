@@ -1,4 +1,4 @@
-"""The alert desk: a thread writes notices to disk, the post delivers them, and neither ever stops the patrol."""
+"""The alert desk: a thread writes notices to the disk, the post delivers them, and neither ever stops the patrol."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ from rosbot_patrol.ros.runtime.node import Worker
 
 log = logging.getLogger(__name__)
 
-DISK_RETRY = 5.0  # [s] between attempts to write where the disk does not take it
+DISK_RETRY = 5.0  # [s] between attempts while the disk does not take something
 RECORD_WAIT = 2.0  # [s] that the patrol's memory waits for the records
 
 
 class AlertDesk:
-    """Takes notices, keeps them, delivers them.
+    """Takes the patrol's notices and has them kept and delivered.
 
     Args:
         post: keeps notices and delivers them.
         pictures: the camera's last pictures.
         keeper: of the records.
-        health: where to say how it goes.
+        health: hears how it goes.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class AlertDesk:
 
     @property
     def is_recorded(self) -> bool:
-        """Whether every notice and memory taken is on disk."""
+        """Whether every notice and memory that was taken is on the disk."""
         return not self._jobs and self._memory is None
 
     def is_held(self, incident: str) -> bool:
@@ -91,7 +91,7 @@ class AlertDesk:
             return False
 
     def told(self, incident: str) -> PostNotice | None:
-        """The notice of an incident from before the program's start, None where there is none."""
+        """The notice of an incident from before the program's start, None if there is none."""
         try:
             return self._delayed.get(token(incident)) or self._post.find(token(incident))
         except (OSError, ValueError) as err:
@@ -99,14 +99,14 @@ class AlertDesk:
             return None
 
     def write_later(self, write: Callable[[], None]) -> None:
-        """Try again and again what the disk did not take: `write` raises OSError until it does; returns at once."""
+        """Have `write` called again and again until it raises no OSError; returns at once."""
         with self._listing:
             if write not in self._unwritten:
                 self._unwritten.append(write)
         self._to_record.set()
 
     def recall(self, incident: str, notice: PostNotice) -> None:
-        """Complete the record of a mission whose notice is older than what the patrol remembers."""
+        """Complete the record of a mission with the notice that outlived the patrol's memory."""
         event = Event(wall=notice.wall, kind="seen", text="somebody was seen, and the program was killed right after")
         self._keeper.put([Entry(incident=incident, changes={"confirmed": notice.wall}, events=(event,))])
         if notice.picture is not None:
@@ -139,7 +139,7 @@ class AlertDesk:
         self._to_record.set()
 
     def follow(self, commands: Commands) -> None:
-        """Take what else a step has for the owner: notices that waited, words, calls that start nothing."""
+        """Take what else a step has for the owner: delayed notices, words, calls that start nothing."""
         jobs = [partial(self._release, release) for release in commands.releases]
         jobs += [partial(self._tell, word, time.time()) for word in commands.words]
         jobs += [partial(self._note_ignored, commands.ignored)] * bool(commands.ignored)
@@ -148,10 +148,10 @@ class AlertDesk:
             self._to_record.set()
 
     def remember(self, save: Callable[[], None]) -> None:
-        """Save the patrol's memory once every notice taken so far is on disk; returns at once.
+        """Save the patrol's memory once every notice taken so far is on the disk; returns at once.
 
-        A mission is never remembered as one that gave its notice before the notice is there, nor, where the records'
-        disk takes them, as one that is over before its record says so.
+        So the memory never says that a mission gave its notice before that is written. Nor does it say that a mission
+        is over before the record does, as long as the disk takes records.
         """
         if self._memory is None:
             self._memory_due = time.monotonic() + RECORD_WAIT
@@ -161,12 +161,12 @@ class AlertDesk:
     # -- the threads
 
     def _record_next(self) -> float:
-        """Write one thing; returns how long to wait for the next [s]."""
+        """Write one thing; returns the pause until the next [s]."""
         if self._jobs:
             job = self._jobs[0]
             try:
                 job()
-            except Exception:  # the other jobs first
+            except Exception:  # this job waits for the others
                 self._jobs.rotate(-1)
                 raise
             self._jobs.popleft()
@@ -188,7 +188,7 @@ class AlertDesk:
         with self._listing:
             waiting = list(self._unwritten)
         for write in waiting:
-            with suppress(OSError):  # which was said when it came
+            with suppress(OSError):  # the failure was said when it came
                 write()
                 with self._listing:
                     self._unwritten.remove(write)
@@ -208,13 +208,13 @@ class AlertDesk:
 
     def _delivered(self, delivery: Delivery) -> None:
         for notice_id in delivery.ids if delivery.delivered else ():
-            with self._telling:  # first that it is on disk, then that it was delivered
+            with self._telling:  # so that "on disk" is published before "delivered"
                 incident = self._told.get(notice_id) or recall_incident(self._keeper.state_dir, notice_id)
                 if incident is not None:
                     self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
     def _record(self, incident: Incident, notice: Notice) -> None:
-        """Bring a notice to the disk, or, where that takes nothing, to the post's memory, from which it is sent."""
+        """Write a notice to the disk, or to the post's memory, from which it is sent if the disk takes nothing."""
         if self._post.has(incident.id) or self.is_held(incident.id):  # the program was killed after it was written
             return
         picture, note = self._picture(notice)
@@ -234,7 +234,7 @@ class AlertDesk:
             self._keeper.put_picture(incident.id, file)
 
     def _hold(self, notice: PostNotice) -> bool:
-        """Keep a notice for the entry delay; whether it is on the disk."""
+        """Keep a notice for the entry delay; returns whether it is on the disk."""
         try:
             self._delayed.put(notice)
         except OSError as err:
@@ -244,7 +244,7 @@ class AlertDesk:
         return True
 
     def _release(self, release: Release) -> None:
-        """Send a notice that waited, or drop it."""
+        """Send a delayed notice, or drop it."""
         notice_id = token(release.mission)
         try:
             notice = self._delayed.get(notice_id)
@@ -264,7 +264,7 @@ class AlertDesk:
         self._keeper.put([Entry(incident=release.mission, events=(event,))])
 
     def _tell(self, word: Word, wall: float) -> None:
-        """Tell the owner something that is no intruder."""
+        """Tell the owner of something else than an intruder."""
         self._post.put(
             PostNotice(
                 id=token(f"{word.kind}-{wall:.3f}"),
@@ -311,7 +311,7 @@ class AlertDesk:
             self._post.keep(verdict_notice(incident))
 
     def _publish(self, incident: Incident, *, transport: str, location: str, text: str, kind: str = "") -> None:
-        """Tell the topic; without a transport the notice is not delivered yet."""
+        """Publish an alert; without a transport its notice is not delivered yet."""
         message = Alert(id=incident.id, delivered=bool(transport), transport=transport, location=location, text=text)
         message.header.stamp = rospy.Time.now()
         message.room_id, message.room_name = incident.room_id, incident.room_name
@@ -326,7 +326,7 @@ def _repeat(work: Callable[[], float], wake: threading.Event) -> None:
     while not rospy.is_shutdown():
         try:
             pause = work()
-        except Exception:  # the desk has to outlive whatever one mail does to it
+        except Exception:  # a defect that one notice brings out must not end the desk
             log.error("the alert desk stumbled", exc_info=True)
             pause = DISK_RETRY
         if pause > 0.0:

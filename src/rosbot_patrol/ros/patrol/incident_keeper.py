@@ -1,7 +1,7 @@
-"""Keeps the record of every mission, on a thread of its own: the patrol hands over what happens and never waits.
+"""The record of every mission, kept on a thread of its own: the patrol hands over what happens and never waits.
 
-Entries are written in order. What the disk does not take is tried again, and said in the log and on /diagnostics; a
-full disk loses its oldest clear incidents first; a damaged database is set aside and a new one begun.
+Entries are written in order. What the disk does not take is tried again, and said in the log and on /diagnostics. A
+full disk loses its oldest clear incidents first. A damaged database is set aside and a new one begun.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ from rosbot_patrol.ros.runtime.node import Worker
 
 log = logging.getLogger(__name__)
 
-DISK_RETRY = 5.0  # [s] between attempts where the disk does not take something
+DISK_RETRY = 5.0  # [s] between attempts while the disk does not take something
 _BUSY, _IDLE = 0.5, 5.0  # [s] between two looks at the pictures, in a mission and without one
-_TIDY = 600.0  # [s] between two looks at age and size
+_TIDY = 600.0  # [s] between two checks of age and size
 _MOST = 5000  # entries in memory while the disk takes nothing; 2 kB each at most
-_RECENT = 5  # records that are looked at for a missing report
+_RECENT = 5  # latest records that are checked for a missing report
 _SAME_AGAIN = 60.0  # [s] until the same complaint is logged again
-_PATIENCE = 3.0  # [s] more than a clip should take
+_PATIENCE = 3.0  # [s] to wait for pictures beyond the end of a clip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class RecordParams:
 
 @dataclass(kw_only=True)
 class _Closing:
-    """A mission that is over: its record waits for the last pictures, until `deadline` (monotonic) at most."""
+    """A mission that is over. Its record waits for the last pictures, until `deadline` (monotonic) at most."""
 
     wall: float
     deadline: float
@@ -72,11 +72,11 @@ class IncidentKeeper:
     """Writes entries and pictures into the incidents' store.
 
     Args:
-        state_dir: of database and folders.
-        pictures: the camera's last ones.
-        health: where to say how it goes.
+        state_dir: folder of the database and the incidents' folders.
+        pictures: the camera's last pictures.
+        health: hears how it goes.
         evidence, retention, records: parameters.
-        on_verdict: is called on the keeper's thread when a mission is over and its verdict on the disk.
+        on_verdict: called on the keeper's thread when a mission is over and its verdict on the disk.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class IncidentKeeper:
         """Begin to work.
 
         Args:
-            running: ids of missions that go on from before the program's start; other open records are closed.
+            running: ids of missions that go on after the program's start; other open records are closed.
         """
         self._running = tuple(running)
         rospy.Subscriber("map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 23)
@@ -131,18 +131,18 @@ class IncidentKeeper:
         return self._evidence.evidence_always or bool(self._closing) or self._album.is_waiting
 
     def finish(self) -> None:
-        """The program ends: complete what is over without waiting for more pictures."""
+        """Complete the records of missions that are over without more pictures, as the program ends."""
         self._is_ending = True
         self._wake.set()
 
     def give_way(self, wanted: bool) -> None:
-        """Leave what room the disk has to a notice that did not find its own: no pictures and reports meanwhile."""
+        """Write no pictures and reports while a notice waits for room on the disk."""
         if wanted != self._gives_way:
             self._gives_way = wanted
             self._wake.set()
 
     def put(self, entries: Sequence[Entry]) -> None:
-        """Take entries."""
+        """Take entries for the records."""
         if not entries:
             return
         self._entries.extend(entries)
@@ -154,16 +154,16 @@ class IncidentKeeper:
         self._wake.set()
 
     def see(self, incident_id: str, stamp: float) -> None:
-        """Somebody was confirmed in the picture of this stamp [s]."""
+        """Note that somebody was confirmed in the picture of this stamp [s]."""
         self._seen.append((incident_id, stamp))
         self._wake.set()
 
     def note(self, sighting: Sighting) -> None:
-        """What the detector saw in a picture."""
+        """Take what the detector saw in a picture."""
         self._album.note(sighting)
 
     def look(self, incident_id: str) -> None:
-        """The robot looks around for this mission, or ("") for none."""
+        """Set the mission for which the robot looks around, "" for none."""
         self._looking = incident_id
 
     # -- the thread
@@ -174,21 +174,21 @@ class IncidentKeeper:
             self._wake.clear()
 
     def step(self) -> float:
-        """Write what there is, whatever the disk says; returns how long to wait for the next step [s]."""
-        while len(self._entries) > _MOST:  # on this thread: another would take away what is being written
+        """Write what there is, whatever the disk says; returns the pause until the next step [s]."""
+        while len(self._entries) > _MOST:  # on this thread, since another one would remove what is being written
             self._entries.popleft()
             self._lost += 1
         try:
             return self._work()
         except StoreError as err:
             return self._trouble(err)
-        except Exception:  # records have to outlive whatever one of them does
+        except Exception:  # a defect that one record brings out must not end the records
             log.error("the keeping of incidents stumbled, and goes on", exc_info=True)
             self._forget_store()
             return DISK_RETRY
 
     def _work(self) -> float:
-        """Write what there is; returns how long to wait for more [s]. Raises StoreError."""
+        """Write what there is; returns the pause until the next step [s]. Raises StoreError."""
         store = self._store or self._open()
         while self._entries:
             self._write(store, self._entries[0])
@@ -221,7 +221,7 @@ class IncidentKeeper:
         return store
 
     def _catch_up(self, store: IncidentStore) -> None:
-        """Write the reports that the end of the program came before."""
+        """Write the reports that the program's last end prevented."""
         for row in find_incidents(store.connection, store.path, Query(limit=_RECENT)):
             is_wanted = row.closed is not None and row.verdict in self._records.report_verdicts
             if is_wanted and not store.folder.path(row.id, REPORT).exists():
@@ -350,7 +350,7 @@ class IncidentKeeper:
         return DISK_RETRY
 
     def _complain(self, err: StoreError) -> None:
-        """Log what is wrong, the same again once a minute only."""
+        """Log what is wrong; the same thing once a minute at most."""
         text, at = self._complaint
         if str(err) == text and time.monotonic() - at < _SAME_AGAIN:
             return
@@ -364,7 +364,7 @@ class IncidentKeeper:
 
 
 def _amend(store: IncidentStore, kept: Incident, entry: Entry) -> None:
-    """The mission went on after its record was closed, as after a crash: what is new is added to the chain."""
+    """Add news to the chain, for a mission that went on after its record was closed, as after a crash."""
     known = f"{kept.verdict}: {kept.reason}"
     for event in entry.events:
         if event.kind == "seen" or (event.kind == "verdict" and event.text != known):

@@ -1,4 +1,4 @@
-"""How the post does, on /diagnostics and on the disk: each channel, who delivers, what nobody delivers."""
+"""Health of the post, on /diagnostics and on the disk: each channel, who delivers, what nobody delivers."""
 
 from __future__ import annotations
 
@@ -15,17 +15,21 @@ from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 
 OVERDUE = 120.0  # [s] after which a notice that nobody delivers is a fault
-COMPARE = 30.0  # [s] between two looks at what the other programs were told
-STATUS = 60.0  # [s] between two writings of a status that has not changed
+COMPARE = 30.0  # [s] between two comparisons with the channels of other programs
+STATUS = 60.0  # [s] between two writings of an unchanged status
 
 
 class PostHealth:
-    """Tells how the post does.
+    """Reports how the post does.
 
     Args:
-        who: this program; mail: what it was told.
-        dispatcher: that delivers, or waits for its turn.
-        health: where to say it.
+        who: name of this program.
+        mail: its channels.
+        dispatcher: delivers, or waits for its turn.
+        health: hears it.
+
+    Attributes:
+        trouble: why the outbox takes nothing, "" if it does.
     """
 
     def __init__(self, who: str, mail: MailParams, dispatcher: Dispatcher, health: Health) -> None:
@@ -35,10 +39,10 @@ class PostHealth:
         self._differ = ""
         self._compared = self._written = float("-inf")
         self._status: list[object] = []
-        self.trouble = ""  # why the outbox takes nothing, "" where it does
+        self.trouble = ""
 
     def report(self) -> None:
-        """Say how it is now. Raises OSError."""
+        """Report the state now. Raises OSError."""
         if time.monotonic() - self._compared >= COMPARE:
             self._compared = time.monotonic()
             self._differ = "; ".join(differences(self._dispatcher.outbox.folder, self._who, self._mail))
@@ -48,12 +52,12 @@ class PostHealth:
             self._report_from_afar()
 
     def say_trouble(self, what: str) -> None:
-        """The outbox takes nothing: say so until `trouble` is "" again."""
+        """Report that the outbox takes nothing, until `trouble` is "" again."""
         self.trouble = what
         self._set("outbox", ERROR, what)
 
     def report_spare(self, statuses: Sequence[ChannelStatus]) -> None:
-        """Say how the channels do with what they have to take from memory."""
+        """Report the channels that have something to take from memory."""
         found = {f"{status.name} (from memory)": status for status in statuses}
         for part in self._spare_parts - set(found):
             self._health.drop(part)
@@ -75,7 +79,7 @@ class PostHealth:
 
     def _report_from_afar(self) -> None:
         outbox, holder = self._dispatcher.outbox, self._dispatcher.lock.holder()
-        for part in self._parts - {"outbox"}:  # that were this program's to say
+        for part in self._parts - {"outbox"}:  # of the time when this program delivered
             self._health.drop(part)
         self._parts &= {"outbox"}
         late = [entry for entry in outbox.waiting() if time.time() - entry.wall > OVERDUE]
