@@ -9,8 +9,9 @@ import pytest
 from postfix_instance import Postfix, why_not
 
 from rosbot_patrol.alerts.channels.channel import DeliveryError
-from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.mail import make_envelope
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.channels.sendmail import SendmailTransport
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher

@@ -6,7 +6,8 @@ import pytest
 from post import Time, deliver_all, notice
 from smtp_server import SmtpServer
 
-from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 

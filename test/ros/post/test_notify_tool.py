@@ -7,7 +7,7 @@ import socket
 import pytest
 from smtp_server import SmtpServer
 
-from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.file_lock import FileLock
 from rosbot_patrol.alerts.dispatch.settings_file import Settings, write_settings
 from rosbot_patrol.alerts.outbox.notice import Notice

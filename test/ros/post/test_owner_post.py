@@ -11,7 +11,7 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 
 from post import Box, channel, notice
 
-from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.delivery import Clocks
 from rosbot_patrol.alerts.outbox.outbox import Outbox
 from rosbot_patrol.ros.post import owner_post

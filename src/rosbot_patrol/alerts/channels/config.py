@@ -1,11 +1,11 @@
 """The channels: the tutorial's own from the parameters, more from a file.
 
 channels:
-phone:
-type: webhook
-url: https://hass.example.org/api/webhook/patrol
-secret_file: ~/.config/rosbot_patrol/webhook_secret
-kinds: [incident, fault]
+  phone:
+    type: webhook
+    url: https://hass.example.org/api/webhook/patrol
+    secret_file: ~/.config/rosbot_patrol/webhook_secret
+    kinds: [incident, fault]
 """
 
 from __future__ import annotations
@@ -22,19 +22,26 @@ from rosbot_patrol.alerts.channels.channel import Channel, Pace, Transport
 from rosbot_patrol.alerts.channels.mail import Envelope, make_envelope
 from rosbot_patrol.alerts.channels.maildir import MaildirTransport
 from rosbot_patrol.alerts.channels.network_words import is_loopback
+from rosbot_patrol.alerts.channels.params import (
+    PASSWORD_VARIABLE,
+    SPECS,
+    ChannelSpec,
+    MaildirSpec,
+    MailParams,
+    SendmailSpec,
+    SmtpSpec,
+    WebhookSpec,
+)
 from rosbot_patrol.alerts.channels.secrets_on_disk import read_secret, refuse_secrets, warn_where_open
 from rosbot_patrol.alerts.channels.sendmail import SENDMAILS, SendmailTransport, find_sendmail
 from rosbot_patrol.alerts.channels.smtp import SmtpServer, SmtpTransport
-from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport, check_url
+from rosbot_patrol.alerts.channels.webhook import WebAddress, WebhookTransport
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.params import load_strict, param, unknown_name
+from rosbot_patrol.params import load_strict, unknown_name
 from rosbot_patrol.yaml_files import read_mapping
 
 DEFAULT = "mail"
-PASSWORD_VARIABLE = "ROSBOT_PATROL_SMTP_PASSWORD"
-KINDS = ("incident", "verdict", "sensor", "fault", "test")
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,39}")
-_SECURITY = ("auto", "none", "starttls", "tls")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,112 +51,6 @@ class Surroundings:
     home: Path
     environ: Mapping[str, str]
     host: str = "localhost"
-
-
-@dataclass(frozen=True, kw_only=True)
-class MailParams:
-    """Recipients of the notices, and how mail is sent."""
-
-    email_to: str = param("", doc="recipients, separated by commas (the tutorial's name)")
-    email_from: str = param("", doc="sender (the tutorial's name)")
-    transport: str = param(
-        "auto",
-        choices=("auto", "sendmail", "smtp", "maildir"),
-        doc="way of sending; auto: sendmail if email_to is a real address and sendmail is installed, else maildir",
-    )
-    maildir: str = param("", doc="Maildir for mails on this disk; empty: rosbot_patrol/mail in ROS's home")
-    sendmail: str = param("", doc="path of the sendmail program; empty: the usual places")
-    mail_interval: float = param(10.0, unit="s", lo=0.0, doc="minimum time between two mails; delays mails, drops none")
-    mail_timeout: float = param(
-        30.0, unit="s", lo=0.5, hi=600.0, doc="longest wait for an answer of a mail server or program"
-    )
-    mail_retry: float = param(5.0, unit="s", lo=0.1, hi=900.0, doc="wait after a failed delivery; doubles up to 900 s")
-    smtp_host: str = param("localhost", doc="mail server")
-    smtp_port: int = param(25, lo=1, hi=65535, doc="port of the mail server")
-    smtp_security: str = param("auto", choices=_SECURITY, doc="encryption; auto: STARTTLS if the server offers it")
-    smtp_user: str = param("", doc="login; empty: none")
-    smtp_password_file: str = param(
-        "", doc="file with the password, readable only by its owner; empty: environment variable " + PASSWORD_VARIABLE
-    )
-    smtp_ca_file: str = param("", doc="CA file for a server certificate that the system does not trust")
-    smtp_allow_plaintext: bool = param(
-        False, doc="allow sending the login without TLS (smtp_security: none) to another machine"
-    )
-    channels: str = param("", doc="file of further channels (docs/alerts.md); empty: none")
-    notify_verdicts: list[str] = param(
-        [],
-        choices=("clear", "unreachable", "unverified"),
-        doc="verdicts that notify the owner; a confirmed sighting always does (patrol_robot)",
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChannelSpec:
-    """Keys that every channel of the file has."""
-
-    type: str = param(choices=("sendmail", "smtp", "maildir", "webhook"), doc="type of the channel")
-    kinds: list[str] = param([], choices=KINDS, doc="kinds of notices it sends; empty: all")
-    interval: float = param(
-        10.0, unit="s", lo=0.0, doc="minimum time between two messages; delays messages, drops none"
-    )
-    retry: float = param(5.0, unit="s", lo=0.1, hi=900.0, doc="wait after a failed delivery; doubles up to 900 s")
-    timeout: float = param(30.0, unit="s", lo=0.5, hi=600.0, doc="longest wait for an answer")
-
-
-@dataclass(frozen=True, kw_only=True)
-class MaildirSpec(ChannelSpec):
-    """A Maildir on this disk."""
-
-    folder: str = param("", doc="folder of the Maildir; empty: rosbot_patrol/mail in ROS's home")
-    to: str = param("", doc="recipients in the mail headers")
-    sender: str = param("", name="from", doc="sender in the mail headers")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SendmailSpec(ChannelSpec):
-    """A sendmail program."""
-
-    to: str = param(doc="recipients, separated by commas")
-    sender: str = param("", name="from", doc="sender")
-    program: str = param("", doc="path of the program; empty: the usual places")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SmtpSpec(ChannelSpec):
-    """A mail server."""
-
-    to: str = param(doc="recipients, separated by commas")
-    sender: str = param("", name="from", doc="sender")
-    host: str = param("localhost", doc="mail server")
-    port: int = param(25, lo=1, hi=65535, doc="port of the mail server")
-    security: str = param("auto", choices=_SECURITY, doc="encryption; auto: STARTTLS if the server offers it")
-    user: str = param("", doc="login; empty: none")
-    password_file: str = param("", doc="file with the password, of mode 600")
-    password_env: str = param("", doc="environment variable with the password")
-    ca_file: str = param("", doc="CA file for a server certificate that the system does not trust")
-    allow_plaintext: bool = param(False, doc="allow sending the login without TLS (security: none) to another machine")
-
-
-@dataclass(frozen=True, kw_only=True)
-class WebhookSpec(ChannelSpec):
-    """A web address that accepts JSON."""
-
-    url: str = param(doc="http or https address; path and query are kept secret", check=check_url)
-    picture: bool = param(True, doc="send the picture, in base64")
-    secret_file: str = param("", doc="file with the signing secret, of mode 600")
-    secret_env: str = param("", doc="environment variable with the signing secret")
-    token_file: str = param("", doc="file with a bearer token, of mode 600")
-    token_env: str = param("", doc="environment variable with the bearer token")
-    ca_file: str = param("", doc="CA file for a server certificate that the system does not trust")
-    allow_plaintext: bool = param(False, doc="allow sending the token over plain http to another machine")
-
-
-SPECS: Mapping[str, type[ChannelSpec]] = {
-    "maildir": MaildirSpec,
-    "sendmail": SendmailSpec,
-    "smtp": SmtpSpec,
-    "webhook": WebhookSpec,
-}
 
 
 def make_channels(params: MailParams, around: Surroundings, *, prefix: str = "~") -> list[Channel]:

@@ -11,7 +11,7 @@ import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.safe_text import token
 from rosbot_patrol.errors import ParamError, StateError
 from rosbot_patrol.files import read_json, write_json

@@ -24,7 +24,7 @@ from typing import Any
 
 import rospy
 
-from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
 from rosbot_patrol.alerts.pictures.album import Sighting
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from datetime import tzinfo
 from typing import Any, TypeVar
 
-from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.errors import ParamError

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.dispatch.settings_file import differences

@@ -23,7 +23,8 @@ from rosgraph.names import get_ros_namespace
 
 from rosbot_patrol.alerts.channels.channel import Channel
 from rosbot_patrol.alerts.channels.channel_test import make_test_notice, try_channel
-from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, load_channels, make_channels
+from rosbot_patrol.alerts.channels.config import Surroundings, load_channels, make_channels
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher
 from rosbot_patrol.alerts.dispatch.settings_file import read_settings

@@ -18,8 +18,9 @@ from typing import Any
 
 import rospy
 
-from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.network_state import network_mark
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.channels.secrets_on_disk import refuse_secrets
 from rosbot_patrol.alerts.dispatch.delivery import Clocks, Delivery, delivery_of
 from rosbot_patrol.alerts.dispatch.dispatcher import Dispatcher

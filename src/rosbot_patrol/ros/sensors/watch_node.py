@@ -22,7 +22,7 @@ from typing import Any
 import rospy
 from std_msgs.msg import Empty
 
-from rosbot_patrol.alerts.channels.config import MailParams
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.safe_outbox import RETRY
 from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
 from rosbot_patrol.counts import count_of

@@ -7,7 +7,7 @@ import sys
 import typing
 from pathlib import Path
 
-from rosbot_patrol.alerts.channels.config import SPECS, MailParams
+from rosbot_patrol.alerts.channels.params import SPECS, MailParams
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.amcl.parameters import AmclParams

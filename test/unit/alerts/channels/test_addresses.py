@@ -3,8 +3,9 @@
 import pytest
 
 from rosbot_patrol.alerts.channels.channel import Channel
-from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.mail import make_envelope, parse_addresses
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.channels.smtp import SmtpServer as Server
 from rosbot_patrol.alerts.channels.smtp import SmtpTransport
 from rosbot_patrol.errors import ParamError

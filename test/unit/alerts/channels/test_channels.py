@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.alerts.channels import sendmail
-from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, load_channels, make_channels
+from rosbot_patrol.alerts.channels.config import Surroundings, load_channels, make_channels
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.channels.secrets_on_disk import read_secret, refuse_secrets
 from rosbot_patrol.alerts.dispatch.settings_file import Settings, differences, read_settings, write_settings
 from rosbot_patrol.errors import ParamError

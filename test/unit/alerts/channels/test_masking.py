@@ -4,8 +4,9 @@ from urllib.parse import unquote
 
 import pytest
 
-from rosbot_patrol.alerts.channels.config import MailParams, Surroundings, make_channels
+from rosbot_patrol.alerts.channels.config import Surroundings, make_channels
 from rosbot_patrol.alerts.channels.masking import Mask, masked_url, url_secrets
+from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.channels.webhook import check_url
 from rosbot_patrol.errors import ParamError
 
