@@ -17,7 +17,6 @@ from pathlib import Path
 import rospy
 
 from rosbot_patrol.alerts.pictures.album import Album, Sighting
-from rosbot_patrol.alerts.pictures.map import MapView, Marks, crop_map, draw_map, view_of_marks
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.alerts.records.files import REPORT, NewFile
 from rosbot_patrol.alerts.records.incident import Event, Incident
@@ -28,11 +27,10 @@ from rosbot_patrol.alerts.records.salvage import open_store
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.report.page import write_report
 from rosbot_patrol.counts import count_of
-from rosbot_patrol.errors import MapError, StoreError
+from rosbot_patrol.errors import StoreError
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.story.mission_log import Entry
-from rosbot_patrol.ros.messages import convert
-from rosbot_patrol.ros.messages.fast_arrays import GridMsg
+from rosbot_patrol.ros.patrol.mission_map import MissionMap
 from rosbot_patrol.ros.patrol.pictures import PictureRing
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 from rosbot_patrol.ros.runtime.node import Worker
@@ -68,6 +66,40 @@ class _Closing:
     files: list[NewFile] | None = None
 
 
+class _Report:
+    """Says on /diagnostics and in the log how the keeping of incidents goes."""
+
+    def __init__(self, health: Health) -> None:
+        self._health = health
+        self._complaint = ("", 0.0)
+
+    def works(self, done: Pruned | None = None) -> None:
+        """Everything is written; `done` is what was removed meanwhile."""
+        if done is None or not done.ids:
+            self._health.set("incidents", OK, "incidents are kept")
+            return
+        is_of_disk = done.reason is not None and done.reason.is_of_disk
+        self._health.set("incidents", WARN if is_of_disk else OK, done.sentence)
+
+    def made_room(self, done: Pruned) -> None:
+        """The disk is full, and `done` is what was removed."""
+        log.warning("incidents: %s", done.sentence)
+        what = f"the disk is full: {count_of(len(done.ids), 'old incident was', 'old incidents were')} removed"
+        self._health.set("incidents", WARN if done.ids else ERROR, what)
+
+    def failed(self, err: StoreError) -> None:
+        """Nothing can be written."""
+        self._health.set("incidents", ERROR, f"incidents cannot be written: {err}")
+
+    def complain(self, err: StoreError) -> None:
+        """Log what is wrong; the same thing once a minute at most."""
+        text, at = self._complaint
+        if str(err) == text and time.monotonic() - at < _SAME_AGAIN:
+            return
+        self._complaint = (str(err), time.monotonic())
+        log.error("incidents cannot be written: %s; trying on every %.0f s", err, DISK_RETRY)
+
+
 class IncidentKeeper:
     """Writes entries and pictures into the incidents' store.
 
@@ -91,7 +123,7 @@ class IncidentKeeper:
         on_verdict: Callable[[Incident], None] = lambda _: None,
     ) -> None:
         self.state_dir = state_dir
-        self._pictures, self._health, self._on_verdict = pictures, health, on_verdict
+        self._pictures, self._report, self._on_verdict = pictures, _Report(health), on_verdict
         self._evidence = evidence or EvidenceParams()
         self._retention, self._records = retention or RetentionParams(), records or RecordParams()
         self._album = Album(self._evidence)
@@ -103,9 +135,8 @@ class IncidentKeeper:
         self._looking = ""
         self._is_ending = self._gives_way = False
         self._lost = 0
-        self._complaint = ("", 0.0)
         self._tidy_at = 0.0
-        self._map: MapView | None = None
+        self._map = MissionMap()
         self._wake = threading.Event()
 
     def start(self, running: Collection[str] = ()) -> None:
@@ -115,7 +146,7 @@ class IncidentKeeper:
             running: ids of missions that go on after the program's start; other open records are closed.
         """
         self._running = tuple(running)
-        rospy.Subscriber("map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 23)
+        self._map.start()
         Worker(self._run, name="incidents").start()
 
     # -- what the patrol hands over; returns at once
@@ -217,7 +248,7 @@ class IncidentKeeper:
         self._store = store
         keep_reserve(self.state_dir)
         self._catch_up(store)
-        self._tell_well()
+        self._report.works()
         return store
 
     def _catch_up(self, store: IncidentStore) -> None:
@@ -291,29 +322,13 @@ class IncidentKeeper:
         if kept is None or kept.closed is not None:
             return
         if closing.files is None:
-            closing.files = [*self._album.finish(incident_id), *self._draw(kept)]
+            closing.files = [*self._album.finish(incident_id), *self._map.draw(kept)]
         store.add_files(incident_id, closing.files)
         incident = store.close(incident_id, wall=closing.wall)
         if incident.verdict in self._records.report_verdicts:
             write_report(store, incident)
         log.info("incident %s is on record: %s", incident.id, incident.verdict)
         self._tidy_at = 0.0
-
-    def _draw(self, incident: Incident) -> list[NewFile]:
-        marks = Marks(path=incident.path, robot=incident.pose, person=incident.person)
-        if not incident.path and incident.pose is None:
-            return []
-        view = self._map or view_of_marks(marks)
-        caption = "The robot's way (blue)"
-        caption += ", where it stood when somebody was seen (arrow)" if incident.pose else ""
-        caption += ", the person (red)" if incident.person else ""
-        return [NewFile(name="map.png", role="map", data=draw_map(view, marks), caption=caption)]
-
-    def _on_map(self, message: GridMsg) -> None:  # type: ignore[valid-type]
-        try:
-            self._map = crop_map(convert.grid_from_msg(message, rospy.resolve_name("map")))
-        except MapError as err:
-            log.error("the map cannot be drawn: %s", err)
 
     # -- the disk
 
@@ -324,38 +339,22 @@ class IncidentKeeper:
         if done.ids:
             log.warning("incidents: %s", done.sentence)
         self._tidy_at = 0.0 if not done.is_done else time.monotonic() + _TIDY
-        self._tell_well(done)
-
-    def _tell_well(self, done: Pruned | None = None) -> None:
-        if done is None or not done.ids:
-            self._health.set("incidents", OK, "incidents are kept")
-            return
-        is_of_disk = done.reason is not None and done.reason.is_of_disk
-        self._health.set("incidents", WARN if is_of_disk else OK, done.sentence)
+        self._report.works(done)
 
     def _trouble(self, err: StoreError) -> float:
-        self._complain(err)
+        """Report a failure, and make room on a full disk; returns the pause until the next step [s]."""
+        self._report.complain(err)
         if err.is_full and self._store is not None:
             try:
                 done = make_room(self._store, wall=time.time())
             except StoreError as worse:
                 log.error("no room could be made for incidents: %s", worse)
             else:
-                log.warning("incidents: %s", done.sentence)
-                what = f"the disk is full: {count_of(len(done.ids), 'old incident was', 'old incidents were')} removed"
-                self._health.set("incidents", WARN if done.ids else ERROR, what)
+                self._report.made_room(done)
                 return 0.1 if done.ids else DISK_RETRY
-        self._health.set("incidents", ERROR, f"incidents cannot be written: {err}")
+        self._report.failed(err)
         self._forget_store()
         return DISK_RETRY
-
-    def _complain(self, err: StoreError) -> None:
-        """Log what is wrong; the same thing once a minute at most."""
-        text, at = self._complaint
-        if str(err) == text and time.monotonic() - at < _SAME_AGAIN:
-            return
-        self._complaint = (str(err), time.monotonic())
-        log.error("incidents cannot be written: %s; trying on every %.0f s", err, DISK_RETRY)
 
     def _forget_store(self) -> None:
         if self._store is not None:
