@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosbot_patrol.errors import LaserTilted, TransformError
@@ -136,7 +136,6 @@ def test_a_scan_that_says_something_is_one(changes: dict[str, object]) -> None:
     assert scan_problem(scan_of(**{"ranges": wall(), **changes})) == ""  # type: ignore[arg-type]
 
 
-@settings(max_examples=25, deadline=None)
 @given(share=st.floats(0.02, 1.0), seed=st.integers(0, 1000))
 def test_readings_of_another_unit_are_named_however_many_beams_meet_something(share: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -175,7 +174,6 @@ def truth(scan: LaserScan, place: Transform) -> np.ndarray:
     return (points @ place.rotation.T + (place.x, place.y, place.z))[:, :2]
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     yaw=st.floats(-4.0, 4.0),
     is_upside_down=st.booleans(),
@@ -195,7 +193,6 @@ def test_level_points_are_those_in_space(
     assert (level.height, level.rises) == (0.2, None)
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     tilt=st.floats(0.01, 0.999 * MAX_TILT),
     way=st.floats(-math.pi, math.pi),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.patrol.house.floor import Floor, floor_of
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.visibility.coverage import sight_on_map
+from rosbot_patrol.patrol.visibility.coverage import Sight, sight_on_map
 from rosbot_patrol.scan import LaserScan
 
 BEAMS = 720
@@ -49,13 +50,26 @@ TWO_ROOMS = (
 )  # 9.5 x 4.5 m, a door of 1 m in the middle at y 1.5 to 2.5
 
 
+_SIGHTS: OrderedDict[tuple[int, float, float, float], tuple[Floor, Sight]] = OrderedDict()
+
+
+def sight_from(floor: Floor, x: float, y: float, reach: float) -> Sight:
+    """`sight_on_map`, remembered: robots that stand, and drives that are repeated, ask for the same again and again."""
+    key = id(floor), x, y, reach
+    if key not in _SIGHTS:
+        _SIGHTS[key] = floor, sight_on_map(floor, x, y, reach)  # with its floor, so that no other takes its id
+        if len(_SIGHTS) > 4096:
+            _SIGHTS.popitem(last=False)
+    return _SIGHTS[key][1]
+
+
 def scan_over(
     floor: Floor, pose: Pose2D, stamp: float, things: list[tuple[float, float, float]], noise: float = 0.01
 ) -> LaserScan:
     """A scan of a drawn house and of upright cylinders (x, y, radius) in it; angle 0 is the robot's x axis."""
     angles = -math.pi + math.tau / BEAMS * np.arange(BEAMS)
     bearings = pose.yaw + angles
-    sight = sight_on_map(floor, pose.x, pose.y, 12.0)
+    sight = sight_from(floor, pose.x, pose.y, 12.0)
     ranges = sight.lengths[np.rint((bearings % math.tau) / sight.step).astype(int) % len(sight.lengths)].copy()
     for x, y, radius in things:
         away, towards = math.hypot(x - pose.x, y - pose.y), math.atan2(y - pose.y, x - pose.x)

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable
 
-from floors import drawn_floor, points, scan_over
+from floors import drawn_floor, points, scan_over, sight_from
 
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalLink, GoalState
@@ -17,7 +17,6 @@ from rosbot_patrol.patrol.mission.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
 from rosbot_patrol.patrol.records.mission import Phase
 from rosbot_patrol.patrol.search.room_search import Eyes, SightParams
-from rosbot_patrol.patrol.visibility.coverage import sight_on_map
 
 WIDTH = 1.047
 HOUSE = (
@@ -82,7 +81,7 @@ class World:
         self.score: Callable[[Pose2D], float] = lambda pose: 0.9
 
     def frame(self) -> Frame:
-        sight = sight_on_map(FLOOR, self.pose.x, self.pose.y, 8.0)
+        sight = sight_from(FLOOR, self.pose.x, self.pose.y, 8.0)
         boxes = []
         for x, y in self.people(self.now):
             dx, dy = x - self.pose.x, y - self.pose.y

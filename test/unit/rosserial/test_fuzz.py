@@ -6,7 +6,7 @@ from pathlib import Path
 
 import fuzz_targets
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 CORPUS = sorted(Path(__file__).with_name("corpus").glob("*.hex"))
@@ -18,7 +18,6 @@ def test_what_was_found(path):
 
 
 @pytest.mark.parametrize("target", fuzz_targets.TARGETS, ids=lambda target: target.__name__)
-@settings(max_examples=150, deadline=None)
 @given(tape=st.binary(max_size=160))
 def test_any_tape(target, tape):
     target(tape)

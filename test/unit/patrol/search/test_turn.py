@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosbot_patrol.geometry import wrap_angle
@@ -79,7 +79,6 @@ def test_a_full_turn_ends_within_six_degrees_at_rest(start, clockwise):
     assert base.now < 14
 
 
-@settings(max_examples=30, deadline=None)
 @given(delay=st.floats(0.0, 0.2), gain=st.floats(0.7, 1.3), speed=st.floats(0.3, 1.5), angle=st.floats(0.3, math.tau))
 def test_other_bases_and_angles(delay, gain, speed, angle):
     base = Base(Spin(angle, False, params=SpinParams(spin_speed=speed)), delay=delay, gain=gain)

@@ -1,7 +1,7 @@
 import random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosbot_patrol.errors import ProtocolError
@@ -88,7 +88,6 @@ def test_longest_frame_and_one_more():
         encode(200, bytes(MAX_PAYLOAD + 1))
 
 
-@settings(max_examples=150, deadline=None)
 @given(
     parts=st.lists(
         st.one_of(
@@ -110,7 +109,6 @@ def test_any_bytes_are_bounded_and_cutting_changes_nothing(parts, cuts):
     assert used + whole.garbage + whole.pending == len(stream)
 
 
-@settings(max_examples=100, deadline=None)
 @given(garbage=st.binary(max_size=200).filter(lambda data: b"\xff\xfe" not in data and not data.endswith(b"\xff")))
 def test_every_frame_between_garbage_is_found(garbage):
     parser = Parser(max_payload=128)

@@ -3,7 +3,7 @@
 import itertools
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosbot_patrol.rosserial.device.client_session import Configured, DeviceSession, NotTrusted
@@ -110,7 +110,6 @@ def test_who_does_not_answer_or_talks_too_much_is_hung_up_on():
     assert long.parser.oversized == 1
 
 
-@settings(max_examples=200, deadline=None)
 @given(data=st.binary(max_size=120), at=st.integers(0, len(PROOF) - 1), value=st.integers(0, 255))
 def test_no_bytes_prove_anything_by_chance(data, at, value):
     changed = bytearray(PROOF)

@@ -1,7 +1,7 @@
 import contextlib
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosbot_patrol.errors import ParamError, ProtocolError
@@ -20,7 +20,6 @@ def test_topic_info_round_trip():
     assert topics.unpack_topic_info(topics.pack_topic_info(info())) == info()
 
 
-@settings(max_examples=100, deadline=None)
 @given(data=st.binary(max_size=64))
 def test_no_bytes_crash_a_reader(data):
     for reader in (

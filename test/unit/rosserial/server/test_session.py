@@ -1,4 +1,4 @@
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rosbot_patrol.rosserial.device.client_session import Configured, DeviceSession, Message, Unconfigured
@@ -165,7 +165,6 @@ def test_fast_client_is_read_more_slowly():
     assert it.pause(1.0) == 0.0
 
 
-@settings(max_examples=100, deadline=None)
 @given(
     chunks=st.lists(
         st.one_of(
