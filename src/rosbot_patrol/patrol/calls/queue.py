@@ -70,6 +70,10 @@ class MissionQueue:
         first = next(iter(self))
         return self._waiting.pop(first.room_id)
 
+    def remove(self, request: Request) -> None:
+        """Take out one that waits. Raises KeyError."""
+        del self._waiting[request.room_id]
+
     def drop(self, *origins: Origin) -> list[Request]:
         """Take out what these origins asked for; all where none is named."""
         dropped = [request for request in self if not origins or request.origin in origins]

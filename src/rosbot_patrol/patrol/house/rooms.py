@@ -72,6 +72,10 @@ class Rooms:
         """The room of a sensor's id, None where the file has none."""
         return self._rooms.get(room_id)
 
+    def get(self, room_id: int) -> Room:
+        """The room of an id that the file has. Raises KeyError."""
+        return self._rooms[room_id]
+
     def refusal(self, room_id: int) -> str:
         """Why an id is not taken, in one sentence."""
         return f"there is no room {room_id}: {self.source} has the rooms 0 to {max(self._rooms)}"

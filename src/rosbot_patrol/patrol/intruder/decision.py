@@ -1,147 +1,192 @@
-"""What the camera sees on a mission: who is confirmed, told and kept in view."""
+"""Decide from the detector's pictures who is an intruder, who is met for the first time, and where the camera looks."""
 
 from __future__ import annotations
 
 import dataclasses
 import logging
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
-from rosbot_patrol.patrol.house.regions import NOBODYS
-from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.mission.mission_run import Conduct
-from rosbot_patrol.patrol.records.commands import Commands, Notice, Release
+from rosbot_patrol.patrol.house.regions import NOBODYS, RoomRegions
+from rosbot_patrol.patrol.house.rooms import Room, Rooms
+from rosbot_patrol.patrol.intruder.camera_tracking import Track, TrackParams
+from rosbot_patrol.patrol.intruder.close_ups import CloseUps, Sighting
+from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.persons import People, PeopleParams
+from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
+from rosbot_patrol.patrol.intruder.weak_sightings import Suspect, SuspectParams, Suspects
 from rosbot_patrol.patrol.records.findings import Confirmation, Person
 from rosbot_patrol.patrol.records.inputs import Frame, Inputs
-from rosbot_patrol.patrol.records.mission import Mission, Verdict
-from rosbot_patrol.patrol.story import status_text as saying
 
 log = logging.getLogger(__name__)
 
+_LEAST_SEEN = 2  # of the last three pictures that show somebody, before the robot stops for them
 
-class Lookout(Conduct):
-    """A `Conduct` that minds what the detector sees. Arguments as of Conduct."""
 
-    def _watch_frames(self, inputs: Inputs, out: Commands) -> None:
-        mission = self.mission
-        assert mission is not None
+@dataclass(frozen=True, kw_only=True)
+class IntruderParams:
+    """The groups of parameters that the decision is made with."""
+
+    alarm_classes: Sequence[str]
+    watch: WatchParams
+    suspects: SuspectParams
+    people: PeopleParams
+    track: TrackParams
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """Somebody was confirmed.
+
+    Attributes:
+        seen: what the detector saw.
+        number: of the person, from 1 on; is_new: met for the first time on this mission.
+        places: x, y in map [m] of each person met so far, None where unknown; this one's at `number - 1`.
+        room: in which the person is, None if unknown; is_outside: the place is known and lies in no room.
+    """
+
+    seen: Confirmation
+    number: int
+    is_new: bool
+    places: tuple[tuple[float, float] | None, ...]
+    room: Room | None
+    is_outside: bool
+
+
+class IntruderDecision:
+    """Takes pictures, gives findings; holds what was seen since `start`.
+
+    Args:
+        rooms: of the points file.
+        params: how sure to be.
+        judge: tells what cannot be an intruder.
+    """
+
+    def __init__(self, rooms: Rooms, params: IntruderParams, judge: Judge) -> None:
+        self._rooms, self._params, self._judge = rooms, params, judge
+        self._watch = Watch(tuple(params.alarm_classes), params.watch, judge)
+        self._suspects = Suspects(params.suspects)
+        self._close_ups = CloseUps(judge)
+        self._people = People(params.people)
+        self._track = Track(params.track)
+
+    def start(self, now: float, met: Iterable[tuple[float, float] | None]) -> None:
+        """Forget everything, for a new mission.
+
+        Args:
+            now: steady time [s]; pictures taken before it do not count.
+            met: places in map [m] of persons who were met before a restart, None where unknown.
+        """
+        self._watch.start(now)
+        self._suspects.start(now)
+        self._close_ups.start()
+        self._track.reset()
+        self._people = People(self._params.people)
+        self._people.recall(met, now)
+
+    # -- who is there
+
+    def see(self, now: float, inputs: Inputs, harmless: Iterable[Sighting]) -> list[Finding]:
+        """Take in a step's pictures.
+
+        Args:
+            now: steady time [s], as the stamps of `inputs`.
+            inputs: of this step.
+            harmless: things that move and are no persons.
+        """
         if inputs.house is not None:
             self._judge.floor = inputs.house.floor
-        self._close_ups.add_pets(self._views.harmless())
+        self._close_ups.add_pets(harmless)
+        findings = []
         for given in inputs.frames:
-            frame = self._leave_out_close_ups(given)
-            for seen in self._watch.add(self._clock.time, frame):
+            frame = self._leave_out_close_ups(now, given)
+            for seen in self._watch.add(now, frame):
                 self._suspects.told(seen.measured)
-                self._note(mission, seen, inputs, out)
-            for seen in self._weigh(frame):
-                self._note(mission, seen, inputs, out)
-            self._point_at(frame, inputs)
-        self._views.suspect(self._suspects.doubtful())
-        self._views.step_back(self._close_ups.doubtful)
+                findings.append(self._find(now, seen, inputs.house))
+            findings += [self._find(now, seen, inputs.house) for seen in self._weigh(frame)]
+            self._point_camera(now, frame, inputs)
+        return findings
 
-    def _leave_out_close_ups(self, frame: Frame) -> Frame:
-        """What is too near to be told from a pet proves nothing, but the robot stops for it."""
+    def has_candidate(self, now: float) -> bool:
+        """Whether a picture of the last moment shows something that may become an intruder."""
+        return self._watch.candidate(now)
+
+    @property
+    def doubtful(self) -> Sequence[Suspect]:
+        """Things that look like a person, from too few sides to tell."""
+        return self._suspects.doubtful()
+
+    @property
+    def too_near(self) -> Sequence[Sighting]:
+        """Things too near to tell a person from a pet."""
+        return self._close_ups.doubtful
+
+    @property
+    def suspects(self) -> Sequence[Suspect]:
+        """Everything that looked a little like somebody."""
+        return self._suspects.all
+
+    @property
+    def refusals(self) -> Mapping[str, int]:
+        """Reasons why boxes were refused, and how often."""
+        return self._watch.refusals
+
+    @property
+    def met(self) -> Sequence[Person]:
+        """Persons who were confirmed."""
+        return self._people.met
+
+    def _leave_out_close_ups(self, now: float, frame: Frame) -> Frame:
+        """Boxes too near to tell a person from a pet prove nothing, but the robot stops for them."""
         if not frame.counts or frame.stamp is None:
             return frame
         boxes, is_left = self._close_ups.sort(frame.stamp, frame.boxes, frame.eye)
         if is_left:
-            self._watch.glimpse(self._clock.time)
+            self._watch.glimpse(now)
         return dataclasses.replace(frame, boxes=boxes)
 
     def _weigh(self, frame: Frame) -> tuple[Confirmation, ...]:
-        """Weak sights are gathered by place."""
+        """Gather weak sightings by place."""
         if not frame.counts or frame.stamp is None or frame.eye is None:
             return ()
         return self._suspects.add(frame.stamp, frame.eye.pose, self._watch.plausible(frame), frame.picture)
 
-    def _note(self, mission: Mission, seen: Confirmation, inputs: Inputs, out: Commands) -> None:
-        """Somebody was confirmed."""
-        mission.sightings += 1
-        if mission.best is None or seen.probability > mission.best.probability:
-            mission.best = seen
-        person, is_new = self._people.note(self._clock.time, seen.measured)
-        room, is_outside = self._room_at(person, inputs)
+    def _find(self, now: float, seen: Confirmation, house: RoomRegions | None) -> Finding:
+        person, is_new = self._people.note(now, seen.measured)
+        room, is_outside = self._room_at(person, house)
         person.label, person.room = seen.label, room.title if room else ""
-        mission.people = self._people.places
-        if mission.place is None and person.number == 1:  # it stays what the sentence and the mail say
-            mission.place, mission.place_room, mission.is_outside = mission.people[0], room, is_outside
-        out.people = tuple(self._people.met)
-        said = saying.sighting(mission, seen, room, is_outside=is_outside)
-        if mission.verdict is not Verdict.CONFIRMED:
-            self._decide(Verdict.CONFIRMED, said)
-        if is_new:
-            notice = self._notice(mission, inputs, seen, person.number)
-            if person.number > 1:
-                log.warning("a second incident, %s: %s", notice.mission.id, said)
-                notice.mission.place_room, notice.mission.is_outside = room, is_outside
-                notice.mission.reason = said
-            mission.notified = out.changed = True
-            out.notices += (notice,)
+        return Finding(
+            seen=seen,
+            number=person.number,
+            is_new=is_new,
+            places=tuple(self._people.places),
+            room=room,
+            is_outside=is_outside,
+        )
 
-    def _room_at(self, person: Person, inputs: Inputs) -> tuple[Room | None, bool]:
+    def _room_at(self, person: Person, house: RoomRegions | None) -> tuple[Room | None, bool]:
         """The room in which a person is, and whether they are known to be in none."""
-        if inputs.house is None or person.x is None or person.y is None:
+        if house is None or person.x is None or person.y is None:
             return None, False
-        found = inputs.house.room_at(person.x, person.y)
-        return self.rooms.find(found), found == NOBODYS
-
-    def _notice(self, mission: Mission, inputs: Inputs, seen: Confirmation, number: int) -> Notice:
-        copy = dataclasses.replace(mission, people=list(mission.people))
-        if number > 1:
-            copy.id, copy.place = f"{mission.id}-{number}", mission.people[number - 1]
-        until = inputs.guarded.holds_until
-        if until is not None:
-            self.held[copy.id] = until
-        return Notice(mission=copy, seen=seen, phase=mission.phase, pose=inputs.pose, is_held=until is not None)
+        found = house.room_at(person.x, person.y)
+        return self._rooms.find(found), found == NOBODYS
 
     # -- the camera is kept on a person
 
-    def _point_at(self, frame: Frame, inputs: Inputs) -> None:
-        boxes = self._watch.plausible(frame)
-        if not boxes or (self._watch.lately(self._clock.time) < 2 and not self._track.is_on):
-            return  # a single picture stops no drive
-        if frame.eye is None or inputs.pose is None or inputs.yaw is None:
-            return
-        column = (boxes[0].xmin + boxes[0].xmax) / 2.0
-        in_odom = frame.eye.pose.yaw - inputs.pose.yaw + inputs.yaw  # odom goes on where the map's part does not
-        self._track.see(self._clock.time, frame.eye.bearing(column), in_odom)
-
-    def _keep_in_view(self, inputs: Inputs, out: Commands) -> bool:
-        """Turn towards whom the camera has in view; what the robot was about waits."""
+    def camera_speed(self, now: float, inputs: Inputs) -> float | None:
+        """Turning speed that keeps somebody in view [rad/s], None if nobody is followed."""
         lost = " and ".join(["its pose in the map"] * (inputs.pose is None) + ["its heading"] * (inputs.yaw is None))
         if lost and self._track.is_on:
             log.warning("the camera no longer follows whom it sees: the robot does not know %s", lost)
-            self._track.release(self._clock.time)
-        speed = self._track.step(self._clock.time, inputs.yaw)
-        mission, was_tracking = self.mission, self._is_tracking
-        assert mission is not None
-        self._is_tracking = speed is not None
-        if speed is None:
-            return False
-        if not was_tracking:
-            out.cancel |= self._interrupt()
-        if self._look is not None and not self._look.drives:
-            self._look.step(self._clock.time, inputs, candidate=False, held=True)
-        near = inputs.clearance is not None and inputs.clearance < self.params.spin.spin_clearance
-        out.speed = 0.0 if near else speed
-        self._say(out, mission.phase, f"keeping the camera on somebody, {saying.phase_text(mission)}")
-        return True
+            self._track.release(now)
+        return self._track.step(now, inputs.yaw)
 
-    def _interrupt(self) -> bool:
-        """Leave off driving; whether there is a goal to give up."""
-        if self._look is not None:
-            self._look.pause()
-            return self._look.drives
-        if self._trip is not None:
-            self._trip.pause()
-        return self._trip is not None
-
-    # -- notices that waited
-
-    def _release(self, inputs: Inputs, out: Commands) -> None:
-        """Notices whose entry delay is over, or that were disarmed in time."""
-        for mission, until in list(self.held.items()):
-            disarmed = inputs.guarded.mode == "disarmed"
-            if disarmed or inputs.wall >= until or inputs.guarded.holds_until is None:
-                del self.held[mission]
-                why = "disarmed within the entry delay" if disarmed else "the entry delay is over"
-                out.releases += (Release(mission=mission, is_dropped=disarmed, why=why),)
-                out.changed = True
+    def _point_camera(self, now: float, frame: Frame, inputs: Inputs) -> None:
+        boxes = self._watch.plausible(frame)
+        if not boxes or (self._watch.lately(now) < _LEAST_SEEN and not self._track.is_on):
+            return
+        if frame.eye is None or inputs.pose is None or inputs.yaw is None:
+            return
+        column = (boxes[0].xmin + boxes[0].xmax) / 2.0
+        in_odom = frame.eye.pose.yaw - inputs.pose.yaw + inputs.yaw  # a correction of the map's part does not turn odom
+        self._track.see(now, frame.eye.bearing(column), in_odom)

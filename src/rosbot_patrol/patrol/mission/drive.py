@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.geometry import Pose2D, distance
 from rosbot_patrol.goal import Goal, GoalLink, GoalState
 from rosbot_patrol.params import param
+from rosbot_patrol.patrol.house.rooms import Room
+from rosbot_patrol.patrol.records.activity import Place, Whereabouts
+from rosbot_patrol.patrol.records.inputs import Inputs
+
+OtherPoses = Callable[[Inputs], Sequence[Pose2D]]
+"""Further poses that serve as well as the first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,3 +124,78 @@ class Drive:
             return DriveStep(problem=f"move_base gave up{tried}: {(text or 'no reason given').rstrip('.')}")
         self._retry_at = now + self.params.retry_delay
         return DriveStep()
+
+
+class Trip:
+    """A drive to one of several poses that serve as well; the next is tried when navigation gives one up.
+
+    Args:
+        name: of the trip, unlike any other's.
+        pose: the first to try, as often as `params` say.
+        params: bounds.
+        others: gives further poses, asked when the first has failed; each is tried once.
+    """
+
+    def __init__(self, name: str, pose: Pose2D, params: DriveParams, others: OtherPoses | None = None) -> None:
+        self._name, self._params, self._others = name, params, others
+        self._drive = Drive(name, pose, params)
+        self._left: list[Pose2D] | None = None
+        self._tried = 0
+        self._problem = ""
+
+    @property
+    def is_at_first(self) -> bool:
+        """Whether it still goes to the first pose."""
+        return self._tried == 0
+
+    def pause(self) -> None:
+        """Interrupt the drive; the next step takes it up again."""
+        self._drive.pause()
+
+    def step(self, now: float, inputs: Inputs) -> DriveStep:
+        """Drive on."""
+        step = self._drive.step(now, inputs.link, inputs.pose)
+        if not step.problem or step.is_down:
+            return step
+        self._problem = self._problem or step.problem
+        if self._left is None:
+            self._left = list(self._others(inputs))[: self._params.other_viewpoints] if self._others else []
+        if self._left:
+            self._tried += 1
+            once = dataclasses.replace(self._params, goal_attempts=1)
+            self._drive = Drive(f"{self._name}/{self._tried}", self._left.pop(0), once)
+            return DriveStep(cancel=step.cancel)
+        also = f"; {self._tried} other viewpoints in it failed, too" if self._tried else ""
+        return dataclasses.replace(step, problem=self._problem + also)
+
+
+class WayHome:
+    """The drive to the base; it fails at once if the map shows no floor at the base's point.
+
+    Args:
+        name: of the drive, unlike any other's.
+        base: room 0.
+        params: bounds.
+    """
+
+    def __init__(self, name: str, base: Room, params: DriveParams) -> None:
+        self._base = base
+        self._drive = Drive(name, base.pose, params)
+
+    def pause(self) -> None:
+        """Interrupt the drive; the next step takes it up again."""
+        self._drive.pause()
+
+    def step(self, now: float, inputs: Inputs) -> DriveStep:
+        """Drive on."""
+        refusal = inputs.house.refusal(self._base) if inputs.house is not None else ""
+        if refusal:
+            return DriveStep(problem=f"{self._base.title}: {refusal}")
+        return self._drive.step(now, inputs.link, inputs.pose)
+
+
+def end_of_way_home(step: DriveStep) -> Place | None:
+    """Where a step of the way home left the robot, None while it drives on."""
+    if step.problem:
+        return Place(Whereabouts.AWAY, f" ({step.problem})")
+    return Place(Whereabouts.HOME) if step.reached else None

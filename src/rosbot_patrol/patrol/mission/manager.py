@@ -4,52 +4,74 @@ Matches the tutorial's patrol_robot (a trigger of a room's sensor sends the robo
 to room 0; persons and fire hydrants alarm).
 
 Differs (CONTRACTS, Settled 4 to 8; A0, quirks):
-- One mission at a time, and detections count while driving, looking and returning. Calls that arrive meanwhile wait,
-  one entry a room, the most urgent first (`queueing`); which of them are answered already, are the robot's own doing or
-  are not armed, `intake` decides. From a mission that is on its way home the robot goes on to the next room at once.
-- A room whose point cannot be reached is looked at from another viewpoint (`phases`); one that has none that can be is
-  reported as unreachable, and the robot does not turn elsewhere. A room that the points file lacks is refused; one with
-  a point off the map's floor is unverified, without a drive.
-- Every mission ends in a verdict: confirmed, clear, unreachable, or unverified where detector, camera or turn failed,
-  the battery or the emergency stop ended it, or a person did.
-- A mission gives one notice, at its first confirmation, and one more for each further person elsewhere (`people`).
-- While a person is in view the robot stops and keeps the camera on them, for a bounded time (`track`).
-- All times and stamps of a mission are steady (`steady`): a clock that is set ends nothing and loses no evidence.
+- One mission runs at a time, and detections count while the robot drives, looks and returns. Calls that arrive
+  meanwhile wait, one entry a room, the most urgent first (`agenda`, `calls.queue`). Calls that are answered already,
+  that the robot sets off itself or that are not armed start nothing (`calls.call_filter`). From the way home the robot
+  goes on to the next room at once.
+- A room whose point cannot be reached is looked at from another viewpoint (`drive`). Without such a viewpoint the room
+  is reported as unreachable, and the robot does not turn elsewhere. A room that the points file lacks is refused. A
+  room with a point off the map's floor is unverified, without a drive.
+- Every mission ends in a verdict: confirmed, clear, unreachable, or unverified. Unverified means that detector, camera
+  or turn failed, or that the battery, the emergency stop or a person ended the mission.
+- A mission gives one notice, at its first confirmation, and one more for each further person elsewhere
+  (`intruder.persons`).
+- While a person is in view the robot stops and keeps the camera on them, for a bounded time
+  (`intruder.camera_tracking`).
+- All times and stamps of a mission are steady (`steady`): setting the clock ends nothing and loses no evidence.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rosbot_patrol.patrol.guard.battery import BatteryWatch
+from rosbot_patrol.geometry import distance
+from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Rooms
+from rosbot_patrol.patrol.intruder.decision import IntruderDecision
 from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.intruder.frozen_camera import SamePictures
-from rosbot_patrol.patrol.mission import resume as recall
-from rosbot_patrol.patrol.mission.mission_run import Viewpoints
-from rosbot_patrol.patrol.mission.orders import Ordered
+from rosbot_patrol.patrol.mission.agenda import Agenda
+from rosbot_patrol.patrol.mission.interruptions import (
+    EmergencyHold,
+    LowBattery,
+    drop_the_old,
+    leave_out_off_the_map,
+    stand_down,
+)
+from rosbot_patrol.patrol.mission.mission_run import RunParts
+from rosbot_patrol.patrol.mission.missions import Missions
+from rosbot_patrol.patrol.mission.notices import NoticeGate
 from rosbot_patrol.patrol.mission.params import ManagerParams
-from rosbot_patrol.patrol.mission.phases import Views
-from rosbot_patrol.patrol.mission.steady import Heard
-from rosbot_patrol.patrol.records.commands import Commands, Word
-from rosbot_patrol.patrol.records.inputs import Frame, Inputs, ScanView
-from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
+from rosbot_patrol.patrol.mission.resume import memory_from_plain, memory_to_plain
+from rosbot_patrol.patrol.mission.steady import SteadyInputs
+from rosbot_patrol.patrol.mission.views import OneTurn, Viewpoints, Views
+from rosbot_patrol.patrol.records.activity import ON_GUARD, Place, Whereabouts
+from rosbot_patrol.patrol.records.commands import Commands
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.records.mission import Mission, Phase
 from rosbot_patrol.patrol.records.request import Origin, Request
+from rosbot_patrol.patrol.story import status_text
+from rosbot_patrol.patrol.story.status_text import StatusReports
 
 log = logging.getLogger(__name__)
 
+AT_HOME = 0.5  # [m] from room 0's point
 
-class PatrolManager(Ordered):
+
+class PatrolManager:
     """The patrol as a function of time and inputs: which mission runs when.
 
     Args:
         rooms: of the points file.
         params: behaviour.
         memory: what `snapshot` gave before the program ended, to go on from there.
-        needs_camera, views, viewpoints, judge: see `Conduct`.
+        needs_camera: pictures come in, so that a silent camera can be told.
+        views: what was seen of a room, and from where to see the rest.
+        viewpoints: further poses that show a room whose own point cannot be reached.
+        judge: tells what cannot be an intruder.
     """
 
     def __init__(
@@ -63,51 +85,140 @@ class PatrolManager(Ordered):
         viewpoints: Viewpoints | None = None,
         judge: Judge | None = None,
     ) -> None:
-        super().__init__(
-            rooms, params or ManagerParams(), needs_camera=needs_camera, views=views, viewpoints=viewpoints, judge=judge
+        self.params = params = params or ManagerParams()
+        kept = memory_from_plain(memory or {}, rooms)
+        agenda = Agenda(rooms, params, count=kept.count, waiting=kept.waiting)
+        self._parts = RunParts(
+            rooms=rooms,
+            params=params,
+            needs_camera=needs_camera,
+            views=views or OneTurn(),
+            viewpoints=viewpoints,
+            decision=IntruderDecision(rooms, params.intruder, judge or Judge()),
+            notices=NoticeGate(kept.held),
+            status=StatusReports(agenda.queue, kept.last_verdict),
         )
-        self._heard = {name: Heard(self._clock) for name in ("detector_at", "camera_at", "camera_changed_at")}
-        self._battery_heard = Heard(self._clock)
-        self._scan: tuple[ScanView, ScanView] | None = None  # as it came, and in steady time
-        self._battery = BatteryWatch(self.params.battery)
+        self._missions = Missions(self._parts, agenda, kept.mission)
+        self._battery = LowBattery(params.battery, self._missions)
+        self._hold = EmergencyHold(self._missions)
+        self._steady = SteadyInputs()
         self._same_pictures = SamePictures()
-        self._homes_tried = 0
         self._is_first = True
-        self._is_stopped = False
-        self._told: dict[str, str] = {}  # by the id of a call that waits
-        if memory:
-            recall.recall(self, self._intake, memory)
+        self._inputs = Inputs()  # of the last step
+        self._pending = Commands()  # of orders since then
+
+    # -- what others see
+
+    @property
+    def mission(self) -> Mission | None:
+        """The mission that runs."""
+        return self._missions.mission
+
+    @property
+    def queue(self) -> MissionQueue:
+        """What waits."""
+        return self._missions.agenda.queue
+
+    @property
+    def is_following(self) -> bool:
+        """Whether the camera is kept on somebody."""
+        return self._missions.run is not None and self._missions.run.is_following
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether only inputs set it in motion: nothing is under way, and nothing waits for a moment."""
+        missions = self._missions
+        is_free = missions.run is None and missions.way_home is None and not self.queue
+        return is_free and missions.ready.is_ready and not self._parts.notices.held and not self._hold.is_on
+
+    def calls(self) -> dict[str, int]:
+        """Rooms that sensors called for and that have no verdict yet, by the id of their missions."""
+        return self._missions.calls()
+
+    def served(self) -> frozenset[int]:
+        """Rooms whose call, coming now, would be answered by what runs or waits."""
+        return self._missions.served()
+
+    def snapshot(self) -> dict[str, Any]:
+        """What has to outlive the program, for JSON."""
+        return memory_to_plain(self._missions.memory())
+
+    # -- orders between two steps
 
     def note_told(self, mission_id: str, reason: str, *, held_until: float | None = None) -> bool:
-        """The notice of a mission is on disk from before the program's start; the memory may be older than that.
+        """Take in a notice that is on disk from before the start; the memory may be older.
 
         Args:
             mission_id: of the mission that runs or of a call that waits.
             reason: what the notice says, one sentence.
-            held_until: where it waits for the entry delay: at the latest until then, in seconds since 1970.
+            held_until: latest end of the entry delay that it waits for [s since 1970], None if it does not wait.
 
         Returns:
             Whether it was news: then the mission is confirmed.
         """
-        if self.mission is None or self.mission.id != mission_id:
-            self._told[mission_id] = reason
-        elif self.mission.notified:
+        run, notices = self._missions.run, self._parts.notices
+        if run is None or run.mission.id != mission_id:
+            notices.note_written(mission_id, reason)
+        elif run.mission.notified:
             return False
         else:
-            recall.confirm(self.mission, reason)
+            run.confirm(reason)
         if held_until is not None:
-            self.held.setdefault(mission_id, held_until)
+            notices.hold(mission_id, held_until)
         return True
 
-    @property
-    def is_resting(self) -> bool:
-        """Whether only what it hears sets it in motion: nothing is under way, and nothing waits for a moment."""
-        is_free = self.mission is None and self._home is None and not self.queue and not self.held
-        return is_free and self._ready.is_ready and not self._is_stopped
+    def ask(self, requests: Sequence[Request]) -> dict[int, str]:
+        """Queue requests; the id of the mission that will answer each room, "" if the room is refused."""
+        taken = self._missions.agenda.ask(requests, self._inputs.wall, self.mission)
+        self._pending.changed = True
+        return taken
 
-    def snapshot(self) -> dict[str, Any]:
-        """What has to outlive the program, for JSON."""
-        return recall.snapshot(self, self._intake)
+    def cancel(self, why: str = "cancelled by a person") -> str:
+        """Give up the mission that runs and all that wait; the robot stays where it is."""
+        missions = self._missions
+        rooms = status_text.rooms_open(self.mission, self.queue)
+        was_on_its_way = missions.way_home is not None
+        missions.give_up(self.queue.drop(), why, self._inputs.wall, self._pending)
+        missions.way_home = None
+        if missions.run is not None:
+            missions.run.give_up(why)
+            missions.end(missions.run, self._pending, Place(Whereabouts.LEFT, f", as the mission was {why}"))
+        if rooms or was_on_its_way:
+            self._pending.cancel = True
+            missions.ready.at_rest = f"{ON_GUARD}, {why}"
+        if rooms:
+            return f"given up: {rooms}; the robot stays where it is"
+        return "the way home is given up" if was_on_its_way else "there is nothing to give up"
+
+    def go_home(self) -> str:
+        """Give up everything and drive home."""
+        rooms = status_text.rooms_open(self.mission, self.queue)
+        if self._inputs.stop:
+            return f"the robot stays where it is: {self._inputs.stop}"
+        self.cancel("called home by a person")
+        self._missions.drive_home()
+        return f"given up: {rooms}; the robot drives home" if rooms else "the robot drives home"
+
+    def withdraw(self, missions: set[str], why: str) -> None:
+        """Give up missions that a program asked for, by id; those that a sensor calls for, too, go on."""
+        asked = self._missions.agenda.drop_asked(missions)
+        self._missions.give_up(asked, why, self._inputs.wall, self._pending)
+        run = self._missions.run
+        if run is None or run.mission.id not in missions or run.mission.origin is not Origin.ACTION:
+            return
+        run.give_up(why)
+        if run.mission.phase is not Phase.RETURNING:
+            run.return_home()
+        self._pending.changed = True
+
+    def abandon(self, why: str) -> Commands:
+        """Give up mission and queue, for an orderly end of the program; the answer holds their records."""
+        rooms = status_text.rooms_open(self.mission, self.queue)
+        if rooms:
+            log.warning("the patrol ends: %s; given up: %s", why, rooms)
+            self.cancel(why)
+        out, self._pending = self._pending, Commands()
+        return out
 
     # -- one step
 
@@ -119,103 +230,62 @@ class PatrolManager(Ordered):
             inputs: since the last step.
         """
         out, self._pending = self._pending, Commands()
-        passed = self._pass_time(now)
         inputs = dataclasses.replace(inputs, frames=self._same_pictures.left(inputs.frames))
-        inputs = self._inputs = self._in_steady_time(inputs)
-        time = self._clock.time
-        self._own_motion.see(time, inputs.pose, awake=not self._is_blind(inputs))
-        self._release(inputs, out)
-        self._take(inputs, out)
+        inputs = self._inputs = self._steady.step(now, inputs)
+        self._parts.status.mode = inputs.guarded.mode
+        if self._is_first and self._missions.run is not None:
+            self._missions.run.begin(self._time)
+        self._release_notices(inputs, out)
+        self._take_calls(inputs, out)
+        stand_down(self._missions, inputs, out)
         if self._is_first:
             self._is_first = False
-            self._drop_the_old(inputs, out)
-        self._mind_the_battery(inputs, out)
-        if inputs.stop:
-            self._hold_still(inputs, out)
-            return out
-        if self._is_stopped:
-            self._is_stopped = False
-            out.words += (Word(kind="emergency stop", text="the emergency stop is released", is_over=True),)
-        self._choose(time, inputs, out)
-        if self.mission is None:
-            self._rest(time, inputs, out)
-            return out
-        self._leave_out_off_the_map(inputs, out)
-        self._count(passed, inputs)
-        self._watch_frames(inputs, out)
-        if self.mission.phase is not Phase.RETURNING:
-            self._views.see(self._clock.time, inputs)
-            self.mission.share_seen = self._views.share()
-        if self._keep_in_view(inputs, out):
-            return out
-        if self.mission.phase is Phase.LOOKING:
-            self._step_look(inputs, out)
-        else:
-            self._step_drive(inputs, out)
+            drop_the_old(self._missions, inputs.wall, self.params.resume_max_age, out)
+        self._battery.step(self._time, inputs, out)
+        if not self._hold.step(inputs, out):
+            self._choose(inputs, out)
+            self._go_on(inputs, out)
         return out
 
-    def _pass_time(self, now: float) -> float:
-        passed = self._clock.step(now)
-        if self._clock.jump:
-            direction = "back" if self._clock.jump < 0.0 else "forward"
-            log.warning("time went %s by %.1f s", direction, abs(self._clock.jump))
-        return passed
+    @property
+    def _time(self) -> float:
+        return self._steady.clock.time
 
-    def _in_steady_time(self, inputs: Inputs) -> Inputs:
-        """The inputs, with every stamp in steady time: the only place that knows of another."""
-        steady: dict[str, Any] = {name: heard.steady(getattr(inputs, name)) for name, heard in self._heard.items()}
-        steady["frames"] = tuple(self._steady_frame(frame) for frame in inputs.frames)
-        if inputs.battery is not None:
-            at = self._battery_heard.steady(inputs.battery.at)
-            steady["battery"] = dataclasses.replace(inputs.battery, at=at)
-        if inputs.scan is not None:
-            steady["scan"] = self._steady_scan(inputs.scan)
-        return dataclasses.replace(inputs, **steady)
+    def _release_notices(self, inputs: Inputs, out: Commands) -> None:
+        out.releases += self._parts.notices.release(inputs.wall, inputs.guarded)
+        out.changed |= bool(out.releases)
 
-    def _steady_scan(self, view: ScanView) -> ScanView:
-        if self._scan is None or self._scan[0] is not view:
-            scan = dataclasses.replace(view.scan, stamp=self._clock.steady(view.scan.stamp))
-            self._scan = view, dataclasses.replace(view, scan=scan)
-        return self._scan[1]
-
-    def _steady_frame(self, frame: Frame) -> Frame:
-        if frame.stamp is None:
-            return dataclasses.replace(frame, picture=self._clock.now)
-        return dataclasses.replace(frame, stamp=self._clock.steady(frame.stamp), picture=frame.stamp)
-
-    def _is_blind(self, inputs: Inputs) -> bool:
-        look = self.params.look
-        silent = self._clock.time - inputs.detector_at > look.detector_timeout
-        return silent or (self._parts.needs_camera and self._clock.time - inputs.camera_at > look.camera_timeout)
-
-    def _take(self, inputs: Inputs, out: Commands) -> None:
-        watching = self._watch.candidate(self._clock.time)
-        taken = self._intake.take(self._clock.time, inputs, self.mission, has_candidate=watching)
+    def _take_calls(self, inputs: Inputs, out: Commands) -> None:
+        agenda, now = self._missions.agenda, self._time
+        agenda.see_robot(now, inputs, is_awake=self._is_awake(inputs))
+        taken = agenda.take(now, inputs, self.mission, has_candidate=self._parts.decision.has_candidate(now))
         out.changed |= taken.changed
         out.ignored += taken.ignored
-        if inputs.guarded.mode == "disarmed":
-            self._stand_down(inputs, out)
 
-    # -- what to do next
+    def _is_awake(self, inputs: Inputs) -> bool:
+        """Whether detector and camera speak."""
+        look, now = self.params.look, self._time
+        sees = not self._parts.needs_camera or now - inputs.camera_at <= look.camera_timeout
+        return sees and now - inputs.detector_at <= look.detector_timeout
 
-    def _choose(self, time: float, inputs: Inputs, out: Commands) -> None:
+    def _choose(self, inputs: Inputs, out: Commands) -> None:
         """End, put back or begin missions."""
-        mission = self.mission
-        ready = self._ready.step(time, inputs)
-        if mission and self._trip is None and self._look is None:
-            self._go_on(inputs)
+        missions, run = self._missions, self._missions.run
+        is_ready = missions.ready.step(self._time, inputs)
         if not self.queue or self._battery.is_low:
             return
         following = next(iter(self.queue))
-        if mission and mission.phase is Phase.RETURNING:
-            self._end(out, f"going on to {self._title(following.room_id)}")
-        elif mission and self._may_wait(mission, following):
-            self._put_back(mission, following, out)
-        elif mission is None and ready:
-            self._begin(inputs, out)
+        if run is None and is_ready:
+            out.changed = True
+            missions.begin(self._time, inputs.wall)
+        elif run is not None and run.mission.phase is Phase.RETURNING:
+            missions.end(run, out, Place(Whereabouts.ON_ITS_WAY, f" {missions.title(following.room_id)}"))
+        elif run is not None and self._may_wait(run.mission, following):
+            out.changed = True
+            missions.put_back(run.mission, following)
 
     def _may_wait(self, mission: Mission, other: Request) -> bool:
-        """Whether a mission is put back for another: for a sensor's call, where nobody was seen yet."""
+        """Whether a mission is put back for another: for a sensor's call, unless somebody was seen."""
         return (
             self.params.priorities.preempt
             and mission.origin is not Origin.TRIGGER
@@ -224,118 +294,22 @@ class PatrolManager(Ordered):
             and mission.verdict is None
         )
 
-    def _put_back(self, mission: Mission, other: Request, out: Commands) -> None:
-        log.info("%s is put back: motion in %s", mission.room.title, self._title(other.room_id))
-        self.queue.put_back(
-            Request(
-                room_id=mission.room.id,
-                origin=mission.origin,
-                note=mission.note,
-                wall=mission.called,
-                priority=mission.priority,
-                id=mission.id,
-                triggers=mission.triggers,
-                times=mission.times,
-            )
-        )
-        self._leave(out)
-        self._ready.at_rest = (
-            f"on guard; {mission.room.title} is put back, as the sensor of {self._title(other.room_id)} calls"
-        )
-
-    def _title(self, room_id: int) -> str:
-        room = self.rooms.find(room_id)
-        return room.title if room else f"room {room_id}"
-
-    def _begin(self, inputs: Inputs, out: Commands) -> None:
-        self.mission = recall.begin(self.queue.pop(), self.rooms, inputs.wall)
-        if self.mission.id in self._told:
-            recall.confirm(self.mission, self._told.pop(self.mission.id))
-        self._home = None
-        out.changed = True
-        self._start(inputs, Phase.DRIVING)
-
-    def _rest(self, time: float, inputs: Inputs, out: Commands) -> None:
-        low = self._battery.is_low
-        if low and self._home is None and self._homes_tried == 0 and not self._is_home(inputs):
-            self._homes_tried += 1
-            self._drive_home()
-        if self._home is not None:
-            self._step_home(time, inputs, out)
+    def _go_on(self, inputs: Inputs, out: Commands) -> None:
+        run = self._missions.run
+        if run is None:
+            self._rest(inputs, out)
             return
-        phase = Phase.IDLE if self._ready.is_ready else Phase.STARTING
-        self._say(
-            out, phase, f"waiting for the battery, which is low ({self._battery.text})" if low else self._ready.text
-        )
+        leave_out_off_the_map(run, inputs, out)
+        place = run.step(self._time, inputs, out, passed=self._steady.clock.passed)
+        if place is not None:
+            self._missions.end(run, out, place)
 
-    # -- what ends a mission early
-
-    def _leave_out_off_the_map(self, inputs: Inputs, out: Commands) -> None:
-        """A room with a point off the map: the robot would look at another place and call that one clear."""
-        mission = self.mission
-        if mission is None or inputs.house is None or mission.phase is Phase.RETURNING:
+    def _rest(self, inputs: Inputs, out: Commands) -> None:
+        missions = self._missions
+        if inputs.pose is not None and distance(inputs.pose, self._parts.rooms.base.pose) >= AT_HOME:
+            self._battery.send_home()
+        if missions.way_home is not None:
+            missions.step_way_home(missions.way_home, self._time, inputs, out)
             return
-        problem = inputs.house.refusal(mission.room)
-        if not problem:
-            return
-        self._decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at: {problem}")
-        if mission.origin is Origin.TRIGGER:
-            text = f"motion in {mission.room.title}, which cannot be looked at: {problem}"
-            out.words += (Word(kind=f"room {mission.room.id}", text=text),)
-        out.cancel = True
-        self._turn_home(inputs, out)
-
-    def _mind_the_battery(self, inputs: Inputs, out: Commands) -> None:
-        if self._battery.step(self._clock.time, inputs.battery):
-            low = self._battery.is_low
-            text = f"the battery is low ({self._battery.text}): the robot goes home and waits there"
-            text = text if low else f"the battery is no longer low ({self._battery.text})"
-            (log.warning if low else log.info)("%s", text)
-            out.words += (Word(kind="battery", text=text, is_over=not low),)
-            self._homes_tried = 0
-        mission = self.mission
-        if self._battery.is_low and mission and mission.phase is not Phase.RETURNING:
-            title, text = mission.room.title, self._battery.text
-            self._decide(Verdict.UNVERIFIED, f"{title} was not looked at to the end: the battery is low ({text})")
-            self._turn_home(inputs, out)
-
-    def _hold_still(self, inputs: Inputs, out: Commands) -> None:
-        """The emergency stop is pressed."""
-        if not self._is_stopped:
-            self._is_stopped = True
-            out.cancel = out.cancel_all = True
-            out.words += (Word(kind="emergency stop", text=f"{inputs.stop}: nobody looks until it is released"),)
-        self._home = None
-        out.goal, out.speed = None, 0.0
-        if self.mission:
-            title = self.mission.room.title
-            self._decide(Verdict.UNVERIFIED, f"{title} was not looked at to the end: {inputs.stop}")
-            self._end(out, "where it was stopped")
-        self._ready.at_rest = "on guard, where it was stopped"
-        self._say(out, Phase.STOPPED, f"{inputs.stop}; it holds until it is released")
-
-    def _drop_the_old(self, inputs: Inputs, out: Commands) -> None:
-        """What was called for so long before a restart that a look would come too late."""
-        oldest = inputs.wall - self.params.resume_max_age
-        hours = self.params.resume_max_age / 3600.0
-        duration = "an hour" if hours == 1.0 else f"{hours:g} hours"
-        why = f"the patrol was down for more than {duration}"
-        old = [request for request in self.queue if request.wall < oldest]
-        kept = self.queue.drop()
-        self._give_up(old, why, out)
-        for request in kept:
-            if request not in old:
-                self.queue.add(request)
-        if self.mission and self.mission.called < oldest:
-            self._decide(Verdict.UNVERIFIED, f"{self.mission.room.title} was not looked at to the end: {why}")
-            self._end(out, "where it is")
-
-    def _stand_down(self, inputs: Inputs, out: Commands) -> None:
-        """The house was disarmed: what sensors and rounds called for is over."""
-        guarding = (Origin.TRIGGER, Origin.SILENT_SENSOR, Origin.SCHEDULE)
-        self._give_up(self.queue.drop(*guarding), inputs.guarded.why, out)
-        mission = self.mission
-        if mission and mission.origin in guarding and mission.phase is not Phase.RETURNING:
-            self._decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at to the end: {inputs.guarded.why}")
-            self._enter(Phase.RETURNING, inputs)
-            out.cancel = out.changed = True
+        phase = Phase.IDLE if missions.ready.is_ready else Phase.STARTING
+        missions.say(out, phase, self._battery.text if self._battery.is_low else missions.ready.text)

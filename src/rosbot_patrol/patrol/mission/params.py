@@ -13,6 +13,7 @@ from rosbot_patrol.params import param
 from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams, check_battery
 from rosbot_patrol.patrol.intruder.camera_tracking import TrackParams
+from rosbot_patrol.patrol.intruder.decision import IntruderParams
 from rosbot_patrol.patrol.intruder.exclusions import JudgeParams
 from rosbot_patrol.patrol.intruder.persons import PeopleParams
 from rosbot_patrol.patrol.intruder.sightings import WatchParams
@@ -62,6 +63,17 @@ class ManagerParams(BehaviourParams):
     track: TrackParams = TrackParams()
     priorities: PriorityParams = PriorityParams()
     battery: BatteryParams = BatteryParams()
+
+    @property
+    def intruder(self) -> IntruderParams:
+        """What the intruder decision is made with."""
+        return IntruderParams(
+            alarm_classes=self.alarm_classes,
+            watch=self.watch,
+            suspects=self.suspects,
+            people=self.people,
+            track=self.track,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,244 +1,196 @@
-"""The two things that a mission does: get to a point from which its room is seen, and look at it."""
+"""The phases of a mission as objects: driving to the room, looking around, returning home."""
 
 from __future__ import annotations
 
-import dataclasses
-import math
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.goal import GoalLink
-from rosbot_patrol.patrol.intruder.close_ups import Sighting
-from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
-from rosbot_patrol.patrol.mission.drive import Drive, DriveParams, DriveStep
+from rosbot_patrol.goal import Goal
+from rosbot_patrol.patrol.house.rooms import Room
+from rosbot_patrol.patrol.intruder.decision import IntruderDecision
+from rosbot_patrol.patrol.mission.drive import DriveParams, OtherPoses, Trip, WayHome, end_of_way_home
+from rosbot_patrol.patrol.mission.look_around import LookAround, LookParts
+from rosbot_patrol.patrol.mission.views import Views
+from rosbot_patrol.patrol.records.activity import Activity, Place
 from rosbot_patrol.patrol.records.inputs import Inputs
-from rosbot_patrol.patrol.records.mission import Mission
-from rosbot_patrol.patrol.search.look import Look, LookParams, LookStep
-from rosbot_patrol.patrol.search.turn import SpinParams
-from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
-
-Choose = Callable[[], Sequence[Pose2D]]
+from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
+from rosbot_patrol.patrol.story import status_text
 
 
-class Trip:
-    """A drive to one of several poses that serve as well: the next is tried where navigation gives one up.
+@dataclass(frozen=True)
+class Arrived:
+    """The robot stands where the room is seen from."""
+
+
+@dataclass(frozen=True)
+class Ruling:
+    """The verdict that a phase comes to, with its sentence."""
+
+    verdict: Verdict
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseStep:
+    """One step of a phase.
+
+    Attributes:
+        status, why: state to report while the phase goes on.
+        goal: to be sent; cancel: the goal that runs is to be given up.
+        speed: turning speed [rad/s], None if the wheels belong to another part.
+        is_progress: a viewpoint is done, which has to outlive the program.
+        outcome: how the phase ended, None while it goes on; a `Place` ends the mission.
+    """
+
+    status: Phase
+    why: str = ""
+    goal: Goal | None = None
+    cancel: bool = False
+    speed: float | None = None
+    is_progress: bool = False
+    outcome: Arrived | Ruling | Place | None = None
+
+
+class PhaseRun(Protocol):
+    """A phase of a mission while it runs."""
+
+    phase: ClassVar[Phase]
+
+    def step(self, now: float, inputs: Inputs) -> PhaseStep:
+        """Go on; `now` and the stamps of `inputs` in steady time [s]."""
+
+    def pause(self) -> bool:
+        """Interrupt the drive, which the next step takes up again; returns whether a goal has to be given up."""
+
+    def hold(self, now: float, inputs: Inputs) -> None:
+        """Keep measuring in a step in which another part has the wheels."""
+
+
+class DrivingTo:
+    """The drive to the room, or to another viewpoint of it.
 
     Args:
-        name: of the trip, unlike any other's.
-        pose: the first to try, as often as `params` say.
+        mission: whose room.
         params: bounds.
-        others: gives further poses, asked for when the first has failed; each is tried once.
+        others: gives further poses that show the room.
     """
 
-    def __init__(self, name: str, pose: Pose2D, params: DriveParams, others: Choose | None = None) -> None:
-        self._name, self._params, self._others = name, params, others
-        self._drive = Drive(name, pose, params)
-        self._left: list[Pose2D] | None = None
-        self._tried = 0
-        self._problem = ""
-        self.pose = pose
+    phase: ClassVar[Phase] = Phase.DRIVING
 
-    @property
-    def is_at_first(self) -> bool:
-        """Whether it still goes to the first pose."""
-        return self._tried == 0
+    def __init__(self, mission: Mission, params: DriveParams, others: OtherPoses | None) -> None:
+        self._room = mission.room
+        self._trip = Trip(f"{mission.id}/{self.phase.value}", mission.room.pose, params, others)
 
-    def pause(self) -> None:
-        """The drive is interrupted; the next step takes it up again."""
-        self._drive.pause()
-
-    def step(self, now: float, link: GoalLink, pose: Pose2D | None) -> DriveStep:
+    def step(self, now: float, inputs: Inputs) -> PhaseStep:
         """Drive on."""
-        step = self._drive.step(now, link, pose)
-        if not step.problem or step.is_down:
-            return step
-        self._problem = self._problem or step.problem
-        if self._left is None:
-            self._left = list(self._others())[: self._params.other_viewpoints] if self._others else []
-        if self._left:
-            self._tried += 1
-            self.pose = self._left.pop(0)
-            once = dataclasses.replace(self._params, goal_attempts=1)
-            self._drive = Drive(f"{self._name}/{self._tried}", self.pose, once)
-            return DriveStep(cancel=step.cancel)
-        also = f"; {self._tried} other viewpoints in it failed, too" if self._tried else ""
-        return dataclasses.replace(step, problem=self._problem + also)
+        title = self._room.title
+        step = self._trip.step(now, inputs)
+        if step.waiting:
+            why = f"{Activity.WAITING_FOR_NAVIGATION.value} to drive to {title}"
+            return PhaseStep(status=Phase.STARTING, why=why, goal=step.goal, cancel=step.cancel)
+        outcome: Arrived | Ruling | None = Arrived() if step.reached else None
+        if step.problem:
+            outcome = Ruling(Verdict.UNREACHABLE, f"{title} cannot be reached: {step.problem}")
+        why = f"driving to {title}{'' if self._trip.is_at_first else ', to another viewpoint in it'}"
+        return PhaseStep(status=self.phase, why=why, goal=step.goal, cancel=step.cancel, outcome=outcome)
+
+    def pause(self) -> bool:
+        """Interrupt the drive."""
+        self._trip.pause()
+        return True
+
+    def hold(self, now: float, inputs: Inputs) -> None:
+        """Nothing to measure."""
 
 
-class Views(Protocol):
-    """What has been seen of a room, and from where to see the rest."""
-
-    def start(self, mission: Mission) -> None:
-        """A mission begins, or goes on after a restart: `mission.views_done` says what was done."""
-
-    def see(self, now: float, inputs: Inputs) -> None:
-        """One step of the drive to the room or of the look."""
-
-    def suspect(self, doubtful: Sequence[Suspect]) -> None:
-        """What looks like a person from too few sides, all of it."""
-
-    def step_back(self, doubtful: Sequence[Sighting]) -> None:
-        """What is too near to be told from a pet, all of it."""
-
-    def harmless(self) -> Sequence[Sighting]:
-        """What moves in the room and is no person."""
-
-    def next(self, inputs: Inputs) -> Viewpoint | None:
-        """Where to look from next, None where the room is seen well enough or there is nowhere."""
-
-    def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
-        """How far to turn to the left at a viewpoint, now that the robot is there [rad]."""
-
-    def share(self) -> float | None:
-        """Share of the room's floor that was seen, None where nobody measures."""
-
-    def blind(self) -> str:
-        """Why what was seen is too little for a verdict, "" where it is not."""
-
-    def is_seen(self) -> bool:
-        """Whether as much of the room was seen as is wanted, however it came about."""
-
-    def moved(self) -> str:
-        """What moved in the room as far as the lidar tells, "" where nothing did."""
-
-
-class OneTurn:
-    """`Views` of a look that ends with its one turn."""
-
-    def start(self, mission: Mission) -> None:
-        """Nothing to remember."""
-
-    def see(self, now: float, inputs: Inputs) -> None:
-        """Nothing to see."""
-
-    def suspect(self, doubtful: Sequence[Suspect]) -> None:
-        """There is no other side."""
-
-    def step_back(self, doubtful: Sequence[Sighting]) -> None:
-        """There is no other place."""
-
-    def harmless(self) -> Sequence[Sighting]:
-        """Nobody knows."""
-        return ()
-
-    def next(self, inputs: Inputs) -> Viewpoint | None:
-        """One turn is enough."""
-        return None
-
-    def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
-        """As planned."""
-        return view.turn
-
-    def share(self) -> float | None:
-        """Nobody measures."""
-        return None
-
-    def blind(self) -> str:
-        """Nobody measures."""
-        return ""
-
-    def is_seen(self) -> bool:
-        """Nobody measures."""
-        return False
-
-    def moved(self) -> str:
-        """Nobody watches."""
-        return ""
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class LookParts:
-    """What a look around is made of."""
-
-    look: LookParams
-    spin: SpinParams
-    drive: DriveParams
-    needs_camera: bool
-
-
-class LookAround:
-    """A full turn at the first viewpoint, then as much of one at each further one as `views` asks for.
+class LookingAround:
+    """The look at the room, and the verdict that it allows.
 
     Args:
-        mission: whose room; its views_done and share_seen are kept up.
-        views: what was seen.
+        mission: whose room; kept up.
+        views: what was seen of the room.
+        decision: what was seen of intruders.
         parts: parameters.
-        pose: where the robot stands now, for the record.
+        pose: where the robot stands now, None if unknown.
     """
 
-    def __init__(self, mission: Mission, views: Views, parts: LookParts, pose: Pose2D | None) -> None:
-        self._mission, self._views, self._parts = mission, views, parts
-        self._drive: Drive | None = None
-        self._view: Viewpoint | None = None
-        self._at = pose
-        self.turned_deg = 360.0 * len(mission.views_done)
-        self._goes_on = bool(mission.views_done)
-        self._stuck: list[str] = []  # why turns ended early
-        self._look: Look = self._new_look()
+    phase: ClassVar[Phase] = Phase.LOOKING
 
-    @property
-    def drives(self) -> bool:
-        """Whether it is on its way to a further viewpoint."""
-        return self._drive is not None
+    def __init__(
+        self, mission: Mission, views: Views, decision: IntruderDecision, parts: LookParts, *, pose: Pose2D | None
+    ) -> None:
+        self._mission, self._views, self._decision = mission, views, decision
+        self._look = LookAround(mission, views, parts, pose)
 
-    def pause(self) -> None:
-        """The drive is interrupted; the next step takes it up again."""
-        if self._drive is not None:
-            self._drive.pause()
+    def step(self, now: float, inputs: Inputs) -> PhaseStep:
+        """Look on."""
+        mission = self._mission
+        candidate = mission.sightings == 0 and self._decision.has_candidate(now)
+        step = self._look.step(now, inputs, candidate=candidate)
+        if step.done:
+            mission.looked = now
+        return PhaseStep(
+            status=self.phase,
+            why=f"{step.why}, in {mission.room.title}",
+            goal=step.goal,
+            cancel=step.cancel,
+            speed=step.speed,
+            is_progress=step.progress,
+            outcome=self._ruling(step.problem) if step.done else None,
+        )
 
-    def step(self, now: float, inputs: Inputs, *, candidate: bool, held: bool = False) -> LookStep:
-        """Look on.
+    def _ruling(self, problem: str) -> Ruling:
+        problem = problem or self._views.blind()
+        if not problem:
+            clear = status_text.clear(self._mission, self._look.turned_deg, self._decision.refusals)
+            return Ruling(Verdict.CLEAR, clear)
+        moved = self._views.moved()
+        also = f"; {moved}" if moved else ""
+        return Ruling(Verdict.UNVERIFIED, f"{self._mission.room.title} could not be verified: {problem}{also}")
 
-        Args:
-            now: steady time [s]; the stamps of `inputs` are of it, too.
-            inputs: of this step.
-            candidate: something is in view that may become an intruder.
-            held: another has the wheels for now.
-        """
-        if self._goes_on:  # after a restart: what was looked at need not be again
-            self._goes_on = False
-            return self._go_on(inputs, LookStep(done=True))
-        if self._drive is not None:
-            return LookStep(why="driving to a further viewpoint") if held else self._step_drive(now, inputs)
-        step = self._look.step(now, inputs, candidate=candidate, held=held)
-        if not step.done:
-            return step
-        self.turned_deg += self._look.turned_deg
-        if step.is_stuck:  # perhaps enough is seen, or will be from elsewhere
-            self._stuck.append(step.problem)
-            return self._go_on(inputs, step)
-        if step.problem:
-            return step
-        if self._at is not None:
-            self._mission.views_done.append((self._at.x, self._at.y, self._at.yaw))
-        return self._go_on(inputs, step)
+    def pause(self) -> bool:
+        """Interrupt the drive to a further viewpoint, if there is one."""
+        self._look.pause()
+        return self._look.is_driving
 
-    def _new_look(self, turn: float = math.tau, stay: float = 0.0) -> Look:
-        look = dataclasses.replace(self._parts.look, linger=self._parts.look.linger + stay)
-        return Look(look, self._parts.spin, needs_camera=self._parts.needs_camera, turn=turn)
+    def hold(self, now: float, inputs: Inputs) -> None:
+        """Measure the turn that another part makes."""
+        if not self._look.is_driving:
+            self._look.step(now, inputs, candidate=False, held=True)
 
-    def _go_on(self, inputs: Inputs, step: LookStep) -> LookStep:
-        self._view = self._views.next(inputs)
-        if self._view is None:
-            is_enough = not self._stuck or self._views.is_seen()
-            return dataclasses.replace(step, problem="" if is_enough else self._stuck[0])
-        self._at = pose = self._view.pose
-        name = f"{self._mission.id}/view{len(self._mission.views_done) + len(self._stuck)}"
-        once = dataclasses.replace(self._parts.drive, goal_attempts=1)
-        self._drive = Drive(name, pose, once)
-        return LookStep(why="going to a further viewpoint", progress=True)
 
-    def _step_drive(self, now: float, inputs: Inputs) -> LookStep:
-        assert self._drive is not None
-        step = self._drive.step(now, inputs.link, inputs.pose)
-        if step.problem:  # the room is not seen better than it is
-            self._drive = None
-            next_step = self._go_on(inputs, LookStep(done=True, why=step.problem))
-            return dataclasses.replace(next_step, cancel=step.cancel)
-        if step.reached:
-            self._drive = None
-            assert self._view is not None
-            self._look = self._new_look(self._views.turn_from(inputs.pose, self._view), self._view.stay)
-            return LookStep(why="at a further viewpoint")
-        return LookStep(speed=None, goal=step.goal, cancel=step.cancel, why="driving to a further viewpoint")
+class Returning:
+    """The way home after the look.
+
+    Args:
+        mission: that is over but for the way home.
+        base: room 0.
+        params: bounds.
+    """
+
+    phase: ClassVar[Phase] = Phase.RETURNING
+
+    def __init__(self, mission: Mission, base: Room, params: DriveParams) -> None:
+        self._mission = mission
+        self._way = WayHome(f"{mission.id}/{self.phase.value}", base, params)
+
+    def step(self, now: float, inputs: Inputs) -> PhaseStep:
+        """Drive on."""
+        step = self._way.step(now, inputs)
+        doing = f"{Activity.WAITING_FOR_NAVIGATION.value} to drive to" if step.waiting else "driving to"
+        return PhaseStep(
+            status=self.phase,
+            why=f"{doing} home, {status_text.verdict(self._mission)}",
+            goal=step.goal,
+            cancel=step.cancel,
+            outcome=end_of_way_home(step),
+        )
+
+    def pause(self) -> bool:
+        """Interrupt the drive."""
+        self._way.pause()
+        return True
+
+    def hold(self, now: float, inputs: Inputs) -> None:
+        """Nothing to measure."""

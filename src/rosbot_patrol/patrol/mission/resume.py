@@ -1,92 +1,80 @@
-"""What of the patrol outlives the program, and how it goes on from there.
+"""What of the patrol outlives the program: one JSON file.
 
-What of the patrol outlives the program: one JSON file.
-
-A program that was killed, alone or with the whole launch, goes on where it stopped: every call gets its verdict. One
-that was ended in order has nothing left to go on with. Latched triggers that were handled are known within one run of
-the launch only, as in another one they are new. A file of another house (another points file) is none.
+After a kill, of the program or of the whole launch, the patrol goes on where it stopped: every call gets its verdict.
+After an orderly end nothing is left to go on with. Handled latched triggers are remembered within one run of the launch
+only: in another run they are new. A file of another house (another points file) is not used.
 """
 
 from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rosbot_patrol.files import write_atomic
-from rosbot_patrol.patrol.calls.call_filter import Intake
-from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.records.mission import Mission, Verdict, mission_from_plain, mission_to_plain
 from rosbot_patrol.patrol.records.request import Request, request_from_plain, request_to_plain
 
-if TYPE_CHECKING:
-    from rosbot_patrol.patrol.mission.manager import PatrolManager
-
-
 log = logging.getLogger(__name__)
 
 
-def begin(request: Request, rooms: Rooms, wall: float) -> Mission:
-    """The mission of a request whose turn has come, at `wall` seconds since 1970."""
-    room = rooms.find(request.room_id)
-    assert room is not None, "the queue holds rooms of the file only"
-    waited = max(wall - request.wall, 0.0)
-    return Mission(
-        id=request.id,
-        room=room,
-        origin=request.origin,
-        priority=request.priority,
-        called=request.wall,
-        note=request.note,
-        wall=wall,
-        triggers=request.triggers,
-        times={"waiting": waited, **{name: s for name, s in request.times.items() if name != "waiting"}},
-        began={"waiting": request.wall},
-    )
+@dataclass(frozen=True, kw_only=True)
+class Memory:
+    """What of the missions outlives the program.
+
+    Attributes:
+        count: missions so far; waiting: requests, the next first; mission: that ran.
+        last_verdict: of the mission that ended last, "" before the first.
+        held: by id of its mission, when a held notice goes out at the latest [s since 1970].
+    """
+
+    count: int = 0
+    waiting: tuple[Request, ...] = ()
+    mission: Mission | None = None
+    last_verdict: str = ""
+    held: Mapping[str, float] = field(default_factory=dict)
 
 
-def snapshot(manager: PatrolManager, intake: Intake) -> dict[str, Any]:
-    """What has to outlive the program, for JSON."""
+def memory_to_plain(memory: Memory) -> dict[str, Any]:
+    """For JSON."""
     return {
-        "count": intake.count,
-        "queue": [request_to_plain(request) for request in manager.queue],
-        "mission": mission_to_plain(manager.mission) if manager.mission else None,
-        "last_verdict": manager.last_verdict,
-        "held": dict(manager.held),
+        "count": memory.count,
+        "queue": [request_to_plain(request) for request in memory.waiting],
+        "mission": mission_to_plain(memory.mission) if memory.mission else None,
+        "last_verdict": memory.last_verdict,
+        "held": dict(memory.held),
     }
 
 
-def recall(manager: PatrolManager, intake: Intake, memory: Mapping[str, Any]) -> None:
-    """Give a manager back what `snapshot` took; what makes no sense is said and left out."""
+def memory_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Memory:
+    """The memory of `memory_to_plain`; a warning and an empty one if it makes no sense."""
+    if not plain:
+        return Memory()
     try:
-        last = Verdict(memory["last_verdict"]).value if memory["last_verdict"] else ""
-        requests = [request_from_plain(plain) for plain in memory["queue"]]
-        mission = mission_from_plain(memory["mission"], manager.rooms) if memory["mission"] else None
-        held = {str(name): float(until) for name, until in memory["held"].items()}
-        intake.count = int(memory["count"])
+        memory = Memory(
+            last_verdict=Verdict(plain["last_verdict"]).value if plain["last_verdict"] else "",
+            waiting=tuple(request_from_plain(request) for request in plain["queue"]),
+            mission=mission_from_plain(plain["mission"], rooms) if plain["mission"] else None,
+            held={str(name): float(until) for name, until in plain["held"].items()},
+            count=int(plain["count"]),
+        )
     except (KeyError, TypeError, ValueError, AttributeError) as err:
         log.warning("what was kept of the last run makes no sense (%r), starting afresh", err)
-        return
-    manager.last_verdict, manager.held, manager.mission = last, held, mission
-    _queue(manager.queue, requests, manager.rooms)
-    if mission:
-        log.info("going on with the mission to %s where the last run stopped", mission.room.title)
+        return Memory()
+    memory = replace(memory, waiting=tuple(_known(memory.waiting, rooms)))
+    if memory.mission:
+        log.info("going on with the mission to %s where the last run stopped", memory.mission.room.title)
+    return memory
 
 
-def confirm(mission: Mission, reason: str) -> None:
-    """Its notice is on disk, and yet the memory knows of nobody: the program was killed between the two."""
-    mission.verdict, mission.reason, mission.notified = Verdict.CONFIRMED, reason, True
-    mission.sightings = max(mission.sightings, 1)
-    log.warning("%s", reason)
-
-
-def _queue(queue: MissionQueue, requests: list[Request], rooms: Rooms) -> None:
+def _known(requests: Iterable[Request], rooms: Rooms) -> Iterator[Request]:
     for request in requests:
         if rooms.find(request.room_id):
-            queue.add(request)
+            yield request
         else:
             log.warning("the call for room %d is dropped: %s", request.room_id, rooms.refusal(request.room_id))
 

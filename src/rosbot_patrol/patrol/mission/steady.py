@@ -1,14 +1,20 @@
 """A clock that only goes forward, made from one that may be set, and the stamps of that one in its time.
 
-All evidence of a mission lives in steady time: `manager` converts every stamp once, as it comes in, and no other part
-of the patrol knows that a clock can be set. Until the clock is set for the first time both times are the same.
+All evidence of a mission lives in steady time: `SteadyInputs` converts every stamp once, as it comes in, and no other
+part of the patrol knows that a clock can be set. Until the clock is set for the first time both times are the same.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import logging
 import math
 from collections import deque
 from dataclasses import dataclass
+
+from rosbot_patrol.patrol.records.inputs import Battery, Frame, Inputs, ScanView
+
+log = logging.getLogger(__name__)
 
 LONGEST_STEP = 5.0  # [s] between two steps; more is a clock that was set, or a program that was held
 BACKWARDS = 1.0  # [s]; less is two machines' disagreement
@@ -100,3 +106,49 @@ class Heard:
         self._at = self._clock.time - (age if self._raw is None else min(age, _LATE))
         self._raw = raw
         return self._at
+
+
+class SteadyInputs:
+    """Turns a step's inputs into steady time.
+
+    Attributes:
+        clock: stepped by `step`.
+    """
+
+    def __init__(self) -> None:
+        self.clock = SteadyClock()
+        self._detector, self._camera, self._camera_changed = (Heard(self.clock) for _ in range(3))
+        self._battery = Heard(self.clock)
+        self._scan: tuple[ScanView, ScanView] | None = None  # as it came, and in steady time
+
+    def step(self, now: float, inputs: Inputs) -> Inputs:
+        """Go on to `now` [s]; returns the inputs with every stamp in steady time."""
+        self.clock.step(now)
+        if self.clock.jump:
+            direction = "back" if self.clock.jump < 0.0 else "forward"
+            log.warning("time went %s by %.1f s", direction, abs(self.clock.jump))
+        return dataclasses.replace(
+            inputs,
+            detector_at=self._detector.steady(inputs.detector_at),
+            camera_at=self._camera.steady(inputs.camera_at),
+            camera_changed_at=self._camera_changed.steady(inputs.camera_changed_at),
+            frames=tuple(self._steady_frame(frame) for frame in inputs.frames),
+            battery=self._steady_battery(inputs.battery),
+            scan=self._steady_scan(inputs.scan),
+        )
+
+    def _steady_battery(self, battery: Battery | None) -> Battery | None:
+        return None if battery is None else dataclasses.replace(battery, at=self._battery.steady(battery.at))
+
+    def _steady_scan(self, view: ScanView | None) -> ScanView | None:
+        if view is None:
+            return None
+        if self._scan is None or self._scan[0] is not view:
+            scan = dataclasses.replace(view.scan, stamp=self.clock.steady(view.scan.stamp))
+            self._scan = view, dataclasses.replace(view, scan=scan)
+        return self._scan[1]
+
+    def _steady_frame(self, frame: Frame) -> Frame:
+        if frame.stamp is None:
+            return dataclasses.replace(frame, picture=self.clock.now)
+        return dataclasses.replace(frame, stamp=self.clock.steady(frame.stamp), picture=frame.stamp)

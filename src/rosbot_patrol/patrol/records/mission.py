@@ -89,6 +89,11 @@ class Mission:
     people: list[tuple[float, float] | None] = field(default_factory=list)
     own_motion: list[tuple[float, int]] = field(default_factory=list)
 
+    @property
+    def verdict_name(self) -> str:
+        """Value of the verdict, "" before there is one."""
+        return self.verdict.value if self.verdict else ""
+
 
 def mission_id(wall: float, count: int) -> str:
     """An id from the time of day [s since 1970] and a running number."""
@@ -106,7 +111,7 @@ def mission_to_plain(mission: Mission) -> dict[str, Any]:
         "note": mission.note,
         "phase": mission.phase.value,
         "wall": mission.wall,
-        "verdict": mission.verdict.value if mission.verdict else "",
+        "verdict": mission.verdict_name,
         "reason": mission.reason,
         "notified": mission.notified,
         "sightings": mission.sightings,

@@ -135,7 +135,7 @@ class Chronicle:
         elif why and why != self._why and not 0.0 <= now - self._why_at < _WHY_PAUSE:
             entries.append(Entry(incident=mission.id, events=(Event(wall=wall, kind="state", text=why),)))
             self._why, self._why_at = why, now
-        verdict = mission.verdict.value if mission.verdict else ""
+        verdict = mission.verdict_name
         if verdict != self._verdict:
             self._verdict = verdict
             event = Event(wall=wall, kind="verdict", text=f"{verdict}: {mission.reason}")
@@ -171,7 +171,7 @@ class Chronicle:
 def _state(mission: Mission) -> dict[str, Any]:
     """What of a mission its record shows now."""
     state: dict[str, Any] = {
-        "verdict": mission.verdict.value if mission.verdict else "",
+        "verdict": mission.verdict_name,
         "reason": mission.reason,
         "sightings": mission.sightings,
         "triggers": mission.triggers,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Mapping
 
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
-from rosbot_patrol.patrol.records.commands import Report
+from rosbot_patrol.patrol.records.commands import Commands, Report
 from rosbot_patrol.patrol.records.findings import Confirmation
+from rosbot_patrol.patrol.records.inputs import Guarded
 from rosbot_patrol.patrol.records.mission import Mission, Phase
 
 _WHERE = {Phase.DRIVING: "on the way to", Phase.LOOKING: "in"}
@@ -82,20 +84,44 @@ def rooms_open(mission: Mission | None, queue: MissionQueue) -> str:
     return f"room{'s' * (len(ids) > 1)} {', '.join(map(str, ids))}" if ids else ""
 
 
-def report(
-    phase: Phase, why: str, mission: Mission | None, queue: MissionQueue, last_verdict: str, mode: str
-) -> Report:
-    """The state for people."""
-    about = Report(phase=phase, why=why, queue=queue.rooms, last_verdict=last_verdict, mode=mode)
-    if mission is None:
-        return about
-    return Report(
-        **{
-            **vars(about),
-            "mission": mission.id,
-            "room_id": mission.room.id,
-            "room_name": mission.room.name,
-            "origin": mission.origin.value,
-            "verdict": mission.verdict.value if mission.verdict else "",
-        }
-    )
+class StatusReports:
+    """Makes the report of each state, once.
+
+    Args:
+        queue: what waits.
+        last_verdict: of the mission that ended before a restart, "" if there was none.
+
+    Attributes:
+        last_verdict: of the mission that ended last; mode: what is armed now.
+    """
+
+    def __init__(self, queue: MissionQueue, last_verdict: str = "") -> None:
+        self.last_verdict, self.mode = last_verdict, Guarded().mode
+        self._queue = queue
+        self._last: Report | None = None
+
+    def say(self, out: Commands, phase: Phase, why: str, mission: Mission | None = None) -> None:
+        """Report a state, unless it is the one reported last.
+
+        Args:
+            out: takes the report.
+            phase: what the patrol does.
+            why: one sentence.
+            mission: that runs.
+        """
+        report = self._report(phase, why, mission)
+        if report != self._last:
+            self._last = out.report = report
+
+    def _report(self, phase: Phase, why: str, mission: Mission | None) -> Report:
+        about = Report(phase=phase, why=why, queue=self._queue.rooms, last_verdict=self.last_verdict, mode=self.mode)
+        if mission is None:
+            return about
+        return dataclasses.replace(
+            about,
+            mission=mission.id,
+            room_id=mission.room.id,
+            room_name=mission.room.name,
+            origin=mission.origin.value,
+            verdict=mission.verdict_name,
+        )

@@ -9,6 +9,7 @@ from patrol_world import ROOMS, World, looking, phase
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.goal import GoalLink
 from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams, check_battery
 from rosbot_patrol.patrol.mission.manager import PatrolManager
@@ -164,7 +165,7 @@ def test_a_room_in_which_something_is_in_view_is_looked_at():
     world = World(person_when=seen)
     world.triggers = [3]
     world.run(lambda w: w.x > 11.9)
-    world.run(lambda w: w.manager._watch.candidate(w.now))
+    world.run(lambda w: w.manager._parts.decision.has_candidate(w.now))
     world.triggers = [1]
     world.step()
     assert world.manager.queue.rooms == (1,)
@@ -242,6 +243,16 @@ def test_withdrawing_leaves_what_a_sensor_called_for():
     world.run(lambda w: len(w.ended) == 3)
     verdicts = {m.room.id: m.verdict for m in world.ended}
     assert verdicts == {1: Verdict.UNVERIFIED, 3: Verdict.UNVERIFIED, 2: Verdict.CLEAR}
+
+
+def test_withdrawing_leaves_the_others_in_order_of_arrival():
+    world = World(link=GoalLink(is_up=False))
+    world.step()
+    world.manager.ask(ask(1, origin=Origin.SILENT_SENSOR))
+    taken = world.manager.ask(ask(2, 3, origin=Origin.ACTION))
+    world.manager.withdraw({taken[2]}, "cancelled")
+    world.manager.ask(ask(1, origin=Origin.ACTION))  # as urgent as room 3 now, and asked for before it
+    assert world.manager.queue.rooms == (1, 3)
 
 
 def test_an_orderly_end_gives_every_call_its_verdict():

@@ -207,10 +207,10 @@ def test_a_turn_towards_somebody_ends_where_the_pose_in_the_map_is_lost(caplog: 
     world = World(walks)
     world.manager = lost = Unlocalised(world.manager)
     world.triggers = (1,)
-    world.until(lambda w: w.manager._is_tracking)
+    world.until(lambda w: w.manager.is_following)
     lost.is_lost = True
     world.step()
-    assert not world.manager._is_tracking
+    assert not world.manager.is_following
     assert "no longer follows whom it sees: the robot does not know its pose in the map" in caplog.text
     world.until(lambda w: bool(w.ended))
     assert world.ended[0].verdict.value == "confirmed"
@@ -231,7 +231,7 @@ def test_whom_the_robot_turns_to_is_found_by_odometry_alone() -> None:
 
     world.manager.step = turned
     world.triggers = (1,)
-    world.until(lambda w: w.manager._is_tracking)
+    world.until(lambda w: w.manager.is_following)
     off[0] = 0.6
     for _ in range(60):
         world.step()

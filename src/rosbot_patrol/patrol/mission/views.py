@@ -1,0 +1,98 @@
+"""What a mission asks of the look at its room: what was seen, and from where to see the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.house.rooms import Room
+from rosbot_patrol.patrol.intruder.close_ups import Sighting
+from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
+from rosbot_patrol.patrol.records.inputs import Inputs
+from rosbot_patrol.patrol.records.mission import Mission
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
+
+Viewpoints = Callable[[Room, Inputs], Sequence[Pose2D]]
+"""Further poses that show a room whose own point cannot be reached, the best first."""
+
+
+class Views(Protocol):
+    """What has been seen of a room, and from where to see the rest."""
+
+    def start(self, mission: Mission) -> None:
+        """Begin a mission, or go on with one after a restart: `mission.views_done` lists the viewpoints done."""
+
+    def see(self, now: float, inputs: Inputs) -> None:
+        """Take in one step of the drive to the room or of the look."""
+
+    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+        """Take in everything that looks like a person from too few sides."""
+
+    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+        """Take in everything that is too near to tell a person from a pet."""
+
+    def harmless(self) -> Sequence[Sighting]:
+        """Things that move in the room and are no persons."""
+
+    def next(self, inputs: Inputs) -> Viewpoint | None:
+        """The next viewpoint, None if the room is seen well enough or no viewpoint is left."""
+
+    def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
+        """Angle to turn to the left at a viewpoint, from where the robot stands now [rad]."""
+
+    def share(self) -> float | None:
+        """Share of the room's floor that was seen, None if nobody measures it."""
+
+    def blind(self) -> str:
+        """Reason why the room cannot be called clear, "" if it can."""
+
+    def is_seen(self) -> bool:
+        """Whether as much of the floor was seen as is wanted."""
+
+    def moved(self) -> str:
+        """What the lidar saw move in the room, "" if nothing did."""
+
+
+class OneTurn:
+    """`Views` of a look that ends with its one turn."""
+
+    def start(self, mission: Mission) -> None:
+        """Nothing to remember."""
+
+    def see(self, now: float, inputs: Inputs) -> None:
+        """Nothing to see."""
+
+    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+        """There is no other side."""
+
+    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+        """There is no other place."""
+
+    def harmless(self) -> Sequence[Sighting]:
+        """Nobody knows."""
+        return ()
+
+    def next(self, inputs: Inputs) -> Viewpoint | None:
+        """One turn is enough."""
+        return None
+
+    def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
+        """As planned."""
+        return view.turn
+
+    def share(self) -> float | None:
+        """Nobody measures."""
+        return None
+
+    def blind(self) -> str:
+        """Nobody measures."""
+        return ""
+
+    def is_seen(self) -> bool:
+        """Nobody measures."""
+        return False
+
+    def moved(self) -> str:
+        """Nobody watches."""
+        return ""
