@@ -97,7 +97,7 @@ class NavigatorView:
     Attributes:
         local, recovery: views for the local planner and the recovery behaviours.
         is_current: whether the sensors can be trusted.
-        must_wait: function that names the person for whom the robot must wait before it drives a velocity, "" for nobody.
+        must_wait: names the person for whom the robot must wait before it drives a velocity, "" for nobody.
     """
 
     local: LocalView
