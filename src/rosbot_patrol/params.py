@@ -153,8 +153,13 @@ def load_strict(cls: type[T], tree: Mapping[str, Any], *, name: str) -> T:
     return load(cls, tree, name=name)
 
 
-def declared(cls: type) -> list[tuple[str, str, Any, ParamInfo]]:
-    """The parameters of `cls` as (name, type, default, info), for tables; required ones have default MISSING."""
+def declared(cls: type, group: object = None) -> list[tuple[str, str, Any, ParamInfo]]:
+    """The parameters of `cls` as (name, type, default, info), for tables; required ones have default MISSING.
+
+    Args:
+        cls: the declaration.
+        group: an instance of it with other defaults, as a node declares them for a group of its parameters.
+    """
     hints = typing.get_type_hints(cls)
     rows = []
     for field in dataclasses.fields(cls):
@@ -162,14 +167,16 @@ def declared(cls: type) -> list[tuple[str, str, Any, ParamInfo]]:
         default = field.default
         if default is dataclasses.MISSING and field.default_factory is not dataclasses.MISSING:
             default = field.default_factory()
+        if group is not None:
+            default = getattr(group, field.name)
         rows.append((info.name or field.name, _type_name(hints[field.name]), default, info))
     return rows
 
 
-def table(cls: type) -> str:
-    """A Markdown table of the parameters of `cls`."""
+def table(cls: type, group: object = None) -> str:
+    """A Markdown table of the parameters of `cls`; arguments as of `declared`."""
     lines = ["| parameter | default | unit | meaning |", "|---|---|---|---|"]
-    for key, _, default, info in declared(cls):
+    for key, _, default, info in declared(cls, group):
         if dataclasses.is_dataclass(default):
             continue
         shown = "(required)" if default is dataclasses.MISSING else f"`{default if default != '' else repr('')}`"

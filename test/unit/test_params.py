@@ -148,3 +148,8 @@ def test_nan_becomes_the_default(caplog):
 @pytest.mark.parametrize("given", ["115200", " 115200 ", "+115200", 115200, 115200.0])
 def test_a_number_in_quotes_is_a_number_where_upstream_takes_int(given):
     assert load(Clamped, {"baud": given, "ports": [given, 7]}) == Clamped(baud=115200, ports=(115200, 7))
+
+
+def test_a_group_with_other_defaults_has_them_in_the_table() -> None:
+    assert "| `depth` | `3` |" in table(Inner)
+    assert "| `depth` | `5` |" in table(Inner, Inner(depth=5))

@@ -136,13 +136,14 @@ SCENARIO: list[tuple[str, type]] = [
 ]
 
 
-def _groups(prefix: str, cls: type) -> list[tuple[str, type]]:
-    """A declaration and the ones nested in it, with their namespaces."""
-    found = [(prefix, cls)]
+def _groups(prefix: str, cls: type, group: object = None) -> list[tuple[str, type, object]]:
+    """A declaration and the ones nested in it, with their namespaces and the defaults that hold there."""
+    found = [(prefix, cls, group)]
     hints = typing.get_type_hints(cls)
-    for field, (name, *_) in zip(dataclasses.fields(cls), declared(cls), strict=True):
+    for field, (name, _, default, _) in zip(dataclasses.fields(cls), declared(cls, group), strict=True):
         if dataclasses.is_dataclass(hints[field.name]):
-            found += _groups(f"{prefix}{name}/", hints[field.name])
+            nested = None if default is dataclasses.MISSING else default
+            found += _groups(f"{prefix}{name}/", hints[field.name], nested)
     return found
 
 
@@ -157,8 +158,8 @@ def document() -> str:
     for node, sections in SECTIONS:
         lines += ["", f"## {node}"]
         for prefix, cls in sections:
-            for namespace, group in _groups(prefix, cls):
-                rows = table(group)
+            for namespace, group, defaults in _groups(prefix, cls):
+                rows = table(group, defaults)
                 if rows.count("\n") > 1:
                     place = namespace if namespace.startswith("/") else f"~{namespace}"
                     lines += ["", *([f"`{place}`", ""] if namespace else []), rows]
