@@ -1,1 +1,1 @@
-"""Detectors: what they find in a picture."""
+"""Detectors of people and objects in images."""

@@ -1,4 +1,4 @@
-"""Which detector the parameters of darknet_ros name."""
+"""Choice of the detector from darknet_ros's parameters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 
 def make_detector(params: DarknetParams, own_models: str) -> Detector:
-    """The detector that the parameters name; DetectorError where its files are missing, damaged or do not fit."""
+    """Make the detector that the parameters name; DetectorError if its files are missing or damaged, or do not fit."""
     threshold = params.yolo_model.threshold.value
     if params.network == "hog":
         hog = importlib.import_module("rosbot_patrol.detection.hog")  # brings OpenCV, 98 MB

@@ -1,10 +1,10 @@
-"""What a detector is, and the one that runs a darknet network.
+"""Interface of a detector, and the detector that runs a darknet network.
 
-Matches what darknet_ros makes of a picture: letterbox, thresholds, class-agnostic suppression at IoU 0.4, boxes cut to
-the picture, those under 1 % of its width or height dropped, one detection for each class above the threshold, ordered
-by class and then by objectness.
+Matches darknet_ros: letterbox, thresholds, class-agnostic suppression at IoU 0.4, boxes cropped to the picture, and
+boxes under 1 % of its width or height dropped. There is one detection for each class above the threshold, ordered by
+class and then by objectness.
 
-Differs: of more than 100 boxes the 100 most probable count, where darknet_ros sends none.
+Differs: of more than 100 boxes the 100 most probable ones are sent; darknet_ros sends none.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ MOST_BOXES = 100
 
 @dataclass(frozen=True)
 class Detection:
-    """Something seen.
+    """One detected object.
 
     Args:
-        class_id: its class, from 0, and that class's name.
+        class_id: index of its class, from 0; class_name: the name.
         probability: objectness times class, 0 to 1.
         xmin: left edge [px], and so on; inside the picture.
     """
@@ -50,21 +50,21 @@ class Detection:
 
 
 class Detector(Protocol):
-    """Finds things in pictures."""
+    """Interface of detectors."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The classes it knows."""
+        """Names of its classes."""
 
     @property
     def runtime(self) -> str:
-        """What computes it, for logs."""
+        """Its run-time, for logs."""
 
     def detect(self, picture: Picture) -> list[Detection]:
-        """What is seen in one picture.
+        """Detect objects in one picture.
 
         Raises:
-            ImageError: the picture cannot be looked at.
+            ImageError: the picture has no usable encoding.
         """
 
 
@@ -86,21 +86,21 @@ class DarknetDetector:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The classes it knows."""
+        """Names of its classes."""
         return self._names
 
     @property
     def runtime(self) -> str:
-        """What computes the network."""
+        """Run-time of the network."""
         return self._network.name
 
     def detect(self, picture: Picture) -> list[Detection]:
-        """What is seen in one picture; ImageError where it has no colours to look at."""
+        """Detect objects in one picture; ImageError if it has no colours."""
         found = self.candidates(picture)
         return to_detections(found, self._names, picture.width, picture.height)
 
     def candidates(self, picture: Picture) -> Candidates:
-        """The boxes as shares of the picture, after suppression."""
+        """Boxes relative to the picture, after suppression."""
         place = Letterbox(picture.width, picture.height, self._spec.width, self._spec.height)
         values = self._network.run(picture.eight_bits(), place)
         return decode(self._spec.heads, values, place, threshold=self._threshold, iou_threshold=IOU_THRESHOLD)
@@ -109,14 +109,14 @@ class DarknetDetector:
 def load_detector(
     cfg_path: str, weights_path: str, names: Sequence[str], *, threshold: float = 0.3, threads: int = 1
 ) -> DarknetDetector:
-    """Read a network's files and make it ready to run.
+    """Load a network's files and make it ready to run.
 
     Args:
         cfg_path: darknet's network file.
         weights_path: its weights file.
-        names: of its classes; where empty, read from the file beside the cfg that ends in .names.
+        names: of its classes; if empty, read from the .names file beside the cfg.
         threshold: on objectness and probability, 0 to 1.
-        threads: how many cores it may use.
+        threads: number of cores it may use.
 
     Raises:
         DetectorError: a file is missing, damaged or does not fit; says which and what to do.
@@ -129,7 +129,7 @@ def load_detector(
 
 
 def read_names(path: str, spec: NetworkSpec) -> list[str]:
-    """Class names, one a line.
+    """Read class names, one per line.
 
     Raises:
         DetectorError: there is no such file.
@@ -145,16 +145,16 @@ def read_names(path: str, spec: NetworkSpec) -> list[str]:
 
 
 def check_names(spec: NetworkSpec, names: Sequence[str]) -> None:
-    """Refuse names that do not match the network: DetectorError with both counts."""
+    """Check the number of names against the network; DetectorError with both counts."""
     if len(names) != spec.classes:
         raise DetectorError(f"{len(names)} class names are given, {spec.source} tells {spec.classes} classes apart")
 
 
 def to_detections(found: Candidates, names: Sequence[str], width: int, height: int) -> list[Detection]:
-    """Candidates as darknet_ros sends them, for a picture of `width` x `height` [px]."""
+    """Detections from candidates, as darknet_ros sends them, for a picture of `width` x `height` [px]."""
     low = np.clip(found.boxes[:, :2] - found.boxes[:, 2:] / 2, 0.0, None)
     high = np.clip(found.boxes[:, :2] + found.boxes[:, 2:] / 2, None, 1.0)
-    large = ((high - low) > SMALLEST_SHARE).all(axis=1)  # not so where something is not a number
+    large = ((high - low) > SMALLEST_SHARE).all(axis=1)  # False for NaN
     pixels = np.array([width, height])
     with np.errstate(invalid="ignore"):
         corners = np.concatenate([low * pixels, high * pixels], axis=1).astype(np.int64)

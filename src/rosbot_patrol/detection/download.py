@@ -1,4 +1,4 @@
-"""Fetch one large file over HTTP: resumed where it was cut, whole or not there at the end."""
+"""Download of one large file over HTTP: resumed after a break; at the end complete or absent."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ MOST_CUTS = 20
 def fetch(
     url: str, target: Path, *, size: int, sha256: str = "", progress: Callable[[int], None] = lambda _: None
 ) -> None:
-    """Fetch a file; what came is kept in TARGET.part until it is whole, and is gone on with the next time.
+    """Download a file; a partial download stays in TARGET.part and is resumed the next time.
 
     Args:
         url: http or https.
-        target: where to put it; its folder is made.
-        size: how long it has to be [bytes].
-        sha256: of its content, "" for any.
-        progress: told how many bytes there are, now and then.
+        target: path of the file; its folder is created.
+        size: expected size [bytes].
+        sha256: expected sum of its content, "" for any.
+        progress: called now and then with the number of bytes.
 
     Raises:
-        DetectorError: it cannot be had, or is another file; says why.
+        DetectorError: it is not available, or is another file; says why.
         OSError: the disk does not take it.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -70,7 +70,7 @@ def _fetch_all(url: str, part: Path, size: int, progress: Callable[[int], None])
 
 
 def _fetch_some(url: str, part: Path, have: int, size: int, progress: Callable[[int], None]) -> str:
-    """Fetch as far as the connection holds; returns why it ended."""
+    """Download until the connection ends; returns the reason."""
     request = urllib.request.Request(url, headers={"User-Agent": "rosbot_patrol", "Accept-Encoding": "identity"})
     if have:
         request.add_header("Range", f"bytes={have}-")
@@ -83,21 +83,21 @@ def _fetch_some(url: str, part: Path, have: int, size: int, progress: Callable[[
                 return _copy(answer, file, start, size, url, progress)
     except urllib.error.HTTPError as err:
         if err.code == http.client.REQUESTED_RANGE_NOT_SATISFIABLE and have:
-            part.unlink()  # not the same file any more: from the start
+            part.unlink()  # the file has changed: start again
             return _fetch_some(url, part, 0, size, progress)
         raise DetectorError(f"{url} answers {err.code} {err.reason}") from err
     except urllib.error.URLError as err:
         raise DetectorError(f"{url} cannot be reached: {err.reason}") from err
     except (http.client.HTTPException, OSError) as err:
         if isinstance(err, OSError) and err.filename is not None:
-            raise  # the disk's
+            raise  # an error of the disk
         if not part.exists():
             raise DetectorError(f"{url} broke off: {err or type(err).__name__}") from err
         return str(err) or type(err).__name__
 
 
 def _check(url: str, answer: http.client.HTTPResponse, have: int, size: int) -> int:
-    """Where in the file the answer begins; DetectorError where it is another file."""
+    """Offset in the file at which the response begins; DetectorError if it is another file."""
     start, offered = 0, answer.headers.get("Content-Length")
     total = int(offered) if offered and offered.isdigit() else None
     if have and answer.status == http.client.PARTIAL_CONTENT:

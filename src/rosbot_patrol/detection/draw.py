@@ -1,4 +1,4 @@
-"""Draw boxes into a picture. With Pillow: OpenCV would make the node that draws larger by 100 MB."""
+"""Drawing of boxes into a picture, with Pillow: OpenCV would enlarge the node by 100 MB."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from rosbot_patrol.images.encodings import Picture
 
 log = logging.getLogger(__name__)
 
-# blue, green, red; well apart for colour-blind eyes too (Okabe and Ito)
+# blue, green, red; distinct for colour-blind people, too (Okabe and Ito)
 COLOURS = ((0, 94, 213), (178, 114, 0), (66, 228, 240), (115, 158, 0), (167, 121, 204), (0, 159, 230), (233, 180, 86))
 
-_PAD = 2  # around a label's letters [px]
+_PAD = 2  # padding around a label's letters [px]
 
 
 def draw_boxes(picture: Picture, found: Iterable[Detection]) -> Picture:
-    """A copy of the picture in bgr8, with box, class and probability of everything found."""
+    """Copy of the picture in bgr8, with box, class and probability of each detection."""
     canvas = Image.fromarray(picture.to("bgr8").pixels)
     draw = ImageDraw.Draw(canvas)
     for one in found:
@@ -37,7 +37,7 @@ def _label(
     draw: ImageDraw.ImageDraw, size: tuple[int, int], text: str, corner: tuple[int, int], colour: tuple[int, int, int]
 ) -> None:
     font = _font(max(11, round(size[1] / 36)))
-    if not isinstance(font, ImageFont.FreeTypeFont):  # Pillow's own letters, which are those of Latin 1
+    if not isinstance(font, ImageFont.FreeTypeFont):  # Pillow's own font has only the letters of Latin 1
         text = text.encode("latin-1", "replace").decode("latin-1")
     _, top, width, height = font.getbbox(text)
     width, height = width + 2 * _PAD, height - top + 2 * _PAD

@@ -1,10 +1,10 @@
-"""People by OpenCV's built-in detector, for a real camera before there are any weights.
+"""People detector of OpenCV, for a real camera without any weights.
 
 Histograms of oriented gradients and a linear support vector machine (Dalal and Triggs, CVPR 2005), trained by them on
-standing and walking people seen whole. It finds no one who sits, lies, is cut off by the picture's edge or is nearer
-than about 2.5 m before a usual camera; furniture and door frames may pass for people.
+whole standing and walking people. It does not find people who sit, lie, are cut off by the picture's border or are
+nearer than about 2.5 m to a usual camera. Furniture and door frames may be detected as people.
 
-The probability is 1 / (1 + exp(-2 margin)) of the machine's margin: it grows with it, and is not calibrated.
+The probability is 1 / (1 + exp(-2 margin)) of the machine's margin: it grows with the margin and is not calibrated.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ MOST_PIXELS = 480 * 360
 
 
 class HogDetector:
-    """Finds people without any files.
+    """Detects people without any files.
 
     Args:
-        threshold: least probability, 0 to 1.
-        threads: how many cores it may use; OpenCV counts for the whole process.
+        threshold: minimum probability, 0 to 1.
+        threads: number of cores it may use; OpenCV applies it to the whole process.
     """
 
     def __init__(self, *, threshold: float = 0.7, threads: int = 1) -> None:
@@ -43,16 +43,16 @@ class HogDetector:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The classes it knows."""
+        """Names of its classes."""
         return NAMES
 
     @property
     def runtime(self) -> str:
-        """What computes it."""
+        """Its run-time."""
         return f"OpenCV {cv2.__version__} HOG"
 
     def detect(self, picture: Picture) -> list[Detection]:
-        """What is seen in one picture; ImageError where it has no colours to look at."""
+        """Detect people in one picture; ImageError if it has no colours."""
         pixels = picture.to("bgr8").pixels
         shrink = min(1.0, (MOST_PIXELS / (picture.width * picture.height)) ** 0.5)
         if shrink < 1.0:
@@ -70,7 +70,7 @@ class HogDetector:
 
 
 def _people(windows: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The people in windows (left, top, width, height [px], shape (N, 4)): centres and sizes as shares."""
+    """Candidates from windows (left, top, width, height [px], shape (N, 4)): relative centres and sizes."""
     size = np.array([width, height], dtype=np.float64)
     centres = (windows[:, :2] + windows[:, 2:] / 2.0) / size
     return np.concatenate([centres, windows[:, 2:] * PERSON_SHARE / size], axis=1)

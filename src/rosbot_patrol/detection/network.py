@@ -1,4 +1,4 @@
-"""The run-times that compute a network: onnxruntime, or OpenCV's dnn where that is not installed."""
+"""Run-times of a network: onnxruntime, or OpenCV's dnn if that is not installed."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ class Network(Protocol):
         """The run-time, for logs."""
 
     def run(self, picture: Picture, place: Letterbox) -> list[np.ndarray]:
-        """The values before each head, shape (channels, rows, columns), for an 8-bit picture."""
+        """Values before each head, shape (channels, rows, columns), for an 8-bit picture."""
 
 
 class OnnxNetwork:
-    """A network computed by onnxruntime; holds no lock of Python's while it computes.
+    """A network run by onnxruntime, without Python's global lock.
 
     Args:
-        model: a graph as of `onnx_build`.
+        model: a graph from `onnx_build`.
         channels: of the network's input, 1 or 3.
-        threads: how many cores it may use.
+        threads: number of cores it may use.
     """
 
     def __init__(self, model: bytes, *, channels: int, threads: int) -> None:
@@ -44,7 +44,7 @@ class OnnxNetwork:
         options = runtime.SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
-        # waiting threads sleep: on a robot's two cores the rest of the house needs them
+        # let waiting threads sleep: the other programs need the robot's two cores
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         options.log_severity_level = 3
         self._session = runtime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
@@ -52,7 +52,7 @@ class OnnxNetwork:
         self.name = f"onnxruntime {runtime.__version__}"
 
     def run(self, picture: Picture, place: Letterbox) -> list[np.ndarray]:
-        """The values before each head."""
+        """Values before each head."""
         width, height = place.fitted
         left, top, right, bottom = place.margins
         if self._grey:
@@ -68,7 +68,7 @@ class OnnxNetwork:
 
 
 class CvNetwork:
-    """A network computed by OpenCV's dnn, several times slower.
+    """A network run by OpenCV's dnn, several times slower.
 
     Args:
         cv2: the module.
@@ -89,13 +89,13 @@ class CvNetwork:
         self.name = f"OpenCV {cv2.__version__} dnn"
 
     def run(self, picture: Picture, place: Letterbox) -> list[np.ndarray]:
-        """The values before each head."""
+        """Values before each head."""
         self._net.setInput(place.draw(picture.to(self._encoding).pixels)[None])
         return [values[0] for values in self._net.forward(self._before_heads)]
 
 
 def _cv_name(spec: NetworkSpec, head: Head) -> str:
-    """What OpenCV calls the layer before a head, whose own decoding differs from darknet's and is not used."""
+    """OpenCV's name of the layer before a head; its own decoding differs from darknet's and is not used."""
     before = spec.layers[head.index - 1] if head.index else None
     if not isinstance(before, Convolutional):
         raise DetectorError(f"{spec.source}, line {head.line}: OpenCV needs a convolution before it")
@@ -104,10 +104,10 @@ def _cv_name(spec: NetworkSpec, head: Head) -> str:
 
 
 def load_network(spec: NetworkSpec, weights: Sequence[ConvWeights], *, threads: int = 1) -> Network:
-    """Make a network ready to run, on the best run-time there is.
+    """Make a network ready to run, on the best available run-time.
 
     Raises:
-        DetectorError: there is none.
+        DetectorError: no run-time is installed.
     """
     if spec.channels not in (1, 3):
         raise DetectorError(f"{spec.source}: takes {spec.channels} channels, pictures have 1 or 3")

@@ -146,7 +146,7 @@ class DarknetParams:
     )
 
     def network_files(self, own_models: str) -> tuple[str, str]:
-        """Paths of cfg and weights; without any folder given our own network in `own_models`."""
+        """Paths of cfg and weights; without any folder, of our own network in `own_models`."""
         model = self.yolo_model
         if not (self.weights_path or self.config_path or model.config_file.name or model.weight_file.name):
             return os.path.join(own_models, "house.cfg"), os.path.join(own_models, "house.weights")

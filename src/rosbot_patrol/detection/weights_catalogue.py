@@ -1,6 +1,6 @@
-"""The weights files that go with the networks of darknet_ros: where their authors offer them, and how to know them.
+"""Catalogue of published weights files for darknet_ros's networks: address, size and checksum.
 
-Sizes follow from the networks; sums are those that several independent projects publish, "" where none was found.
+Sizes follow from the networks. Checksums are those published by several independent projects, "" if none was found.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ class WeightsFile:
     Args:
         name: of its network; the file is called NAME.weights.
         size: [bytes].
-        url: where its authors offer it.
-        sha256: of its content, "" where it is not known.
+        url: its authors' download address.
+        sha256: of its content, "" if unknown.
     """
 
     name: str
@@ -33,7 +33,7 @@ class WeightsFile:
         return f"{self.name}.weights"
 
     def describe(self) -> str:
-        """Its name, size and sum, so that somebody can tell a copy of it."""
+        """Name, size and checksum, so that somebody can recognise a copy."""
         known = f", sha256 {self.sha256}" if self.sha256 else ""
         return f"{self.file} ({self.size:,} bytes{known})"
 

@@ -1,1 +1,1 @@
-"""Where a robot without a map drives next: frontiers of the known space."""
+"""Frontier exploration: where a robot without a map drives next."""

@@ -1,4 +1,4 @@
-"""Drives the robot to the borders of its map until there are none, and then home: a map without a hand on the keys."""
+"""Exploration: drives the robot to the frontiers of its map until there are none, and then home."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from rosbot_patrol.params import param
 
 log = logging.getLogger(__name__)
 
-_SAME = 0.6  # so near to each other two borders are one [m]
-_NEARER = 0.15  # that is progress [m]
+_SAME = 0.6  # frontiers closer than this are one [m]
+_NEARER = 0.15  # decrease of the distance that counts as progress [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,13 +32,13 @@ class ExplorerParams:
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """What to do now.
+    """Output of one step.
 
     Attributes:
-        goal: to drive to, None: nothing new.
-        is_done: it is over.
-        text: what it is about.
-        frontiers: of the newest look at the map, None where it did not look.
+        goal: next goal, None: unchanged.
+        is_done: exploration is over.
+        text: its reason.
+        frontiers: of the latest evaluation of the map, None without one.
     """
 
     goal: Goal | None = None
@@ -48,14 +48,14 @@ class Step:
 
 
 class Explorer:
-    """Explores once.
+    """Runs one exploration.
 
     Args:
-        params: when to go on.
+        params: time limits.
 
     Attributes:
-        left_out: borders that could not be reached, or that stayed when the robot stood there, in map [m].
-        area: floor that the map showed last [m2].
+        left_out: frontiers that were unreachable, or remained after the robot's visit, in map [m].
+        area: floor in the latest map [m2].
     """
 
     def __init__(self, params: ExplorerParams | None = None) -> None:
@@ -67,18 +67,18 @@ class Explorer:
         self._goal: Goal | None = None
         self._tags = itertools.count(1)
         self._best, self._since, self._looked = math.inf, 0.0, -math.inf
-        self._arrived: tuple[float, int] | None = None  # when, and the number of the map then
+        self._arrived: tuple[float, int] | None = None  # time, and the number of the map then
         self._goes_home = self._is_over = False
 
     def step(self, now: float, grid: Grid | None, maps: int, pose: Pose2D | None, link: GoalLink) -> Step:
-        """Go on.
+        """Decide what to do now.
 
         Args:
             now: [s].
             grid: the newest map.
-            maps: how many there were so far.
+            maps: number of maps so far.
             pose: of the robot in map.
-            link: what move_base says.
+            link: state of move_base.
         """
         if self._is_over:
             return Step(is_done=True, text="explored")
@@ -103,7 +103,7 @@ class Explorer:
             return Step(text=self._about)
         self._looked = now
         found = Borders(grid, pose, self.params.frontiers).frontiers()
-        if not any(_is_at(f, self._target) for f in found):  # it was seen on the way
+        if not any(_is_at(f, self._target) for f in found):  # it was explored on the way
             return self._next(now, grid, pose)
         return Step(text=self._about, frontiers=tuple(found))
 
@@ -113,7 +113,7 @@ class Explorer:
         return "" if t is None else f"driving to a border of {t.length:.1f} m at ({t.x:.1f}, {t.y:.1f})"
 
     def _look(self, now: float, grid: Grid, maps: int, pose: Pose2D) -> Step:
-        """The robot stands at a border; the next map but one shows what it saw from there."""
+        """Wait at a frontier: the next map but one includes the scans from there."""
         if self._arrived is None:
             self._arrived = now, maps
         if maps < self._arrived[1] + 2 and now - self._arrived[0] < self.params.map_patience:

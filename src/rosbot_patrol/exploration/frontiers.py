@@ -1,7 +1,7 @@
-"""Where a map ends before a wall does: borders between floor and the unknown, and where to stand to look beyond.
+"""Frontiers of a map: borders between floor and unknown space, and where to stand to look beyond.
 
 Frontier-based exploration (Yamauchi, A frontier-based approach for autonomous exploration, CIRA 1997); frontiers are
-weighed by way and length.
+weighed by path length and size.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ class FrontierParams:
 
 @dataclass(frozen=True, kw_only=True)
 class Frontier:
-    """One border to the unknown.
+    """One frontier.
 
     Attributes:
-        x: of its middle in map [m]; y: likewise.
+        x, y: its centre in map [m].
         length: of it [m].
         goal: where to stand, looking at it.
-        way: to there [m].
-        cost: the less the better.
+        way: path length to the goal [m].
+        cost: smaller is better.
     """
 
     x: float
@@ -58,12 +58,12 @@ class Frontier:
 
 
 class Borders:
-    """A map and what of it the robot reaches.
+    """A map and the part of it that the robot can reach.
 
     Args:
         grid: occupancy, -1 unknown, 0 free to 100 occupied.
         start: of the robot in map.
-        params: what is worth a drive.
+        params: limits.
     """
 
     def __init__(self, grid: Grid, start: Pose2D, params: FrontierParams) -> None:
@@ -81,11 +81,11 @@ class Borders:
 
     @property
     def area(self) -> float:
-        """Floor that is known [m2]."""
+        """Known floor [m2]."""
         return float(self._free.sum()) * self._info.resolution**2
 
     def frontiers(self) -> list[Frontier]:
-        """Those that can be reached, the best first."""
+        """Reachable frontiers, the best first."""
         p, beside = self._params, cv2.dilate(self._unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         border = self._free & beside & (self._clearance >= p.frontier_clearance)
         count, labels, stats, _ = cv2.connectedComponentsWithStats(border.astype(np.uint8), connectivity=8)
@@ -112,7 +112,7 @@ class Borders:
         return Frontier(x=x, y=y, length=length, goal=Pose2D(*at, yaw), way=way, cost=cost)
 
     def _nearest(self, mask: Mask, x: float, y: float, within: float = 1.0) -> tuple[int, int] | None:
-        """(ix, iy) of the mask's cell that is nearest to a place, None where none lies within a distance [m]."""
+        """(ix, iy) of the mask's cell nearest to a place, None if there is none within a distance [m]."""
         info, reach = self._info, math.ceil(within / self._info.resolution)
         ix, iy = info.cell_of(x, y)
         x0, y0 = max(ix - reach, 0), max(iy - reach, 0)
@@ -127,7 +127,7 @@ class Borders:
 
 
 def _distances(is_wall: Mask, resolution: float) -> Array:
-    """Of each cell to the nearest wall [m]."""
+    """Distance from each cell to the nearest wall [m]."""
     if not is_wall.any():
         return np.full(is_wall.shape, math.inf)
     return np.asarray(cv2.distanceTransform((~is_wall).astype(np.uint8), cv2.DIST_L2, 5), np.float64) * resolution

@@ -1,1 +1,1 @@
-"""Encodings of pictures: ROS messages and compressed bytes to numpy arrays and back."""
+"""Encodings of pictures: conversion between ROS messages, compressed bytes and numpy arrays."""

@@ -1,14 +1,13 @@
-"""Pictures as jpeg and png, and the text that says what they were before.
+"""Compression of pictures to JPEG and PNG, and the message text with their original encoding.
 
-Matches compressed_image_transport (noetic-devel): the format "rgb8; jpeg compressed bgr8" and its like, colours stored
-as blue, green, red, the source's encoding restored on the way back.
+Matches compressed_image_transport (noetic-devel): formats such as "rgb8; jpeg compressed bgr8", colours stored as blue,
+green, red, and the source's encoding restored on the way back.
 
-Differs: 16-bit pictures become jpegs with their values scaled to 8 bits, where upstream cuts them off at 255; `mode`
-gray gives mono8 for jpeg too; a depth picture as jpeg is refused; colours of 16 bits and yuv422 travel as 8 bits a
-colour.
+Differs: 16-bit pictures become JPEGs with values scaled to 8 bits, where upstream clips them at 255. `mode` gray gives
+mono8 for JPEG, too. A depth picture as JPEG is refused. Colours of 16 bits and yuv422 travel as 8 bits per colour.
 
-A jpeg as most are is written and read by libjpeg-turbo itself (simplejpeg), whatever the order of its colours; OpenCV,
-which takes a node 100 MB, is loaded for the rest.
+An ordinary JPEG is written and read by libjpeg-turbo itself (simplejpeg), in any order of colours. OpenCV, which costs
+a node 100 MB, is loaded only for the rest.
 """
 
 from __future__ import annotations
@@ -44,12 +43,12 @@ class CompressedParams:
 
     @property
     def plain(self) -> bool:
-        """Whether it is a jpeg as any, without the special kinds that only `cv2.imencode` writes."""
+        """Whether it is an ordinary JPEG, without the special kinds that only `cv2.imencode` writes."""
         special = self.jpeg_progressive or self.jpeg_optimize or self.jpeg_restart_interval > 0
         return self.format == "jpeg" and not special
 
     def options(self) -> list[int]:
-        """The same for `cv2.imencode`."""
+        """The parameters for `cv2.imencode`."""
         cv2 = _opencv()
         if self.format == "png":
             return [cv2.IMWRITE_PNG_COMPRESSION, self.png_level]
@@ -84,11 +83,11 @@ def compress(picture: Picture, params: CompressedParams) -> tuple[str, bytes]:
 
 
 def _plain_jpeg(pixels: np.ndarray, encoding: str, params: CompressedParams) -> bytes | None:
-    """As `_encode`, a quarter faster: the colours need not be put in another order first."""
+    """Like `_encode`, a quarter faster, because the colours need no reordering."""
     order = _ORDERS.get(encoding, _BY_CHANNELS[pixels.shape[2]])
     try:
         data: bytes = simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), params.jpeg_quality, order, "420")
-    except ValueError:  # such as more columns than a jpeg can have
+    except ValueError:  # such as more columns than a JPEG can have
         return None
     return data
 
@@ -127,7 +126,7 @@ def decompress(text: str, data: bytes, *, mode: str = "unchanged") -> Picture:
     flag = {"gray": cv2.IMREAD_GRAYSCALE, "color": cv2.IMREAD_COLOR}.get(mode, cv2.IMREAD_UNCHANGED)
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flag) if data else None
-    except cv2.error as err:  # such as a header that speaks of a billion pixels
+    except cv2.error as err:  # such as a header that announces a billion pixels
         raise ImageError(f"{count_of(len(data), 'byte')} of the format '{text}' cannot be decoded: {err}") from err
     if pixels is None:
         one, many = f"byte of the format '{text}' is", f"bytes of the format '{text}' are"
@@ -157,7 +156,7 @@ def _opencv() -> Any:
 
 
 def _has_no_place(picture: Picture, name: str) -> bool:
-    """Whether a file of that format cannot hold its values as they are, or a reader would take them for others."""
+    """Whether a file of that format cannot store its values, or a reader would misinterpret them."""
     known = ENCODINGS[picture.encoding]
     deep = picture.pixels.dtype == np.uint16
     return known.channels == 2 or (deep and (known.channels > 1 or (known.raw and name == "jpeg")))

@@ -1,11 +1,11 @@
-"""Depth pictures compressed without loss of what matters: png or RVL of 16-bit values.
+"""Compression of depth pictures: PNG or RVL of 16-bit values.
 
-Matches compressed_depth_image_transport (noetic-devel): 12 bytes ahead (format, two parameters), metres as inverse
-depth quantised to 16 bits, millimetres as they are but for those beyond `depth_max`, and the format's text, such as
-"32FC1; compressedDepth png".
+Matches compressed_depth_image_transport (noetic-devel): 12 bytes of header (format, two parameters), metres as inverse
+depth quantised to 16 bits, millimetres unchanged up to `depth_max`, and a format text such as "32FC1; compressedDepth
+png".
 
-Differs: what is not positive counts as unknown, and what is nearer than 16 bits reach is as near as they do; upstream
-leaves both to chance. Data that end too soon, or that lie about their size, are refused.
+Differs: values that are not positive are unknown, and values too near for 16 bits are clamped; upstream's result is
+undefined for both. Data that end too soon, or state a wrong size, are refused.
 """
 
 from __future__ import annotations
@@ -67,11 +67,11 @@ def compress_depth(picture: Picture, params: CompressedDepthParams) -> tuple[str
 
 
 def decompress_depth(text: str, data: bytes) -> Picture:
-    """The depth picture in compressed bytes.
+    """The depth picture from compressed bytes.
 
     Args:
-        text: the message's format; without "png" or "rvl" it is an older sender's png.
-        data: what came.
+        text: the message's format; without "png" or "rvl" it is a PNG from an older sender.
+        data: compressed bytes.
 
     Raises:
         ImageError: the bytes are no such picture; says why.

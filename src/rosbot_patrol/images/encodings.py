@@ -1,7 +1,7 @@
-"""Pictures in the encodings of sensor_msgs/Image, as numpy arrays.
+"""Pictures as numpy arrays, in the encodings of sensor_msgs/Image.
 
-Matches what cv_bridge makes of mono, rgb, bgr, rgba and bgra of 8 and 16 bits, their 8UC and 16UC names, 32FC1, and a
-camera's own bayer mosaics and yuv422. Only the last two need OpenCV (98 MB in a process that only looks at pixels).
+Matches cv_bridge for mono, rgb, bgr, rgba and bgra of 8 and 16 bits, their 8UC and 16UC names, 32FC1, and a camera's
+own bayer mosaics and yuv422. Only the last two need OpenCV (98 MB in a process that only reads pixels).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ class Encoding:
     Args:
         dtype: numpy's name of the type, without byte order.
         channels: values of a pixel.
-        order: which are red, green and blue, () where none is.
-        raw: as a camera's chip or driver gives it, to be developed into colours (`raw_colours`).
+        order: indices of red, green and blue, () without colours.
+        raw: raw data of a camera's chip or driver, to be developed into colours (`raw_colours`).
     """
 
     dtype: str
@@ -59,7 +59,7 @@ ENCODINGS = {
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture and how to read it.
+    """A picture and its encoding.
 
     Args:
         pixels: values, shape (rows, columns, channels), in this machine's byte order; may be read-only.
@@ -81,10 +81,10 @@ class Picture:
 
     @property
     def order(self) -> tuple[int, ...]:
-        """Which channel is red, green and blue.
+        """Indices of the red, green and blue channels.
 
         Raises:
-            ImageError: it has no colours to look at (depth).
+            ImageError: it has no colours (depth).
         """
         order = ENCODINGS[self.encoding].order
         if not order:
@@ -92,7 +92,7 @@ class Picture:
         return order
 
     def eight_bits(self) -> Picture:
-        """The same with 8 bits a value and in colours or grey; 16 bits are scaled as cv_bridge does."""
+        """The picture with 8 bits per value, in colour or grey; 16 bits are scaled as in cv_bridge."""
         if ENCODINGS[self.encoding].raw:
             develop = importlib.import_module("rosbot_patrol.images.raw_colours").develop
             developed: Picture = develop(self)
@@ -105,7 +105,7 @@ class Picture:
         return Picture(scaled, self.encoding.replace("16", "8"))
 
     def to(self, encoding: str) -> Picture:
-        """The same in mono8, rgb8 or bgr8; the pixels may be shared with this one."""
+        """The picture in mono8, rgb8 or bgr8; it may share the pixels of this one."""
         if encoding == self.encoding:
             return self
         if encoding not in ("mono8", "rgb8", "bgr8"):
@@ -126,7 +126,7 @@ class Picture:
         if self.pixels.shape[2] == 1:
             return self.pixels
         red, green, blue = (self.pixels[:, :, i].astype(np.uint32) for i in self.order)
-        # the weights of BT.601 in 14 bits, as OpenCV
+        # weights of BT.601 in 14 bits, as in OpenCV
         return ((red * 4899 + green * 9617 + blue * 1868 + 8192) >> 14).astype(np.uint8)[:, :, None]
 
 
@@ -141,10 +141,10 @@ def unpack(
         width: columns [px].
         height: rows [px].
         step: length of a row [bytes]; 0 means no gap between rows.
-        big_endian: how values of more than one byte are written.
+        big_endian: byte order of values of more than one byte.
 
     Raises:
-        ImageError: the encoding is not known here, or the sizes do not fit; says which.
+        ImageError: the encoding is unknown, or the sizes do not fit; says which.
     """
     known = ENCODINGS.get(encoding)
     if known is None:
@@ -165,7 +165,7 @@ def unpack(
 
 
 def pack(picture: Picture) -> tuple[bytes, int]:
-    """The bytes of a picture message (little-endian, no gaps) and the length of a row [bytes]."""
+    """Bytes of a picture message (little-endian, no gaps), and the length of a row [bytes]."""
     pixels = picture.pixels
     little = np.ascontiguousarray(pixels, dtype=pixels.dtype.newbyteorder("<"))
     return little.tobytes(), pixels.shape[1] * pixels.shape[2] * pixels.dtype.itemsize

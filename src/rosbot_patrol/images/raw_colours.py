@@ -1,4 +1,4 @@
-"""Colours from what a camera's chip or driver gives: bayer mosaics and yuv422.
+"""Conversion of a camera's raw data to colours: bayer mosaics and yuv422.
 
 Matches cv_bridge's conversions of bayer_* (OpenCV's bilinear rule), yuv422 (u, y, v, y) and yuv422_yuy2 (y, u, y, v).
 """
@@ -22,7 +22,7 @@ _CODES = {
 
 
 def develop(picture: Picture) -> Picture:
-    """The picture in rgb8, or rgb16 where a mosaic has 16 bits.
+    """The picture in rgb8, or rgb16 for a mosaic of 16 bits.
 
     Raises:
         ImageError: it is too small or too odd for its pattern.

@@ -9,7 +9,7 @@ from rosbot_patrol.kernels import kernel
 
 @kernel("int64(uint16[::1], uint8[::1])")
 def encode(values, out):
-    """Write values into `out`, which has room for 3 bytes a value and 16 more; returns how many bytes are used."""
+    """Write values into `out`, which has room for 3 bytes per value and 16 more; returns the number of bytes used."""
     word, filled, at = 0, 0, 0
     i, previous, count = 0, 0, len(values)
     while i < count:
@@ -55,7 +55,7 @@ def encode(values, out):
 
 @kernel("UniTuple(int64, 2)(uint8[::1], int64)")
 def read_number(data, at):
-    """The number that begins at a nibble, and the nibble after it; -1 for that where the data end or make no sense."""
+    """Read the number at a nibble; returns it and the next nibble, which is -1 if the data end or are invalid."""
     nibbles = (len(data) // 4) * 8
     number, shift = 0, 0
     while at < nibbles and shift <= 30:
@@ -70,7 +70,7 @@ def read_number(data, at):
 
 @kernel("int64(uint8[::1], uint16[::1])")
 def decode(data, out):
-    """Read values into `out`; returns how many there were, -1 where the data end too soon or make no sense."""
+    """Read values into `out`; returns their number, -1 if the data end too soon or are invalid."""
     at, done, previous, count = 0, 0, 0, len(out)
     while done < count:
         for part in range(2):

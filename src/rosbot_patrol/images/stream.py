@@ -1,4 +1,4 @@
-"""Whether a camera is alive: silent since, frozen since."""
+"""Supervision of a camera's stream: silent or frozen, and since when."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 class Stream(enum.Enum):
-    """What a stream of pictures does."""
+    """State of a stream of pictures."""
 
     WAITING = "no picture yet"
     FLOWING = "pictures come in"
@@ -17,11 +17,11 @@ class Stream(enum.Enum):
 
 @dataclass
 class StreamWatch:
-    """Watches one stream of pictures, in seconds of a clock that does not stop (not simulated time).
+    """Supervises one stream of pictures, in seconds of a clock that does not stop (not simulated time).
 
     Args:
-        timeout: silence that means it has stopped [s].
-        frozen_timeout: the same picture for this long means it is frozen [s], 0 for never.
+        timeout: silence after which it counts as stopped [s].
+        frozen_timeout: time of unchanging pictures after which it counts as frozen [s]; 0: never.
     """
 
     timeout: float
@@ -32,7 +32,7 @@ class StreamWatch:
     _content: object = None
 
     def note(self, now: float, content: object) -> None:
-        """A picture has come in; equal contents mean that nothing has changed."""
+        """Record a picture; equal contents mean that nothing has changed."""
         fresh = self._last is None or not 0.0 <= now - self._last <= self.timeout
         if fresh or content != self._content:
             self._changed = now
@@ -43,11 +43,11 @@ class StreamWatch:
 
     @property
     def rate(self) -> float:
-        """Pictures a second, smoothed."""
+        """Pictures per second, smoothed."""
         return self._rate
 
     def state(self, now: float) -> Stream:
-        """What the stream does."""
+        """State of the stream."""
         if self._last is None:
             return Stream.WAITING
         if now - self._last > self.timeout:

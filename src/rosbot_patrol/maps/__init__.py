@@ -1,1 +1,1 @@
-"""Occupancy grids: map files, pictures of maps, distances, ways."""
+"""Occupancy grids: map files, map images, distances, path lengths."""

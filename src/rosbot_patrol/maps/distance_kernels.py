@@ -1,4 +1,4 @@
-"""Exact Euclidean distance to the nearest marked cell, bounded (Felzenszwalb and Huttenlocher 2012)."""
+"""Inner loop: exact bounded Euclidean distance to the nearest marked cell (Felzenszwalb and Huttenlocher 2012)."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from rosbot_patrol.kernels import kernel
 
 @kernel("float32[:, ::1](boolean[:, ::1], int64)")
 def bounded_distances(marked: NDArray[np.bool_], bound: int) -> NDArray[np.float32]:
-    """Distance of each cell to the nearest marked one, in cells, at most `bound`; shape as `marked`.
+    """Distance from each cell to the nearest marked one [cells], at most `bound`; shape as `marked`.
 
-    First along the columns, by one sweep up and one down over whole rows; then along each row by the lower envelope
-    of the parabolas that the column distances open.
+    First along the columns, by one sweep up and one down over whole rows. Then along each row, by the lower envelope of
+    the parabolas given by the column distances.
     """
     height, width = marked.shape
     column = np.empty((height, width), dtype=np.int32)

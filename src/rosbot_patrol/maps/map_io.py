@@ -1,4 +1,4 @@
-"""A map on disk: a yaml file and its picture, read as map_server reads them and written as map_saver writes them.
+"""Map files: a yaml file and its image, read as map_server does and written as map_saver does.
 
 The grid's row 0 is the lowest y; the picture's first row is the highest. Only this module flips.
 """
@@ -23,7 +23,7 @@ from rosbot_patrol.maps.pictures import pgm_bytes, read_picture
 
 @dataclass(frozen=True, kw_only=True)
 class MapFile:
-    """What a map's yaml says: picture, edge of a pixel [m], lower left corner (x, y [m], yaw [rad]), thresholds."""
+    """Contents of a map's yaml: image, edge of a pixel [m], lower left corner (x, y [m], yaw [rad]), thresholds."""
 
     image: Path
     resolution: float
@@ -32,7 +32,7 @@ class MapFile:
 
 
 def read_map(path: Path | str) -> Grid:
-    """A map as int8 cells (-1 unknown, 0 free to 100 occupied), from its yaml.
+    """Read a map as int8 cells (-1 unknown, 0 free to 100 occupied), from its yaml.
 
     Raises:
         MapError: the yaml or its picture is missing or broken; names file and key.
@@ -41,7 +41,7 @@ def read_map(path: Path | str) -> Grid:
 
 
 def read_map_file(path: Path | str) -> MapFile:
-    """Read and check a map's yaml; the picture's path is taken from the folder of the yaml. Raises MapError."""
+    """Read and check a map's yaml; the image's path is relative to the yaml's folder. Raises MapError."""
     path = Path(path)
     tree = _yaml_tree(path)
     image = _value(path, tree, "image", str, "the picture's file name")
@@ -59,7 +59,7 @@ def read_map_file(path: Path | str) -> MapFile:
 
 
 def read_grid(map_file: MapFile) -> Grid:
-    """The cells of a map whose yaml is read. Raises MapError."""
+    """Read the cells of a map after its yaml. Raises MapError."""
     picture = read_picture(map_file.image)
     cells = np.ascontiguousarray(np.flipud(cells_from_picture(picture, map_file.thresholds)))
     height, width = cells.shape
@@ -69,7 +69,7 @@ def read_grid(map_file: MapFile) -> Grid:
 
 
 def map_bytes(grid: Grid, image_name: str, *, occupied: int = 65, free: int = 25) -> tuple[bytes, bytes]:
-    """The pgm and the yaml of a map, byte for byte as map_saver writes them."""
+    """Bytes of a map's pgm and yaml, exactly as map_saver writes them."""
     info = grid.info
     picture = picture_from_cells(np.flipud(grid.cells), occupied=occupied, free=free)
     pgm = pgm_bytes(picture, f"CREATOR: map_saver.cpp {info.resolution:.3f} m/pix")
@@ -83,9 +83,9 @@ def map_bytes(grid: Grid, image_name: str, *, occupied: int = 65, free: int = 25
 
 
 def write_map(stem: str, grid: Grid, *, occupied: int = 65, free: int = 25) -> tuple[Path, Path]:
-    """Write `stem`.pgm and `stem`.yaml, each whole or not at all; returns both paths.
+    """Write `stem`.pgm and `stem`.yaml, each completely or not at all; returns both paths.
 
-    The yaml names the picture as given where `stem` is absolute or has no folder, else by its file name alone.
+    The yaml names the image as given if `stem` is absolute or has no folder, else by its file name alone.
 
     Raises:
         MapError: a file cannot be written.
@@ -126,7 +126,7 @@ def _value(path: Path, tree: dict[str, Any], key: str, kind: type, expected: str
 
 
 def _as_number(value: Any) -> float | None:
-    """A number. Yaml 1.1 reads `1e-2` as a text, yaml-cpp as a number: take both."""
+    """Convert to a number; yaml 1.1 reads `1e-2` as a text, yaml-cpp as a number: accept both."""
     if isinstance(value, bool):
         return None
     try:

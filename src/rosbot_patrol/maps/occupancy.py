@@ -1,4 +1,4 @@
-"""Grey values of a map's picture <-> occupancy values (-1 unknown, 0 free to 100 occupied), as map_server has them."""
+"""Conversion between grey values of a map's image and occupancy (-1 unknown, 0 to 100), as in map_server."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GREY_FREE, GREY_OCCUPIED, GREY_UNKNOWN = 254, 0, 205
 
 @dataclass(frozen=True, kw_only=True)
 class Thresholds:
-    """How grey becomes occupancy: darkness above `occupied` is a wall, below `free` is floor (0 to 1)."""
+    """Conversion of grey to occupancy: darkness above `occupied` is a wall, below `free` is floor (0 to 1)."""
 
     occupied: float = 0.65
     free: float = 0.196
@@ -26,14 +26,14 @@ class Thresholds:
 
 
 def cells_from_picture(picture: NDArray[np.uint8], thresholds: Thresholds) -> NDArray[np.int8]:
-    """Occupancy of each pixel, rows in the picture's order.
+    """Occupancy of each pixel, in the image's order of rows.
 
     Args:
         picture: shape (rows, columns) or (rows, columns, channels); the last of 2 or 4 channels is alpha.
         thresholds: how grey is read. `trinary` averages alpha in with the colours, as upstream does; `scale` leaves
             cells between the thresholds unknown where alpha is 0; `raw` takes the value as it is (255 is unknown).
     """
-    if picture.ndim == 2:  # one of 256 answers for each pixel: look it up
+    if picture.ndim == 2:  # only 256 different values: use a table
         answers = _cells_of_greys(np.arange(256.0), np.ones(256, dtype=bool), thresholds)
         found: NDArray[np.int8] = answers[picture]
         return found

@@ -1,4 +1,4 @@
-"""Pictures of maps: portable grey and pixel maps read by numpy, all other formats by OpenCV where it is installed."""
+"""Image files of maps: pgm and ppm are read by numpy, other formats by OpenCV if it is installed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_PIXELS = 1 << 30
 
 
 def read_picture(path: Path) -> NDArray[np.uint8]:
-    """The pixels of a picture, shape (rows, columns) or (rows, columns, channels), top row first.
+    """Read the pixels of an image, shape (rows, columns) or (rows, columns, channels), top row first.
 
     Raises:
         MapError: the file is missing, cut short, or no picture.
@@ -89,7 +89,7 @@ def _read_by_opencv(path: Path, data: bytes) -> NDArray[np.uint8]:
 
 
 def _is_cut_short(data: bytes) -> bool:
-    """Whether a png lacks its last chunk or a bmp is shorter than it says (OpenCV fills the rest without a word)."""
+    """Whether a png lacks its last chunk or a bmp is shorter than it states (OpenCV pads the rest in silence)."""
     if data.startswith(b"\x89PNG"):
         return b"IEND" not in data[-64:]
     if data.startswith(b"BM") and len(data) >= 6:
@@ -98,7 +98,7 @@ def _is_cut_short(data: bytes) -> bool:
 
 
 def pgm_bytes(picture: NDArray[np.uint8], comment: str) -> bytes:
-    """A grey picture as a binary pgm, byte for byte as map_saver writes it."""
+    """Bytes of a grey image as binary pgm, exactly as map_saver writes it."""
     height, width = picture.shape
     header = f"P5\n# {comment}\n{width} {height}\n255\n".encode()
     return header + np.ascontiguousarray(picture).tobytes()

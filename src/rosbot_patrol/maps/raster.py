@@ -1,4 +1,4 @@
-"""Plane shapes drawn on a grid, as a lidar would leave them on a map."""
+"""Drawing of plane shapes on a grid, as a lidar would map them."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ def _turn(a: Points, b: Points, c: Points) -> float:
 
 
 def slice_hull(vertices: Points, height: float) -> Points:
-    """The convex hull of points of shape (N, 3), cut at a height; corners of shape (M, 2), M = 0 where it misses.
+    """Cut the convex hull of points of shape (N, 3) at a height; corners of shape (M, 2), M = 0 if it misses.
 
-    Every edge of the hull joins two of the points, so the cuts of all pairs that straddle the height span the slice.
+    Every edge of the hull joins two of the points, so the cuts of all pairs across the height span the slice.
     """
     above, below = vertices[vertices[:, 2] >= height], vertices[vertices[:, 2] < height]
     if not len(above) or not len(below):
@@ -72,11 +72,11 @@ def outline_points(polygon: Points, step: float) -> Points:
 
 
 def surface_cells(info: GridInfo, polygons: Sequence[Points]) -> tuple[Mask, Mask]:
-    """What convex obstacles leave on a grid: cells that their common surface passes, and cells that they fill.
+    """Cells of convex obstacles on a grid: those that their common surface crosses, and those that they fill.
 
     An obstacle of two points is a line: it is passed and fills only the cells that it goes through.
 
-    A cell is passed where a part of an outline in it lies in no other obstacle: those are the cells that beams end in.
+    A cell counts as crossed if a part of an outline in it lies in no other obstacle: beams end in those cells.
     """
     passed, filled = np.zeros(info.shape, dtype=bool), np.zeros(info.shape, dtype=bool)
     lows = np.array([polygon.min(axis=0) for polygon in polygons]).reshape(-1, 2)
@@ -113,7 +113,7 @@ def _fill(mask: Mask, info: GridInfo, polygon: Points) -> None:
 
 
 def flood(is_open: Mask, ix: int, iy: int) -> Mask:
-    """Cells that can be reached from (ix, iy) over open cells, going along rows and columns; it spreads by runs."""
+    """Cells that can be reached from (ix, iy) over open cells, along rows and columns; it spreads by runs."""
     reached = np.zeros_like(is_open)
     height, width = is_open.shape
     pending = [(ix, iy)]
@@ -136,9 +136,9 @@ def flood(is_open: Mask, ix: int, iy: int) -> Mask:
 
 
 def seen_map(passed: Mask, filled: Mask, ix: int, iy: int) -> NDArray[np.int8]:
-    """A map as a robot that has been everywhere would draw it, starting at a cell.
+    """Map that a robot would draw after it has been everywhere, starting at a cell.
 
-    What can be reached is free, the surfaces around it are occupied, and the rest, also inside of walls, is unknown.
+    Reachable cells are free, the surfaces around them are occupied, and the rest, such as inside walls, is unknown.
     """
     free = flood(~filled, ix, iy)
     beside = np.zeros_like(free)

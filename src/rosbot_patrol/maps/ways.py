@@ -1,4 +1,4 @@
-"""How far it is over a grid."""
+"""Path lengths over a grid."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ Array = NDArray[np.float64]
 
 
 def steps_over(wide: Mask, start: tuple[int, int]) -> Array:
-    """Steps from a cell to each other over a mask, by waves over the whole grid: a diagonal counts 1.4.
+    """Steps from a cell to every other over a mask, by waves over the whole grid: a diagonal counts 1.4.
 
     Args:
-        wide: where one gets through, shape (H, W).
+        wide: passable cells, shape (H, W).
         start: (ix, iy) of the cell to begin with.
 
     Returns:
-        Cells, inf where no way leads, shape (H, W).
+        Path lengths [cells], inf if unreachable, shape (H, W).
     """
     out = np.full(wide.shape, math.inf)
     ix, iy = start

@@ -1,7 +1,7 @@
-"""tf without ROS: who is whose parent, where, and when; looked up as tf2 (0.7) does.
+"""tf without ROS: parents, poses and times of frames, looked up as in tf2 (0.7).
 
-Frames may carry tf1's leading slash. Transforms that move are kept for `cache_s`, static ones for ever. Between two
-stamps the place is interpolated in a straight line and the turn on the shortest arc.
+Frame names may carry tf1's leading slash. Moving transforms are kept for `cache_s`, static ones for ever. Between two
+stamps, positions are interpolated linearly and rotations on the shortest arc.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from rosbot_patrol.errors import TransformError, TransformNotYet, TransformTooOl
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.geometry import Transform as Transform
 
-UNIT_WITHIN = 1e-3  # of a quaternion's length from 1; tf2 refuses others, and so do we
+UNIT_WITHIN = 1e-3  # tolerance of a quaternion's length; tf2 refuses others, and so do we
 
 
 class Edge(NamedTuple):
-    """parent_from_child at a time [s]: a place [m] and a quaternion."""
+    """parent_from_child at a time [s]: a position [m] and a quaternion."""
 
     parent: str
     child: str
@@ -37,10 +37,10 @@ IDENTITY = Transform()
 
 
 class TransformTree:
-    """All transforms heard of.
+    """All transforms received.
 
     Args:
-        cache_s: how long one that moves is kept after the newest of its frame [s].
+        cache_s: age, against the newest of its frame, at which a moving transform is dropped [s].
     """
 
     def __init__(self, cache_s: float = 10.0) -> None:
@@ -48,7 +48,7 @@ class TransformTree:
         self._above: dict[str, _Moving | _Static] = {}
 
     def add(self, edge: Edge, *, is_static: bool = False) -> str:
-        """Take in a transform; returns why it is left out, "" where it is not (tf2 leaves out the same)."""
+        """Add a transform; returns why it is ignored, "" if it is not (tf2 ignores the same)."""
         parent, child = edge.parent.lstrip("/"), edge.child.lstrip("/")
         problem = _problem(edge, parent, child)
         if problem:
@@ -63,20 +63,20 @@ class TransformTree:
         return known.add(edge.stamp, parent, place)
 
     def add_all(self, edges: Iterable[Edge], *, is_static: bool = False) -> None:
-        """Take in several transforms; those that make no sense are left out as by `add`."""
+        """Add several transforms; invalid ones are ignored as in `add`."""
         for edge in edges:
             self.add(edge, is_static=is_static)
 
     def clear(self) -> None:
-        """Forget what moves: time went back."""
+        """Forget moving transforms, because time went back."""
         self._above = {frame: above for frame, above in self._above.items() if isinstance(above, _Static)}
 
     def transform(self, target: str, source: str, stamp: float | None = None) -> Transform:
         """Look up target_from_source at a time [s], or the newest time that all transforms between them share.
 
         Raises:
-            TransformNotYet: a frame is not known, not connected, or not until that time: it may still come.
-            TransformTooOld: it is not kept so far back.
+            TransformNotYet: a frame is unknown, not connected, or not yet known at that time.
+            TransformTooOld: that time is no longer stored.
         """
         target, source = target.lstrip("/"), source.lstrip("/")
         if target == source:
@@ -92,7 +92,7 @@ class TransformTree:
         raise self._unknown(target, source, problem or other_problem)
 
     def newest(self, target: str, source: str) -> tuple[Transform, float]:
-        """The newest target_from_source and its time [s], 0 where nothing between them moves; raises as `transform`."""
+        """The newest target_from_source and its time [s], 0 if nothing between them moves; raises as `transform`."""
         stamp = self._newest_common(target.lstrip("/"), source.lstrip("/"))
         return self.transform(target, source, stamp), stamp
 
@@ -109,7 +109,7 @@ class TransformTree:
         return any(frame in above.parents for above in self._above.values())
 
     def _climb(self, frame: str, when: float, end: str) -> tuple[dict[str, Transform], _Outside | None]:
-        """All frames from here to `end` or the top, as frame_from_start; and why it stopped sooner, if it did."""
+        """All frames from here up to `end` or the root, as frame_from_start; and the error that stopped it, if any."""
         found, total = {frame: IDENTITY}, IDENTITY
         while frame != end:
             above = self._above.get(frame)
@@ -127,7 +127,7 @@ class TransformTree:
         return found, None
 
     def _newest_common(self, target: str, source: str) -> float:
-        """The newest time at which all between two frames are known, 0 where nothing between them moves."""
+        """Newest time at which all transforms between two frames are known, 0 if none of them moves."""
         rising, falling = self._line_above(source), self._line_above(target)
         meeting = next((frame for frame in rising if frame in falling), None)
         stamps = [
@@ -158,7 +158,7 @@ class TransformTree:
 
 
 class _Outside(NamedTuple):
-    """A time for which nothing is known, and from when to when something is [s]."""
+    """A time without a transform, and the span of those stored [s]."""
 
     at: float
     first: float
@@ -211,18 +211,18 @@ class _Moving:
 
     def at(self, when: float) -> tuple[str, Transform] | _Outside:
         stamps = self._stamps
-        i = bisect_right(stamps, when) - 1  # the newest that is not later
+        i = bisect_right(stamps, when) - 1  # the newest one not later
         if i < 0 or (i == len(stamps) - 1 and stamps[i] != when):
             return _Outside(when, stamps[0], stamps[-1])
         parent, place = self._entries[i]
-        if stamps[i] == when or self._entries[i + 1][0] != parent:  # a new parent: nothing lies between
+        if stamps[i] == when or self._entries[i + 1][0] != parent:  # a new parent: no interpolation
             return parent, place
         share = (when - stamps[i]) / (stamps[i + 1] - stamps[i])
         return parent, _between(place, self._entries[i + 1][1], share)
 
 
 def _problem(edge: Edge, parent: str, child: str) -> str:
-    """Why a transform makes no sense, "" where it does."""
+    """Reason why a transform is invalid, "" if it is valid."""
     if not parent or not child:
         return "a frame has no name"
     if parent == child:
@@ -234,7 +234,7 @@ def _problem(edge: Edge, parent: str, child: str) -> str:
 
 
 def _between(a: Transform, b: Transform, share: float) -> Transform:
-    """Straight for the place, the shortest arc for the turn."""
+    """Interpolate: linearly for the position, on the shortest arc for the rotation."""
     rest = 1.0 - share
     dot = a.qx * b.qx + a.qy * b.qy + a.qz * b.qz + a.qw * b.qw
     angle = math.acos(min(abs(dot), 1.0))

@@ -1,1 +1,1 @@
-"""Darknet's files and arithmetic: cfg, weights, decoding, an ONNX graph of the same."""
+"""Darknet's files and arithmetic: cfg, weights, decoding, and an equivalent ONNX graph."""

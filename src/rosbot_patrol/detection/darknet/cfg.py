@@ -1,10 +1,10 @@
-"""Read darknet's network files (.cfg) into a checked list of layers with their shapes.
+"""Reader of darknet's network files (.cfg): a checked list of layers with their shapes.
 
 Matches the parser of darknet (pjreddie/darknet, as in darknet_ros) for the layers of YOLOv2, v3 and v4, tiny and full,
 with the options of AlexeyAB's version that those use (groups of a route, mish, scale_x_y).
 
-Differs: options that only steer training are read over; an unknown layer, activation or a shape that does not fit is an
-error that names file and line, where darknet guesses or dies.
+Differs: options that only affect training are ignored. An unknown layer or activation, or a shape that does not fit, is
+an error that names file and line; darknet guesses or dies.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Section:
     options: dict[str, tuple[str, int]] = field(default_factory=dict)
 
     def fail(self, problem: str, key: str = "") -> DetectorError:
-        """The error for a problem of this section, or of one of its keys."""
+        """Make the error for a problem of this section or one of its keys."""
         line = self.options[key][1] if key in self.options else self.line
         return DetectorError(f"{self.source}, line {line}: [{self.name}] {problem}")
 
@@ -57,7 +57,7 @@ class Section:
         return self.options[key][0] if key in self.options else default
 
     def integer(self, key: str, default: int, *, lo: int | None = None) -> int:
-        """A value as whole number, at least `lo`."""
+        """A value as a whole number, at least `lo`."""
         text = self.text(key, str(default))
         try:
             value = int(text)
@@ -68,15 +68,15 @@ class Section:
         return value
 
     def number(self, key: str, default: float) -> float:
-        """A value as number."""
+        """A value as a number."""
         return self._numbers(key, str(default))[0]
 
     def numbers(self, key: str) -> tuple[float, ...]:
-        """A value as list of numbers, () where it is missing."""
+        """A value as a list of numbers, () if it is missing."""
         return self._numbers(key, "")
 
     def integers(self, key: str) -> tuple[int, ...]:
-        """A value as list of whole numbers, () where it is missing."""
+        """A value as a list of whole numbers, () if it is missing."""
         values = self._numbers(key, "")
         if any(not v.is_integer() for v in values):
             raise self.fail(f"{key}={self.text(key, '')} are not whole numbers", key)
@@ -119,11 +119,11 @@ def parse_cfg(text: str, source: str = "cfg") -> NetworkSpec:
     """Build the network that a cfg file describes.
 
     Args:
-        text: what the file holds.
+        text: contents of the file.
         source: its name, for messages.
 
     Raises:
-        DetectorError: names file, line and what is wrong there.
+        DetectorError: names file, line and problem.
     """
     sections = parse_sections(text, source)
     if not sections:
@@ -150,7 +150,7 @@ def parse_cfg(text: str, source: str = "cfg") -> NetworkSpec:
 
 
 def read_cfg(path: str) -> NetworkSpec:
-    """Read and parse a cfg file; DetectorError as `parse_cfg`, or where the file cannot be read."""
+    """Read and parse a cfg file; DetectorError as in `parse_cfg`, or if the file cannot be read."""
     try:
         with open(path, encoding="utf-8") as file:
             text = file.read()

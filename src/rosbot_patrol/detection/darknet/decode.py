@@ -1,7 +1,7 @@
-"""From the values of a network's heads to boxes, as darknet computes them.
+"""Decoding of a network's heads to boxes, as darknet computes them.
 
-Threshold rules: a box counts when its objectness is above the threshold, a class of it when objectness times class is.
-Boxes are shares of the picture: x and y of the centre, width, height.
+Threshold rules: a box counts if its objectness is above the threshold, and a class of it if objectness times class is.
+Boxes are relative to the picture: x and y of the centre, width, height.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ class Candidates:
         return len(self.boxes)
 
     def only(self, keep: np.ndarray) -> Candidates:
-        """Those that `keep` (a mask, or indices in a new order) names."""
+        """The boxes selected by `keep` (a mask, or indices in a new order)."""
         return Candidates(self.boxes[keep], self.objectness[keep], self.probabilities[keep])
 
 
 def decode_head(head: Head, values: np.ndarray, net_size: tuple[int, int], threshold: float) -> Candidates:
-    """The boxes of one head above the threshold, as shares of the network's input.
+    """Boxes of one head above the threshold, relative to the network's input.
 
     Args:
         head: a Region or Yolo layer.
-        values: what the layer before it gave, shape (channels, rows, columns).
+        values: output of the layer before it, shape (channels, rows, columns).
         net_size: width and height of the network's input [px].
         threshold: on objectness and on probability.
     """
@@ -65,20 +65,20 @@ def decode_head(head: Head, values: np.ndarray, net_size: tuple[int, int], thres
 def decode(
     heads: list[Head], values: list[np.ndarray], place: Letterbox, *, threshold: float, iou_threshold: float
 ) -> Candidates:
-    """The boxes of a picture: all heads, mapped back through the letterbox, suppressed as darknet_ros does.
+    """Boxes of a picture: all heads, mapped back through the letterbox, suppressed as in darknet_ros.
 
     Args:
         heads: the network's heads.
-        values: what the layer before each gave, shape (channels, rows, columns).
-        place: where the picture lay in the input.
+        values: output of the layer before each, shape (channels, rows, columns).
+        place: position of the picture in the input.
         threshold: on objectness and on probability.
-        iou_threshold: of two boxes that overlap more, the one of lower objectness goes.
+        iou_threshold: of two boxes that overlap more, the one of lower objectness is dropped.
     """
     return suppress_by_objectness(candidates(heads, values, place, threshold=threshold), iou_threshold)
 
 
 def candidates(heads: list[Head], values: list[np.ndarray], place: Letterbox, *, threshold: float) -> Candidates:
-    """As `decode`, without suppression."""
+    """Like `decode`, without suppression."""
     net_size = (place.net_width, place.net_height)
     parts = [decode_head(head, array, net_size, threshold) for head, array in zip(heads, values, strict=True)]
     boxes = np.concatenate([part.boxes for part in parts])
@@ -87,7 +87,7 @@ def candidates(heads: list[Head], values: list[np.ndarray], place: Letterbox, *,
 
 
 def suppress_by_objectness(found: Candidates, iou_threshold: float) -> Candidates:
-    """Whatever its class, a box goes that overlaps one of higher objectness (darknet's do_nms_obj); sorted by it."""
+    """Drop boxes of any class that overlap one of higher objectness (darknet's do_nms_obj); sorts by it."""
     ranked = found.only(np.argsort(-found.objectness, kind="stable"))
     alive = np.ones(len(ranked), dtype=bool)
     for start in range(0, len(ranked), BLOCK):
@@ -100,7 +100,7 @@ def suppress_by_objectness(found: Candidates, iou_threshold: float) -> Candidate
 
 
 def suppress_by_class(found: Candidates, iou_threshold: float) -> Candidates:
-    """Of each class by itself, as the program `darknet detector test` does (darknet's do_nms_sort)."""
+    """Suppress within each class, as the program `darknet detector test` does (darknet's do_nms_sort)."""
     probabilities = found.probabilities.copy()
     for column in probabilities.T:
         order = np.argsort(-column, kind="stable")
@@ -131,7 +131,7 @@ def logistic(values: np.ndarray) -> np.ndarray:
 
 
 def softmax(values: np.ndarray) -> np.ndarray:
-    """Along the last axis, float32."""
+    """Softmax along the last axis, float32."""
     powers = np.exp(values - values.max(axis=-1, keepdims=True))
     return powers / powers.sum(axis=-1, keepdims=True)
 
@@ -140,7 +140,7 @@ def _objectness(head: Head, raw: np.ndarray) -> np.ndarray:
     if isinstance(head, Region) and head.background:
         return np.ones_like(raw)
     if isinstance(head, Yolo) and head.new_coords:
-        return raw  # the convolution before it is logistic already
+        return raw  # the convolution before it already applies the logistic function
     return logistic(raw)
 
 
@@ -160,7 +160,7 @@ def _boxes(
     grid_size: tuple[int, int],
     net_size: tuple[int, int],
 ) -> np.ndarray:
-    """Boxes as shares of the input, shape (N, 4), from what the network says about each of N cells."""
+    """Boxes relative to the input, shape (N, 4), from the network's output for each of N cells."""
     scale = np.asarray(net_size if isinstance(head, Yolo) else grid_size, dtype=np.float32)
     if isinstance(head, Yolo) and head.new_coords:
         offsets, sizes = raw[:, :2], 4.0 * raw[:, 2:] ** 2

@@ -1,9 +1,9 @@
-"""The networks of the YOLO families as short descriptions, and their cfg files made from them.
+"""YOLO networks as short descriptions, and their cfg files.
 
 The layers are those of Redmon and Farhadi, "YOLO9000: Better, Faster, Stronger" (2017) and "YOLOv3: An Incremental
 Improvement" (2018), of Bochkovskiy, Wang and Liao, "YOLOv4: Optimal Speed and Accuracy of Object Detection" (2020) and,
-for its tiny form, of "Scaled-YOLOv4" (2021); anchors and sizes are those that the published weights belong to. That the
-sizes of those weights come out of them is tested.
+for its tiny form, of "Scaled-YOLOv4" (2021). Anchors and sizes belong to the published weights; a test checks that the
+networks need weights files of those sizes.
 
 A description is a row of words:
 
@@ -32,7 +32,7 @@ class Family:
     Args:
         layers: its description.
         size: width and height of its input [px].
-        classes: how many it tells apart.
+        classes: number of classes.
         anchors: width and height of each, in cells for [region], in pixels for [yolo].
     """
 
@@ -113,12 +113,12 @@ FAMILIES = {
 
 
 def cfg_text(family: Family, *, size: int | None = None, thinner: int = 1) -> str:
-    """A network's cfg file.
+    """Text of a network's cfg file.
 
     Args:
         family: the network.
         size: another size of its input [px], a multiple of 32.
-        thinner: divide the filters of all layers by this, but of those before a head; for tests.
+        thinner: divide the filters of all layers by this, except before a head; for tests.
     """
     side = str(size or family.size)
     parts = [_section("net", batch="1", subdivisions="1", width=side, height=side, channels="3")]

@@ -10,7 +10,7 @@ Shape = tuple[int, int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class Layer:
-    """What all layers have: their place in the network (from 0, without [net]), line in the file, and shapes."""
+    """Common part of all layers: index in the network (from 0, without [net]), line in the file, and shapes."""
 
     index: int
     line: int
@@ -37,14 +37,14 @@ class Convolutional(Layer):
 
     @property
     def parameters(self) -> int:
-        """How many numbers it has in a weights file."""
+        """Number of its values in a weights file."""
         n, c, h, w = self.weights_shape
         return n * c * h * w + n * (4 if self.batch_normalize else 1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Maxpool(Layer):
-    """Greatest of `size` x `size`; `padding` cells in all per axis, half of them (rounded down) before the picture."""
+    """Maximum of `size` x `size`; `padding` cells in all per axis, half of them (rounded down) before the picture."""
 
     size: int
     stride: int
@@ -53,7 +53,7 @@ class Maxpool(Layer):
 
 @dataclass(frozen=True, kw_only=True)
 class Route(Layer):
-    """Earlier layers side by side, of each the channels of group `group_id` of `groups`."""
+    """Concatenation of earlier layers, from each the channels of group `group_id` of `groups`."""
 
     layers: tuple[int, ...]
     groups: int
@@ -62,7 +62,7 @@ class Route(Layer):
 
 @dataclass(frozen=True, kw_only=True)
 class Shortcut(Layer):
-    """The layer before plus earlier layers."""
+    """Sum of the previous layer and earlier layers."""
 
     layers: tuple[int, ...]
     activation: str
@@ -70,7 +70,7 @@ class Shortcut(Layer):
 
 @dataclass(frozen=True, kw_only=True)
 class Upsample(Layer):
-    """Each cell `stride` times in both directions, multiplied by `scale`."""
+    """Repetition of each cell `stride` times in both directions, multiplied by `scale`."""
 
     stride: int
     scale: float
@@ -85,17 +85,17 @@ class Reorg(Layer):
 
 @dataclass(frozen=True, kw_only=True)
 class Dropout(Layer):
-    """Nothing at run time."""
+    """No operation at run time."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Head(Layer):
-    """A layer whose values are boxes.
+    """A layer that outputs boxes.
 
     Args:
         anchors: width and height of this head's boxes, shape (boxes of a cell, 2) as tuples; of [region] in cells, of
             [yolo] in pixels of the network's input.
-        classes: how many classes it tells apart.
+        classes: number of classes.
     """
 
     anchors: tuple[tuple[float, float], ...]
@@ -112,7 +112,7 @@ class Region(Head):
 
 @dataclass(frozen=True, kw_only=True)
 class Yolo(Head):
-    """The head of YOLOv3 and v4; `new_coords` is scaled-YOLOv4's way of writing boxes."""
+    """The head of YOLOv3 and v4; `new_coords` is scaled-YOLOv4's box format."""
 
     scale_x_y: float
     new_coords: bool
@@ -123,10 +123,10 @@ class NetworkSpec:
     """A whole network.
 
     Args:
-        source: the file it came from, for messages.
+        source: its file, for messages.
         channels: of the input, height and width of it [px].
         layers: in order.
-        text: the file as it was.
+        text: contents of the file.
     """
 
     source: str
@@ -138,20 +138,20 @@ class NetworkSpec:
 
     @property
     def convolutions(self) -> list[Convolutional]:
-        """The layers that have weights, in the order of the weights file."""
+        """Layers with weights, in the order of the weights file."""
         return [layer for layer in self.layers if isinstance(layer, Convolutional)]
 
     @property
     def heads(self) -> list[Head]:
-        """The layers that give boxes."""
+        """Layers that output boxes."""
         return [layer for layer in self.layers if isinstance(layer, Head)]
 
     @property
     def classes(self) -> int:
-        """How many classes it tells apart."""
+        """Number of classes."""
         return self.heads[0].classes if self.heads else 0
 
     @property
     def parameters(self) -> int:
-        """How many numbers its weights file holds."""
+        """Number of values in its weights file."""
         return sum(layer.parameters for layer in self.convolutions)

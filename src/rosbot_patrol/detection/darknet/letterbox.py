@@ -1,4 +1,4 @@
-"""Where a picture lies in the network's input: as large as fits, in the middle, grey around it, as darknet does."""
+"""Letterbox: the picture in the network's input, as large as fits, centred, with grey around it, as in darknet."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Letterbox:
-    """The place of a picture of `width` x `height` in an input of `net_width` x `net_height` [px]."""
+    """Position of a picture of `width` x `height` in an input of `net_width` x `net_height` [px]."""
 
     width: int
     height: int
@@ -32,10 +32,10 @@ class Letterbox:
 
     @property
     def row_gains(self) -> np.ndarray:
-        """What each row of the fitted picture is multiplied by, float32, shape (rows,): 1, but for the last.
+        """Factor of each row of the fitted picture, float32, shape (rows,): 1, except for the last.
 
-        Darknet leaves one of the last row's two summands out, on the ground that the other has all the weight. Where
-        single precision puts that row just above the picture's last one, it is black instead; a network sees that.
+        Darknet omits one of the last row's two summands, because the other has all the weight. If single precision puts
+        that row just above the picture's last one, it becomes black instead, and the network sees that.
         """
         rows = self.fitted[1]
         gains = np.ones(rows, dtype=np.float32)
@@ -45,10 +45,10 @@ class Letterbox:
         return gains
 
     def to_picture(self, boxes: np.ndarray) -> np.ndarray:
-        """Boxes (x, y, width, height as shares of the input, shape (N, 4)) as shares of the picture."""
+        """Convert boxes (x, y, width, height, relative to the input, shape (N, 4)) to the picture."""
         width, height = self.fitted
         out = np.empty_like(boxes)
-        # darknet centres by half pixels here and by whole ones when it draws the picture; that is kept
+        # darknet centres by half pixels here and by whole ones when it draws the picture; we keep that
         out[:, 0] = (boxes[:, 0] - (self.net_width - width) / 2.0 / self.net_width) / (width / self.net_width)
         out[:, 1] = (boxes[:, 1] - (self.net_height - height) / 2.0 / self.net_height) / (height / self.net_height)
         out[:, 2] = boxes[:, 2] * (self.net_width / width)
@@ -56,9 +56,9 @@ class Letterbox:
         return out
 
     def draw(self, picture: np.ndarray) -> np.ndarray:
-        """The input of the network: float32, shape (channels, net_height, net_width), 0 to 1, from a uint8 picture.
+        """Input of the network: float32, shape (channels, net_height, net_width), 0 to 1, from a uint8 picture.
 
-        The same arithmetic as the first nodes of the ONNX graph, for run-times that lack it and for training.
+        It uses the same arithmetic as the first nodes of the ONNX graph, for run-times without them and for training.
         """
         width, height = self.fitted
         left, top, _, _ = self.margins
@@ -70,7 +70,7 @@ class Letterbox:
 
 
 def _along(values: np.ndarray, length: int, *, axis: int) -> np.ndarray:
-    """Linear interpolation to `length` samples along an axis, first and last kept."""
+    """Linear interpolation to `length` samples along an axis; the first and last samples stay."""
     have = values.shape[axis]
     at = np.arange(length, dtype=np.float32) * np.float32((have - 1) / max(length - 1, 1))
     low = np.minimum(at.astype(np.intp), have - 1)

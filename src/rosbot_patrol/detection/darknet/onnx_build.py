@@ -1,12 +1,12 @@
-"""Build an ONNX graph that computes what darknet computes, from a network and its weights.
+"""Builder of an ONNX graph that computes the same as darknet, from a network and its weights.
 
-The graph takes a picture as it came (uint8, rows, columns, channels), fits it into the network's input as darknet's
-letterbox does (its bilinear rule keeps the corner pixels' centres, which ONNX calls `align_corners`; grey 0.5 around),
-and gives the values before each head. What a head makes of them is computed in `decode`.
+The graph takes an unscaled picture (uint8, rows, columns, channels) and fits it into the network's input as darknet's
+letterbox does. Its bilinear rule keeps the corner pixels' centres, which ONNX calls `align_corners`; the border is grey
+0.5. The outputs are the values before each head; `decode` converts them to boxes.
 
-Inputs besides the picture: `size` (1, channels, rows, columns of the fitted picture), `pads` (as of ONNX Pad: the cells
-around it), `gains` (the factor of each fitted row, 1 / 255 as a rule) and `order` (which of the picture's channels is
-red, green, blue), so that one graph serves pictures of every size and encoding.
+Inputs besides the picture: `size` (1, channels, rows, columns of the fitted picture), `pads` (as in ONNX Pad: the cells
+around it), `gains` (the factor of each fitted row, usually 1 / 255) and `order` (indices of the picture's red, green
+and blue channels). So one graph serves pictures of every size and encoding.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ GREY = 0.5
 
 
 def build_model(spec: NetworkSpec, weights: Sequence[ConvWeights]) -> bytes:
-    """The serialised graph of a network; its outputs are named "head0", "head1", ... in the order of `spec.heads`."""
+    """Build the serialised graph of a network; its outputs are "head0", "head1", ... in the order of `spec.heads`."""
     return _Graph(spec).build(list(weights))
 
 
@@ -84,7 +84,7 @@ class _Graph:
         return bytes(model.SerializeToString())
 
     def node(self, kind: str, inputs: list[str], **attributes: Any) -> str:
-        """Add a node of one output and return that output's name."""
+        """Add a node with one output and return that output's name."""
         output = f"{kind.lower()}_{len(self._nodes)}"
         self._nodes.append(helper.make_node(kind, inputs, [output], **attributes))
         return output
@@ -119,10 +119,10 @@ class _Graph:
         scaled = self.node("Mul", [ordered, "gains"])
         padded = self.node("Pad", [scaled, "pads", self.constant(GREY, np.float32)])
         shape = self.constant([1, spec.channels, spec.height, spec.width], np.int64)
-        return self.node("Reshape", [padded, shape])  # states the size, so that the rest of the graph is fixed
+        return self.node("Reshape", [padded, shape])  # sets the size, so that the rest of the graph has fixed shapes
 
     def convolutional(self, layer: Convolutional, source: str) -> str:
-        """Convolution with batch normalisation worked into its numbers."""
+        """Add a convolution with folded batch normalisation."""
         weights, biases = self._weights.pop().folded()
         convolved = self.node(
             "Conv",
@@ -135,7 +135,7 @@ class _Graph:
         return self.activate(layer.activation, convolved)
 
     def maxpool(self, layer: Maxpool, source: str) -> str:
-        """Darknet pads half (rounded down) before the picture and the rest after it."""
+        """Add a maxpool; darknet pads half (rounded down) before the picture and the rest after it."""
         before = layer.padding // 2
         after = layer.padding - before
         return self.node(
@@ -147,7 +147,7 @@ class _Graph:
         )
 
     def route(self, layer: Route, _: str) -> str:
-        """Concatenation of (parts of) earlier layers."""
+        """Add a concatenation of (parts of) earlier layers."""
         parts = [self._part(i, layer.groups, layer.group_id) for i in layer.layers]
         return parts[0] if len(parts) == 1 else self.node("Concat", parts, axis=1)
 
@@ -159,27 +159,27 @@ class _Graph:
         return self.node("Slice", [self._outputs[index], *bounds])
 
     def shortcut(self, layer: Shortcut, source: str) -> str:
-        """Sum with earlier layers."""
+        """Add a sum with earlier layers."""
         for index in layer.layers:
             source = self.node("Add", [source, self._outputs[index]])
         return self.activate(layer.activation, source)
 
     def upsample(self, layer: Upsample, source: str) -> str:
-        """Nearest cell."""
+        """Add an upsampling to the nearest cell."""
         scales = self.constant([1, 1, layer.stride, layer.stride], np.float32)
         rule = {"mode": "nearest", "coordinate_transformation_mode": "asymmetric", "nearest_mode": "floor"}
         grown = self.node("Resize", [source, "", scales], **rule)
         return grown if layer.scale == 1.0 else self.node("Mul", [grown, self.constant(layer.scale, np.float32)])
 
     def reorg(self, layer: Reorg, source: str) -> str:
-        """Darknet reads the memory of (c, h, w) as (c / s2, h * s, w * s) before it folds s x s cells into channels."""
+        """Add a reorg; darknet reads (c, h, w) as (c / s2, h * s, w * s) before it folds s x s cells into channels."""
         (c, h, w), s = layer.in_shape, layer.stride
         read = self.node("Reshape", [source, self.constant([c // (s * s), h, s, w, s], np.int64)])
         folded = self.node("Transpose", [read], perm=[2, 4, 0, 1, 3])
         return self.node("Reshape", [folded, self.constant([1, *layer.out_shape], np.int64)])
 
     def dropout(self, _: Dropout, source: str) -> str:
-        """Nothing at run time."""
+        """Add nothing: dropout has no effect at run time."""
         return source
 
 

@@ -1,4 +1,4 @@
-"""Seeded weights for a network whose real ones are not at hand: for benchmarks and for comparing implementations."""
+"""Seeded random weights for a network, for benchmarks and to compare implementations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rosbot_patrol.detection.darknet.weights import ConvWeights
 
 
 def random_weights(spec: NetworkSpec, rng: np.random.Generator) -> list[ConvWeights]:
-    """Weights that keep the size of the values from layer to layer, so that boxes of all probabilities come out."""
+    """Weights that preserve the scale of values from layer to layer, so that boxes of all probabilities result."""
     return [_layer(conv, rng) for conv in spec.convolutions]
 
 

@@ -1,11 +1,11 @@
-"""Read and write darknet's weights files.
+"""Reader and writer of darknet's weights files.
 
-A file is a header (three int32: major, minor, revision; then how many pictures training has seen, 8 bytes from version
-0.2 on and 4 before) and then, of each convolution in order, float32: biases; with batch normalisation scales, means and
-variances; weights by filter, channel, row, column.
+A file has a header of three int32 (major, minor, revision) and the number of training pictures (8 bytes since version
+0.2, 4 before). Then come the float32 values of each convolution in order: biases; with batch normalisation scales,
+means and variances; weights by filter, channel, row, column.
 
-Differs: darknet reads what is there and goes on; here a file that is shorter or longer than the network needs is
-refused, with both sizes.
+Differs: darknet reads whatever is there; here a file that is shorter or longer than the network needs is an error with
+both sizes.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from rosbot_patrol.errors import DetectorError
 
 @dataclass(frozen=True, kw_only=True)
 class ConvWeights:
-    """The numbers of one convolution, float32.
+    """Weights of one convolution, float32.
 
     Args:
         weights: shape (filters, channels of a group, rows, columns).
         biases: shape (filters,).
-        scales: of batch normalisation, shape (filters,); None without it, and so for `means` and `variances`.
+        scales: of batch normalisation, shape (filters,); None without it, as are `means` and `variances`.
     """
 
     weights: np.ndarray
@@ -37,7 +37,7 @@ class ConvWeights:
     variances: np.ndarray | None = None
 
     def folded(self) -> tuple[np.ndarray, np.ndarray]:
-        """Weights and biases with batch normalisation worked in; darknet divides by sqrt(variance) + 1e-6."""
+        """Weights and biases with folded batch normalisation; darknet divides by sqrt(variance) + 1e-6."""
         if self.scales is None or self.means is None or self.variances is None:
             return self.weights, self.biases
         gain = self.scales.astype(np.float64) / (np.sqrt(self.variances.astype(np.float64)) + 1e-6)
@@ -46,15 +46,15 @@ class ConvWeights:
 
 
 def weights_size(spec: NetworkSpec) -> int:
-    """How long a weights file of this network is [bytes], in today's format."""
+    """Size of this network's weights file [bytes], in the present format."""
     return 20 + 4 * spec.parameters
 
 
 def parse_weights(data: bytes, spec: NetworkSpec, source: str = "weights") -> list[ConvWeights]:
-    """The numbers of each convolution of `spec`, in order; they are views of `data`, read-only.
+    """Weights of each convolution of `spec`, in order, as read-only views of `data`.
 
     Raises:
-        DetectorError: the file is not as long as the network needs; names both sizes.
+        DetectorError: the file has the wrong size for the network; names both sizes.
     """
     if len(data) < 16:
         raise DetectorError(f"{source}: has {len(data)} bytes, {spec.source} needs {weights_size(spec)}")
@@ -74,7 +74,7 @@ def parse_weights(data: bytes, spec: NetworkSpec, source: str = "weights") -> li
 
 
 def read_weights(path: str, spec: NetworkSpec) -> list[ConvWeights]:
-    """Read a weights file; DetectorError as `parse_weights`, or with what to do where it cannot be read."""
+    """Read a weights file; DetectorError as in `parse_weights`, or with what to do if it cannot be read."""
     try:
         with open(path, "rb") as file:
             data = file.read()
@@ -89,13 +89,13 @@ def read_weights(path: str, spec: NetworkSpec) -> list[ConvWeights]:
 
 
 def format_weights(spec: NetworkSpec, layers: Iterable[ConvWeights], *, seen: int = 0, bits: int = 23) -> bytes:
-    """A weights file (version 0.2) from the numbers of each convolution.
+    """Bytes of a weights file (version 0.2) from the weights of each convolution.
 
     Args:
         spec: the network.
-        layers: its convolutions' numbers.
-        seen: pictures that it was trained on.
-        bits: of each number's fraction that are kept, of 23: with 10, half precision, the file packs to three fifths.
+        layers: weights of its convolutions.
+        seen: number of training pictures.
+        bits: kept bits of each fraction, of 23: with 10 (half precision) the file compresses to three fifths.
 
     Raises:
         DetectorError: the numbers do not fit the network; names the layer.
@@ -110,7 +110,7 @@ def format_weights(spec: NetworkSpec, layers: Iterable[ConvWeights], *, seen: in
 
 
 def _rounded(array: np.ndarray, bits: int) -> np.ndarray:
-    """Numbers whose last bits are nought, the nearest such."""
+    """Numbers rounded so that their last bits are zero."""
     gone = 23 - bits
     if not gone:
         return array
