@@ -1,1 +1,1 @@
-"""Many seeded patrols of simulated houses, judged by what was really there."""
+"""Campaigns: many seeded patrols of simulated houses, compared with ground truth."""

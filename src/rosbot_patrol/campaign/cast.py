@@ -1,4 +1,4 @@
-"""Who is in a room during a patrol, and where: places drawn at random among those that are fit."""
+"""People in a room during a patrol: their places, drawn at random among suitable ones."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.campaign.floor import RECOGNISED, VIEW_RANGE, Floor
 
-NEAREST, FARTHEST = 1.0, 5.0  # from the room's point, somebody who stands in plain sight [m]
+NEAREST, FARTHEST = 1.0, 5.0  # distance from the room's point to a person in plain sight [m]
 PLAIN, HIDDEN = 0.6, 0.12  # share of the body in the line of sight
-VIEWPOINT = (0.9, 3.5)  # how far off a hidden one can be recognised [m]
-FROM_ELSEWHERE = (2.5, 6.0)  # way that somebody who arrives late has to go [m]
+VIEWPOINT = (0.9, 3.5)  # distance at which a hidden person can be recognised [m]
+FROM_ELSEWHERE = (2.5, 6.0)  # path length of a person who arrives late [m]
 _TRIES = 400
 
 
 @dataclass(frozen=True, kw_only=True)
 class Person:
-    """Somebody whom the patrol should find: name and posture in the scenario."""
+    """A person whom the patrol should find: name and posture in the scenario."""
 
     name: str
     posture: str = ""
@@ -31,7 +31,7 @@ class Person:
 
 @dataclass(frozen=True)
 class Cast:
-    """Who is there: the scenario's actors, and which of them should be found."""
+    """The actors of a scenario, and which of them should be found."""
 
     actors: tuple[dict[str, Any], ...] = ()
     people: tuple[Person, ...] = ()
@@ -41,7 +41,7 @@ class Cast:
 
 @dataclass(frozen=True)
 class Stage:
-    """A room to put somebody into."""
+    """A room in which to place people."""
 
     floor: Floor
     room: int
@@ -49,12 +49,12 @@ class Stage:
 
     @property
     def point(self) -> tuple[float, float]:
-        """Of the room, x, y [m]."""
+        """Point of the room, x, y [m]."""
         pose = next(room.pose for room in self.floor.rooms if room.id == self.room)
         return pose.x, pose.y
 
     def drawn(self) -> NDArray[np.float64]:
-        """Places of the room where somebody can stand, in a random order, shape (N, 2)."""
+        """Places of the room where a person can stand, in random order, shape (N, 2)."""
         return self.rng.permutation(self.floor.places(self.room, self.floor.standable))
 
     def in_sight(self) -> tuple[float, float] | None:
@@ -68,24 +68,24 @@ class Stage:
         return None
 
     def is_hidden_from_the_way(self, place: Sequence[float], posture: str) -> bool:
-        """Whether too little of a body to be recognised is seen from the robot's way to the room."""
+        """Whether too little of a body to be recognised is visible from the robot's route to the room."""
         drive = self.floor.drive_to(self.room)
         near = drive[np.hypot(*(drive - place).T) < VIEW_RANGE][::4]
         return all(self.floor.share_seen(eye, place, posture) < RECOGNISED for eye in near)
 
     def is_walkable(self, a: Sequence[float], b: Sequence[float]) -> bool:
-        """Whether somebody can go to and fro between two places, and stop for the robot anywhere between them."""
+        """Whether a person can walk to and fro between two places, and stop for the robot anywhere between."""
         count = max(int(math.dist(a, b) / 0.3), 1)
         between = [(a[0] + k / count * (b[0] - a[0]), a[1] + k / count * (b[1] - a[1])) for k in range(1, count)]
         return self.floor.is_straight(a, b) and all(self.floor.leaves_way(self.room, *p) for p in between)
 
     def facing(self) -> float:
-        """A heading [rad]."""
+        """A random heading [rad]."""
         return round(float(self.rng.uniform(-math.pi, math.pi)), 2)
 
 
 def plain_place(floor: Floor, room: int, rng: np.random.Generator) -> tuple[float, float] | None:
-    """A place in plain sight of a room's point, where the robot can pass; None where there is none [m]."""
+    """A place in plain sight of a room's point, where the robot can pass [m]; None if there is none."""
     return Stage(floor, room, rng).in_sight()
 
 
@@ -206,7 +206,7 @@ def _empty(stage: Stage) -> Cast | None:
     return Cast(told="nobody")
 
 
-# How to cast each kind; the next way only where no room of the house has a place for the one before.
+# How to cast each kind; the next function only if no room of the house has a place for the previous one.
 CASTS: dict[str, tuple[Callable[[Stage], Cast | None], ...]] = {
     "standing": (_standing,),
     "walking": (_walking,),

@@ -1,4 +1,4 @@
-"""Charts of a campaign as inline SVG: shares with their intervals, and how measured values spread."""
+"""Charts of a campaign as inline SVG: shares with their intervals, and spreads of measured values."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from html import escape
 
 from rosbot_patrol.campaign.table import Share
 
-_LEFT, _WIDTH, _ROW = 280.0, 420.0, 30.0  # of a chart: room for the names, length of an axis, height of a line [px]
+_LEFT, _WIDTH, _ROW = 280.0, 420.0, 30.0  # of a chart: space for the names, length of an axis, height of a line [px]
 _RIGHT = 190.0
 
 
 def share_chart(shares: Sequence[Share], *, good: float | None = 1.0) -> str:
-    """A line for each share: the interval as a bar, the share as a dot.
+    """Draw a line for each share: the interval as a bar, the share as a dot.
 
     Args:
-        shares: those of no trials are left out, and without any there is no chart.
-        good: what the share should be; another is drawn as a fault. None where neither is.
+        shares: those without trials are omitted; "" if none is left.
+        good: target of the share; another value is drawn as a fault. None: no target.
     """
     shown = [share for share in shares if share.trials]
     if not shown:
@@ -40,7 +40,7 @@ def share_chart(shares: Sequence[Share], *, good: float | None = 1.0) -> str:
 
 
 def spread_chart(rows: Sequence[tuple[str, Sequence[float], float | None]], unit: str) -> str:
-    """A line for each measure: every value as a dot, the median as a stroke, the bound as a dashed one.
+    """Draw a line for each measure: values as dots, the median as a stroke, the bound as a dashed line.
 
     Args:
         rows: name, values, and the bound that they should keep or None; rows without values are left
@@ -59,7 +59,7 @@ def spread_chart(rows: Sequence[tuple[str, Sequence[float], float | None]], unit
         y = _ROW * i + 18.0
         parts.append(_name(y, name))
         for k, value in enumerate(values):
-            off = ((k * 7) % 11 - 5) * 0.9  # apart, so that equal ones show
+            off = ((k * 7) % 11 - 5) * 0.9  # offset, so that equal values stay visible
             kind = "wrong" if bound is not None and value > bound else "well"
             parts.append(f'<circle class="mark {kind}" cx="{_x(value, most):.1f}" cy="{y + off:.1f}" r="3"/>')
         middle = sorted(values)[len(values) // 2]

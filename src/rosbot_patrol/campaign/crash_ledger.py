@@ -1,6 +1,7 @@
-"""The books of a crash campaign: what was called for and what was killed, written before it is done, and whether every
-call got its verdict and every confirmed incident its one mail. Calls come one at a time, so that each has the records
-between it and the next; what the patrol keeps counts, not what it says.
+"""Ledger of a crash campaign: calls and kills, written to the disk before they happen, and the balance at the end.
+
+Every call must get its verdict and every confirmed incident its one mail. Calls come one at a time, so that the records
+between two calls belong to the first. The balance uses the patrol's stored records, not its messages.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from rosbot_patrol.campaign.plan import CLEAR
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.files import append_line
 
-CLOCK_SLACK = 1.0  # between the clocks of two programs [s]
+CLOCK_SLACK = 1.0  # maximum difference between the clocks of two programs [s]
 
 
 class Journal:
-    """Lines of JSON, each on the disk before `add` returns. One program writes at a time.
+    """Lines of JSON, each on the disk before `add` returns. Only one program writes at a time.
 
     Args:
-        path: of the file; what a crash left half written at its end is passed over.
+        path: of the file; a line left incomplete by a crash is skipped.
     """
 
     def __init__(self, path: Path) -> None:
@@ -54,7 +55,7 @@ class Journal:
 
 @dataclass(frozen=True, kw_only=True)
 class KeptRecord:
-    """What of an incident's record is asked for here; `wall` is when its mission began, seconds since 1970."""
+    """Fields of an incident's record that are used here; `wall` is the start of its mission, seconds since 1970."""
 
     id: str
     room: int
@@ -73,19 +74,19 @@ class KeptMail:
 
 @dataclass(frozen=True)
 class Books:
-    """What came of a crash campaign.
+    """Result of a crash campaign.
 
     Attributes:
-        kills: by victim.
-        moments: by moment.
-        calls: triggers that were raised; answered: those that got a verdict, by verdict.
-        lost: sentences on those that got none.
-        watched: calls whose mission ended in the life in which somebody stood in the room.
-        overlooked: sentences on those of them that ended in `clear`, whatever was killed.
-        confirmed: incidents; mails: how many of them have so many mails.
+        kills: number by victim.
+        moments: number of kills by moment.
+        calls: number of triggers; answered: those with a verdict, by verdict.
+        lost: sentences on those without a verdict.
+        watched: calls whose mission ended in a launch with somebody in that room.
+        overlooked: sentences on those of them that ended in `clear`.
+        confirmed: number of incidents; mails: incidents by their number of mails.
         strangers: sentences on mails without an incident, incidents without a mail or with several.
-        repeated: mails that came more than once under one Message-ID.
-        verified: what the check of the database said, "" for all well, None where it was not asked.
+        repeated: mails that arrived more than once with the same Message-ID.
+        verified: result of the database check, "" if all is well, None if it was not run.
         waiting: notices left in the outbox at the end.
     """
 
@@ -105,12 +106,12 @@ class Books:
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing was lost, overlooked, doubled or broken."""
+        """Whether nothing was lost, overlooked, duplicated or damaged."""
         found = self.lost or self.overlooked or self.strangers or self.repeated
         return not (found or self.verified or self.waiting)
 
     def text(self) -> str:
-        """For people."""
+        """Report for people."""
         kills = sum(self.kills.values())
         answered = sum(self.answered.values())
         low, high = wilson(answered, self.calls)
@@ -138,13 +139,13 @@ def balance(
     verified: str | None,
     waiting: int,
 ) -> Books:
-    """Hold calls, records and mails against each other.
+    """Compare calls, records and mails.
 
     Args:
         journal: lines of the campaign.
-        records: that the guard kept.
+        records: of the guard.
         mails: that arrived, each as often as it did.
-        verified: what the check of the database said.
+        verified: result of the database check.
         waiting: notices in the outbox.
     """
     lines = list(journal)
@@ -195,25 +196,25 @@ def balance(
 
 
 def _verdict_of(call: Mapping[str, Any], after: Mapping[str, Any] | None, records: Sequence[KeptRecord]) -> str:
-    """The verdict of the first mission to a call's room that began after it and before the next call."""
+    """Verdict of the first mission to a call's room that began after the call and before the next one."""
     until = math.inf if after is None else after["wall"]
     own = [r for r in records if r.room == call["room"] and call["wall"] - CLOCK_SLACK <= r.wall < until and r.verdict]
     return min(own, key=lambda record: record.wall).verdict if own else ""
 
 
 def next_patrol(journal: Iterable[Mapping[str, Any]]) -> int:
-    """The number of the patrol to go on with."""
+    """Number of the patrol to continue with."""
     begun = [int(line["patrol"]) for line in journal if line["kind"] == "call"]
     return max(begun, default=-1) + 1
 
 
 def open_call(journal: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """The last call, where nobody has written down what became of it."""
+    """The last call, if its outcome has not been recorded."""
     calls = [line for line in journal if line["kind"] == "call"]
     done = {line["call"] for line in journal if line["kind"] in ("verdict", "given_up")}
     return calls[-1] if calls and calls[-1]["call"] not in done else None
 
 
 def everything_killed(journal: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether the last that was written is that all were killed."""
+    """Whether the last entry says that everything was killed."""
     return bool(journal) and journal[-1]["kind"] == "kill" and journal[-1]["victim"] == ALL

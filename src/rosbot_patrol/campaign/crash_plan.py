@@ -1,4 +1,4 @@
-"""Which program is killed when, drawn from a seed: one to three kills in each patrol, and now and then all at once."""
+"""Plan of a crash campaign, drawn from a seed: which program is killed when, one to three kills in a patrol."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 ALL = "all"
 GUARD = "patrolling_node"
 
-# Each block of kills has these once, in an order of its own: every node of the launch, the patrol itself more often.
+# Each block of kills has these once, in its own order: every node of the launch, the patrol itself more often.
 VICTIMS = (
     GUARD, GUARD, GUARD, GUARD, ALL, ALL, "move_base", "amcl", "map_server", "twist_mux", "darknet_ros", "sensor_watch",
     "esp_client1", "rgb_compress", "robot_state_publisher", "laser_broadcaster",
 )  # fmt: skip
 
-# What happens to a patrol, in order, and until how long after it a kill comes [s].
+# Moments of a patrol, in order, and the longest delay of a kill after them [s].
 MOMENTS = {"called": 0.5, "driving": 6.0, "seen": 0.4, "looking": 6.0, "returning": 4.0}
 _MOST = 3  # kills in one patrol
 
@@ -46,13 +46,13 @@ class CrashPatrol:
 
 
 def victim_of(seed: int, number: int) -> str:
-    """Whom a kill of the campaign hits."""
+    """Victim of a kill of the campaign."""
     block, place = divmod(number, len(VICTIMS))
     return VICTIMS[int(np.random.default_rng([seed, block, 11]).permutation(len(VICTIMS))[place])]
 
 
 def plan_crashes(seed: int, kills: int) -> list[CrashPatrol]:
-    """The patrols of a campaign of so many kills; those of a shorter one are the first of a longer one's."""
+    """Patrols of a campaign with this number of kills; a longer campaign begins with the same patrols."""
     patrols: list[CrashPatrol] = []
     number = 0
     while number < kills:

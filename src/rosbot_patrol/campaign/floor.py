@@ -1,7 +1,6 @@
-"""The floor of a house, by the world itself and not by its map: where somebody can stand, where the robot can drive,
-which room a place belongs to, and what is seen from where.
+"""Floor of a house from the world's own shapes: where people can stand, where the robot can drive, what is in view.
 
-Rooms are parted as the patrol parts them (`patrol.room_regions`), but over the floor as it is. Cells are of 0.1 m.
+Rooms are separated as in the patrol (`patrol.house.regions`), but on the true floor. Cells are 0.1 m wide.
 """
 
 from __future__ import annotations
@@ -28,19 +27,19 @@ from rosbot_patrol.simulation.scene.ways import EYE_LEVEL, Ways
 Mask = NDArray[np.bool_]
 
 CELL = 0.1
-PERSON_RADIUS, ROBOT_RADIUS = 0.30, 0.24  # that each keeps from furniture [m]
-BODY_RADIUS = 0.25  # of somebody [m]
-PERSON_HEIGHTS = (0.16, 0.45, 0.75, EYE_LEVEL)  # at which somebody meets furniture [m]
+PERSON_RADIUS, ROBOT_RADIUS = 0.30, 0.24  # distance that each keeps from furniture [m]
+BODY_RADIUS = 0.25  # of a person [m]
+PERSON_HEIGHTS = (0.16, 0.45, 0.75, EYE_LEVEL)  # heights at which a person collides with furniture [m]
 ROBOT_HEIGHTS = (0.04, 0.1, 0.16, 0.2)
 EYE = 0.22  # height of the robot's camera [m]
 VIEW_WIDTH = 1.047  # of the camera [rad]
-HALF_VIEW = 0.50  # to each side, a little less [rad]
-RECOGNISED = 0.3  # share of a body in view from which on it should be recognised
-VIEW_RANGE = 7.0  # farther off nobody is asked to be recognised [m]
+HALF_VIEW = 0.50  # half of it, with a margin [rad]
+RECOGNISED = 0.3  # visible share of a body above which it should be recognised
+VIEW_RANGE = 7.0  # maximum range at which a person should be recognised [m]
 BODY_HEIGHTS = {"": (0.3, 0.6, 0.9, 1.2, 1.5), "sitting": (0.25, 0.5, 0.75, 1.0), "crouching": (0.2, 0.4, 0.6, 0.8)}
-SIDE = 0.15  # of a body from its middle [m]
+SIDE = 0.15  # distance of a body's side from its centre [m]
 
-_TIGHT = 0.12  # that the robot keeps from furniture where a room's point asks for it [m]
+_TIGHT = 0.12  # distance that the robot keeps from furniture if a room's point requires less [m]
 
 _STEPS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
@@ -72,23 +71,23 @@ class Floor:
         self._drives: dict[int, NDArray[np.int64]] = {}
 
     def places(self, room: int, mask: Mask) -> NDArray[np.float64]:
-        """Middles of the cells of a room that are in a mask, shape (N, 2) [m]."""
+        """Centres of a room's cells that are in a mask, shape (N, 2) [m]."""
         iy, ix = np.nonzero(mask & (self._room_of == room))
         x0, y0 = self.info.origin_x + CELL / 2.0, self.info.origin_y + CELL / 2.0
         return np.column_stack((x0 + ix * CELL, y0 + iy * CELL))
 
     def room_at(self, x: float, y: float) -> int:
-        """Number of the room that a place belongs to, -1 outside of the house."""
+        """Number of the room at a place, -1 outside the house."""
         ix, iy = self.info.cell_of(x, y)
         return int(self._room_of[iy, ix]) if self.info.contains_cell(ix, iy) else -1
 
     def can_stand(self, x: float, y: float) -> bool:
-        """Whether there is room for somebody."""
+        """Whether a person has room to stand there."""
         ix, iy = self.info.cell_of(x, y)
         return self.info.contains_cell(ix, iy) and bool(self.standable[iy, ix])
 
     def leaves_way(self, room: int, x: float, y: float) -> bool:
-        """Whether the robot still comes from the base to a room's point when somebody stands at a place."""
+        """Whether the robot still gets from the base to a room's point when a person stands at a place."""
         apart = (BODY_RADIUS + ROBOT_RADIUS) / CELL + 1.0
         cx, cy = self.info.cell_of(x, y)
         drive = self._cells_to(room)
@@ -100,12 +99,12 @@ class Floor:
         return bool(flood(way, int(start[0]), int(start[1]))[goal[1], goal[0]])
 
     def share_seen(self, eye: Sequence[float], person: Sequence[float], posture: str = "") -> float:
-        """How much of somebody's body is in the line of sight from the robot's camera at a place, 0 to 1.
+        """Share of a person's body in the line of sight from the robot's camera at a place, 0 to 1.
 
         Args:
-            eye: where the robot stands, x, y [m].
-            person: where the body stands, x, y [m].
-            posture: how it holds itself.
+            eye: position of the robot, x, y [m].
+            person: position of the body, x, y [m].
+            posture: of the body.
         """
         bearing = math.atan2(person[1] - eye[1], person[0] - eye[0])
         dx, dy = -SIDE * math.sin(bearing), SIDE * math.cos(bearing)
@@ -114,7 +113,7 @@ class Floor:
         return self._sight.share((eye[0], eye[1], EYE), points, ())
 
     def in_view(self, robot: Pose2D, person: Sequence[float], posture: str = "") -> float:
-        """The same share, 0 where the robot does not look there or it is too far off."""
+        """The same share, 0 if the robot does not look there or the person is too far away."""
         away = math.hypot(person[0] - robot.x, person[1] - robot.y)
         bearing = math.atan2(person[1] - robot.y, person[0] - robot.x)
         if not 0.3 < away < VIEW_RANGE or abs(angle_difference(bearing, robot.yaw)) > HALF_VIEW:
@@ -122,7 +121,7 @@ class Floor:
         return self.share_seen((robot.x, robot.y), person, posture)
 
     def way(self, start: Sequence[float], goal: Sequence[float]) -> list[tuple[float, float]]:
-        """Corners of a way on foot from one place to another, both among them, empty where there is none."""
+        """Corners of a walk from one place to another, including both; empty if there is no path."""
         cells = _cells_between(self.standable, self.info.cell_of(*start), self.info.cell_of(*goal))
         if not cells:
             return []
@@ -130,7 +129,7 @@ class Floor:
         return self._straightened([(start[0], start[1]), *points[1:-1], (goal[0], goal[1])])
 
     def wall_behind(self, x: float, y: float, farthest: float = 1.2) -> Pose2D | None:
-        """The nearest wall to a place, as the pose of what hangs on it and faces the room; None where none is near."""
+        """Pose of something on the nearest wall to a place, facing the room; None if no wall is near."""
         cut = self.ways.cut(EYE_LEVEL)
         ranges = cut.cast(x, y, -math.pi, math.tau / 72, 72, 9.0)
         best = int(np.argmin(ranges))
@@ -145,13 +144,13 @@ class Floor:
         return Pose2D(x + off * math.cos(towards), y + off * math.sin(towards), yaw)
 
     def drive_to(self, room: int) -> NDArray[np.float64]:
-        """The shortest way for the robot from the base to a room's point, x, y, shape (N, 2) [m]."""
+        """The robot's shortest path from the base to a room's point, x, y, shape (N, 2) [m]."""
         origin = np.array([self.info.origin_x, self.info.origin_y])
         found: NDArray[np.float64] = origin + (self._cells_to(room) + 0.5) * CELL
         return found
 
     def _cells_to(self, room: int) -> NDArray[np.int64]:
-        """Cells of the shortest way from the base to a room's point, ix, iy, shape (N, 2)."""
+        """Cells of the shortest path from the base to a room's point, ix, iy, shape (N, 2)."""
         if room not in self._drives:
             known = self.rooms.find(room)
             assert known is not None
@@ -170,7 +169,7 @@ class Floor:
         return kept
 
     def is_straight(self, start: Sequence[float], goal: Sequence[float]) -> bool:
-        """Whether somebody can walk straight from one place to another."""
+        """Whether a person can walk straight from one place to another."""
         count = max(int(math.dist(start, goal) / (CELL / 2.0)), 1)
         return all(
             self.can_stand(start[0] + k / count * (goal[0] - start[0]), start[1] + k / count * (goal[1] - start[1]))
@@ -178,17 +177,17 @@ class Floor:
         )
 
     def _reached(self, drivable: Mask) -> Mask:
-        """Where the robot gets to from its base."""
+        """Cells that the robot can reach from its base."""
         base = self.rooms.base.pose
         near = shrunk(self.open, _TIGHT)
-        for room in self.rooms:  # a point may be given a little nearer to furniture than the robot likes
+        for room in self.rooms:  # a room's point may be slightly closer to furniture than the robot's own margin
             ix, iy = self.info.cell_of(room.pose.x, room.pose.y)
             about = (slice(iy - 2, iy + 3), slice(ix - 2, ix + 3))
             drivable[about] |= near[about]
         return flood(drivable, *self.info.cell_of(base.x, base.y))
 
     def _room_cells(self) -> NDArray[np.int16]:
-        """Room of each cell, -1 where there is none."""
+        """Room of each cell, -1 if there is none."""
         iy, ix = np.indices(self.info.shape).reshape(2, -1)
         x, y = self.info.origin_x + (ix + 0.5) * CELL, self.info.origin_y + (iy + 0.5) * CELL
         px, py, inside = self.plan.indices(x, y)
@@ -197,7 +196,7 @@ class Floor:
 
 
 def shrunk(mask: Mask, radius: float) -> Mask:
-    """The cells of a mask that are farther than a radius [m] from all that is not in it."""
+    """Cells of a mask farther than a radius [m] from all cells outside it."""
     reach = math.ceil(radius / CELL)
     padded = np.pad(mask, reach)
     kept = mask.copy()
@@ -216,7 +215,7 @@ def _info_of(bodies: Sequence[Body]) -> GridInfo:
 
 
 def _cells_between(mask: Mask, start: tuple[int, int], goal: tuple[int, int]) -> list[tuple[int, int]]:
-    """Cells of the shortest way over a mask, empty where there is none (Dijkstra 1959)."""
+    """Cells of the shortest path over a mask, empty if there is none (Dijkstra 1959)."""
     far = np.full(mask.shape, math.inf)
     parents: dict[tuple[int, int], tuple[int, int]] = {}
     far[goal[1], goal[0]] = 0.0

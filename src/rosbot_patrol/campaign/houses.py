@@ -1,4 +1,4 @@
-"""The houses that a campaign patrols: which files they are made of, and what stands in them."""
+"""Houses of a campaign: their files and their furniture."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class HouseFiles:
 
 @dataclass(frozen=True)
 class House:
-    """A house as it stands, without anybody in it."""
+    """A house without people."""
 
     files: HouseFiles
     bodies: tuple[Body, ...]

@@ -1,4 +1,4 @@
-"""How sure a share of trials is: the score interval of Wilson (1927), good for few trials, and for all or none."""
+"""Confidence interval of a share: Wilson's score interval (1927), valid for few trials, and for all or none."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ Z95 = 1.959964  # of the normal distribution
 
 
 def wilson(hits: int, trials: int, z: float = Z95) -> tuple[float, float]:
-    """Bounds between which the true share lies, for a level of 95 % unless told otherwise.
+    """Bounds of the true share, at a level of 95 % by default.
 
     Args:
-        hits: trials that came out.
-        trials: of all.
+        hits: number of successful trials.
+        trials: number of all trials.
         z: quantile of the normal distribution.
     """
     if not 0 <= hits <= trials:

@@ -1,8 +1,8 @@
-"""What breaks in the patrols of a campaign with faults, and which verdicts are then as right as the expected one.
+"""Faults in the patrols of a campaign, and the verdicts that they excuse.
 
-Every other patrol has one fault of the simulator (docs/scenarios.md), begun while the robot drives or looks, most of
-them for some seconds. A guard whose camera fails may say `unverified`, never `clear` with somebody there; one whose
-lidar or wheels fail may also say that the room was not reached. What befalls a motion sensor changes no verdict.
+Every other patrol has one fault of the simulator (docs/scenarios.md) that begins while the robot drives or looks; most
+last for some seconds. A guard with a failed camera may say `unverified`, but never `clear` with somebody there. With
+failed lidar or wheels it may also say that the room was not reached. A fault of a motion sensor changes no verdict.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Mishap:
     """One fault of a patrol.
 
     Attributes:
-        told: what breaks, in words.
+        told: the fault in words.
         fault: its entry in the scenario.
-        allowed: verdicts that are right beside the expected one.
+        allowed: verdicts accepted besides the expected one.
     """
 
     told: str
@@ -35,7 +35,7 @@ class Mishap:
 
 
 def mishap_of(seed: int, number: int, room: int, rooms: Sequence[int]) -> Mishap | None:
-    """The mishap of a patrol, None in every other one.
+    """Mishap of a patrol, None in every other one.
 
     Args:
         seed: of the campaign.

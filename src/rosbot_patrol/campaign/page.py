@@ -1,4 +1,4 @@
-"""A campaign's results as one HTML page that needs no other file."""
+"""Results of a campaign as one self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rosbot_patrol.campaign.record import Result
 from rosbot_patrol.campaign.table import HEADINGS, Share, by_kind, row, shares
 from rosbot_patrol.counts import count_of
 
-PLACE_AIM, SHARE_AIM = 0.3, 0.05  # aims of place [m] and of share
+PLACE_AIM, SHARE_AIM = 0.3, 0.05  # targets of the position [m] and of the share
 _WHEN = {
     "goal": "trigger to goal",
     "seen_to_notice": "in view to notice",
@@ -66,11 +66,11 @@ dot is a patrol, the stroke the median, the dashed stroke the aim. "-": not know
 
 
 def page(results: Sequence[Result], command: Callable[[Result], str], *, subtitle: str = "") -> str:
-    """The page.
+    """Make the page.
 
     Args:
         results: of the campaign.
-        command: what plays a patrol again.
+        command: command that repeats a patrol.
         subtitle: a line under the title, such as the commit and the machine.
     """
     counted = shares(results)

@@ -1,11 +1,11 @@
-"""What happens in each patrol of a campaign, drawn from a seed: house, room, who is there, and what should come.
+"""Plan of each patrol in a campaign, drawn from a seed: house, room, people, expected outcome.
 
-Patrol k of seed s is the same whatever else is run: the seed of everything in it is (s, k). Each block of
-`len(KINDS)` patrols has every kind once, in an order of its own; the houses take turns.
+Patrol k of seed s is the same whatever else is run: everything in it uses the seed (s, k). Each block of `len(KINDS)`
+patrols has every kind once, in its own order; the houses take turns.
 
-Nobody is put into a wall or into the robot's only way: every place is one where somebody has room to stand by the
-world's own shapes. Somebody hidden is out of sight from the room's point, and where the house allows it from the
-way there, but not from everywhere that the robot can reach in that room.
+Nobody is placed in a wall or on the robot's only path: by the world's own shapes there is room to stand at every place.
+A hidden person is out of sight from the room's point and, if the house allows it, from the route there. But some place
+in that room, within the robot's reach, has a view of the person.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ INTRUDERS = frozenset({"standing", "walking", "hidden", "late", "two"})
 
 CLEAR, CONFIRMED = "clear", "confirmed"
 TRIGGER_AT = 2.0  # [s] after the first guard
-WITHIN = 600.0  # simulated time for a patrol [s]
-PASSES = 8  # over all rooms: each draws some places and one posture only
+WITHIN = 600.0  # simulated time limit of a patrol [s]
+PASSES = 8  # passes over all rooms: each draws some places and one posture only
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,11 +39,11 @@ class Patrol:
     Attributes:
         number: in the campaign; seed: of the campaign.
         kind: one of KINDS.
-        house: its name; room: number of the room that is triggered.
-        people: who should be found; expected: the verdict.
-        viewpoint: a place from which a hidden one is seen [m], None where nobody hides.
-        scenario: the file's tree.
-        mishap: what breaks, in words, "" where nothing does; allowed: verdicts that it makes as right.
+        house: its name; room: number of the triggered room.
+        people: persons to be found; expected: the verdict.
+        viewpoint: a place with a view of the hidden person [m], None if nobody hides.
+        scenario: contents of the scenario file.
+        mishap: the fault in words, "" for none; allowed: verdicts that it excuses.
     """
 
     number: int
@@ -61,16 +61,16 @@ class Patrol:
 
     @property
     def title(self) -> str:
-        """What it is about, in a line."""
+        """Description in one line."""
         return str(self.scenario["title"])
 
     def to_plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Contents for JSON."""
         return asdict(self)
 
 
 def patrol_from_plain(tree: dict[str, Any]) -> Patrol:
-    """What `to_plain` made. Raises KeyError, TypeError where it is something else."""
+    """Patrol from the result of `to_plain`. Raises KeyError, TypeError for anything else."""
     people = tuple(Person(**person) for person in tree["people"])
     viewpoint = tree["viewpoint"]
     at = (float(viewpoint[0]), float(viewpoint[1])) if viewpoint else None
@@ -78,28 +78,28 @@ def patrol_from_plain(tree: dict[str, Any]) -> Patrol:
 
 
 def kind_of(seed: int, number: int) -> str:
-    """The kind of a patrol."""
+    """Kind of a patrol."""
     block, place = divmod(number, len(KINDS))
     return KINDS[int(np.random.default_rng([seed, block, 1]).permutation(len(KINDS))[place])]
 
 
 def house_of(seed: int, number: int, houses: Sequence[str]) -> str:
-    """The house of a patrol: they take turns, and begin with another in each block."""
+    """House of a patrol: they take turns, starting with another one in each block."""
     return houses[(number + number // len(KINDS) + seed) % len(houses)]
 
 
 def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor, *, faults: bool = False) -> Patrol:
-    """Draw a patrol.
+    """Plan a patrol.
 
     Args:
         seed: of the campaign.
         number: of the patrol.
         files: of the house that it is in.
         floor: of that house.
-        faults: something breaks in every other patrol; who is there stays the same.
+        faults: whether every other patrol has a fault; the people stay the same.
 
     Raises:
-        WorldError: no room of the house has a place for what the kind asks for.
+        WorldError: no room of the house has a place that suits the kind.
     """
     kind = kind_of(seed, number)
     rng = np.random.default_rng([seed, number, 2])
@@ -158,8 +158,8 @@ def _patrol(seed: int, number: int, kind: str, files: HouseFiles, floor: Floor, 
 
 
 def scenario_text(patrol: Patrol) -> str:
-    """The scenario's file."""
+    """Text of the scenario file."""
     expect = dict(patrol.scenario["expect"])
-    if "verdicts" in expect:  # JSON made the rooms text
+    if "verdicts" in expect:  # JSON has turned the room numbers into strings
         expect["verdicts"] = {int(room): verdict for room, verdict in expect["verdicts"].items()}
     return yaml.safe_dump({**patrol.scenario, "expect": expect}, sort_keys=False, allow_unicode=True, width=120)

@@ -1,4 +1,4 @@
-"""How far a campaign is, in a line: a bar, counts, and the time that is left by the mean of those that ended."""
+"""Progress line of a campaign: a bar, counts, and the remaining time by the mean duration."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ WIDTH = 24
 
 
 def clock(seconds: float) -> str:
-    """A time as people read it."""
+    """Duration for people."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
 
 
 def progress_line(done: int, total: int, here: int, elapsed: float, *, failed: int) -> str:
-    """The line.
+    """Make the line.
 
     Args:
-        done: that ended, those of an earlier run among them.
+        done: patrols that have ended, including earlier runs.
         total: of the campaign.
-        here: that ended in this run.
-        elapsed: since it began [s].
-        failed: of those that are done.
+        here: patrols that have ended in this run.
+        elapsed: time since its start [s].
+        failed: failures among those done.
     """
     filled = round(WIDTH * done / total) if total else WIDTH
     left = f", {clock(elapsed / here * (total - done))} left" if here and done < total else ""

@@ -1,4 +1,4 @@
-"""What came of each patrol: one JSON file a patrol, written whole, so that a campaign goes on where it stopped."""
+"""Results of the patrols: one JSON file each, written atomically, so that a campaign can be resumed."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from rosbot_patrol.errors import ParamError, StateError
 from rosbot_patrol.files import read_json, write_json
 
 RESULT, PLAN, SETTINGS = "result.json", "patrol.json", "campaign.json"
-BESIDE = 1.0  # a notice that tells of a place so far from anybody tells of nobody [m]
+BESIDE = 1.0  # error of a notified position above which it refers to nobody [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """What came of one patrol, and what was true; None is what is not known.
+    """Result of one patrol, and the ground truth; None is unknown.
 
     Attributes:
-        verdict: of the mission to the room, "" where there was none; reason: its sentence.
-        problem: why the patrol could not be played to its end, "" where it was.
+        verdict: of the mission to the room, "" for none; reason: its sentence.
+        problem: reason why the patrol was not completed, "" if it was.
         was_there: whether somebody was in the room or in view before the verdict, long enough to be found, or found.
-        in_room, in_view: for how long [s]; views: how often the camera could have seen somebody [1].
-        place_error: of the person, as told and as true [m].
+        in_room, in_view: durations [s]; views: number of images that could show somebody.
+        place_error: distance of the notified position from the true one [m].
         share_told, share_true: of the room's floor that was seen.
         times: seconds of simulated time between two events, by name.
-        contacts: what the robot touched; touches: each touch in words, with when and who moved.
+        contacts: objects that the robot touched; touches: each touch in words, with its time and who moved.
         localisation: mean and largest error of the pose [m].
-        home_error: from where the robot began, at the end [m].
-        home: whether it came back; None where it went on to another room, or nobody knows.
-        suspects: what looked like somebody to the guard, as it says.
-        mishap: what broke, "" where nothing did; allowed: verdicts that it made as right.
-        people: who were to be found; mails: about incidents that were delivered; missions: that ended.
-        sim_s, wall_s: how long it took.
+        home_error: final distance from the robot's start [m].
+        home: whether it came back; None if it went on to another room, or unknown.
+        suspects: objects that the guard reports as person-like.
+        mishap: the fault, "" for none; allowed: verdicts that it excuses.
+        people: persons to be found; mails: delivered mails about incidents; missions: number that ended.
+        sim_s, wall_s: duration.
     """
 
     number: int
@@ -72,32 +72,32 @@ class Result:
 
     @property
     def detected(self) -> bool | None:
-        """Whether who was there was found; None where nobody was."""
+        """Whether a present person was found; None if nobody was there."""
         return self.verdict == CONFIRMED if self.was_there else None
 
     @property
     def missed(self) -> bool:
-        """Whether somebody was there and was not found, though nothing that broke excuses it."""
+        """Whether a present person was not found, without an excusing fault."""
         return self.detected is False and self.verdict not in self.allowed
 
     @property
     def false_alarm(self) -> bool:
-        """Whether somebody was found and nobody was there."""
+        """Whether the guard found somebody although nobody was there."""
         return self.verdict == CONFIRMED and not self.was_there
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether somebody was there, and the notice tells of a place where nobody was."""
+        """Whether somebody was there, but the notice names a place where nobody was."""
         return self.verdict == CONFIRMED and self.place_error is not None and self.place_error > BESIDE
 
     @property
     def has_its_mails(self) -> bool:
-        """Whether there came one, or one for each of several people."""
+        """Whether there was one mail, or one for each of several people."""
         return 1 <= self.mails <= max(self.people, 1)
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What did not go as it should have, each in a few words."""
+        """Deviations from the expected outcome, each in a few words."""
         found = [self.problem] if self.problem else []
         found += ["missed"] if self.missed else []
         found += ["false alarm"] if self.false_alarm else []
@@ -113,12 +113,12 @@ class Result:
         return tuple(found)
 
     def to_json(self) -> str:
-        """For the file."""
+        """Text for the file."""
         return json.dumps(asdict(self), indent=1, ensure_ascii=False)
 
 
 def result_from_plain(tree: Mapping[str, Any]) -> Result:
-    """What a result file holds; what a newer version added is left out.
+    """Result from the contents of its file; fields of newer versions are ignored.
 
     Raises:
         TypeError: a field is missing.
@@ -133,7 +133,7 @@ def result_from_plain(tree: Mapping[str, Any]) -> Result:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a folder's campaign is about; another campaign needs another folder."""
+    """Settings of a folder's campaign; another campaign needs another folder."""
 
     seed: int
     houses: tuple[str, ...]
@@ -145,8 +145,8 @@ class CampaignFolder:
     """The files of a campaign.
 
     Args:
-        folder: is made where it is missing.
-        settings: of the campaign; have to be those that the folder was begun with.
+        folder: created if it is missing.
+        settings: of the campaign; must equal those of the folder's start.
 
     Raises:
         ParamError: the folder holds another campaign, or its file cannot be read.
@@ -161,16 +161,16 @@ class CampaignFolder:
         now = json.loads(json.dumps(asdict(settings)))
         if begun is None:
             write_json(path, now)
-        elif (begun := {"faults": False, **begun}) != now:  # from before there were any
+        elif (begun := {"faults": False, **begun}) != now:  # a folder from before there were faults
             differs = ", ".join(f"{k} {begun.get(k)}, not {v}" for k, v in now.items() if begun.get(k) != v)
             raise ParamError(str(folder), f"holds a campaign of another kind ({differs}): name another folder")
 
     def of(self, number: int) -> Path:
-        """The folder of a patrol."""
+        """Folder of a patrol."""
         return self.folder / f"{number:04d}"
 
     def result(self, number: int) -> Result | None:
-        """What came of a patrol, None where it has not been played."""
+        """Result of a patrol, None if it has not been run."""
         tree = _read(self.of(number) / RESULT)
         if tree is None:
             return None
@@ -180,7 +180,7 @@ class CampaignFolder:
             raise ParamError(str(self.of(number) / RESULT), f"is no result ({err}): remove it") from err
 
     def results(self) -> list[Result]:
-        """All that have been played, in order."""
+        """Results of all patrols run so far, in order."""
         numbers = sorted(int(path.parent.name) for path in self.folder.glob(f"[0-9]*/{RESULT}"))
         return [result for number in numbers if (result := self.result(number)) is not None]
 

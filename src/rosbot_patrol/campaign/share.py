@@ -1,5 +1,6 @@
-"""The share of a room's floor that the camera really had in view: by the patrol's own definition, from true poses and
-the world itself instead of the map, the scans and where the robot thought that it was.
+"""True share of a room's floor that was in view, from the true poses and the world's own shapes.
+
+It uses the patrol's own definition, but neither the map, the scans nor the robot's estimate of its pose.
 """
 
 from __future__ import annotations
@@ -14,19 +15,19 @@ from rosbot_patrol.geometry import Pose2D, distance
 from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Eye, Sight
 from rosbot_patrol.simulation.scene.slices import Slice
 
-RATE = 10.0  # pictures that the detector looks at, of simulated time [Hz]
+RATE = 10.0  # rate of images at the detector, in simulated time [Hz]
 _BEAMS = 720
-_SAME = 0.01  # from places so near one can look as far [m]
+_SAME = 0.01  # positions closer than this share one view [m]
 
 
 def true_share(
     floor: Floor, room: int, robot: Track, begin: float, end: float, params: CoverageParams | None = None
 ) -> float:
-    """The share, 0 to 1.
+    """Share of a room's floor that was in view, 0 to 1.
 
     Args:
         floor: of the house.
-        room: whose floor counts.
+        room: number of the room.
         robot: its true poses.
         begin: of the mission [s].
         end: of the look around [s].

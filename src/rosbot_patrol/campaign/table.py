@@ -1,4 +1,4 @@
-"""A campaign's results as tables, in text and in markdown, and as figures with their intervals."""
+"""Results of a campaign as tables, in text and in markdown, and as figures with intervals."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TIMES = ("goal", "arrived", "seen_to_notice", "notice", "mail", "looked", "home"
 
 @dataclass(frozen=True)
 class Share:
-    """So many of so many."""
+    """A number of hits among a number of trials."""
 
     name: str
     hits: int
@@ -24,7 +24,7 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """In which the true share lies by 95 %."""
+        """Interval that holds the true share with 95 %."""
         return wilson(self.hits, self.trials)
 
     def __str__(self) -> str:
@@ -35,7 +35,7 @@ class Share:
 
 
 def shares(results: Sequence[Result]) -> list[Share]:
-    """What a campaign is about."""
+    """The campaign's main shares."""
     there = [r for r in results if r.was_there and not r.mishap]
     broken = [r for r in results if r.mishap]
     also = [Share("as it should be though something broke", sum(not r.failures for r in broken), len(broken))]
@@ -59,13 +59,13 @@ def shares(results: Sequence[Result]) -> list[Share]:
 
 
 def by_kind(results: Sequence[Result]) -> list[tuple[str, list[Share]]]:
-    """Detections and false alarms for each kind."""
+    """Detections and false alarms of each kind."""
     kinds = sorted({r.kind for r in results})
     return [(kind, shares([r for r in results if r.kind == kind])[:2]) for kind in kinds]
 
 
 def measures(results: Sequence[Result]) -> list[tuple[str, str, float, float, int]]:
-    """What was measured: name, unit, median, largest, how often."""
+    """Measured values: name, unit, median, largest, count."""
     asked: list[tuple[str, str, Callable[[Result], float | None]]] = [
         ("place of the person, error", "m", lambda r: r.place_error),
         ("share of the floor, told less true", "", _share_error),
@@ -106,7 +106,7 @@ HEADINGS = (
 
 
 def row(result: Result) -> tuple[str, ...]:
-    """A patrol's cells under HEADINGS."""
+    """Cells of a patrol under HEADINGS."""
     localisation = result.localisation[1] if result.localisation else None
     return (
         str(result.number),
@@ -139,7 +139,7 @@ def _percent(value: float | None) -> str:
 
 
 def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Columns as wide as they need to be."""
+    """Text table with columns of the needed width."""
     lines = [tuple(headings), *(tuple(r) for r in rows)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(headings))]
     return "\n".join(
@@ -148,7 +148,7 @@ def text_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def markdown_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """The same for a page."""
+    """Markdown table."""
     lines = [f"| {' | '.join(headings)} |", "|" + "---|" * len(headings)]
     lines += [f"| {' | '.join(cell.replace('|', '/') for cell in r)} |" for r in rows]
     return "\n".join(lines)
@@ -165,7 +165,7 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def figures(results: Sequence[Result]) -> dict[str, float]:
-    """The figures of a campaign by name, for a benchmark."""
+    """Figures of a campaign by name, for a benchmark."""
     detected, alarms, placed, _, home, _, _, *survived = shares(results)
     named = {
         "detection_rate": detected.hits / detected.trials if detected.trials else 0.0,

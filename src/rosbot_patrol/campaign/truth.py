@@ -1,4 +1,4 @@
-"""What really was there during a patrol, from the simulator's own poses: who was in the room, and who was in view."""
+"""Ground truth of a patrol from the simulator's own poses: who was in the room, and who was in view."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rosbot_patrol.campaign.cast import Person
 from rosbot_patrol.campaign.floor import RECOGNISED, Floor
 from rosbot_patrol.geometry import Pose2D, angle_difference
 
-ENOUGH = 1.5  # in view for so long, somebody has to be found [s]
-_ONE_TOUCH = 1.0  # a pause in a touch that makes it two [s]
-_LONGEST = 0.5  # between two poses of the same one; more is a gap [s]
+ENOUGH = 1.5  # time in view after which a person should be found [s]
+_ONE_TOUCH = 1.0  # pause that separates two touches [s]
+_LONGEST = 0.5  # longest time between two poses of an actor; more is a gap [s]
 
 
 @dataclass(frozen=True)
@@ -24,29 +24,29 @@ class Track:
     poses: Sequence[Pose2D]
 
     def at(self, time: float) -> Pose2D | None:
-        """The pose at a time, the last one before it; None before the first."""
+        """Last pose at or before a time; None before the first."""
         i = bisect.bisect_right(self.times, time) - 1
         return self.poses[i] if i >= 0 else None
 
     def speed(self, time: float, span: float = 0.4) -> float | None:
-        """How fast it moved over a span up to a time [m/s], None before the first pose."""
+        """Speed over a span up to a time [m/s], None before the first pose."""
         before, after = self.at(time - span), self.at(time)
         return None if before is None or after is None else math.dist(before[:2], after[:2]) / span
 
     def turning(self, time: float, span: float = 0.4) -> float | None:
-        """How fast it turned over a span up to a time, either way [rad/s], None before the first pose."""
+        """Turning speed over a span up to a time, unsigned [rad/s], None before the first pose."""
         before, after = self.at(time - span), self.at(time)
         return None if before is None or after is None else abs(angle_difference(after.yaw, before.yaw)) / span
 
 
 @dataclass(frozen=True, kw_only=True)
 class Presence:
-    """What was true of the people of a patrol between trigger and verdict.
+    """Ground truth on the people of a patrol between trigger and verdict.
 
     Attributes:
-        in_room: seconds that anybody was in the room that was triggered.
-        in_view: seconds that anybody was in the camera's view.
-        first_view: simulated time at which somebody came into view, None where nobody did.
+        in_room: seconds with anybody in the triggered room.
+        in_view: seconds with anybody in the camera's view.
+        first_view: simulated time at which somebody first came into view, None: never.
     """
 
     in_room: float = 0.0
@@ -55,12 +55,12 @@ class Presence:
 
     @property
     def was_there(self) -> bool:
-        """Whether there was somebody to be found."""
+        """Whether there was a person to be found."""
         return self.in_room >= ENOUGH or self.in_view >= ENOUGH
 
     @property
     def was_seen(self) -> bool:
-        """Whether anybody was in the room or in view at all: too short to be asked for, enough to be right."""
+        """Whether anybody was in the room or in view at all, even for a time too short to require a detection."""
         return self.in_room > 0.0 or self.in_view > 0.0
 
 
@@ -73,16 +73,16 @@ def presence(
     begin: float,
     end: float,
 ) -> Presence:
-    """Who was there from `begin` to `end` [s].
+    """Presence of people from `begin` to `end` [s].
 
     Args:
         floor: of the house.
-        room: that was triggered.
-        people: who count.
+        room: the triggered room.
+        people: the persons that count.
         tracks: of each actor, by name.
         robot: the robot's true poses.
         begin: of the mission.
-        end: when the verdict was told.
+        end: time of the verdict.
     """
     in_room: set[float] = set()
     in_view: set[float] = set()
@@ -109,7 +109,7 @@ def presence(
 
 
 def place_error(tracks: dict[str, Track], people: Sequence[Person], time: float, x: float, y: float) -> float | None:
-    """How far a place that was told is from the nearest of the people at that time [m]; None where nobody is known."""
+    """Distance of a notified place from the nearest person at that time [m]; None if no position is known."""
     there = [pose for p in people if p.name in tracks and (pose := tracks[p.name].at(time)) is not None]
     return min((math.dist(pose[:2], (x, y)) for pose in there), default=None)
 
@@ -119,8 +119,8 @@ def touches(contacts: Sequence[tuple[float, str]], robot: Track, tracks: dict[st
 
     Args:
         contacts: simulated time and name of what the robot touched, for each moment of a touch.
-        robot: its way.
-        tracks: of those who move.
+        robot: its poses.
+        tracks: of the actors.
     """
     told: list[str] = []
     last: dict[str, float] = {}
