@@ -10,34 +10,32 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rosbot_patrol.amcl.localizer import Localizer
+from rosbot_patrol.amcl.core import AmclCore
+from rosbot_patrol.amcl.initial_pose import PoseRecord
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.closed_loop.delayed_plans import DelayedPlans
+from rosbot_patrol.closed_loop.frames import BASE, MAP, ODOM, add_pose, tree_of
 from rosbot_patrol.closed_loop.low_sight import LowSight
 from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams
-from rosbot_patrol.control.give_way import GiveWay, GiveWayParams
-from rosbot_patrol.control.movers import MoverParams, MoverWatch
 from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.layers.obstacle import observe_level
-from rosbot_patrol.costmap.params import read_costmap
-from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert
+from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome, Reason
-from rosbot_patrol.navigation.navigator import Navigator
-from rosbot_patrol.navigation.params import MoveBaseParams
+from rosbot_patrol.navigation.interfaces import Command, Outcome, PlanSource, Reason
+from rosbot_patrol.navigation.stack import NavigationStack
 from rosbot_patrol.package_files import read_move_base
 from rosbot_patrol.params import load
-from rosbot_patrol.planning.interfaces import Array, LocalView, RecoveryView
-from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
-from rosbot_patrol.scan import LevelScan
+from rosbot_patrol.planning.interfaces import Array
 from rosbot_patrol.simulation.engine import STEP, Engine
 from rosbot_patrol.yaml_files import read_mapping
+
+_START_VARIANCE = (0.01, 0.01, 0.005)  # of x, y [m^2] and yaw [rad^2]
+_GLOBAL_EVERY = 5  # cycles between two updates of the global costmap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +57,6 @@ class StackParams:
     move_base: Mapping[str, Any]
     amcl: AmclParams = field(default_factory=AmclParams)
     guard: GuardParams = field(default_factory=GuardParams)
-    movers: MoverParams = field(default_factory=MoverParams)
-    give_way: GiveWayParams = field(default_factory=GiveWayParams)
 
 
 def read_profile(folder: Path) -> StackParams:
@@ -111,47 +107,30 @@ class ClosedLoop:
     ) -> None:
         self.engine = engine
         self._delays = delays or Delays()
-        tree = params.move_base
-        own = {k: v for k, v in tree.items() if not isinstance(v, dict)}
-        self._params = load(MoveBaseParams, own, name="move_base/", ignore=["recovery_behaviors"])
-        self.global_costmap = LayeredCostmap(read_costmap(tree["global_costmap"], name="global_costmap/"))
-        self.local_costmap = LayeredCostmap(read_costmap(tree["local_costmap"], name="local_costmap/"))
-        for layer in self.global_costmap.static_layers:
-            layer.set_map(known)
-        self._planner = make_global_planner(self._params.base_global_planner, tree)
-        self._plans = DelayedPlans(self._plan, lambda: self.now, self._delays.plan)
-        self.controller = make_local_planner(
-            self._params.base_local_planner,
-            tree,
-            self.local_costmap,
-            controller_frequency=self._params.controller_frequency,
-        )
-        p = self._params
-        self.navigator = Navigator(
-            p,
-            plans=self._plans,
-            controller=self.controller,
-            recoveries=make_recoveries(
-                tree,
-                conservative=p.conservative_reset_dist,
-                clearing_radius=p.aggressive_radius,
-                clearing_rotation=p.clearing_rotation_allowed,
-            ),
-        )
-        self._localizer = Localizer(params.amcl, np.random.default_rng(seed))
-        self._localizer.set_map(known)
-        self._localizer.set_pose(engine.pose, np.diag([0.01, 0.01, 0.005]))
+        self._tree = tree_of(engine.robot.description)
+        self.stack = NavigationStack(params.move_base, self._tree, self._make_plans, name="move_base/", now=engine.now)
+        self._amcl = AmclCore(params.amcl, self._tree, np.random.default_rng(seed))
         self._guard = CollisionGuard(params.guard)
-        self._low_sight = LowSight(engine, (self.local_costmap, self.global_costmap), self._guard)
-        self._movers = MoverWatch(params.movers)
-        self._give_way = GiveWay(params.give_way)
+        self._low_sight = LowSight(engine, self.stack.costmaps, self._guard)
+        for layer in self.stack.global_costmap.map_layers:
+            self.stack.global_costmap.hear_map(layer, known, MAP)
+        self._start_amcl(known)
         self._commands: deque[tuple[float, Twist2D]] = deque()
         self._map_from_odom = engine.pose
-        self._every = round(1.0 / p.controller_frequency / STEP)
+        self._every = round(1.0 / self.stack.params.controller_frequency / STEP)
         self._ticks = 0
         self._moved_at = -math.inf
         self._touching: set[str] = set()
         self.drive = Drive()
+
+    def _make_plans(self, stack: NavigationStack) -> PlanSource:
+        return DelayedPlans(lambda goal: stack.plan_from_robot(goal, self.now), lambda: self.now, self._delays.plan)
+
+    def _start_amcl(self, known: Grid) -> None:
+        covariance = np.zeros((6, 6))
+        covariance[[0, 1, 5], [0, 1, 5]] = _START_VARIANCE
+        self._amcl.hear_map(known)
+        self._amcl.hear_initial_pose(PoseRecord(MAP, 0.0, self.engine.pose, covariance), self.now)
 
     @property
     def now(self) -> float:
@@ -168,21 +147,22 @@ class ClosedLoop:
         """map_from_base, as amcl believes."""
         return compose(self._map_from_odom, self.odom_pose)
 
-    def _plan(self, goal: Pose2D) -> Array:
-        grid = Grid(self.global_costmap.info, self.global_costmap.cells.copy())
-        return self._planner.plan(grid, self.map_pose, goal)
+    @property
+    def global_costmap(self) -> LayeredCostmap:
+        """The one that plans are made on."""
+        return self.stack.global_costmap.costmap
 
     def drive_to(self, goal: Pose2D, timeout: float, *, each_step: Callable[[], None] = lambda: None) -> Drive:
         """Drive to a goal in the frame of the map, for at most a time [s]; `each_step` is called after each."""
         self.drive = Drive()
         begin = self.now
         self._tick()
-        self.navigator.set_goal(goal, self.now)
+        self.stack.navigator.set_goal(goal, self.now)
         while self.now < begin + timeout and self.drive.outcome is None:
             self._step()
             each_step()
         if self.drive.outcome is None:
-            self.navigator.cancel()
+            self.stack.navigator.cancel()
         self._stand()
         self.drive.seconds = self.now - begin
         self.drive.error = math.hypot(self.engine.pose.x - goal.x, self.engine.pose.y - goal.y)
@@ -216,61 +196,48 @@ class ClosedLoop:
     def _tick(self) -> None:
         """One scan, and everything that follows from it."""
         now, odom = self.now, self.odom_pose
-        level = self.engine.level_scan()
-        localized = self._localizer.update(level.scan, odom, level.pose)
-        if localized.estimate is not None and self._localizer.map_from_odom is not None:
-            self._map_from_odom = self._localizer.map_from_odom
-        self._guard.see(level.scan, level.pose, now, odom)
-        self._low_sight.look(now, odom, (odom, self.map_pose))
-        self._movers.see(level.scan, compose(odom, level.pose))
-        self._update(self.local_costmap, self.odom_pose, level)
-        if self._ticks % (5 * self._every) == 0:
-            self._update(self.global_costmap, self.map_pose, level)
-        command = self.navigator.step(now, self._view(now))
+        add_pose(self._tree, ODOM, BASE, odom, now)
+        self._see(now)
+        add_pose(self._tree, MAP, ODOM, self._map_from_odom, now)
+        self._low_sight.look(now, odom)
+        self.stack.hear_velocity(self.engine.robot.odometry.twist, now)
+        self.stack.local_costmap.update(now)
+        if self._ticks % (_GLOBAL_EVERY * self._every) == 0:
+            self.stack.global_costmap.update(now)
+        command = self.stack.step(now).command
+        self._note(command)
+        if command.twist is not None:
+            verdict = self._guard.limit(command.twist, now, odom)
+            self._commands.append((now + self._delays.command, verdict.twist))
+
+    def _see(self, now: float) -> None:
+        """Show a scan to all programs; amcl and the guard take it level."""
+        scan = self.engine.scan()
+        for costmap in self.stack.costmaps:
+            for each in costmap.scan_inputs:
+                each.hear(scan, now)
+        self.stack.people.hear(scan)
+        self._amcl.feed.hear(scan, now)
+        for placed in self._amcl.feed.placed(now):
+            step = self._amcl.step(placed)
+            if step.outcome.estimate is not None and step.map_from_odom is not None:
+                self._map_from_odom = step.map_from_odom
+            self._guard.see(placed.scan, placed.base_from_laser, now, placed.odom_from_base)
+
+    def _note(self, command: Command) -> None:
+        drive = self.drive
         if command.outcome is not None:
-            self.drive.outcome = command.outcome
+            drive.outcome = command.outcome
         if command.recovery is not None:
-            self.drive.recoveries.append(command.recovery[2])
-        if command.text not in self.drive.reasons[-1:]:
-            self.drive.reasons.append(command.text)
-        if command.plan is not None and not self.drive.planned:
-            self.drive.planned = float(np.hypot(*np.diff(command.plan[:, :2], axis=0).T).sum())
-        if command.twist is None:
-            return
-        verdict = self._guard.limit(command.twist, now, odom)
-        if command.reason is Reason.WAITING:
-            self.drive.waited += self._every * STEP
-        self._commands.append((now + self._delays.command, verdict.twist))
-
-    def _update(self, costmap: LayeredCostmap, pose: Pose2D, seen: LevelScan) -> None:
-        level = replace(seen, pose=compose(pose, seen.pose))
-        for layer in costmap.obstacle_layers:
-            for buffer in layer.buffers.values():
-                if buffer.params.data_type == "LaserScan":
-                    buffer.add(observe_level(level, buffer.params, layer.params.max_obstacle_height))
-        costmap.update(self.now, pose)
-
-    def _view(self, now: float) -> NavigatorView:
-        odom, local = self.odom_pose, self.local_costmap
-        return NavigatorView(
-            local=LocalView(
-                now=now,
-                pose=odom,
-                velocity=self.engine.robot.odometry.twist,
-                costmap=Grid(local.info, local.cells.copy()),
-                local_from_plan=invert(self._map_from_odom),
-            ),
-            recovery=RecoveryView(
-                now=now,
-                pose_global=self.map_pose,
-                pose_local=odom,
-                global_costmap=self.global_costmap,
-                local_costmap=local,
-            ),
-            must_wait=lambda wish: self._give_way.waits(wish, self._movers.movers(now), odom, now),
-        )
+            drive.recoveries.append(command.recovery[2])
+        if command.text not in drive.reasons[-1:]:
+            drive.reasons.append(command.text)
+        if command.plan is not None and not drive.planned:
+            drive.planned = float(np.hypot(*np.diff(command.plan[:, :2], axis=0).T).sum())
+        if command.twist is not None and command.reason is Reason.WAITING:
+            drive.waited += self._every * STEP
 
     @property
     def plan(self) -> Array:
         """The plan that is followed, in the local costmap's frame."""
-        return self.controller.visible_plan
+        return self.stack.controller.visible_plan

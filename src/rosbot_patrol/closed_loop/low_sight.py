@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
+
+import numpy as np
 
 from rosbot_patrol.control import collision_guard
 from rosbot_patrol.control.collision_guard import CollisionGuard
-from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.layers.obstacle import ObservationBuffer
-from rosbot_patrol.costmap.layers.range_layer import RangeReading
-from rosbot_patrol.costmap.sensor_params import DepthSourceParams
-from rosbot_patrol.costmap.sources.depth import DepthPicture, Optics, observe_depth
-from rosbot_patrol.geometry import Pose2D, compose
+from rosbot_patrol.costmap.fed import FedCostmap
+from rosbot_patrol.costmap.inputs import DepthInput, DepthRecord, OpticsRecord, RangeInput, RangeRecord
+from rosbot_patrol.costmap.sources.depth import Optics
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation.engine import Engine
-from rosbot_patrol.simulation.scene.matrices import from_pose2d, to_pose2d
+from rosbot_patrol.simulation.scene.matrices import to_pose2d
 
 log = logging.getLogger(__name__)
 
@@ -26,69 +27,56 @@ class LowSight:
 
     Args:
         engine: with the robot in it. Without a renderer there are no pictures.
-        costmaps: that have layers for them, or not.
+        costmaps: with inputs for them, or not.
         guard: stops for the range sensors.
     """
 
-    def __init__(self, engine: Engine, costmaps: tuple[LayeredCostmap, ...], guard: CollisionGuard) -> None:
-        self._engine, self._costmaps, self._guard = engine, costmaps, guard
+    def __init__(self, engine: Engine, costmaps: Sequence[FedCostmap], guard: CollisionGuard) -> None:
+        self._engine, self._guard = engine, guard
         self._next_ranges = self._next_picture = 0.0
-        self._used: dict[int, float] = {}
-        wants = any(self._depth_buffers(costmap) for costmap in costmaps)
+        inputs = [each for costmap in costmaps for each in costmap.inputs]
+        self._ranges = [each for each in inputs if isinstance(each, RangeInput)]
+        self._depths = [each for each in inputs if isinstance(each, DepthInput)]
         self._has_camera = engine.has_camera and engine.robot.description.camera is not None
-        if wants and not self._has_camera:
+        if self._depths and not self._has_camera:
             log.warning("a costmap wants depth pictures, and the engine has no renderer or the robot no camera")
+        k, size = engine.params.camera.intrinsics, engine.params.camera
+        for each in self._depths:
+            each.hear_optics(OpticsRecord(size.width, size.height, Optics(k.fx, k.fy, k.cx, k.cy)))
 
-    def look(self, now: float, odom_from_base: Pose2D, poses: tuple[Pose2D, ...]) -> None:
+    def look(self, now: float, odom_from_base: Pose2D) -> None:
         """Take what is due.
 
         Args:
             now: time [s].
             odom_from_base: for the guard.
-            poses: of the robot in the frame of each costmap.
         """
         if now >= self._next_ranges - 1e-6:
             self._next_ranges = now + _RANGES
-            self._hear(now, odom_from_base, poses)
+            self._hear(now, odom_from_base)
         if self._has_camera and now >= self._next_picture - 1e-6:
             self._next_picture = now + _PICTURES
-            self._picture(now, poses)
+            self._picture(now)
 
-    def _hear(self, now: float, odom_from_base: Pose2D, poses: tuple[Pose2D, ...]) -> None:
+    def _hear(self, now: float, odom_from_base: Pose2D) -> None:
         p, mounts = self._engine.params.range, self._engine.robot.description.ranges
         distances = self._engine.ranges() if mounts else {}
         for mount in mounts:
-            place, distance = to_pose2d(mount.pose), distances[mount.frame]
-            reading = collision_guard.RangeReading(distance, p.range_min, p.range_max, place)
+            distance = distances[mount.frame]
+            reading = collision_guard.RangeReading(distance, p.range_min, p.range_max, to_pose2d(mount.pose))
             self._guard.see_range(mount.frame, reading, now, odom_from_base)
-            for costmap, pose in zip(self._costmaps, poses, strict=True):
-                at = compose(pose, place)
-                for layer in costmap.range_layers:
-                    layer.add(RangeReading(now, at, distance, p.range_min, p.range_max, p.field_of_view))
+            for each in self._ranges:
+                if each.topic.strip("/").replace("/", "_") == mount.frame:  # as the simulator names them
+                    each.hear(RangeRecord(now, mount.frame, distance, p.range_min, p.range_max, p.field_of_view), now)
 
-    def _picture(self, now: float, poses: tuple[Pose2D, ...]) -> None:
-        wants = [
-            (buffer, params, pose)
-            for costmap, pose in zip(self._costmaps, poses, strict=True)
-            for buffer, params in self._depth_buffers(costmap)
-            if params.max_rate == 0.0 or now - self._used.get(id(buffer), -1e9) >= 0.95 / params.max_rate
-        ]
+    def _picture(self, now: float) -> None:
+        wanting = [each for each in self._depths if each.is_due(now)]
         mount = self._engine.robot.description.camera
-        if not wants or mount is None:
+        if not wanting or mount is None:
             return
-        k = self._engine.params.camera.intrinsics
-        optics = Optics(k.fx, k.fy, k.cx, k.cy)
         depth = self._engine.picture(colour=False).depth
-        for buffer, params, pose in wants:
-            self._used[id(buffer)] = now
-            picture = DepthPicture.of(depth, optics, stride=params.stride, stamp=now)
-            buffer.add(observe_depth(picture, from_pose2d(pose) @ mount.pose, params))
-
-    @staticmethod
-    def _depth_buffers(costmap: LayeredCostmap) -> list[tuple[ObservationBuffer, DepthSourceParams]]:
-        return [
-            (buffer, buffer.params)
-            for layer in costmap.obstacle_layers
-            for buffer in layer.buffers.values()
-            if isinstance(buffer.params, DepthSourceParams)
-        ]
+        height, width = depth.shape
+        data = np.ascontiguousarray(depth, "<f4").view(np.uint8).ravel()
+        record = DepthRecord(now, mount.frame, width, height, "32FC1", 4 * width, data)
+        for each in wanting:
+            each.hear(record, now)

@@ -121,10 +121,14 @@ class Input(ABC, Generic[T]):
     def _place(self, item: T, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
         """Put it into the layer; raises TransformError if it cannot be placed yet."""
 
+    def is_due(self, stamp: float) -> bool:
+        """Whether a record of a time [s] will be looked at, by `max_rate`."""
+        return not 0.0 <= stamp - self._used < self._period
+
     def _keep(self, stamp: float, frame: str, now: float, decode: Callable[[], T | None]) -> None:
         """Decode a record unless they come too fast, and let it wait; `decode` may raise ImageError or SensorError."""
         self._heard = now
-        if 0.0 <= stamp - self._used < self._period:
+        if not self.is_due(stamp):
             return
         try:
             item = decode()

@@ -29,7 +29,7 @@ def main() -> None:
             print(
                 f"room {room} -> ({goal.x:.1f}, {goal.y:.1f}): {outcome.text if outcome else 'timed out'} "
                 f"{loop.now - start:.1f} s, contacts {loop.contacts - contacts}, recoveries {loop.recoveries}, "
-                f"{1e3 * spent / max(steps, 1):.1f} ms a step, {loop.navigator.reason}"
+                f"{1e3 * spent / max(steps, 1):.1f} ms a step, {loop.stack.navigator.text}"
             )
 
 

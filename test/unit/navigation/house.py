@@ -65,11 +65,11 @@ def cast(grid: Grid, x: float, y: float, yaw: float, *, beams: int = 180, reach:
     return np.where(hit.any(axis=1), steps[first], np.inf)
 
 
-def scan_of(ranges: np.ndarray, stamp: float) -> LaserScan:
+def scan_of(ranges: np.ndarray, stamp: float, frame: str) -> LaserScan:
     """Those ranges as a scan of a sensor that looks along the robot."""
     return LaserScan(
         stamp=stamp,
-        frame_id="laser",
+        frame_id=frame,
         angle_min=-math.pi,
         angle_increment=math.tau / len(ranges),
         range_min=0.1,

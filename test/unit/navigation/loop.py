@@ -1,4 +1,4 @@
-"""A closed loop in plain Python: navigator, costmaps and planners of a configuration against a unicycle."""
+"""move_base's stack against a unicycle with a lidar: a closed loop without the simulator."""
 
 from __future__ import annotations
 
@@ -8,70 +8,28 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from house import cast, scan_of
 
-from rosbot_patrol.costmap.layered import LayeredCostmap
-from rosbot_patrol.costmap.layers.obstacle import observe
-from rosbot_patrol.costmap.params import read_costmap
-from rosbot_patrol.errors import PlanningError
+from rosbot_patrol.closed_loop.delayed_plans import DelayedPlans
+from rosbot_patrol.closed_loop.frames import BASE, MAP, ODOM, add_pose
 from rosbot_patrol.geometry import Pose2D, Twist2D, wrap_angle
 from rosbot_patrol.grid import Grid
-from rosbot_patrol.navigation.interfaces import NavigatorView, Outcome, PlanResult
-from rosbot_patrol.navigation.navigator import Navigator
-from rosbot_patrol.navigation.params import MoveBaseParams
-from rosbot_patrol.params import load
-from rosbot_patrol.planning.interfaces import LocalView, RecoveryView
-from rosbot_patrol.planning.registry import make_global_planner, make_local_planner, make_recoveries
+from rosbot_patrol.navigation.interfaces import Outcome
+from rosbot_patrol.navigation.stack import NavigationStack
+from rosbot_patrol.package_files import read_move_base
+from rosbot_patrol.tf.tree import TransformTree
 
 CONFIG = Path(__file__).resolve().parents[3] / "config" / "tuned"
 
 
 def tuned() -> dict[str, Any]:
     """The tuned profile as move_base's private namespace."""
-
-    def read(name: str) -> dict[str, Any]:
-        return yaml.safe_load((CONFIG / name).read_text())
-
-    tree = {**read("move_base.yaml"), **read("trajectory_planner.yaml")}
-    common = read("costmap_common_params.yaml")
-    for which in ("global_costmap", "local_costmap"):
-        tree[which] = {**common, **read(f"{which}_params.yaml")[which]}
-    return tree
-
-
-class ImmediatePlans:
-    """A PlanSource that plans when asked."""
-
-    def __init__(self, loop: Loop, planner: Any) -> None:
-        self._loop, self._planner = loop, planner
-        self._result: PlanResult | None = None
-        self.count = 0
-
-    def request(self, goal: Pose2D) -> None:
-        self.count += 1
-        costmap = self._loop.global_costmap
-        try:
-            poses = self._planner.plan(Grid(costmap.info, costmap.cells.copy()), self._loop.pose, goal)
-            self._result = PlanResult(poses=poses)
-        except PlanningError as err:
-            self._result = PlanResult(error=err)
-
-    def poll(self) -> PlanResult | None:
-        result, self._result = self._result, None
-        return result
-
-    @property
-    def is_busy(self) -> bool:
-        return False
-
-    def drop(self) -> None:
-        self._result = None
+    return dict(read_move_base(CONFIG))
 
 
 @dataclass
 class Loop:
-    """The world, the robot in it, and the navigator that drives it."""
+    """The world, the robot in it, and the stack that drives it."""
 
     known: Grid
     world: Grid
@@ -84,54 +42,27 @@ class Loop:
     recoveries: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.global_costmap = LayeredCostmap(read_costmap(self.tree["global_costmap"], name="~global_costmap/"))
-        self.local_costmap = LayeredCostmap(read_costmap(self.tree["local_costmap"], name="~local_costmap/"))
-        for layer in self.global_costmap.static_layers:
-            layer.set_map(self.known)
-        own = {k: v for k, v in self.tree.items() if not isinstance(v, dict)}
-        self.params = load(MoveBaseParams, own)
-        self.controller = make_local_planner(
-            self.params.base_local_planner,
-            self.tree,
-            self.local_costmap,
-            controller_frequency=self.params.controller_frequency,
-        )
-        self.plans = ImmediatePlans(self, make_global_planner(self.params.base_global_planner, self.tree))
-        self.navigator = Navigator(
-            self.params,
-            plans=self.plans,
-            controller=self.controller,
-            recoveries=make_recoveries(self.tree, conservative=3.0, clearing_radius=0.2, clearing_rotation=True),
-        )
+        self._frames = TransformTree()
+        self.stack = NavigationStack(self.tree, self._frames, self._plans)
+        costmap = self.stack.global_costmap
+        for layer in costmap.map_layers:
+            costmap.hear_map(layer, self.known, MAP)
         self._cycle = 0
 
-    def sense(self) -> None:
-        ranges = cast(self.world, self.pose.x, self.pose.y, self.pose.yaw)
-        seen = observe(scan_of(ranges, self.now), self.pose, inf_is_valid=True)
-        costmaps = [self.local_costmap] + ([self.global_costmap] if self._cycle % 5 == 0 else [])
-        for costmap in costmaps:
-            for layer in costmap.obstacle_layers:
-                for buffer in layer.buffers.values():
-                    buffer.add(seen)
-            costmap.update(self.now, self.pose)
+    def _plans(self, stack: NavigationStack) -> DelayedPlans:
+        return DelayedPlans(lambda goal: stack.plan_from_robot(goal, self.now), lambda: self.now, 0.0)
 
-    def view(self) -> NavigatorView:
-        local = self.local_costmap
-        return NavigatorView(
-            local=LocalView(
-                now=self.now,
-                pose=self.pose,
-                velocity=self.velocity,
-                costmap=Grid(local.info, local.cells.copy()),
-            ),
-            recovery=RecoveryView(
-                now=self.now,
-                pose_global=self.pose,
-                pose_local=self.pose,
-                global_costmap=self.global_costmap,
-                local_costmap=local,
-            ),
-        )
+    def sense(self) -> None:
+        add_pose(self._frames, ODOM, BASE, self.pose, self.now)
+        add_pose(self._frames, MAP, ODOM, Pose2D(), self.now)
+        scan = scan_of(cast(self.world, self.pose.x, self.pose.y, self.pose.yaw), self.now, BASE)
+        self.stack.hear_velocity(self.velocity, self.now)
+        self.stack.people.hear(scan)
+        for costmap, every in zip(self.stack.costmaps, (5, 1), strict=True):
+            for each in costmap.scan_inputs:
+                each.hear(scan, self.now)
+            if self._cycle % every == 0:
+                costmap.update(self.now)
 
     def move(self, twist: Twist2D) -> None:
         """A base with wheels at 0.4 m/s at most, that follows within its accelerations."""
@@ -164,7 +95,7 @@ class Loop:
 
     def step(self) -> Outcome | None:
         self.sense()
-        command = self.navigator.step(self.now, self.view())
+        command = self.stack.step(self.now).command
         if command.recovery:
             self.recoveries.append(command.recovery[2])
         self.move(command.twist or Twist2D())
@@ -174,7 +105,7 @@ class Loop:
     def drive(self, goal: Pose2D, timeout: float) -> Outcome | None:
         """To a goal; None where it takes too long."""
         self.sense()
-        self.navigator.set_goal(goal, self.now)
+        self.stack.navigator.set_goal(goal, self.now)
         end = self.now + timeout
         while self.now < end:
             outcome = self.step()
