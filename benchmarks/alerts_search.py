@@ -119,7 +119,7 @@ def write_one(store: IncidentStore) -> float:
     began = time.perf_counter()
     store.begin(Incident(id="timed", wall=START, room_id=1, room_name="hall"))
     for i in range(10):
-        store.add_event("timed", Event(wall=START, kind="state", text=f"event {i}"))
+        store.record("timed", add=[Event(wall=START, kind="state", text=f"event {i}")])
     store.close("timed", wall=START, verdict="clear")
     return (time.perf_counter() - began) / 12
 

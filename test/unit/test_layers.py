@@ -27,7 +27,14 @@ ROWS: list[set[str]] = [
 ROW_OF = {name: i for i, row in enumerate(ROWS) for name in row}
 # The same inside a package, for its sub-packages and modules.
 ROWS_INSIDE: dict[str, list[set[str]]] = {
-    "alerts": [{"safe_text", "records"}, {"pictures", "report"}, {"outbox"}, {"channels"}, {"dispatch"}],
+    "alerts": [
+        {"safe_text", "disk_reserve"},
+        {"records"},
+        {"pictures", "report"},
+        {"outbox"},
+        {"channels"},
+        {"dispatch"},
+    ],
     "simulation": [
         {"noise", "meshes"},
         {"scene"},

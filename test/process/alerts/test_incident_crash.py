@@ -31,7 +31,7 @@ for i in itertools.count():
     name = f"r{sys.argv[2]}-{i}"
     store.begin(Incident(id=name, wall=float(i), room_id=1, room_name="hall"))
     say("begun", name)
-    store.add_event(name, Event(wall=1.0, kind="note", text="one"))
+    store.record(name, add=[Event(wall=1.0, kind="note", text="one")])
     say("event", name)
     store.add_files(name, [NewFile(name=f"{k}.jpg", role="look", data=bytes([k]) * 20000) for k in range(3)])
     say("files", name)

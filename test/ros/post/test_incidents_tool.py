@@ -19,7 +19,7 @@ def house(tmp_path):
         for i, verdict in enumerate(("clear", "confirmed", "unreachable")):
             wall = 1_790_000_000.0 + 3600 * i
             store.begin(Incident(id=f"m{i}", wall=wall, room_id=i, room_name="Küche\x1b[31m", reason="why"))
-            store.add_event(f"m{i}", Event(wall=wall, kind="sensor", text=f"motion sensor {i} sees motion"))
+            store.record(f"m{i}", add=[Event(wall=wall, kind="sensor", text=f"motion sensor {i} sees motion")])
             store.add_files(f"m{i}", [NewFile(name="best-1.jpg", role="best", data=b"\xff\xd8 jpeg")])
             store.close(f"m{i}", wall=wall + 60.0, verdict=verdict)
         store.begin(Incident(id="m3", wall=1_790_020_000.0, room_id=3, room_name="hall"))

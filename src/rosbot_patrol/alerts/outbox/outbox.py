@@ -20,8 +20,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rosbot_patrol.alerts.disk_reserve import DiskReserve
 from rosbot_patrol.alerts.outbox.notice import LaterFormat, Notice
-from rosbot_patrol.files import DISK_FULL, sync_folder, write_atomic
+from rosbot_patrol.files import DISK_FULL, write_atomic
 
 log = logging.getLogger(__name__)
 
@@ -75,6 +76,7 @@ class Outbox:
     def __init__(self, folder: Path, *, keep: int = 200) -> None:
         self.folder, self.sent = folder, folder / "sent"
         self._keep = keep
+        self._reserve = DiskReserve(folder / "reserve", RESERVE)
         self._known: dict[str, Waiting] = {}
         self._left_alone: set[str] = set()
         self._stuck: list[str] = []  # those of them with a notice that has to be made again
@@ -199,7 +201,7 @@ class Outbox:
         for scratch in (*self.folder.glob(".*.tmp"), *self.sent.glob(".*.tmp")):
             if _is_left_over(scratch):
                 scratch.unlink(missing_ok=True)
-        self._keep_reserve()
+        self._reserve.fill(only_with=8 * RESERVE)
 
     # -- inside
 
@@ -253,25 +255,9 @@ class Outbox:
         for name in sorted(e.name for e in _scan(self.sent))[:-20]:
             freed += (self.sent / name).stat().st_size
             (self.sent / name).unlink(missing_ok=True)
-        reserve = self.folder / "reserve"
-        if freed < 2 * size and reserve.exists():
-            left = reserve.stat().st_size
-            freed += min(left, size + 65536)
-            os.truncate(reserve, max(left - size - 65536, 0))
+        if freed < 2 * size:
+            freed += self._reserve.give(size + 65536)
         return freed > 0
-
-    def _keep_reserve(self) -> None:
-        reserve = self.folder / "reserve"
-        system = os.statvfs(self.folder)
-        have = reserve.stat().st_size if reserve.exists() else 0
-        if have >= RESERVE or system.f_bavail * system.f_frsize < 8 * RESERVE:
-            return
-        handle = os.open(reserve, os.O_RDWR | os.O_CREAT, 0o600)
-        try:
-            os.posix_fallocate(handle, 0, RESERVE)
-        finally:
-            os.close(handle)
-        sync_folder(self.folder)
 
 
 def _scan(folder: Path) -> list[os.DirEntry[str]]:

@@ -68,7 +68,9 @@ def close_abandoned(store: IncidentStore, running: Collection[str], *, wall: flo
         kept = store.get(incident_id)
         reason = (kept.reason if kept else "") or "the program ended before there was a verdict"
         verdict = (kept.verdict if kept else "") or "unverified"
-        store.add_event(incident_id, Event(wall=wall, kind="note", text="closed after a restart: the mission is over"))
+        store.record(
+            incident_id, add=[Event(wall=wall, kind="note", text="closed after a restart: the mission is over")]
+        )
         store.close(incident_id, wall=wall, verdict=verdict, reason=reason)
         said.append(f"incident {incident_id} was still open and is closed now, {verdict}: {reason}")
     return said

@@ -6,7 +6,6 @@ kind always stay, whatever their age.
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import suppress
@@ -14,6 +13,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from rosbot_patrol.alerts.disk_reserve import DiskReserve
 from rosbot_patrol.alerts.records.database import errors_of
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.counts import count_of
@@ -25,7 +25,6 @@ DAY = 86_400.0
 ALWAYS_KEPT = 100  # the newest of each verdict stay, however old
 AT_ONCE = 200  # removals in one go, so that other work has its turn
 _ORDER = (("clear",), ("unreachable", "unverified", ""), ("confirmed",))
-_RESERVE = "incidents.reserve"
 _RESERVE_BYTES = 2 * MB  # what the database needs to write down that something goes
 
 
@@ -125,23 +124,20 @@ def make_room(store: IncidentStore, *, wall: float, wanted: float = 10.0 * MB) -
 
 def keep_reserve(state_dir: Path) -> None:
     """Hold some room on the disk that `make_room` can use. Raises StoreError."""
-    path = state_dir / _RESERVE
-    with errors_of(path):
-        if path.exists() and path.stat().st_size == _RESERVE_BYTES:
-            return
-        try:
-            with path.open("wb") as file:
-                os.posix_fallocate(file.fileno(), 0, _RESERVE_BYTES)
-        except OSError:
-            path.unlink(missing_ok=True)
-            raise
+    reserve = _reserve(state_dir)
+    with errors_of(reserve.path):
+        reserve.fill()
 
 
 def release_reserve(state_dir: Path) -> None:
-    """Let go of the room that is held. Raises StoreError."""
-    path = state_dir / _RESERVE
-    with errors_of(path):
-        path.unlink(missing_ok=True)
+    """Give up the room that is held. Raises StoreError."""
+    reserve = _reserve(state_dir)
+    with errors_of(reserve.path):
+        reserve.give(_RESERVE_BYTES)
+
+
+def _reserve(state_dir: Path) -> DiskReserve:
+    return DiskReserve(state_dir / "incidents.reserve", _RESERVE_BYTES)
 
 
 def used_bytes(store: IncidentStore) -> int:

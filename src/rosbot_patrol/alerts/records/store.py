@@ -122,18 +122,6 @@ class IncidentStore:
             for event in add:
                 insert_event(self.connection, incident_id, event)
 
-    def update(self, incident_id: str, **changes: Any) -> None:
-        """As `record`, fields only."""
-        self.record(incident_id, **changes)
-
-    def add_events(self, incident_id: str, events: Iterable[Event]) -> None:
-        """As `record`, events only."""
-        self.record(incident_id, add=events)
-
-    def add_event(self, incident_id: str, event: Event) -> None:
-        """As `add_events`."""
-        self.add_events(incident_id, [event])
-
     def add_files(self, incident_id: str, files: Iterable[NewFile]) -> None:
         """Keep files of an open record; a name that is known gets the new content. Raises StoreError, ValueError."""
         files = list(files)

@@ -12,7 +12,7 @@ def find(quick_disk, make_incident):
         for i, (name, room, room_name, verdict) in enumerate(rows):
             given = {"room_id": room, "room_name": room_name, "verdict": "", "reason": "", "object_class": ""}
             store.begin(make_incident(id=name, wall=100.0 * (i + 1), **given))
-            store.add_event(name, Event(wall=1.0, kind="sensor", text=f"sensor {room} sees motion"))
+            store.record(name, add=[Event(wall=1.0, kind="sensor", text=f"sensor {room} sees motion")])
             store.close(name, wall=1000.0, verdict=verdict, reason='somebody\'s "cat"' if name == "c" else "none")
         store.begin(make_incident(id="d", wall=50.0, room_id=2, room_name="hall", verdict=""))  # the clock went back
         yield lambda **given: [f.id for f in find_incidents(store.connection, store.path, Query(**given))]

@@ -21,7 +21,7 @@ def fill(folder, make_incident, count=3, close=True):
     with IncidentStore(folder, wall=1.0) as store:
         for i in range(count):
             store.begin(make_incident(id=f"m{i:03}", reason="x" * 500))
-            store.add_event(f"m{i:03}", Event(wall=1.0, kind="note", text="y" * 500))
+            store.record(f"m{i:03}", add=[Event(wall=1.0, kind="note", text="y" * 500)])
             store.add_files(f"m{i:03}", [NewFile(name="a.jpg", role="best", data=b"%d" % i)])
             if close:
                 store.close(f"m{i:03}", wall=2.0)
@@ -56,7 +56,7 @@ def test_what_can_be_read_of_a_damaged_one_is_copied(quick_disk, make_incident):
     fill(quick_disk, make_incident, count=60)
     with IncidentStore(quick_disk) as store:
         store.begin(make_incident(id="running"))
-        store.add_event("running", Event(wall=1.0, kind="note", text="kept"))
+        store.record("running", add=[Event(wall=1.0, kind="note", text="kept")])
         store.amend("m059", wall=3.0, text="added")
     path = quick_disk / "incidents.sqlite"
     data = bytearray(path.read_bytes())

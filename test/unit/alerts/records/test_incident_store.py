@@ -24,8 +24,8 @@ def picture(name="a.jpg", data=b"jpeg", **given):
 
 def test_a_record_reads_back_while_open_and_when_closed(store, make_incident, quick_disk):
     store.begin(make_incident(verdict="", closed=None))
-    store.update(ID, times=(("driving", 10.0), ("looking", 20.0)), share_seen=0.96)
-    store.add_event(ID, Event(wall=11.0, kind="sensor", text="sensor 3 sees motion", data={"sensor": 3}))
+    store.record(ID, times=(("driving", 10.0), ("looking", 20.0)), share_seen=0.96)
+    store.record(ID, add=[Event(wall=11.0, kind="sensor", text="sensor 3 sees motion", data={"sensor": 3})])
     store.add_files(ID, [picture(stamp=61.5, caption="Küche")])
     for reader in (store, IncidentStore(quick_disk, read_only=True)):
         kept = reader.get(ID)
@@ -41,7 +41,7 @@ def test_a_record_reads_back_while_open_and_when_closed(store, make_incident, qu
 
 def test_what_was_written_is_there_for_another_program_at_once(store, make_incident, quick_disk):
     store.begin(make_incident())
-    store.add_event(ID, Event(wall=1.0, kind="note", text="x"))
+    store.record(ID, add=[Event(wall=1.0, kind="note", text="x")])
     with IncidentStore(quick_disk, read_only=True) as other:
         assert len(other.get(ID).events) == 1
         assert other.open_ids() == (ID,)
@@ -63,8 +63,8 @@ def test_a_closed_record_takes_amendments_only(store, make_incident):
         store.amend(ID, wall=2.0, text="too early")
     before = store.close(ID, wall=2.0)
     for write in (
-        lambda: store.update(ID, reason="another"),
-        lambda: store.add_event(ID, Event(wall=3.0, kind="note", text="x")),
+        lambda: store.record(ID, reason="another"),
+        lambda: store.record(ID, add=[Event(wall=3.0, kind="note", text="x")]),
         lambda: store.add_files(ID, [picture()]),
     ):
         with pytest.raises(StoreError, match="is closed"):
@@ -109,7 +109,7 @@ def test_what_is_no_name_of_a_file_is_refused(store, make_incident, name):
 
 def test_strange_texts_are_kept(store, make_incident):
     store.begin(make_incident(room_name="<script>\0 台所 \U0001f600 \ud800", reason="'; DROP TABLE links; --"))
-    store.add_event(ID, Event(wall=1.0, kind="note", text="\0\n\u2028", data={"x": float("inf")}))
+    store.record(ID, add=[Event(wall=1.0, kind="note", text="\0\n\u2028", data={"x": float("inf")})])
     kept = store.close(ID, wall=2.0)
     assert store.get(ID).room_name == "<script>\0 台所 \U0001f600 ?"
     assert store.get(ID).events[0].data == {"x": None}
@@ -119,7 +119,7 @@ def test_strange_texts_are_kept(store, make_incident):
 def test_too_many_events_are_not_all_kept(store, make_incident, monkeypatch):
     monkeypatch.setattr("rosbot_patrol.alerts.records.database.MAX_EVENTS", 3)
     store.begin(make_incident())
-    store.add_events(ID, [Event(wall=float(i), kind="sensor", text=str(i)) for i in range(9)])
+    store.record(ID, add=[Event(wall=float(i), kind="sensor", text=str(i)) for i in range(9)])
     texts = [event.text for event in store.get(ID).events]
     assert texts == ["0", "1", "2", "more than 3 events came; the others are not kept"]
 
@@ -163,10 +163,10 @@ def test_a_full_disk_is_said_as_such_and_the_record_stays_as_it_was(store, make_
     pages = store.connection.execute("PRAGMA page_count").fetchone()[0]
     store.connection.execute(f"PRAGMA max_page_count={pages}")
     with pytest.raises(StoreError) as caught:
-        store.add_event(ID, Event(wall=1.0, kind="note", text="x" * 100_000))
+        store.record(ID, add=[Event(wall=1.0, kind="note", text="x" * 100_000)])
     assert caught.value.is_full
     assert store.get(ID).events == ()
-    store.add_event(ID, Event(wall=1.0, kind="note", text="small"))
+    store.record(ID, add=[Event(wall=1.0, kind="note", text="small")])
 
 
 def test_a_locked_database_waits_and_then_says_so(store, make_incident, quick_disk, monkeypatch):

@@ -13,7 +13,7 @@ def house(quick_disk, make_incident):
     with IncidentStore(quick_disk, wall=1.0) as store:
         for i in range(5):
             store.begin(make_incident(id=f"m{i}", wall=100.0 + i))
-            store.add_event(f"m{i}", Event(wall=1.0, kind="sensor", text=f"sensor {i}"))
+            store.record(f"m{i}", add=[Event(wall=1.0, kind="sensor", text=f"sensor {i}")])
             store.add_files(f"m{i}", [NewFile(name="best.jpg", role="best", data=b"jpeg%d" % i)])
             store.close(f"m{i}", wall=200.0 + i)
         store.amend("m1", wall=300.0, text="a neighbour")
