@@ -59,10 +59,11 @@ class Intake:
         taken = Taken()
         for room_id in inputs.triggers:
             room = self._rooms.find(room_id)
+            answering = _answering(mission, room_id)
             if room is None:
                 self._refuse(room_id, now)
-            elif _answers(mission, room):
-                self._join(mission, room, now, taken)
+            elif answering is not None:
+                self._join(answering, room, now, taken)
             else:
                 self._weigh(room, now, inputs, mission, taken, has_candidate=has_candidate)
         for request in inputs.requests:
@@ -83,8 +84,9 @@ class Intake:
         if room is None:
             log.error("refused: %s", self._rooms.refusal(request.room_id))
             return ""
-        if mission and _answers(mission, room):
-            return mission.id
+        answering = _answering(mission, room.id)
+        if answering is not None:
+            return answering.id
         return self._add(dataclasses.replace(request, wall=request.wall or wall), mission)
 
     def _add(self, request: Request, mission: Mission | None) -> str:
@@ -107,8 +109,7 @@ class Intake:
         if self._repeats.is_news(room_id, now):
             log.error("motion trigger refused: %s", self._rooms.refusal(room_id))
 
-    def _join(self, mission: Mission | None, room: Room, now: float, taken: Taken) -> None:
-        assert mission is not None
+    def _join(self, mission: Mission, room: Room, now: float, taken: Taken) -> None:
         mission.triggers += 1
         if mission.origin is not Origin.TRIGGER:  # from now on it is one that no other call puts back
             mission.origin, mission.priority = Origin.TRIGGER, self._priorities.of(Origin.TRIGGER)
@@ -147,6 +148,8 @@ def _is_off_map(room: Room, inputs: Inputs) -> bool:
     return inputs.house is not None and room.id in inputs.house.lost
 
 
-def _answers(mission: Mission | None, room: Room) -> bool:
-    """Whether the mission that runs answers a call of this room: until it has looked at it."""
-    return mission is not None and mission.room.id == room.id and mission.phase is not Phase.RETURNING
+def _answering(mission: Mission | None, room_id: int) -> Mission | None:
+    """The mission that runs, if it answers a call of this room: until it has looked at it."""
+    if mission is None or mission.room.id != room_id or mission.phase is Phase.RETURNING:
+        return None
+    return mission

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rosbot_patrol.patrol.intruder.exclusions import PET, Judge, goes_on
+from rosbot_patrol.patrol.intruder.exclusions import Judge, Reason, goes_on
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 
 _SAME = 1.0  # so near to each other two sightings are of one [m]
@@ -104,17 +104,18 @@ class CloseUps:
                 near.append((box, place))
                 continue
             kept.append(box)
-            refusal = self._judge.refusal(box)
-            if refusal == PET:
-                self._pets.append(place)
-            elif not refusal and box.probability >= _SURE and (m.has_legs or self._is_tall(box, m)):
+            exclusion = self._judge.exclusion(box)
+            if exclusion is not None:
+                if exclusion.reason is Reason.PET:
+                    self._pets.append(place)
+            elif box.probability >= _SURE and (m.has_legs or self._is_tall(box, m)):
                 self._people.append(place)
         self._open = [s for s in self._open if not self._is_told(s)]
         is_left = False
         for box, place in near:
             if self._is_person(place):
                 kept.append(box)
-            elif not self._judge.refusal(box) and not any(place.may_be(pet) for pet in self._pets):
+            elif self._judge.exclusion(box) is None and not any(place.may_be(pet) for pet in self._pets):
                 is_left = True
                 self._note(place)
         return tuple(kept), is_left

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Floor
@@ -49,7 +50,32 @@ class Known:
         return math.hypot(measured.x - self.x, measured.y - self.y) <= self.radius + min(measured.error, 0.5)
 
 
-PET = "it is as low as a pet"
+class Reason(Enum):
+    """Why a box shows no intruder; the value is the sentence."""
+
+    FAR = "it is too far off to be measured"
+    KNOWN = "it is a known object"
+    OUTSIDE = "it is outside of the floor that the map shows"
+    FLAT = "it is flat, a picture or a screen"
+    LARGE = "it is too large for a person"
+    PET = "it is as low as a pet"
+    SMALL = "it is too small for a person"
+    PART = "only a part of it is in the picture"
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """A reason, and a more exact sentence if there is one."""
+
+    reason: Reason
+    detail: str = ""
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        return self.detail or self.reason.value
+
+
 _NEAR_ERROR = 0.35  # of a place by the floor that is good enough to tell the size: right before the camera [m]
 
 
@@ -67,12 +93,21 @@ class Judge:
     ) -> None:
         self.params, self.known, self.floor = params or JudgeParams(), known, floor
 
-    def refusal(self, box: Box) -> str:
-        """Why a box is no intruder, "" where it may be one."""
+    def exclusion(self, box: Box) -> Exclusion | None:
+        """Why a box is no intruder, None if it may be one."""
         m = box.measured
         if m is None:
-            return "it is too far off to be measured" if box.doubt else ""
-        return self._known(box, m) or self._outside(m) or self._picture(m) or self._size(box, m) or _part(box, m)
+            return Exclusion(Reason.FAR) if box.doubt else None
+        known = self._known(box, m)
+        if known is not None:
+            return known
+        reason = self._outside(m) or (Reason.FLAT if m.is_flat else None) or self._size(box, m) or _part(box, m)
+        return Exclusion(reason) if reason else None
+
+    def refusal(self, box: Box) -> str:
+        """The sentence of `exclusion`, "" if the box may be an intruder."""
+        found = self.exclusion(box)
+        return found.text if found else ""
 
     def is_too_near(self, box: Box) -> bool:
         """Whether so little of it is in the picture that a person and a pet look alike: legs, or a part at its side."""
@@ -81,40 +116,36 @@ class Judge:
             return False
         return m.top < self.params.person_top_min and m.width < self.params.lying_length
 
-    def _known(self, box: Box, m: Measured) -> str:
+    def _known(self, box: Box, m: Measured) -> Exclusion | None:
         found = next((k for k in self.known if k.is_at(m) and k.label in ("", box.label)), None)
-        return f"it is {found.name} at ({found.x:.1f}, {found.y:.1f})" if found else ""
+        return Exclusion(Reason.KNOWN, f"it is {found.name} at ({found.x:.1f}, {found.y:.1f})") if found else None
 
-    def _outside(self, m: Measured) -> str:
+    def _outside(self, m: Measured) -> Reason | None:
         if self.floor is None or m.source == "floor":
-            return ""
+            return None
         within = self.params.outside_after + m.error
-        if self.floor.nearest(self.floor.free, m.x, m.y, within) is not None:
-            return ""
-        return "it is outside of the floor that the map shows"
+        is_inside = self.floor.nearest(self.floor.free, m.x, m.y, within) is not None
+        return None if is_inside else Reason.OUTSIDE
 
-    def _picture(self, m: Measured) -> str:
-        return "it is flat, a picture or a screen" if m.is_flat else ""
-
-    def _size(self, box: Box, m: Measured) -> str:
+    def _size(self, box: Box, m: Measured) -> Reason | None:
         p = self.params
         if box.label != "person" or not _has_size(m):
-            return ""
-        sure = max(1.0 - 0.5 * m.error, 0.6)  # of the bounds, as far as the distance is
+            return None
+        sure = max(1.0 - 0.5 * m.error, 0.6)  # the bounds are relaxed as the distance is uncertain
         if m.top > p.person_top_max / sure or m.width > p.person_width_max / sure:
-            return "it is too large for a person"
+            return Reason.LARGE
         if m.width >= p.lying_length * sure:
-            return ""
+            return None
         if goes_on(box, m) or m.is_cut_aside:  # the picture ends before it does
-            return ""
+            return None
         if m.top < p.person_top_min * sure:
-            return PET
-        return "it is too small for a person" if m.height < p.person_height_min * sure else ""
+            return Reason.PET
+        return Reason.SMALL if m.height < p.person_height_min * sure else None
 
 
-def _part(box: Box, m: Measured) -> str:
+def _part(box: Box, m: Measured) -> Reason | None:
     """Half a chair at the picture's side may be half a hydrant; a thing stays, and is seen whole as the robot turns."""
-    return "only a part of it is in the picture" if m.is_cut_aside and box.label != "person" else ""
+    return Reason.PART if m.is_cut_aside and box.label != "person" else None
 
 
 def _has_size(m: Measured) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rosbot_patrol.patrol.records.activity import ON_GUARD
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.search.look import LookParams
 
@@ -19,7 +20,7 @@ class Readiness:
         self._woke: float | None = None
         self._is_silent = False
         self.is_ready = False
-        self.at_rest = "on guard"
+        self.at_rest = ON_GUARD
 
     def step(self, now: float, inputs: Inputs) -> bool:
         """Look at what is there; `now` and the stamps of `inputs` in steady time [s]."""
@@ -31,7 +32,7 @@ class Readiness:
             lacks += ["its heading in odom"] * (inputs.yaw is None)
             lacks += ["the detector"] * (self._is_silent and now - self._woke < self._look.detector_wait)
             self.is_ready = not lacks
-            self.at_rest = "waiting for " + " and ".join(lacks) if lacks else "on guard"
+            self.at_rest = "waiting for " + " and ".join(lacks) if lacks else ON_GUARD
         return self.is_ready
 
     @property

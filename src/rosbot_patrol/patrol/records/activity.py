@@ -24,6 +24,25 @@ class Activity(Enum):
     TO_VIEWPOINT = "driving to a further viewpoint"
     FOLLOWING = "keeping the camera on somebody"
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether it waits for something that may not come."""
+        return self in _WAITING
+
+
+_WAITING = (Activity.WAITING_FOR_NAVIGATION, Activity.WAITING_FOR_BATTERY, Activity.WAITING_TO_TURN)
+_FULL_TURN = 360.0  # [deg]
+
+
+def turning(turned_deg: float, whole_deg: float) -> str:
+    """The sentence about a turn, in steps of 30 degrees."""
+    return f"{Activity.TURNING.value}, {max(turned_deg, 0.0) // 30 * 30:.0f} of {whole_deg:.0f} degrees"
+
+
+def is_full_turn(why: str) -> bool:
+    """Whether a sentence of `turning` is about a full turn."""
+    return f" of {_FULL_TURN:.0f} degrees" in why
+
 
 def activity_of(why: str) -> Activity:
     """The activity that a sentence tells."""
@@ -55,4 +74,4 @@ class Place:
 
 def is_away(why: str) -> bool:
     """Whether the sentence of an idle patrol says that it did not come home."""
-    return why.startswith(f"{ON_GUARD}, {Whereabouts.AWAY.value}")
+    return why.removeprefix(f"{ON_GUARD}, ").startswith(Whereabouts.AWAY.value)

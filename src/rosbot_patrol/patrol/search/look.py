@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.goal import Goal
 from rosbot_patrol.params import param
+from rosbot_patrol.patrol.records.activity import Activity, turning
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.search.turn import Spin, SpinParams
 
@@ -102,11 +103,11 @@ class Look:
             self._began = now
         if self._turned_at is not None:
             self._turned_at = now if held else self._turned_at
-            return self._linger(now, inputs)
+            return self._linger(now, self._turned_at, inputs)
         if not self._turning:
             blind = self._blind(now, inputs)
             if blind and now - self._began < self.params.detector_wait:
-                return LookStep(why=f"waiting before the turn: {blind}")
+                return LookStep(why=f"{Activity.WAITING_TO_TURN.value}: {blind}")
             self._turning, self._turning_since = True, now
         self._note_blindness(now, inputs)
         self._measure_in_map(inputs.pose)
@@ -118,7 +119,7 @@ class Look:
             if spin is self.spin:  # a correction that fails takes nothing from the turn
                 self._stuck = step.problem
             self._turned_at = now
-        return LookStep(speed=step.speed, why=f"turning to look around, {self._progress()}")
+        return LookStep(speed=step.speed, why=turning(self.spin.turned_deg, math.degrees(self.spin.target)))
 
     @property
     def turned_deg(self) -> float:
@@ -139,18 +140,12 @@ class Look:
     def _is_off(self) -> bool:
         return self.params.correction_min < abs(self._left()) <= self.params.correction_max
 
-    def _progress(self) -> str:
-        whole = math.degrees(self.spin.target)
-        return f"{max(self.spin.turned_deg, 0.0) // 30 * 30:.0f} of {whole:.0f} degrees"
-
-    def _linger(self, now: float, inputs: Inputs) -> LookStep:
-        assert self._turned_at is not None
+    def _linger(self, now: float, turned_at: float, inputs: Inputs) -> LookStep:
         self._note_blindness(now, inputs)
-        waited = now - self._turned_at
-        done = waited >= self.params.linger
+        done = now - turned_at >= self.params.linger
         problem = self._problem or self._stuck
         is_stuck = bool(self._stuck) and not self._problem
-        return LookStep(done=done, problem=problem, is_stuck=is_stuck, why="waiting for the detector's last pictures")
+        return LookStep(done=done, problem=problem, is_stuck=is_stuck, why=Activity.WAITING_FOR_PICTURES.value)
 
     def _note_blindness(self, now: float, inputs: Inputs) -> None:
         if not self._problem:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from rosbot_patrol.patrol.records.activity import ON_GUARD, Activity, activity_of, is_away, is_full_turn
 from rosbot_patrol.patrol.records.mission import Phase, Verdict
 
 
@@ -122,14 +123,14 @@ class Narrator:
             if self.on_guard_at is not None:
                 return []
             self.on_guard_at = now
-            extra = told.why.removeprefix("on guard").strip("; ")
+            extra = told.why.removeprefix(ON_GUARD).strip("; ")
             return [f"On guard{f' ({extra})' if extra else ''}."]
         mission = next(m for m in self.missions if m.id == last.mission)
         mission.verdict, mission.why = told.last_verdict, told.why
         mission.times["end"] = now
         self.ended += 1
         self._called.discard(mission.room_id)
-        self.is_home = "not at home" not in told.why
+        self.is_home = not is_away(told.why)
         place = "Home again" if self.is_home else "Not home"
         return [f"{place}. Verdict for {last.room}: {told.last_verdict}.", f"On guard ({_details(told.why)})."]
 
@@ -137,14 +138,17 @@ class Narrator:
     def _news(last: Telling, told: Telling) -> list[str]:
         if told.phase == Phase.STARTING.value and told.why != last.why:
             return [f"Not yet on guard: {told.why}."]
-        if "waiting" in told.why and "waiting" not in last.why and "last pictures" not in told.why:
+        before, doing = activity_of(last.why), activity_of(told.why)
+        if doing is before:
+            return []
+        if doing.is_waiting and not before.is_waiting and before is not Activity.WAITING_FOR_PICTURES:
             return [f"{told.why[:1].upper()}{told.why[1:]}."]
-        if "keeping the camera" in told.why and "keeping the camera" not in last.why:
+        if doing is Activity.FOLLOWING:
             return ["Somebody is in view: the camera is kept on them."]
-        if "driving to a further viewpoint" in told.why and "driving to a further viewpoint" not in last.why:
+        if doing is Activity.TO_VIEWPOINT:
             return [f"On to a further viewpoint in {told.room}."]
-        if "turning" in told.why and "turning" not in last.why:
-            once = "Turning once" if "of 360" in told.why else "Turning"
+        if doing is Activity.TURNING:
+            once = "Turning once" if is_full_turn(told.why) else "Turning"
             return [f"{once} to look around in {told.room}."]
         return []
 
@@ -158,4 +162,4 @@ class Narrator:
 
 
 def _details(why: str) -> str:
-    return why.removeprefix("on guard, ").rstrip(".")
+    return why.removeprefix(f"{ON_GUARD}, ").rstrip(".")
