@@ -57,7 +57,7 @@ class ChannelTest:
 
     @property
     def advice(self) -> str:
-        """What to look at, "" where there is nothing to say."""
+        """What to look at, "" if there is nothing to say."""
         return _ADVICE.get(self.cause, "") if self.cause else ""
 
 

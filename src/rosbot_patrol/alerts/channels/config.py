@@ -54,7 +54,7 @@ class Surroundings:
 
 
 def make_channels(params: MailParams, around: Surroundings, *, prefix: str = "~") -> list[Channel]:
-    """The default channel of the parameters, and those of the file; one that the file calls `mail` takes its place.
+    """The default channel of the parameters, and those of the file, in which one called `mail` replaces it.
 
     Args:
         params: checked.
@@ -107,7 +107,7 @@ def _channels(name: str, given: Any, prefix: str, around: Surroundings) -> list[
 
 
 def _shown(value: Any) -> str:
-    """A value of the file as it may be shown: what could hold a web address by its type only."""
+    """A value of the file for a message; if it could hold a web address, its type only."""
     is_short = isinstance(value, (str, int, float, type(None))) and "/" not in str(value)
     return repr(value)[:40] if is_short else f"something else ({type(value).__name__})"
 
@@ -155,7 +155,7 @@ def _default_channels(params: MailParams, around: Surroundings, prefix: str) -> 
 
 
 class _Maker:
-    """Makes transports, and knows what their keys are called where they were given."""
+    """Makes transports, and knows the names of their keys for messages."""
 
     _same: ClassVar[Mapping[str, str]] = {}
 
@@ -163,7 +163,7 @@ class _Maker:
         self._prefix, self._around, self._names = prefix, around, names or self._same
 
     def make(self, spec: ChannelSpec, name: str) -> dict[str, Transport]:
-        """The transports of a channel by recipient, "" where it has none of its own; raises ParamError."""
+        """The transports of a channel by recipient, "" for one without recipients; raises ParamError."""
         if isinstance(spec, MaildirSpec):
             folder = Path(spec.folder).expanduser() if spec.folder else self._around.home / "rosbot_patrol" / "mail"
             return {"": MaildirTransport(folder, self.envelope(spec.to, spec.sender))}

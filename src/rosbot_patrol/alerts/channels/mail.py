@@ -31,7 +31,7 @@ class Envelope:
     Attributes:
         sender: of the mail.
         to: all recipients, for the mail's header; nobody twice.
-        only: who gets this copy; None where there is but one.
+        only: recipient of this copy; None if there is only one recipient.
     """
 
     sender: Address
@@ -39,7 +39,7 @@ class Envelope:
     only: Address | None = None
 
     def copies(self) -> list[Envelope]:
-        """One envelope for each recipient: what one of them refuses or delays concerns no other."""
+        """One envelope for each recipient, so that a refusal or delay by one concerns no other."""
         return [replace(self, only=address) for address in self.to]
 
     @property
@@ -86,7 +86,7 @@ def parse_addresses(name: str, text: str) -> tuple[Address, ...]:
             raise ParamError(name, f"expected a mail address, got {text!r}") from err
         if not address.username or address.username.startswith("-"):
             raise ParamError(name, f"expected a mail address, got {text!r}")
-        # a domain has no case (RFC 5321, 2.4); what stands before it may have
+        # the domain has no case (RFC 5321, 2.4); the part before it may have
         found.setdefault((address.username, address.domain.lower()), address)
     return tuple(found.values())
 
@@ -98,8 +98,8 @@ def make_envelope(
 
     Args:
         to_text: recipients, with commas between.
-        from_text: sender; what is no real address becomes one that servers take.
-        names: what the two are called, for messages.
+        from_text: sender; if it is no real address, one that servers take replaces it.
+        names: of the two parameters, for messages.
         host: of this machine.
 
     Raises:
@@ -118,8 +118,8 @@ def build_mail(notice: Notice, envelope: Envelope) -> EmailMessage:
     """The mail that tells a notice: plain text, the same as a page for phones, and the picture shown in it.
 
     Args:
-        notice: what happened; nothing in it can add a header or a line to the table of facts.
-        envelope: who to tell.
+        notice: the content; nothing in it can add a header or a line to the table of facts.
+        envelope: sender and recipients.
     """
     mail = _empty_mail(one_line(notice.subject)[:200], notice.id, notice.wall, envelope)
     mail["X-Rosbot-Patrol-Kind"] = token(notice.kind)

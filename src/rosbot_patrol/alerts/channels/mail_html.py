@@ -46,8 +46,8 @@ def html_page(notice: Notice, picture_cid: str = "") -> str:
     """The page of a notice; nothing in the notice can add markup.
 
     Args:
-        notice: what happened.
-        picture_cid: Content-ID of the picture; "" where there is none.
+        notice: the content.
+        picture_cid: Content-ID of the picture; "" if there is none.
     """
     label, colour = _LOOKS.get(notice.kind, (notice.kind.capitalize(), "#24566b"))
     rows = "".join(_ROW.substitute(name=_clean(name), value=_clean(value)) for name, value in notice.facts)

@@ -18,7 +18,7 @@ class MaildirTransport:
     """Stores mails.
 
     Args:
-        folder: of the Maildir; is made where missing.
+        folder: of the Maildir; made if it is missing.
         envelope: for the mails' headers.
     """
 
@@ -32,7 +32,7 @@ class MaildirTransport:
         return f"the Maildir {self.folder}"
 
     def send(self, notice: Notice) -> str:
-        """Store the mail; the one that lies there already where a crash came between sending and crossing out."""
+        """Store the mail, unless it is there already because a crash prevented the receipt; returns its path."""
         try:
             for part in ("tmp", "new", "cur"):
                 (self.folder / part).mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Secrets out of what others write: a server may repeat in its answer what it was sent.
+"""Masks for secrets in other programs' words: a server may repeat in its answer what it was sent.
 
 Of a web address the path and the query are secrets: whoever knows them can send to it.
 """
@@ -35,7 +35,7 @@ class Mask:
         self._found = re.compile("|".join(map(re.escape, longest_first)), re.IGNORECASE) if forms else None
 
     def __call__(self, text: str) -> str:
-        """The text with `...` where a secret was."""
+        """The text with `...` in place of secrets."""
         return self._found.sub(MASK, text) if self._found else text
 
 

@@ -1,4 +1,4 @@
-"""Whether this machine's network is another than a moment ago: then what was down may be tried at once."""
+"""A mark of this machine's network: if it changes, a channel that was down is worth a try."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from types import TracebackType
 
 from rosbot_patrol.alerts.channels.channel import FailureCause
 
-WHOLE_EXCHANGE = 4.0  # a whole exchange may take so many times the time-out of one answer
+WHOLE_EXCHANGE = 4.0  # limit of a whole exchange, in time-outs of one answer
 
 
 class StarttlsMissing(smtplib.SMTPNotSupportedError):
@@ -27,10 +27,10 @@ def explain(
     """Cause of a network failure, and one clause about it, without a full stop.
 
     Args:
-        err: what was raised.
+        err: the failure.
         where: host and port.
         timeout: that was given for each answer [s].
-        mask: takes secrets out of what the other side wrote.
+        mask: hides secrets in the other side's words.
     """
     host = where.rpartition(":")[0]
     if isinstance(err, socket.gaierror):
@@ -55,7 +55,7 @@ def explain(
 
 
 def is_loopback(host: str) -> bool:
-    """Whether what goes to a host stays on this machine."""
+    """Whether data for a host stays on this machine."""
     name = host.strip("[]").rstrip(".").lower()
     if name == "localhost" or name.endswith(".localhost"):  # RFC 6761, 6.3
         return True

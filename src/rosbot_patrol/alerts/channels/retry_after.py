@@ -13,7 +13,7 @@ _SECONDS = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)", re.ASCII)
 
 
 def parse_retry_after(text: str, now: float) -> float | None:
-    """How long to wait [s], 0 for a date that is over; None where nothing is asked for.
+    """Pause that is asked for [s], 0 for a date in the past; None if nothing is asked for.
 
     Args:
         text: the header's value: seconds, or one of the three dates of HTTP.

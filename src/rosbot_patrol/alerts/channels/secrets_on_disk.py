@@ -17,7 +17,7 @@ _SECRET = re.compile(r"(?:^|_)(?:password|passwd|passphrase|secret|token|api_?ke
 
 
 def refuse_secrets(tree: Mapping[str, Any], *, name: str, place: str) -> None:
-    """Refuse a password that stands where others read it.
+    """Refuse a password in a place that others can read.
 
     Args:
         tree: parameters, nested or not.

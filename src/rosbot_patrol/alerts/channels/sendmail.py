@@ -20,7 +20,7 @@ class SendmailTransport:
 
     Args:
         program: its path.
-        envelope: who to tell; one recipient, as the program answers once for all that it is given.
+        envelope: sender and one recipient, since the program answers once for all recipients.
         timeout: it has to end within [s].
     """
 
@@ -58,6 +58,6 @@ class SendmailTransport:
 
 
 def find_sendmail(given: str) -> str | None:
-    """The sendmail program, None where there is none."""
+    """Path of the sendmail program, None if there is none."""
     candidates = (given,) if given else SENDMAILS
     return next((path for path in candidates if os.access(path, os.X_OK)), None)

@@ -1,4 +1,4 @@
-"""A mail server, with TLS and login where asked for."""
+"""SMTP transport: a mail server, with TLS and login if asked for."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class SmtpServer:
 
     Attributes:
         host, port: of the server.
-        security: "auto" (STARTTLS where it is offered), "none", "starttls", "tls".
+        security: "auto" (STARTTLS if it is offered), "none", "starttls", "tls".
         user, password: of the login; an empty user for none.
         timeout: for each answer [s].
         ca_file: certificates to trust besides the system's; "" for none.
@@ -41,7 +41,7 @@ class SmtpTransport:
 
     Args:
         server: where.
-        envelope: who to tell; one recipient, as SMTP answers for each of several by itself.
+        envelope: sender and one recipient, since SMTP answers for each recipient by itself.
     """
 
     name = "smtp"
@@ -152,7 +152,7 @@ def _hang_up(server: smtplib.SMTP) -> None:
 
 
 def _any_certificate() -> ssl.SSLContext:
-    # Opportunistic: better than clear text, which is what "auto" means without it. Never with a login.
+    # Opportunistic: better than the clear text that "auto" would send otherwise. Never with a login.
     context = ssl.create_default_context()
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE

@@ -39,11 +39,11 @@ _CAUSES = {401: FailureCause.UNAUTHORIZED, 403: FailureCause.FORBIDDEN, 404: Fai
 
 @dataclass(frozen=True, kw_only=True)
 class WebAddress:
-    """Where to, and what goes along.
+    """Address of a webhook, and what is sent along.
 
     Attributes:
         url: http or https; its path and query are secrets, and are shown nowhere.
-        name: of the channel, by which the address is told apart where it is shown.
+        name: of the channel, shown in place of the secret path.
         secret: of the signature; "" for none.
         token: for `Authorization: Bearer`; "" for none.
         with_picture: send the picture, in base64.
@@ -61,13 +61,13 @@ class WebAddress:
 
 
 def check_url(url: str) -> str | None:
-    """What is wrong with a web address, None where nothing is."""
+    """What is wrong with a web address, None if nothing is."""
     if any(c.isspace() or not c.isprintable() for c in url) or not url.isascii():
         return "has a blank, a line break or a letter that a web address cannot have"
     try:
         parts = urlsplit(url)
         port = parts.port
-    except ValueError:  # what it says repeats a part of the address
+    except ValueError:  # the error repeats a part of the address
         return "is no web address: its host or port cannot be read"
     if parts.scheme not in ("http", "https") or not parts.hostname:
         return "is no web address, expected http://... or https://..."
@@ -80,7 +80,7 @@ class WebhookTransport:
     """Posts notices.
 
     Args:
-        address: where to.
+        address: of the webhook.
         wall: seconds since 1970, for the signature.
     """
 
@@ -146,7 +146,7 @@ class WebhookTransport:
                 answer = connection.getresponse()
                 data = answer.read(SHOWN + 4 * self._mask.longest)  # so that no secret is cut and then not found
                 said = self._mask(data.decode("utf-8", "replace"))[:SHOWN]
-                pause = answer.headers.get("Retry-After", "")  # the first where there are several
+                pause = answer.headers.get("Retry-After", "")  # the first of several
                 return answer.status, self._mask(answer.reason), _printable(said), pause
             finally:
                 connection.close()
@@ -176,7 +176,7 @@ class WebhookTransport:
 
 
 def sign(secret: str, stamp: str, body: bytes) -> str:
-    """The signature header: who knows the secret can check that body and time are ours."""
+    """The signature header: a receiver that knows the secret can check that body and time are ours."""
     digest = hmac.new(secret.encode(), stamp.encode() + b"." + body, hashlib.sha256)
     return f"sha256={digest.hexdigest()}"
 

@@ -18,9 +18,9 @@ def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: 
     """The notice of a confirmed intruder.
 
     Args:
-        incident: what happened.
-        picture: JPEG, None where there is none.
-        picture_note: what to say about the picture, or why there is none.
+        incident: the record.
+        picture: JPEG, None if there is none.
+        picture_note: a remark about the picture, or why there is none.
     """
     return Notice(
         id=token(incident.id),
@@ -38,7 +38,7 @@ def incident_notice(incident: Incident, picture: bytes | None, *, picture_note: 
 
 
 def _rooms(incident: Incident) -> dict[str, Any]:
-    """Where the person is, and who called where that is another room."""
+    """The room with the person, and the room that called if that is another one."""
     if incident.place is Place.CALLED:
         return {"room_id": incident.room_id, "room_name": incident.room_name}
     called = {"called_id": incident.room_id, "called_name": incident.room_name}

@@ -17,7 +17,7 @@ from typing import Any
 FORMAT = 1
 _ID = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]{0,149}")
 
-URGENT = ("incident", "test")  # never merged into a digest, never held up by what is not urgent
+URGENT = ("incident", "test")  # kinds that are never merged into a digest, nor held up by other kinds
 
 
 class LaterFormat(ValueError):
@@ -36,11 +36,11 @@ class Notice:
         text: paragraphs, for people.
         facts: (name, value) pairs shown as a table below the text.
         room_id, room_name: where, else the room that it is about; -1 and "" for nowhere.
-        place: where, for people, where `room_name` does not say it; "" where it does.
-        called_id, called_name: the room that the robot was sent to, where it is another; -1 and "" for the same.
+        place: description for people, if `room_name` does not say it; otherwise "".
+        called_id, called_name: the room that called, if it is another one; otherwise -1 and "".
         verdict: of the mission; "" for none.
         incident: id of its record; "" for none.
-        picture: JPEG, None where there is none.
+        picture: JPEG, None if there is none.
         picture_name: file name of it.
         channels: names of those that are asked; empty for all that take its kind.
 
@@ -75,7 +75,7 @@ class Notice:
         return self.kind in URGENT
 
     def to_bytes(self) -> bytes:
-        """The notice as it lies on disk."""
+        """The notice in its form on disk."""
         tree = {"format": FORMAT, **{name: getattr(self, name) for name in _TEXTS}}
         tree |= {"wall": self.wall, "room_id": self.room_id, "facts": self.facts, "channels": self.channels}
         if self.called_id >= 0:
@@ -103,7 +103,7 @@ class Notice:
             raise ValueError("is no notice: it has no format number")
         if tree["format"] > FORMAT:
             raise LaterFormat(f"is of format {tree['format']}, this version knows up to {FORMAT}")
-        check = tree.pop("check", None)  # those of earlier versions have none
+        check = tree.pop("check", None)  # notices of 1.0.0 have none
         if check is not None and check != _check(tree):
             raise ValueError("is no notice: it was damaged, its checksum does not fit")
         try:

@@ -103,7 +103,7 @@ class Album:
         return files
 
     def look(self, incident_id: str, ring: EvidenceRing) -> list[NewFile]:
-        """The newest picture of a look around, where one is due."""
+        """The newest picture of a look around, if one is due."""
         shelf, picture = self._shelves.get(incident_id), ring.newest
         if shelf is None or picture is None or shelf.looks >= self.params.look_pictures:
             return []

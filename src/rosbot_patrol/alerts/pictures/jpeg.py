@@ -66,7 +66,7 @@ class LabelledBox:
 
 
 def to_jpeg(picture: Picture, boxes: Sequence[LabelledBox] = (), *, quality: int = 88) -> bytes:
-    """The picture with its boxes; one that is JPEG already, and gets none, stays as it is.
+    """The picture as JPEG with its boxes; a JPEG without boxes stays as it is.
 
     Raises:
         AlertError: an encoding that is not known, or too few bytes.

@@ -1,4 +1,4 @@
-"""The house's map as a picture, with the way that the robot took, where it stood, and where the person was."""
+"""The house's map as a picture, with the robot's way, its place, and the person's."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from rosbot_patrol.grid import Grid
 
 _WALL, _FREE, _UNKNOWN = 40, 255, 214
 _WAY, _ROBOT, _PERSON, _GOAL = (120, 160, 220), (20, 80, 200), (210, 30, 30), (60, 140, 60)
-_MARGIN = 0.5  # [m] about what is known
+_MARGIN = 0.5  # [m] around the known area
 _SIZE = 900  # [px] of the longer side
-_FINE = 2  # drawn so many times larger, for smooth lines
+_FINE = 2  # factor by which the drawing is larger, for smooth lines
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class MapView:
 
 @dataclass(frozen=True, kw_only=True)
 class Marks:
-    """What is drawn on the map, in its frame [m, rad]; None where it is not known."""
+    """Marks on the map, in its frame [m, rad]; None if unknown."""
 
     path: Sequence[tuple[float, float]] = ()
     robot: tuple[float, float, float] | None = None
@@ -58,7 +58,7 @@ def crop_map(grid: Grid) -> MapView:
 
 
 def view_of_marks(marks: Marks) -> MapView:
-    """An empty map that holds all marks, for where no map is known."""
+    """An empty map around all marks, if no map is known."""
     spots = [*marks.path, *(spot for spot in (marks.person, marks.room) if spot is not None)]
     spots += [marks.robot[:2]] if marks.robot else []
     xs, ys = [x for x, _ in spots] or [0.0], [y for _, y in spots] or [0.0]

@@ -42,7 +42,7 @@ class EvidenceRing:
 
     Args:
         seconds: how far back it reaches.
-        rate: older pictures are thinned to so many a second [Hz].
+        rate: older pictures are thinned to this rate [Hz].
         max_bytes: of all pictures together; 40 MB hold 43 raw ones of 640 x 480, or 1,000 compressed ones.
         fresh: pictures younger than this [s] are all kept.
     """
@@ -62,7 +62,7 @@ class EvidenceRing:
         return self._new[-1] if self._new else None
 
     def snapshot(self) -> EvidenceRing:
-        """The ring as it is now, for another thread."""
+        """A copy of the ring, for another thread."""
         other = EvidenceRing(seconds=self._seconds, rate=1.0 / self._gap, max_bytes=self._max_bytes, fresh=self._fresh)
         other._old, other._new, other.bytes = self._old.copy(), self._new.copy(), self.bytes
         return other
@@ -87,7 +87,7 @@ class EvidenceRing:
             self.bytes -= len((self._old or self._new).popleft().data)
 
     def find(self, stamp: float, tolerance: float) -> Picture | None:
-        """The picture nearest to a time [s], None where none lies within the tolerance."""
+        """The picture nearest to a time [s], None if none lies within the tolerance."""
         best = min((*self._old, *self._new), key=lambda p: abs(p.stamp - stamp), default=None)
         return best if best is not None and abs(best.stamp - stamp) <= tolerance else None
 
@@ -162,7 +162,7 @@ class Candidate:
 
 
 def best_pictures(candidates: Iterable[Candidate], count: int = 3, apart: float = 1.0) -> list[str]:
-    """The names of the pictures that show best who it was (sure, large, sharp), each some time [s] from the others."""
+    """Names of the pictures that show the person best (sure, large, sharp), each some time [s] from the others."""
     known = list(candidates)
     sharpest = max((c.sharpness for c in known), default=0.0) or 1.0
 
@@ -178,7 +178,7 @@ def best_pictures(candidates: Iterable[Candidate], count: int = 3, apart: float 
 
 
 def sharpness(jpeg: bytes) -> float:
-    """How much detail a picture shows: the variance of its edges when it is small; 0 where it cannot be read."""
+    """Detail of a picture: the variance of its edges at a small size; 0 if it cannot be read."""
     try:
         image = Image.open(io.BytesIO(jpeg))
         image.draft("L", (_SHARP_WIDTH, _SHARP_WIDTH))

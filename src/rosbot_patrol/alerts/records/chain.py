@@ -1,4 +1,4 @@
-"""A SHA-256 chain: each link names the digest of what was kept and the hash of the link before it.
+"""A SHA-256 chain: each link names the digest of its content and the hash of the link before it.
 
 Whoever changes, removes or reorders something afterwards breaks the chain at that place. It holds no secret: somebody
 who can write the database can make the whole chain anew, so that a hash which left the robot (mails and reports carry
@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-START = "0" * 64  # what the first link has in the place of a link before it
+START = "0" * 64  # stands for the link before the first one
 
 BEGUN, RECORD, AMENDMENT, REMOVAL = "begun", "record", "amendment", "removal"
 
@@ -27,9 +27,9 @@ class Link:
         n: counts from 1, without gaps.
         kind: BEGUN (the database), RECORD (an incident was closed), AMENDMENT (to a closed one), REMOVAL (by
             retention: the record's and the amendments' bodies are gone, their digests stay).
-        incident: its id, "" where it is about none.
+        incident: its id, "" if the link is about none.
         wall: when, seconds since 1970.
-        body: canonical JSON, None where it was removed.
+        body: canonical JSON, None if it was removed.
         digest: SHA-256 of the body, in hex.
         previous: hash of the link before.
         hash: of this link, see `link_hash`.
@@ -62,7 +62,7 @@ def link_hash(n: int, kind: str, incident: str, wall: float, body_digest: str, p
 
 
 def make_link(before: tuple[int, str], kind: str, incident: str, wall: float, body: str) -> Link:
-    """The link after the one whose number and hash are given; (0, START) before the first."""
+    """The link after one with this number and hash; (0, START) before the first."""
     n, previous, body_digest = before[0] + 1, before[1], digest(body)
     own = link_hash(n, kind, incident, wall, body_digest, previous)
     return Link(
@@ -71,7 +71,7 @@ def make_link(before: tuple[int, str], kind: str, incident: str, wall: float, bo
 
 
 def link_problem(link: Link, before: tuple[int, str]) -> str:
-    """What does not fit in a link, given number and hash of the one before it; "" where all does."""
+    """What does not fit in a link after one with this number and hash; "" if everything does."""
     if link.n != before[0] + 1:
         gone = link.n - before[0] - 1
         return f"{gone} link{'s are' if gone > 1 else ' is'} missing before it"

@@ -1,4 +1,4 @@
-"""The incidents' SQLite file: its tables, how it is opened, and what becomes of one that cannot be used.
+"""The incidents' SQLite file: tables, rows, and opening.
 
 WAL, so that people read while the robot writes; synchronous=FULL, so that what a call wrote is on the disk when it
 returns. Tables:
@@ -129,7 +129,7 @@ def open_for_reading(path: Path, *, any_version: bool = False) -> sqlite3.Connec
 
 
 def open_for_writing(path: Path) -> sqlite3.Connection:
-    """A connection that writes; makes the database where there is none.
+    """A connection that writes; makes the database if there is none.
 
     Raises:
         StoreError: `is_corrupt` where the file is no such database or a damaged one.
@@ -172,7 +172,7 @@ def _prepare(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def _version(path: Path) -> int:
-    """The version that a file says it has; 0 where there is none or it says nothing."""
+    """The version in a file's header; 0 if there is no file or no version."""
     if not path.exists():
         return 0
     try:
@@ -230,7 +230,7 @@ def append_link(
 
 
 def insert_incident(connection: sqlite3.Connection, incident: Incident) -> None:
-    """A row for an open record, where there is none of its id."""
+    """Insert a row for an open record, unless there is one of its id."""
     newest = connection.execute("SELECT max(wall) FROM incidents").fetchone()[0]
     is_late = newest is not None and incident.wall < newest
     values = {**columns_of(incident), "record": chain.canonical(_without_lists(incident)), "late": int(is_late)}
@@ -303,7 +303,7 @@ def room_tag(room_id: int) -> str:
 
 
 def person_tag(room_id: int | None) -> str:
-    """A word of the text index for the room in which somebody was, where another one had called."""
+    """A word of the text index for the room with the person, if another one had called."""
     return f"inroom{room_id}"
 
 
@@ -321,7 +321,7 @@ def record_from_json(path: Path, incident_id: str, text: str | None) -> Incident
 
 
 def clean(text: str) -> str:
-    """The text without what SQLite cannot hold."""
+    """The text without characters that SQLite cannot hold."""
     return text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
 
 

@@ -45,14 +45,14 @@ class IncidentFolder:
     """`root`/ID/NAME.
 
     Args:
-        root: is made where it is missing, at the first file.
+        root: made with the first file if it is missing.
     """
 
     def __init__(self, root: Path) -> None:
         self.root = root
 
     def path(self, incident_id: str, name: str = "") -> Path:
-        """Where an incident's files lie, or one of them. Raises ValueError for what is no name of a file."""
+        """The folder of an incident's files, or the path of one. Raises ValueError if that is no file name."""
         for part in (incident_id, name) if name else (incident_id,):
             if not is_name(part):
                 raise ValueError(f"{part!r} is no name for a file")
@@ -97,14 +97,14 @@ class IncidentFolder:
             return path.read_bytes()
 
     def remove(self, incident_id: str) -> None:
-        """Remove a folder and what is in it; nothing where there is none. Raises StoreError."""
+        """Remove an incident's folder, if there is one, with all files in it. Raises StoreError."""
         folder = self.path(incident_id)
         with errors_of(folder):
             if folder.is_dir():
                 shutil.rmtree(folder)
 
     def problem(self, incident_id: str, file: StoredFile) -> str:
-        """What is wrong with a file of a record; "" where it is as it was kept."""
+        """What is wrong with a file of a record; "" if it is unchanged."""
         path = self.path(incident_id, file.name)
         try:
             data = path.read_bytes()

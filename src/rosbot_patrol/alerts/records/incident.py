@@ -27,7 +27,7 @@ _DOING = {"driving": "driving to", "looking": "looking around in", "returning": 
 
 
 class Place(Enum):
-    """What is known of where a person is."""
+    """Knowledge about a person's place."""
 
     CALLED = "in the room that called"
     OTHER = "in another room"
@@ -41,7 +41,7 @@ class Event:
 
     Attributes:
         wall: when, seconds since 1970.
-        kind: sensor (what one said), state (what the robot does), seen, suspect, notice, verdict, fault, note.
+        kind: sensor (its words), state (of the robot), seen, suspect, notice, verdict, fault, note.
         text: one sentence.
         data: further plain values, such as the sensor's id.
     """
@@ -60,7 +60,7 @@ class StoredFile:
         name: in that folder.
         role: detection (the notice's picture), best, before, after, look, map, other.
         sha256: of its bytes, in hex; size: of it [bytes].
-        stamp: when a picture was taken, by the robot's clock [s]; None where it is no picture.
+        stamp: time of a picture by the robot's clock [s]; None for other files.
         caption: for people.
     """
 
@@ -77,19 +77,19 @@ class Incident:
     """One mission, whatever came of it.
 
     Attributes:
-        id: that of its mission, with "-2" and so on for further persons elsewhere in the same mission.
+        id: of its mission, with "-2" and so on for further persons elsewhere in the same mission.
         wall: when it began, seconds since 1970; ros_time: the same by the robot's clock [s].
-        room_id, room_name: where the robot was sent.
-        origin: what sent it: trigger, schedule, action, silent sensor, all.
+        room_id, room_name: room that the robot was sent to.
+        origin: reason of the mission: trigger, schedule, action, silent sensor, all.
         verdict: one of VERDICTS, OPEN while there is none; reason: in one sentence.
-        phase: what the robot was doing when it saw somebody first, or else last: driving, looking, returning.
+        phase: the robot's phase when it saw somebody first, or its last one: driving, looking, returning.
         times: (phase, wall) in the order in which the phases began.
-        share_seen: of the room's floor, 0 to 1; None where nobody measured.
-        object_class, probability: of the detector, mean over `pictures`; "", 0 and 0 where nobody was confirmed.
+        share_seen: seen share of the room's floor, 0 to 1; None if it was not measured.
+        object_class, probability: of the detector, mean over `pictures`; "", 0 and 0 if nobody was confirmed.
         confirmed: when somebody was, seconds since 1970; sightings: confirmations in all.
-        pose: x [m], y [m], yaw [rad] of the robot in map at that moment, None where it was not known.
-        person: x, y [m] of the person in map, None where nobody knows.
-        person_room_id: number of the room that lies in, NO_ROOM for none, None where nobody knows.
+        pose: x [m], y [m], yaw [rad] of the robot in map at that moment, None if unknown.
+        person: x, y [m] of the person in map, None if unknown.
+        person_room_id: number of the room with the person, NO_ROOM for none, None if unknown.
         person_room: name of that room.
         path: x, y [m] of the robot in map on its way.
         triggers: how often the room's sensor called.
@@ -131,7 +131,7 @@ class Incident:
 
     @property
     def place(self) -> Place:
-        """What is known of where the person is."""
+        """Knowledge about the person's place."""
         if not self.object_class:
             return Place.CALLED
         if self.person_room_id == NO_ROOM:
@@ -154,7 +154,7 @@ class Incident:
 
     @property
     def person_title(self) -> str:
-        """The room in which the person is, with its number where that is known; "" for none."""
+        """The room with the person, with its number if that is known; "" for none."""
         is_numbered = self.person_room_id not in (None, NO_ROOM)
         return f"room {self.person_room_id} ({self.person_room})" if is_numbered else self.person_room
 

@@ -16,14 +16,14 @@ _COLUMNS = "seq, id, wall, room_id, room_name, origin, verdict, reason, share, o
 
 @dataclass(frozen=True, kw_only=True)
 class Query:
-    """What to look for; what is not said does not matter.
+    """Conditions on incidents; those that are not given do not matter.
 
     Attributes:
         room: its id; somebody was there, or it called.
         verdict: "" for those that are open.
         since, until: when the mission began, seconds since 1970.
         text: words that have to be there, or how they begin; case and accents do not matter.
-        limit: at most so many.
+        limit: largest number of results.
     """
 
     room: int | None = None

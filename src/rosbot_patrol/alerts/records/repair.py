@@ -25,7 +25,7 @@ from rosbot_patrol.counts import count_of
 
 
 def repair(store: IncidentStore, *, wall: float) -> list[str]:
-    """Put right what can be; returns what was done, in sentences.
+    """Repair what can be repaired; returns what was done, in sentences.
 
     Args:
         store: just opened, for writing.

@@ -23,9 +23,9 @@ from rosbot_patrol.params import param
 MB = 1_000_000
 DAY = 86_400.0
 ALWAYS_KEPT = 100  # the newest of each verdict stay, however old
-AT_ONCE = 200  # removals in one go, so that other work has its turn
+AT_ONCE = 200  # removals in one go, so that other work is not held up
 _ORDER = (("clear",), ("unreachable", "unverified", ""), ("confirmed",))
-_RESERVE_BYTES = 2 * MB  # what the database needs to write down that something goes
+_RESERVE_BYTES = 2 * MB  # the database needs it to write down a removal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,11 +85,11 @@ class Pruned:
 
 
 def prune(store: IncidentStore, params: RetentionParams, *, wall: float) -> Pruned:
-    """Remove what is too old or too much, at most AT_ONCE.
+    """Remove incidents that are too old or too many, AT_ONCE at most.
 
     Args:
         store: of the incidents.
-        params: what may stay.
+        params: limits.
         wall: now, seconds since 1970.
 
     Raises:

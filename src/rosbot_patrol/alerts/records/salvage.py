@@ -1,4 +1,4 @@
-"""Opening the incidents whatever state they are in: damaged databases are set aside, and what can be read is copied."""
+"""Opening of the incidents in any state: a damaged database is set aside, and what can be read is copied."""
 
 from __future__ import annotations
 

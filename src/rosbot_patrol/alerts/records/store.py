@@ -78,7 +78,7 @@ class IncidentStore:
         self.connection.close()
 
     def settle(self) -> bool:
-        """Move what is finished from the WAL into the database, so that a WAL that is lost takes none of it along.
+        """Move finished records from the WAL into the database, so that the loss of a WAL does not lose them.
 
         Returns:
             Whether that is done; somebody who reads for long holds it up.
@@ -88,7 +88,7 @@ class IncidentStore:
         """
         if not self._is_settled:
             with errors_of(self.path):
-                self.connection.execute("PRAGMA busy_timeout=0")  # who reads is not waited for
+                self.connection.execute("PRAGMA busy_timeout=0")  # do not wait for readers
                 try:
                     self._is_settled = not self.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]
                 finally:
@@ -98,7 +98,7 @@ class IncidentStore:
     # -- a record while its mission runs
 
     def begin(self, incident: Incident) -> None:
-        """Open a record; nothing where the id is known already. Raises StoreError, ValueError (the id)."""
+        """Open a record, unless the id is known already. Raises StoreError, or ValueError for a bad id."""
         if not is_name(incident.id):
             raise ValueError(f"{incident.id!r} is no id for an incident")
         with transaction(self.connection, self.path):
@@ -108,7 +108,7 @@ class IncidentStore:
         self._is_settled = False
 
     def record(self, incident_id: str, *, add: Iterable[Event] = (), **changes: Any) -> None:
-        """Add to an open record, all or nothing. Raises StoreError, also where it is not open.
+        """Add to an open record, all or nothing. Raises StoreError, also if it is not open.
 
         Args:
             incident_id: of the record.
@@ -194,7 +194,7 @@ class IncidentStore:
     # -- reading
 
     def get(self, incident_id: str) -> Incident | None:
-        """A record, open or closed; None where there is none. Raises StoreError."""
+        """A record, open or closed; None if there is none. Raises StoreError."""
         with errors_of(self.path):
             row = self._row(incident_id)
             if row is None:
@@ -262,7 +262,7 @@ class IncidentStore:
 
 
 def recall_incident(state_dir: Path, incident_id: str) -> Incident | None:
-    """A record, read beside whoever writes; None where there is none or it cannot be read."""
+    """A record, read beside a program that writes; None if there is none or it cannot be read."""
     try:
         with IncidentStore(state_dir, read_only=True) as store:
             return store.get(incident_id)

@@ -1,4 +1,4 @@
-"""Whether the incidents on disk are those that were kept: chain, records, lists and files."""
+"""Check that the incidents on disk are unchanged: chain, records, lists and files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_PROBLEMS = 20
 
 @dataclass(frozen=True, kw_only=True)
 class Verification:
-    """What came of a check.
+    """Result of a check.
 
     Attributes:
         problems: sentences, the first that was found first; at most MAX_PROBLEMS.
@@ -35,7 +35,7 @@ class Verification:
 
     @property
     def fits(self) -> bool:
-        """Nothing was changed."""
+        """Whether nothing was changed."""
         return not self.problems
 
 

@@ -35,9 +35,9 @@ class Evidence:
     """What a report is made of besides the record.
 
     Attributes:
-        read: a file's bytes by its name, None where it cannot be read.
+        read: gives a file's bytes by its name, None if it cannot be read.
         link: of the chain, None while the record is open.
-        amendments: what was added afterwards.
+        amendments: later additions.
     """
 
     read: Callable[[str], bytes | None]
@@ -234,7 +234,7 @@ def make_report(store: IncidentStore, incident: Incident) -> str:
 
 
 def write_report(store: IncidentStore, incident: Incident) -> Path:
-    """Write an incident's report into its folder; returns where it lies. Raises StoreError."""
+    """Write an incident's report into its folder; returns its path. Raises StoreError."""
     html = make_report(store, incident)
     store.folder.write(incident.id, [NewFile(name=REPORT, role="other", data=html.encode("utf-8"))])
     return store.folder.path(incident.id, REPORT)

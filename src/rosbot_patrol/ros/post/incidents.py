@@ -1,10 +1,10 @@
-"""incidents: what the patrol has on record: lists, searches, shows, reports, exports, checks, removes.
+"""incidents: lists, searches, shows, reports, exports, checks and removes the patrol's records.
 
 rosrun rosbot_patrol incidents list [--room N] [--verdict V] [--since WHEN] [--text WORDS]
 
 Options may stand before or after the command.
 Needs no roscore. All but `prune` only read, also while the patrol writes.
-Exit status: 0 where all is well, 1 where a check fails or something is not there, 2 where the call makes no sense.
+Exit status: 0 if all is well, 1 if a check fails or something is not there, 2 if the call makes no sense.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     use_private_umask()
     state_dir = state_folder(given.state_dir, get_ros_namespace())
     try:
-        IncidentStore(state_dir, read_only=True).close_database()  # no command makes one where there is none
+        IncidentStore(state_dir, read_only=True).close_database()  # no command makes a new one
         with IncidentStore(state_dir, wall=time.time(), read_only=given.command != "prune") as store:
             if store.later_version:
                 print(f"(incidents.sqlite is of a later version; this is {store.path.name})", file=sys.stderr)
@@ -255,7 +255,7 @@ def _export(store: IncidentStore, given: argparse.Namespace) -> int:
         archive.writestr("record.json", json.dumps(record, ensure_ascii=False, indent=1))
         archive.writestr("link.json", json.dumps(proof, indent=1))
         if link is not None and link.body is not None:
-            archive.writestr("record.canonical.json", link.body)  # what the digest is of
+            archive.writestr("record.canonical.json", link.body)  # the digest is of these bytes
         archive.writestr(REPORT, make_report(store, incident))
         for file in incident.files:
             archive.writestr(file.name, store.folder.read(incident.id, file.name))

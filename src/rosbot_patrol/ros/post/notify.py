@@ -1,10 +1,10 @@
-"""notify: tries the ways to the owner, and shows what waits for them; needs no ROS master.
+"""notify: tests the channels to the owner, and shows the notices that wait; needs no ROS master.
 
 rosrun rosbot_patrol notify --test [--channel NAME] [--config FILE]     a real test notice through each channel
 rosrun rosbot_patrol notify --list                                      what waits, and why
 rosrun rosbot_patrol notify --flush                                     try all that waits now
 
-It uses the channels that the robot's nodes were last started with (they leave that in the outbox), or those of a file.
+It uses the channels that the robot's nodes were last started with, as they left them in the outbox, or those of a file.
 Exit status: 0 all well, 1 something was not taken or waits still, 2 it cannot be tried.
 """
 
@@ -80,7 +80,7 @@ def try_all(channels: list[Channel]) -> int:
 
 
 def show(folder: Path) -> int:
-    """List what waits."""
+    """List the notices that wait."""
     if not folder.is_dir():
         print(f"There is no outbox at {folder}: no node has used it yet (--state-dir names another place).")
         return 0
@@ -95,7 +95,7 @@ def show(folder: Path) -> int:
 
 
 def flush(folder: Path, channels: list[Channel]) -> int:
-    """Have everything tried now, by the node that delivers, or else here."""
+    """Have everything tried now, by the node that delivers, or by this program if none does."""
     if not folder.is_dir():
         return show(folder)
     fast = [replace(channel, pace=replace(channel.pace, interval=0.0)) for channel in channels]
