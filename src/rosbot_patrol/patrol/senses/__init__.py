@@ -1,1 +1,1 @@
-"""What the patrol's node does with its inputs, without ROS: keep the newest, refuse the stale, measure, assemble."""
+"""The patrol's senses: what arrives is judged, placed and measured, and each step is told of it."""
