@@ -132,20 +132,7 @@ class PatrolNode:
     def _make_ends(self, inputs: InputParams, rooms: Rooms, folder: Path) -> None:
         self._stepping = threading.Lock()
         self._loop = Loop(self.params.rate, self._step, name="patrol")
-        journal = Journal(folder / "calls.jsonl", self.store.taken)
-        self._lost_calls = journal.damage
-        topic = self.params.eyes.depth_topic
-        eyes = dataclasses.replace(self.params.eyes, depth_topic=rospy.resolve_name(topic) if topic else "")
-        senses = PatrolSenses(
-            inputs, eyes, Transforms(), rooms=rooms, alarm_classes=self.params.alarm_classes, health=self.health
-        )
-        wake = self._loop.hurry
-        calls = CallDesk(rooms, self.store, journal, latched_window=inputs.latched_window, wake=wake)
-        self.inputs = PatrolInputs(
-            inputs, eyes, senses=senses, calls=calls, sensor_rooms=SensorRooms(self.sensors), wake=wake
-        )
-        for _, room, wall in journal.left:
-            self.inputs.ask(Request(room_id=room, wall=wall, note="kept over a restart"))
+        self.inputs = self._make_inputs(inputs, rooms, Journal(folder / "calls.jsonl", self.store.taken))
         self.inputs.on_boxes = self._note_sighting
         self.missed = MissedCalls(folder / "alive", self.inputs.ask, self.inputs.room_of)
         self.neighbour = Neighbour(self.params.sensor_watch_after, self.params.sensor_watch_notice_after, self.health)
@@ -165,6 +152,21 @@ class PatrolNode:
         self._arming = ArmingDesk(memory, kept, self._tell_owner, self.desk.write_later)
         self._orders = Orders(self.manager, rooms, self._stepping)
         self._actions = PatrolActions(self.manager, rooms)
+
+    def _make_inputs(self, params: InputParams, rooms: Rooms, journal: Journal) -> PatrolInputs:
+        self._lost_calls = journal.damage
+        topic = self.params.eyes.depth_topic
+        eyes = dataclasses.replace(self.params.eyes, depth_topic=rospy.resolve_name(topic) if topic else "")
+        senses = PatrolSenses(
+            params, eyes, Transforms(), rooms=rooms, alarm_classes=self.params.alarm_classes, health=self.health
+        )
+        wake = self._loop.hurry
+        calls = CallDesk(rooms, self.store, journal, latched_window=params.latched_window, wake=wake)
+        sensor_rooms = SensorRooms(self.sensors)
+        made = PatrolInputs(params, eyes, senses=senses, calls=calls, sensor_rooms=sensor_rooms, wake=wake)
+        for _, room, wall in journal.left:
+            made.ask(Request(room_id=room, wall=wall, note="kept over a restart"))
+        return made
 
     def run(self) -> None:
         """Patrol until shutdown."""
