@@ -11,6 +11,7 @@ An unusable scan (see `scan.scan_problem`) frees nothing; the base then creeps a
 
 from __future__ import annotations
 
+import enum
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -86,12 +87,29 @@ class _Met(NamedTuple):
         return transform_points(compose(invert(odom_from_base), self.pose), point)
 
 
+class Cause(enum.Enum):
+    """Why a command is held back; the value is the sentence for it if there is no better one."""
+
+    NONE = ""
+    NEAR = "something is near on the way"
+    IN_THE_WAY = "something is in the way"
+    TURN_ONLY = "something is in the way, turning only"
+    BLIND = "nothing is seen"
+    SOMEONE = "someone passes"
+
+
 class Verdict(NamedTuple):
     """Result of the guard: the safe command, its share of the wish (0 to 1), and the reason if it is less than all."""
 
     twist: Twist2D
     scale: float
-    reason: str
+    cause: Cause = Cause.NONE
+    detail: str = ""
+
+    @property
+    def reason(self) -> str:
+        """The cause in a sentence, "" if all of the wish is done."""
+        return self.detail or self.cause.value
 
 
 class CollisionGuard:
@@ -163,7 +181,7 @@ class CollisionGuard:
     def limit(self, wish: Twist2D, now: float, odom_from_base: Pose2D | None = None) -> Verdict:
         """Safe part of a commanded velocity."""
         if wish == STOP:
-            return Verdict(STOP, 1.0, "")
+            return Verdict(STOP, 1.0)
         reason = self.blind(now)
         if reason:
             return self._without_sight(wish, reason)
@@ -176,11 +194,11 @@ class CollisionGuard:
 
     def _verdict(self, wish: Twist2D, scale: float, whole: Twist2D | None = None) -> Verdict:
         if scale < _CREEP:
-            return Verdict(STOP, 0.0, "something is in the way")
+            return Verdict(STOP, 0.0, Cause.IN_THE_WAY)
         twist = Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale)
         if whole is not None and whole != wish:
-            return Verdict(twist, 0.0, "something is in the way, turning only")
-        return Verdict(twist, scale, "" if scale >= 0.999 else "something is near on the way")
+            return Verdict(twist, 0.0, Cause.TURN_ONLY)
+        return Verdict(twist, scale, Cause.NONE if scale >= 0.999 else Cause.NEAR)
 
     def blind(self, now: float) -> str:
         """Reason why there is no usable scan now, "" if the last one is fresh."""
@@ -200,7 +218,8 @@ class CollisionGuard:
         if wish.wz != 0.0:
             parts.append(p.stale_turn / abs(wish.wz))
         scale = min(parts)
-        return Verdict(Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale), scale, reason)
+        twist = Twist2D(wish.vx * scale, wish.vy * scale, wish.wz * scale)
+        return Verdict(twist, scale, Cause.BLIND, reason)
 
     def _points(self, now: float, odom_from_base: Pose2D | None) -> Array:
         """Obstacles seen and remembered, in the base's present frame."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, RangeReading
+from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, RangeReading, Verdict
 from rosbot_patrol.geometry import STOP, Pose2D, Twist2D, compose, invert, transform_points
 from rosbot_patrol.scan import LaserScan
 
@@ -75,7 +75,7 @@ def clearance(pose, segments):
 
 def test_open_space_is_not_limited():
     verdict = guard_at(wall_ahead(3.0)).limit(AHEAD, 0.1)
-    assert verdict == (AHEAD, 1.0, "")
+    assert verdict == Verdict(AHEAD, 1.0)
 
 
 def test_slows_then_stops_ahead_of_a_wall():
@@ -161,7 +161,7 @@ def test_without_a_fresh_scan_it_creeps_and_says_so():
     guard = guard_at(wall_ahead(3.0))
     assert "the last scan is 2.0 s old" in guard.limit(AHEAD, 2.0).reason
     assert guard.limit(LEFT, 2.0).twist.wz == pytest.approx(0.4)
-    assert guard.limit(STOP, 2.0) == (STOP, 1.0, "")
+    assert guard.limit(STOP, 2.0) == Verdict(STOP, 1.0)
     assert guard.limit(AHEAD, -5.0).scale < 1.0  # the clock went back
 
 
@@ -211,7 +211,7 @@ def test_a_scan_that_was_refused_for_its_mount_is_none_either():
 def test_a_large_hall_is_free():
     guard = CollisionGuard(GuardParams())
     guard.see(replace(cast([], Pose2D()), ranges=np.full(720, math.inf)), BASE_FROM_LASER, 0.0)
-    assert guard.limit(AHEAD, 0.0) == (AHEAD, 1.0, "")
+    assert guard.limit(AHEAD, 0.0) == Verdict(AHEAD, 1.0)
 
 
 @pytest.mark.parametrize("limit", [math.inf, 3.4028234663852886e38])
@@ -270,7 +270,7 @@ def test_the_end_of_the_range_and_nan_are_no_obstacles():
     guard = guard_at(wall_ahead(5.0))
     for nothing in (0.9, math.inf, math.nan):
         hear(guard, nothing)
-    assert guard.limit(AHEAD, 0.1, Pose2D()) == (AHEAD, 1.0, "")
+    assert guard.limit(AHEAD, 0.1, Pose2D()) == Verdict(AHEAD, 1.0)
 
 
 def test_too_near_to_measure_is_near():
@@ -283,7 +283,7 @@ def test_too_near_to_measure_is_near():
 def test_the_negative_reading_of_a_broken_range_sensor_says_nothing(broken):
     guard = guard_at(wall_ahead(5.0))
     hear(guard, broken, times=20)
-    assert guard.limit(AHEAD, 0.1, Pose2D()) == (AHEAD, 1.0, "")
+    assert guard.limit(AHEAD, 0.1, Pose2D()) == Verdict(AHEAD, 1.0)
     hear(guard, 0.06, now=0.2)
     hear(guard, broken, now=0.4)  # does not clear what it met before
     assert guard.limit(AHEAD, 0.5, Pose2D()).twist == STOP

@@ -52,10 +52,13 @@ class Loop:
     def _plans(self, stack: NavigationStack) -> DelayedPlans:
         return DelayedPlans(lambda goal: stack.plan_from_robot(goal, self.now), lambda: self.now, 0.0)
 
-    def sense(self) -> None:
+    def sense(self, ranges: np.ndarray | None = None) -> None:
+        """Look around; `ranges` instead of what the lidar would measure."""
         add_pose(self._frames, ODOM, BASE, self.pose, self.now)
         add_pose(self._frames, MAP, ODOM, Pose2D(), self.now)
-        scan = scan_of(cast(self.world, self.pose.x, self.pose.y, self.pose.yaw), self.now, BASE)
+        if ranges is None:
+            ranges = cast(self.world, self.pose.x, self.pose.y, self.pose.yaw)
+        scan = scan_of(ranges, self.now, BASE)
         self.stack.hear_velocity(self.velocity, self.now)
         self.stack.people.hear(scan)
         for costmap, every in zip(self.stack.costmaps, (5, 1), strict=True):

@@ -30,7 +30,7 @@ from sensor_msgs.msg import LaserScan as LaserScanMsg
 from sensor_msgs.msg import Range
 from std_msgs.msg import Bool
 
-from rosbot_patrol.control.collision_guard import CollisionGuard, GuardParams, RangeReading, Verdict
+from rosbot_patrol.control.collision_guard import Cause, CollisionGuard, GuardParams, RangeReading, Verdict
 from rosbot_patrol.control.give_way import GiveWay, GiveWayParams
 from rosbot_patrol.control.movers import MoverParams, MoverWatch
 from rosbot_patrol.control.mux import Choice, LockParams, MuxParams, SourceParams, TwistMux
@@ -149,7 +149,7 @@ class Eyes:
         if pose is not None and abs(current - self._movers.stamp) < self._params.collision_guard.stale_after:
             someone = self._give_way.waits(wish, self._movers.movers(current), pose, current)
             if someone:
-                return Verdict(STOP, 0.0, someone)
+                return Verdict(STOP, 0.0, Cause.SOMEONE, someone)
         return self.guard.limit(wish, current, pose)
 
     def pose(self, stamp: float | None = None) -> Pose2D | None:
@@ -183,7 +183,8 @@ class TwistMuxNode:
         self._eyes = Eyes(params, self._wake) if params.guard else None
         self._last: Choice = Choice(None, STOP)
         self._stopped_at = float("-inf")
-        self._reason = self._blind = ""
+        self._cause = Cause.NONE
+        self._blind = ""
         self._told = float("-inf")
         self._subscribers: dict[str, rospy.Subscriber] = {}
         for source in params.topics:
@@ -250,11 +251,11 @@ class TwistMuxNode:
         self._health.set("", WARN if choice.lock or is_refused else OK, text)
         if choice.lock and self._last.lock != choice.lock:
             log.warning("the base is stopped: %s is set", choice.lock)
-        self._reason = ""
+        self._cause = Cause.NONE
 
     def _guarded(self, wish: Twist2D, current: float) -> Verdict:
         if self._eyes is None:
-            return Verdict(wish, 1.0, "")
+            return Verdict(wish, 1.0)
         return self._eyes.limit(wish, current)
 
     def _tell(self, choice: Choice, verdict: Verdict) -> None:
@@ -265,11 +266,11 @@ class TwistMuxNode:
             f"{choice.source} drives" + (f"; {self._blind}" if self._blind else ""),
             {"guard": verdict.reason or "free", "part of the wish": f"{verdict.scale:.2f}"},
         )
-        kind = "blind" if self._blind else verdict.reason  # the age of the last scan is no news
-        if is_held and kind != self._reason and time.monotonic() - self._told > REPEAT_LOG:
+        cause = Cause.BLIND if self._blind else verdict.cause
+        if is_held and cause is not self._cause and time.monotonic() - self._told > REPEAT_LOG:
             self._told = time.monotonic()
             log.warning("%s is held back: %s", choice.source, verdict.reason)
-        self._reason = kind
+        self._cause = cause
 
 
 def body() -> None:
