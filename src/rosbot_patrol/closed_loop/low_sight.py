@@ -10,7 +10,8 @@ import numpy as np
 from rosbot_patrol.control import collision_guard
 from rosbot_patrol.control.collision_guard import CollisionGuard
 from rosbot_patrol.costmap.fed import FedCostmap
-from rosbot_patrol.costmap.inputs import DepthInput, DepthRecord, OpticsRecord, RangeInput, RangeRecord
+from rosbot_patrol.costmap.inputs import DepthInput, RangeInput
+from rosbot_patrol.costmap.records import DepthRecord, OpticsRecord, RangeRecord
 from rosbot_patrol.costmap.sources.depth import Optics
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation.engine import Engine

@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,10 @@ from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.layers.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
 from rosbot_patrol.costmap.layers.range_layer import RangeReading, RangeSensorLayer
 from rosbot_patrol.costmap.params import SourceParams
+from rosbot_patrol.costmap.records import CloudRecord, DepthRecord, OpticsRecord, RangeRecord
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams
-from rosbot_patrol.costmap.sources.cloud import CloudLayout, cloud_points, observe_cloud
-from rosbot_patrol.costmap.sources.depth import DepthPicture, Optics, observe_depth
+from rosbot_patrol.costmap.sources.cloud import cloud_points, observe_cloud
+from rosbot_patrol.costmap.sources.depth import DepthPicture, observe_depth
 from rosbot_patrol.errors import ImageError, LaserTilted, SensorError, TransformError
 from rosbot_patrol.images.encodings import unpack
 from rosbot_patrol.scan import LaserScan, level_scan
@@ -40,52 +41,12 @@ _PATIENCE = 1.0  # if the parameters set no limit, scans that say nothing stop t
 _SILENT = 5.0  # if the parameters set no limit, an input that is silent for this time is reported [s]
 
 
-class CloudRecord(NamedTuple):
-    """A sensor_msgs/PointCloud2 (bytes and layout) or PointCloud (points [m], layout None)."""
-
-    stamp: float
-    frame: str
-    data: Any
-    layout: CloudLayout | None = None
-
-
-class DepthRecord(NamedTuple):
-    """A sensor_msgs/Image with depths; `data` is anything with that many bytes."""
-
-    stamp: float
-    frame: str
-    width: int
-    height: int
-    encoding: str
-    step: int
-    data: Any
-    is_bigendian: bool = False
-
-
-class OpticsRecord(NamedTuple):
-    """A sensor_msgs/CameraInfo: size and pinhole [px]."""
-
-    width: int
-    height: int
-    optics: Optics
-
-
-class RangeRecord(NamedTuple):
-    """A sensor_msgs/Range: distance and limits [m], width of the cone [rad]."""
-
-    stamp: float
-    frame: str
-    distance: float
-    range_min: float
-    range_max: float
-    field_of_view: float
-
-
 class Input(ABC, Generic[T]):
     """One topic of a layer. All times [s] are of one clock.
 
     Args:
         name: "layer/source", for messages.
+        topic: where its records come from.
         now: time at the start.
         limit: silence that stops the robot [s], 0 for none.
         frame: of the sensor, "" for the record's.
@@ -99,6 +60,7 @@ class Input(ABC, Generic[T]):
     def __init__(
         self,
         name: str,
+        topic: str,
         now: float,
         *,
         limit: float = 0.0,
@@ -106,7 +68,7 @@ class Input(ABC, Generic[T]):
         max_rate: float = 0.0,
         newest_only: bool = True,
     ) -> None:
-        self.name = name
+        self.name, self.topic = name, topic
         self.refused = ""
         self._limit = limit
         self._frame = frame.lstrip("/")
@@ -186,6 +148,7 @@ class _ObstacleInput(Input[T]):
         p = buffer.params
         super().__init__(
             name,
+            p.topic,
             now,
             limit=p.expected_update_rate,
             frame=p.sensor_frame,
@@ -268,7 +231,12 @@ class DepthInput(Input[DepthPicture]):
 
     def __init__(self, name: str, now: float, buffer: ObservationBuffer, params: DepthSourceParams) -> None:
         super().__init__(
-            name, now, limit=params.expected_update_rate, frame=params.sensor_frame, max_rate=params.max_rate
+            name,
+            params.topic,
+            now,
+            limit=params.expected_update_rate,
+            frame=params.sensor_frame,
+            max_rate=params.max_rate,
         )
         self._buffer, self.params = buffer, params
         self._optics: OpticsRecord | None = None
@@ -312,8 +280,7 @@ class RangeInput(Input[RangeRecord]):
     """Readings of range sensors."""
 
     def __init__(self, name: str, now: float, topic: str, layer: RangeSensorLayer) -> None:
-        super().__init__(name, now, limit=layer.params.no_readings_timeout, newest_only=False)
-        self.topic = topic
+        super().__init__(name, topic, now, limit=layer.params.no_readings_timeout, newest_only=False)
         self._layer = layer
 
     def hear(self, record: RangeRecord, now: float) -> None:

@@ -37,12 +37,14 @@ class Step:
     Attributes:
         goal: next goal, None: unchanged.
         is_done: exploration is over.
+        is_waiting: an input is missing.
         text: its reason.
         frontiers: of the latest evaluation of the map, None without one.
     """
 
     goal: Goal | None = None
     is_done: bool = False
+    is_waiting: bool = False
     text: str = ""
     frontiers: tuple[Frontier, ...] | None = None
 
@@ -84,7 +86,8 @@ class Explorer:
             return Step(is_done=True, text="explored")
         if grid is None or pose is None or not link.is_up:
             missing = [("a map", grid is None), ("the robot's pose", pose is None), ("move_base", not link.is_up)]
-            return Step(text=f"waiting for {' and '.join(name for name, is_missing in missing if is_missing)}")
+            names = " and ".join(name for name, is_missing in missing if is_missing)
+            return Step(is_waiting=True, text=f"waiting for {names}")
         self._home = self._home or pose
         state = link.state if self._goal is not None and link.tag == self._goal.tag else GoalState.ACTIVE
         if self._goal is None:
@@ -117,7 +120,7 @@ class Explorer:
         if self._arrived is None:
             self._arrived = now, maps
         if maps < self._arrived[1] + 2 and now - self._arrived[0] < self.params.map_patience:
-            return Step(text="waiting for the map")
+            return Step(is_waiting=True, text="waiting for the map")
         assert self._target is not None
         if any(_is_at(f, self._target) for f in Borders(grid, pose, self.params.frontiers).frontiers()):
             log.info("the border at (%.1f, %.1f) stays unknown from nearby", self._target.x, self._target.y)

@@ -128,7 +128,7 @@ class NavigationStack:
     def scan_topic(self) -> str:
         """Topic of the local costmap's first scans, by which people are followed; "" if it takes none."""
         scans = self.local_costmap.scan_inputs
-        return scans[0].params.topic if scans else ""
+        return scans[0].topic if scans else ""
 
     def configure(self, params: MoveBaseParams) -> None:
         """Take other parameters from the next step on."""

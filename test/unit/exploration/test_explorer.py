@@ -120,7 +120,7 @@ def test_a_robot_that_comes_no_nearer_gives_a_goal_up(caplog: pytest.LogCaptureF
 def test_what_is_missing_is_told() -> None:
     explorer = Explorer()
     said = explorer.step(0.0, None, 0, None, GoalLink())
-    assert said.text == "waiting for a map and the robot's pose and move_base"
+    assert (said.is_waiting, said.text) == (True, "waiting for a map and the robot's pose and move_base")
     assert explorer.step(0.0, None, 0, START, GoalLink(is_up=True)).text == "waiting for a map"
 
 

@@ -1,8 +1,7 @@
 """move_base over a bag: the stack that its node runs, stepped at the controller's rate on the bag's clock.
 
 The robot goes where the bag's went. So a replay shows what this move_base would command there: near the commands of the
-bag where it drives as that one did. Plans are made at once and come 0.2 s later; depth pictures and range sensors are
-not replayed.
+bag where it drives as that one did. Plans are made at once and come 0.2 s later.
 """
 
 from __future__ import annotations
@@ -15,7 +14,9 @@ import numpy as np
 
 from rosbot_patrol.closed_loop.delayed_plans import DelayedPlans
 from rosbot_patrol.costmap.fed import FedCostmap
+from rosbot_patrol.costmap.inputs import CloudInput, DepthInput, RangeInput
 from rosbot_patrol.costmap.layers.keepout import KeepoutLayer
+from rosbot_patrol.costmap.records import CloudRecord, DepthRecord, OpticsRecord, RangeRecord
 from rosbot_patrol.errors import MapError, TransformError
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.navigation.interfaces import Command, PlanSource, State
@@ -64,7 +65,6 @@ class MoveBaseReplay:
         MapError: the map cannot be used.
     """
 
-    inputs = INPUTS
     kinds = heard.KINDS
 
     def __init__(
@@ -76,6 +76,7 @@ class MoveBaseReplay:
         self._stack = NavigationStack(tree, self._tree, self._make_plans, name=name)
         self._navigator = self._stack.navigator
         self._updates = [_Updates(costmap) for costmap in reversed(self._stack.costmaps)]
+        self._sensors, self._cameras = _topics_of(self._stack)
         self._has_own_map = grid is not None
         if grid is not None:
             self._take_map(grid, self._stack.global_costmap.frame)
@@ -91,6 +92,18 @@ class MoveBaseReplay:
 
     def _make_plans(self, stack: NavigationStack) -> PlanSource:
         return DelayedPlans(lambda goal: stack.plan_from_robot(goal, self._now), lambda: self._now, PLAN_S)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """What it hears: besides scans what the costmaps see by."""
+        return (
+            *INPUTS,
+            *(
+                Input(name=name, types=(_TYPES[type(heard_by[0])],), is_needed=False)
+                for name, heard_by in self._sensors.items()
+            ),
+            *(Input(name=name, types=("sensor_msgs/CameraInfo",), is_needed=False) for name in self._cameras),
+        )
 
     def begin(self, names: Collection[str]) -> None:
         """Which of the inputs will be heard: it asks for what it needs itself."""
@@ -111,6 +124,12 @@ class MoveBaseReplay:
                 self._hear_map(content)
             case list():
                 self._tree.add_all(content, is_static=name == "tf_static")
+            case OpticsRecord():
+                for camera in self._cameras[name]:
+                    camera.hear_optics(content)
+            case CloudRecord() | DepthRecord() | RangeRecord():
+                for each in self._sensors[name]:
+                    each.hear(content, now)
             case _:
                 self._counts["refused"] += 1
 
@@ -201,6 +220,25 @@ class MoveBaseReplay:
         if self._navigator.state is not self._state:
             self._state = self._navigator.state
             self._states.add(now, self._state.name.lower())
+
+
+_TYPES: dict[type, str] = {
+    CloudInput: "sensor_msgs/PointCloud2",
+    DepthInput: "sensor_msgs/Image",
+    RangeInput: "sensor_msgs/Range",
+}
+
+
+def _topics_of(stack: NavigationStack) -> tuple[dict[str, list[Any]], dict[str, list[DepthInput]]]:
+    """The costmaps' inputs by topic, without those of scans, and the cameras by the topics of their optics."""
+    sensors: dict[str, list[Any]] = {}
+    cameras: dict[str, list[DepthInput]] = {}
+    for each in [each for costmap in stack.costmaps for each in costmap.inputs]:
+        if type(each) in _TYPES:
+            sensors.setdefault(each.topic.lstrip("/"), []).append(each)
+        if isinstance(each, DepthInput):
+            cameras.setdefault(each.optics_topic.lstrip("/"), []).append(each)
+    return sensors, cameras
 
 
 class _Updates:

@@ -76,7 +76,7 @@ class Explore:
             if step.frontiers is not None:
                 self._show(step.frontiers)
             since += 1.0 / RATE
-            if step.text != said or (step.text.startswith("waiting for") and since >= REMIND_S):
+            if step.text != said or (step.is_waiting and since >= REMIND_S):
                 said, since = step.text, 0.0
                 log.info("%s", step.text)
             if step.is_done:

@@ -10,16 +10,8 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud, PointCloud2, Range
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.costmap.fed import FedCostmap
-from rosbot_patrol.costmap.inputs import (
-    CloudInput,
-    CloudRecord,
-    DepthInput,
-    DepthRecord,
-    OpticsRecord,
-    RangeInput,
-    RangeRecord,
-    ScanInput,
-)
+from rosbot_patrol.costmap.inputs import CloudInput, DepthInput, RangeInput, ScanInput
+from rosbot_patrol.costmap.records import CloudRecord, DepthRecord, OpticsRecord, RangeRecord
 from rosbot_patrol.costmap.sources.cloud import CloudLayout
 from rosbot_patrol.costmap.sources.depth import Optics
 from rosbot_patrol.ros.messages.convert import scan_from_msg
@@ -74,7 +66,7 @@ class _DepthTopics:
         self._input = source
         self._info: rospy.Subscriber | None = None
         self._ask_info()
-        _subscribe(source.params.topic, Image, self._on_picture, buff_size=2**22)
+        _subscribe(source.topic, Image, self._on_picture, buff_size=2**22)
 
     def _on_picture(self, msg: Image) -> None:
         self._input.hear(depth_from_msg(msg), now())
@@ -99,10 +91,10 @@ def subscribe_inputs(costmap: FedCostmap) -> None:
     """Subscribe to everything that a costmap's layers see by."""
     for each in costmap.inputs:
         if isinstance(each, ScanInput):
-            _subscribe(each.params.topic, LaserScanMsg, _hearer(each, scan_from_msg), buff_size=2**18)
+            _subscribe(each.topic, LaserScanMsg, _hearer(each, scan_from_msg), buff_size=2**18)
         elif isinstance(each, CloudInput):
             kind = PointCloud2 if each.params.data_type == "PointCloud2" else PointCloud
-            _subscribe(each.params.topic, kind, _hearer(each, cloud_from_msg), buff_size=2**24)
+            _subscribe(each.topic, kind, _hearer(each, cloud_from_msg), buff_size=2**24)
         elif isinstance(each, DepthInput):
             _DepthTopics(each)
         elif isinstance(each, RangeInput):

@@ -12,6 +12,7 @@ import pytest
 from made_bag import Maker, write_bag
 from made_drive import BEGIN, LASER, drive, room_map, scan_at
 
+from rosbot_patrol.errors import BagError
 from rosbot_patrol.geometry import Pose2D, compose, invert
 from rosbot_patrol.planning.local_planners import trajectory_planner
 from rosbot_patrol.replay.bags.bag import Bag
@@ -23,6 +24,7 @@ from rosbot_patrol.replay.runner import run_replay
 from rosbot_patrol.scan import LaserScan
 
 SECONDS, GOAL = 7.0, Pose2D(1.9, 0.0, 0.0)
+IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
 ODOMETRY, CANCEL = "nav_msgs/msg/Odometry", "actionlib_msgs/msg/GoalID"
 
 
@@ -142,3 +144,40 @@ def test_a_cancelled_goal_ends(tmp_path: Path) -> None:
     assert len(result.tables["outcomes"]["stamp"]) == 0
     last = {name: values[-1] for name, values in result.tables["commands"].items()}
     assert (last["vx"], last["wz"], last["reason"]) == (0.0, 0.0, "cancelled")
+
+
+def low_bar(maker: Maker) -> list[tuple[float, str, object]]:
+    """A camera on the robot that sees a bar on the floor, 0.6 m ahead, under the lidar's plane, from 1.5 s on."""
+    wide, high, focal, camera = 160, 120, 100.0, 0.2
+    mount = maker.transform("base_link", "camera", BEGIN, (0.0, 0.0, camera), (-0.5, 0.5, -0.5, 0.5))
+    k = np.array([focal, 0, wide / 2, 0, focal, high / 2, 0, 0, 1])
+    region = maker.new("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False)
+    rest = k, np.eye(3).ravel(), np.zeros(12), 0, 0, region
+    info = maker.new(INFO, maker.header(BEGIN, "camera"), high, wide, "plumb_bob", np.zeros(5), *rest)
+    depth = np.full((high, wide), np.nan, np.float32)
+    rows = [round(high / 2 + focal * (camera + 0.04 - z) / 0.6) for z in (0.1, 0.03)]
+    depth[rows[0] : rows[1], 20:140] = 0.6
+    found = [(BEGIN, "/tf_static", maker.tf(mount)), (BEGIN, "/camera/depth/camera_info", info)]
+    for i in range(15, round(10 * SECONDS)):
+        stamp = BEGIN + 0.1 * i
+        data = depth.view(np.uint8).ravel()
+        image = maker.new(IMAGE, maker.header(stamp, "camera"), high, wide, "32FC1", 0, 4 * wide, data)
+        found.append((stamp + 0.02, "/camera/depth/image_raw", image))
+    return found
+
+
+def test_a_low_thing_that_the_camera_saw_stops_the_robot(tmp_path: Path) -> None:
+    commands = replayed(drive_bag(tmp_path, *low_bar(Maker()))).tables["commands"]
+    later = commands["stamp"] > BEGIN + 2.5
+    assert later.any()
+    assert commands["vx"][later].mean() < 0.05
+
+
+def test_a_depth_topic_of_another_type_is_named(tmp_path: Path) -> None:
+    maker = Maker()
+    wrong = (BEGIN + 0.1, "/camera/depth/image_raw", maker.initial_pose(BEGIN, Pose2D()))
+    path = drive_bag(tmp_path, wrong)
+    with pytest.raises(
+        BagError, match="'/camera/depth/image_raw' is geometry_msgs/PoseWithCovarianceStamped, expected"
+    ):
+        replayed(path)
