@@ -11,7 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -39,6 +39,15 @@ _KEPT = 5  # records that wait for their transform
 _OLDEST = 1.0  # a record that is older than the newest that waits by more waits no longer [s]
 _PATIENCE = 1.0  # if the parameters set no limit, scans that say nothing stop the robot after this time [s]
 _SILENT = 5.0  # if the parameters set no limit, an input that is silent for this time is reported [s]
+
+
+@dataclass(frozen=True)
+class _Waiting(Generic[T]):
+    """What is kept of a record until its transform is known."""
+
+    stamp: float
+    frame: str
+    item: T
 
 
 class Input(ABC, Generic[T]):
@@ -77,10 +86,10 @@ class Input(ABC, Generic[T]):
         self._heard = self._used = -math.inf
         self._born = self._placed = now
         self._unplaced = ""
-        self._waiting: deque[tuple[float, str, T]] = deque(maxlen=_KEPT)
+        self._waiting: deque[_Waiting[T]] = deque(maxlen=_KEPT)
 
     @abstractmethod
-    def _place(self, item: T, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+    def _place(self, entry: _Waiting[T], frames: Frames, target: str, now: float) -> None:
         """Put it into the layer; raises TransformError if it cannot be placed yet."""
 
     def is_due(self, stamp: float) -> bool:
@@ -102,16 +111,15 @@ class Input(ABC, Generic[T]):
         self.refused = ""
         if item is not None:
             self._used = stamp
-            self._waiting.append((stamp, self._frame or frame, item))
+            self._waiting.append(_Waiting(stamp, self._frame or frame, item))
 
     def take(self, frames: Frames, target: str, now: float) -> None:
         """Place what waits, in the frame `target`; what cannot be placed yet waits on."""
-        later: list[tuple[float, str, T]] = []
+        later: list[_Waiting[T]] = []
         waiting = list(self._waiting)
         for entry in reversed(waiting) if self._newest_only else waiting:
-            stamp, frame, item = entry
             try:
-                self._place(item, stamp, frame, frames, target, now)
+                self._place(entry, frames, target, now)
             except TransformError as err:
                 self._unplaced = self._unplaced or str(err)
                 later.append(entry)
@@ -119,9 +127,9 @@ class Input(ABC, Generic[T]):
             self._placed, self._unplaced = now, ""
             if self._newest_only:
                 break
-        newest = max((entry[0] for entry in later), default=0.0)
-        later.sort(key=lambda entry: entry[0])
-        self._waiting = deque((e for e in later if newest - e[0] < _OLDEST), maxlen=_KEPT)
+        newest = max((entry.stamp for entry in later), default=0.0)
+        later.sort(key=lambda entry: entry.stamp)
+        self._waiting = deque((e for e in later if newest - e.stamp < _OLDEST), maxlen=_KEPT)
 
     def trouble(self, now: float) -> str:
         """What is wrong with it, "" for nothing."""
@@ -178,9 +186,10 @@ class ScanInput(_ObstacleInput[LaserScan]):
         """Keep a scan until the next update."""
         self._keep(scan.stamp, scan.frame_id, now, lambda: scan if self._check.accepts(scan, now) else None)
 
-    def _place(self, item: LaserScan, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+    def _place(self, entry: _Waiting[LaserScan], frames: Frames, target: str, now: float) -> None:
+        scan = replace(entry.item, frame_id=entry.frame)
         try:
-            level = level_scan(replace(item, frame_id=frame), frames.transform(target, frame, stamp), target)
+            level = level_scan(scan, frames.transform(target, entry.frame, entry.stamp), target)
             problem = height_problem(level, self.params)
         except LaserTilted as err:
             problem = str(err)
@@ -213,12 +222,10 @@ class CloudInput(_ObstacleInput["NDArray[np.float64]"]):
         points = np.array([(p.x, p.y, p.z) for p in record.data[::stride]], np.float64).reshape(-1, 3)
         return points[np.isfinite(points).all(axis=1)]
 
-    def _place(
-        self, item: NDArray[np.float64], stamp: float, frame: str, frames: Frames, target: str, now: float
-    ) -> None:
+    def _place(self, entry: _Waiting[NDArray[np.float64]], frames: Frames, target: str, now: float) -> None:
         del now
-        matrix = frames.transform(target, frame, stamp).matrix
-        self._buffer.add(observe_cloud(item, matrix, self.params, stamp=stamp, top=self._top))
+        matrix = frames.transform(target, entry.frame, entry.stamp).matrix
+        self._buffer.add(observe_cloud(entry.item, matrix, self.params, stamp=entry.stamp, top=self._top))
 
 
 class DepthInput(Input[DepthPicture]):
@@ -270,10 +277,10 @@ class DepthInput(Input[DepthPicture]):
             raise ImageError(f"{self.optics_topic} tells no focal length, the camera is not calibrated")
         return DepthPicture.of(picture.pixels[:, :, 0], known.optics, stride=self.params.stride, stamp=record.stamp)
 
-    def _place(self, item: DepthPicture, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+    def _place(self, entry: _Waiting[DepthPicture], frames: Frames, target: str, now: float) -> None:
         del now
-        matrix = frames.transform(target, frame, stamp).matrix
-        self._buffer.add(observe_depth(item, matrix, self.params))
+        matrix = frames.transform(target, entry.frame, entry.stamp).matrix
+        self._buffer.add(observe_depth(entry.item, matrix, self.params))
 
 
 class RangeInput(Input[RangeRecord]):
@@ -287,10 +294,10 @@ class RangeInput(Input[RangeRecord]):
         """Keep a reading until the next update."""
         self._keep(record.stamp, record.frame, now, lambda: _framed(record))
 
-    def _place(self, item: RangeRecord, stamp: float, frame: str, frames: Frames, target: str, now: float) -> None:
+    def _place(self, entry: _Waiting[RangeRecord], frames: Frames, target: str, now: float) -> None:
         del now
-        pose = frames.lookup(target, frame, stamp)
-        self._layer.add(RangeReading(stamp, pose, item.distance, item.range_min, item.range_max, item.field_of_view))
+        pose, r = frames.lookup(target, entry.frame, entry.stamp), entry.item
+        self._layer.add(RangeReading(r.stamp, pose, r.distance, r.range_min, r.range_max, r.field_of_view))
 
 
 def _framed(record: RangeRecord) -> RangeRecord:

@@ -161,7 +161,7 @@ def test_pictures_come_no_faster_than_asked_for(topics):
     used = []
     for k in range(20):
         topics.send("camera/depth/image_raw", picture(100.0 + 0.1 * k))
-        used += [entry[0] for entry in sources[0]._waiting]
+        used += [entry.stamp for entry in sources[0]._waiting]
         sources[0]._waiting.clear()
     assert np.diff(used) == pytest.approx([0.5, 0.5, 0.5])
 
