@@ -18,7 +18,7 @@ from rosbot_patrol.amcl.initial_pose import PoseRecord, taken_pose
 from rosbot_patrol.amcl.localizer import Localizer, Outcome, start_of
 from rosbot_patrol.amcl.parameters import AmclParams
 from rosbot_patrol.amcl.particles.particle_filter import Estimate
-from rosbot_patrol.amcl.trust import State, Trust
+from rosbot_patrol.amcl.trust import State
 from rosbot_patrol.geometry import Pose2D, compose
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.scan_feed import ScanFeed
@@ -63,6 +63,7 @@ class AmclCore:
         rng: source of all chance.
 
     Attributes:
+        localizer: for reading; it is changed by the methods here.
         feed: where scans come in and wait for the odometry.
         late: number of scans that came after a newer one.
     """
@@ -73,7 +74,7 @@ class AmclCore:
         self._params, self._frames = params, frames
         self._global = params.global_frame_id.lstrip("/")
         self._lock = threading.Lock()  # of the localizer
-        self._localizer = Localizer(params, rng)
+        self.localizer = Localizer(params, rng)
         self._odom_from_base: Pose2D | None = None
         self._stamp = -math.inf
         self._was_placed = False  # by an initial pose or global localization
@@ -82,34 +83,9 @@ class AmclCore:
     # State
 
     @property
-    def has_map(self) -> bool:
-        """Whether there is a map to localise on."""
-        return self._localizer.has_map
-
-    @property
-    def map_from_odom(self) -> Pose2D | None:
-        """The newest correction, None before the first."""
-        return self._localizer.map_from_odom
-
-    @property
-    def estimate(self) -> Estimate | None:
-        """The newest estimate, None before the first."""
-        return self._localizer.estimate
-
-    @property
-    def trust(self) -> Trust:
-        """Whether the estimate is to be believed."""
-        return self._localizer.trust
-
-    @property
-    def is_seeking(self) -> bool:
-        """Whether the whole map is searched for the robot."""
-        return self._localizer.is_seeking
-
-    @property
     def is_found(self) -> bool:
         """Whether the robot is localised and not searched for."""
-        return self.trust.state is State.LOCALISED and not self.is_seeking
+        return self.localizer.trust.state is State.LOCALISED and not self.localizer.is_seeking
 
     @property
     def stamp(self) -> float:
@@ -119,13 +95,13 @@ class AmclCore:
     @property
     def pose(self) -> Pose2D | None:
         """map_from_base at the newest scan, None before the first estimate."""
-        correction, odometry = self._localizer.map_from_odom, self._odom_from_base
+        correction, odometry = self.localizer.map_from_odom, self._odom_from_base
         return None if correction is None or odometry is None else compose(correction, odometry)
 
     def fix(self) -> Fix | None:
         """The newest pose with its estimate, None before the first."""
         with self._lock:
-            pose, estimate, odometry = self.pose, self._localizer.estimate, self._odom_from_base
+            pose, estimate, odometry = self.pose, self.localizer.estimate, self._odom_from_base
             if pose is None or estimate is None or odometry is None:
                 return None
             return Fix(pose, estimate, odometry, self._stamp)
@@ -135,13 +111,13 @@ class AmclCore:
     def configure(self, params: AmclParams) -> None:
         """Take other parameters from now on; raises MapError if the map cannot be used with them."""
         with self._lock:
-            self._localizer.reconfigure(params)
+            self.localizer.reconfigure(params)
             self._params = params
 
     def hear_map(self, grid: Grid) -> None:
         """Take a map; raises MapError if it cannot be used."""
         with self._lock:
-            self._localizer.set_map(grid)
+            self.localizer.set_map(grid)
 
     def hear_initial_pose(self, record: PoseRecord, now: float) -> bool:
         """Start about a given pose; False, with a warning, if it has to be ignored. `now` [s] is logged."""
@@ -162,26 +138,26 @@ class AmclCore:
         log.info("Setting pose (%.6f): %.3f %.3f %.3f", now, *taken.pose)
         with self._lock:
             self._was_placed = True
-            self._localizer.set_pose(taken.pose, taken.covariance, taken.odom_from_base)
+            self.localizer.set_pose(taken.pose, taken.covariance, taken.odom_from_base)
             if self._params.force_update_after_initialpose:
-                self._localizer.request_update()
+                self.localizer.request_update()
         return True
 
     def localize_globally(self) -> bool:
         """Start anew from anywhere on the free floor; False if the map has none."""
         with self._lock:
-            started = self._was_placed = self._localizer.localize_globally()
+            started = self._was_placed = self.localizer.localize_globally()
         return started
 
     def seek(self) -> bool:
         """Search the whole map for the robot; False if that cannot be."""
         with self._lock:
-            return self._localizer.seek()
+            return self.localizer.seek()
 
     def request_update(self) -> None:
         """Update at the next scan even without motion."""
         with self._lock:
-            self._localizer.request_update()
+            self.localizer.request_update()
 
     def resume(self, params: AmclParams, odom_from_base: Pose2D | None) -> None:
         """Start from the pose in `params`, unless a pose was given already.
@@ -192,7 +168,7 @@ class AmclCore:
         """
         with self._lock:
             if not self._was_placed:
-                self._localizer.set_pose(*start_of(params), odom_from_base)
+                self.localizer.set_pose(*start_of(params), odom_from_base)
 
     # Step
 
@@ -200,9 +176,9 @@ class AmclCore:
         """Take in a scan that `feed` has handed out."""
         scan = placed.scan
         with self._lock:
-            outcome = self._localizer.update(scan, placed.odom_from_base, placed.base_from_laser)
-            correction = None if outcome.is_late else self._localizer.map_from_odom
-            particles = self._localizer.filter.poses
+            outcome = self.localizer.update(scan, placed.odom_from_base, placed.base_from_laser)
+            correction = None if outcome.is_late else self.localizer.map_from_odom
+            particles = self.localizer.filter.poses
             if not outcome.is_late:
                 self._odom_from_base, self._stamp = placed.odom_from_base, scan.stamp
         self.late += outcome.is_late
@@ -213,8 +189,8 @@ class AmclCore:
         if outcome.is_found and outcome.estimate is not None:
             x, y, yaw = outcome.estimate.pose
             log.warning("found the robot at %.2f %.2f %.2f, the estimate has moved there", x, y, yaw)
-        was, self._was_seeking = self._was_seeking, self._localizer.is_seeking
+        was, self._was_seeking = self._was_seeking, self.localizer.is_seeking
         if self._was_seeking and not was:
-            log.warning("searching the whole map for the robot: %s", self._localizer.trust.reason or "asked to")
+            log.warning("searching the whole map for the robot: %s", self.localizer.trust.reason or "asked to")
         elif was and not self._was_seeking and not outcome.is_found:
             log.info("the search is over: the estimate came right by itself, or a pose was set")

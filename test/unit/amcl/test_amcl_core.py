@@ -96,7 +96,7 @@ def test_a_saved_pose_counts_only_if_none_was_given() -> None:
 
 def test_without_a_map_there_is_nothing_to_search_on() -> None:
     core = AmclCore(PARAMS, TransformTree(), np.random.default_rng(0))
-    assert not core.has_map
+    assert not core.localizer.has_map
     assert not core.seek()
     assert not core.localize_globally()
     assert core.fix() is None

@@ -148,6 +148,6 @@ class AmclReplay:
         stamp = now if math.isinf(self._next_health) else self._next_health
         self._next_health = stamp + HEALTH_S * (1.0 + math.floor((now - stamp) / HEALTH_S))
         pose = self._core.pose or (math.nan, math.nan, math.nan)
-        trust = self._core.trust
-        state, seeking = trust.state.name.lower(), self._core.is_seeking
+        trust = self._core.localizer.trust
+        state, seeking = trust.state.name.lower(), self._core.localizer.is_seeking
         self._health.add(now, *pose, state, trust.belief, trust.agreement, seeking, self._core.feed.dropped)

@@ -186,8 +186,8 @@ class AmclNode:
     def _tell_health(self, current: float) -> None:
         silence = self._watch.tend(current)
         level, message = (WARN, silence) if silence else self._state()
-        core = self._core
-        trust, estimate, seeking = core.trust, core.estimate, core.is_seeking
+        core, localizer = self._core, self._core.localizer
+        trust, estimate, seeking = localizer.trust, localizer.estimate, localizer.is_seeking
         values: dict[str, object] = {"scans dropped": core.feed.dropped, "scans late": core.late}
         if estimate is not None:
             spread = spread_of(estimate)
@@ -200,12 +200,12 @@ class AmclNode:
         self._outputs.send_health(trust, estimate, max(core.stamp, 0.0), seeking=seeking)
 
     def _state(self) -> tuple[int, str]:
-        if not self._core.has_map:
+        if not self._core.localizer.has_map:
             return ERROR, "there is no map yet"
         if self._core.feed.problem:
             rospy.logwarn_throttle(10.0, f"scans are dropped: {self._core.feed.problem}")
             return ERROR, f"scans are dropped: {self._core.feed.problem}"
-        if self._core.map_from_odom is None:
+        if self._core.localizer.map_from_odom is None:
             return WARN, "waiting for the first scan"
         return OK, "localised"
 
