@@ -77,8 +77,8 @@ def test_clearing_is_done_at_once():
     assert clear.step(view(Pose2D(), 0.0, local)) is None
 
 
-def recoveries(tree):
-    return make_recoveries(tree, conservative=3.0, clearing_radius=0.46, clearing_rotation=True)
+def recoveries(tree, **given):
+    return make_recoveries(tree, conservative=3.0, clearing_radius=0.46, clearing_rotation=True, **given)
 
 
 def test_upstreams_four_behaviours():
@@ -191,8 +191,18 @@ def test_move_slow_and_clear():
 
 
 def test_listed_move_slow_and_clear_gets_the_planner():
-    listed = {"recovery_behaviors": [{"name": "m", "type": "move_slow_and_clear/MoveSlowAndClear"}]}
-    assert isinstance(recoveries(listed)[0], MoveSlowAndClear)
+    listed = {
+        "recovery_behaviors": [{"name": "m", "type": "move_slow_and_clear/MoveSlowAndClear"}],
+        "m": {"limited_trans_speed": 0.12},
+    }
+    local = costmap()
+    planner = make_local_planner("DWAPlannerROS", {}, local, controller_frequency=10.0)
+    (slow,) = recoveries(listed, planner=planner)
+    planner.set_plan(np.column_stack((np.linspace(0, 1.5, 31), np.zeros((31, 2)))))
+    seen = LocalView(now=0.0, pose=Pose2D(), velocity=Twist2D(0.12), costmap=local.grid)
+    assert planner.compute(seen).vx > 0.12
+    slow.start(view(Pose2D(), 0.0, local))
+    assert 0.0 < planner.compute(seen).vx <= 0.12
 
 
 def test_a_rotation_takes_its_limits_from_the_local_planner():

@@ -25,16 +25,13 @@ def play(path, seconds: float = 4.0, *, turning: float = 0.0, drift=lambda t: 0.
     return witness
 
 
-def test_somebody_who_walks_has_moved() -> None:
-    witness = play(lambda t: [(3.5, 0.8 + 0.5 * t, 0.12)])
+@pytest.mark.parametrize("turning", [0.0, 0.75])
+def test_somebody_who_walks_has_moved_whether_the_robot_turns_or_not(turning: float) -> None:
+    witness = play(lambda t: [(3.5, 0.8 + 0.5 * t, 0.12)], turning=turning)
     assert witness.moved is not None
     assert witness.moved.far > 1.0
     assert (witness.moved.x, witness.moved.y) == pytest.approx((3.4, 2.6), abs=0.4)
     assert witness.text().startswith("something moved by")
-
-
-def test_somebody_who_walks_while_the_robot_turns_has_moved() -> None:
-    assert play(lambda t: [(3.5, 0.8 + 0.5 * t, 0.12)], turning=0.75).moved is not None
 
 
 def test_a_chair_that_was_pushed_aside_has_not() -> None:
