@@ -16,7 +16,8 @@ from rosbot_patrol.patrol.intruder.exclusions import Judge
 from rosbot_patrol.patrol.mission.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
 from rosbot_patrol.patrol.records.mission import Phase
-from rosbot_patrol.patrol.search.room_search import Eyes, SightParams
+from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.survey import SightParams
 
 WIDTH = 1.047
 HOUSE = (

@@ -20,7 +20,7 @@ from rosbot_patrol.patrol.intruder.sightings import WatchParams
 from rosbot_patrol.patrol.intruder.weak_sightings import SuspectParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.search.look import LookParams
-from rosbot_patrol.patrol.search.room_search import SightParams
+from rosbot_patrol.patrol.search.survey import SightParams
 from rosbot_patrol.patrol.search.turn import SpinParams
 from rosbot_patrol.patrol.senses.params import EyesTopics
 

@@ -4,7 +4,8 @@ import dataclasses
 
 from rosbot_patrol.params import load
 from rosbot_patrol.patrol.mission.params import NodeParams
-from rosbot_patrol.patrol.search.room_search import Eyes, SightParams
+from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.survey import SightParams
 
 SET = {
     "path_to_params": "points.yaml",

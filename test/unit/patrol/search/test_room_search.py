@@ -15,7 +15,8 @@ from rosbot_patrol.patrol.intruder.exclusions import Judge, Known
 from rosbot_patrol.patrol.mission.manager import ManagerParams
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Phase
-from rosbot_patrol.patrol.search.room_search import Eyes, SightParams
+from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.survey import SightParams
 from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams
 
 
