@@ -102,6 +102,7 @@ class Missions:
             run.decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at")
         level = logging.INFO if place.kind is Whereabouts.HOME else logging.WARNING
         log.log(level, "the mission to %s is over, %s", mission.room.title, place.text)
+        out.suspects += status_text.suspects(self.parts.decision.suspects)
         self._close(mission, out)
         self.run = None
         self.ready.at_rest = f"{ON_GUARD}, {place.text}; {status_text.verdict(mission)}"
@@ -114,7 +115,6 @@ class Missions:
 
     def _close(self, mission: Mission, out: Commands) -> None:
         self.parts.status.last_verdict = mission.verdict_name
-        out.suspects += status_text.suspects(self.parts.decision.suspects)
         out.ended += (mission,)
         out.changed = True
 

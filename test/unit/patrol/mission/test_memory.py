@@ -38,3 +38,15 @@ def test_a_recalled_mission_that_a_low_battery_ends_at_once_knows_whom_it_met() 
     mission = world.until(lambda w: bool(w.ended)).ended[0]
     assert mission.sightings > before.manager.mission.sightings  # they are seen again on the way home
     assert world.notices == []
+
+
+def test_what_looked_like_somebody_is_told_once_with_the_mission_that_saw_it() -> None:
+    world = World(lambda now: [(7.0, 1.0)])
+    world.score = lambda pose: 0.45  # too weak to confirm
+    world.triggers = (1,)
+    world.until(lambda w: w.phase is Phase.LOOKING and w.pose.yaw < -1.5)
+    world.triggers = (0,)
+    world.step()
+    ended = world.manager.abandon("the end")
+    assert [mission.room.id for mission in ended.ended] == [0, 1]
+    assert len(ended.suspects) == 1
