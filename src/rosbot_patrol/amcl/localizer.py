@@ -127,7 +127,7 @@ class Localizer:
         """Use a map; the particles stay.
 
         Raises:
-            MapError: the map is turned, empty, or its place makes no sense.
+            MapError: the map is turned or empty, or its place is invalid.
         """
         self._map, self._seeker = KnownMap(grid, self._params, self._rng), None
         self._witness.forget()

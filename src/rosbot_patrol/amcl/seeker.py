@@ -115,7 +115,7 @@ class Seeker:
         """Pose of the robot when it is clear, else None.
 
         Args:
-            believed: agreement at the estimate in use, 0 to 1, nan where there is none; the new one must beat it.
+            believed: agreement at the active estimate, 0 to 1, nan if unknown; the new one must exceed it.
         """
         if self.estimate is None or self._held < FOUND_UPDATES:
             return None

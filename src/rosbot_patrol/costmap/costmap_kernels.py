@@ -31,7 +31,7 @@ def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, 
         resolution: edge of a cell [m].
         origin_x: left edge of the window [m].
         origin_y: lower edge [m].
-        sensor_x: where the rays start [m]; outside the window nothing is cleared.
+        sensor_x: start of the rays [m]; outside the window nothing is cleared.
         sensor_y: the same.
         ends: shape (N, 2) [m].
         reach: [cells].
@@ -182,7 +182,7 @@ def fill_polygon(cells, corners, value, left, low, right, high, changes):
     Args:
         cells: costs.
         corners: in cells (x, y), shape (N, 2).
-        value: what they are set to.
+        value: new cost.
         left: of the rectangle [cells].
         low: its lower edge.
         right: not included.

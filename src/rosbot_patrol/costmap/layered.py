@@ -236,7 +236,7 @@ class LayeredCostmap:
         Args:
             pose: its middle.
             side: its extent [m].
-            inside: forget what is inside.
+            inside: clear the inside instead of the outside.
             names: of the layers to clear; None: all.
 
         Returns:

@@ -47,22 +47,24 @@ class CostmapParams:
 class StaticParams:
     """Parameters of costmap_2d::StaticLayer."""
 
-    enabled: bool = param(True)
+    enabled: bool = param(True, doc="use the layer")
     map_topic: str = param("map", doc="topic of the map (nav_msgs/OccupancyGrid)")
     first_map_only: bool = param(False, doc="ignore later maps")
     subscribe_to_updates: bool = param(False, doc="use <map_topic>_updates")
-    track_unknown_space: bool = param(True)
+    track_unknown_space: bool = param(True, doc="distinguish unknown cells from free ones")
     use_maximum: bool = param(False, doc="combine by maximum instead of overwriting")
-    lethal_cost_threshold: int = param(100, lo=0, hi=100, clamps="both")
-    unknown_cost_value: int = param(-1, lo=-128, hi=255)
-    trinary_costmap: bool = param(True)
+    lethal_cost_threshold: int = param(100, lo=0, hi=100, clamps="both", doc="lowest occupancy of a lethal cell")
+    unknown_cost_value: int = param(-1, lo=-128, hi=255, doc="occupancy that means unknown")
+    trinary_costmap: bool = param(
+        True, doc="only free, lethal and unknown cells; false: intermediate values become costs"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ObstacleParams:
     """Parameters of costmap_2d::ObstacleLayer."""
 
-    enabled: bool = param(True)
+    enabled: bool = param(True, doc="use the layer")
     track_unknown_space: bool = param(
         False, doc="distinguish unknown cells from free ones; default: the costmap's setting"
     )
@@ -70,8 +72,10 @@ class ObstacleParams:
     combination_method: int = param(
         1, doc="0: overwrite, 1: maximum, any other: leave the costmap as it is (upstream: 99)"
     )
-    max_obstacle_height: float = param(2.0, unit="m", lo=0.0, hi=50.0, clamps="both")
-    transform_tolerance: float = param(0.2, unit="s", lo=0.0)
+    max_obstacle_height: float = param(
+        2.0, unit="m", lo=0.0, hi=50.0, clamps="both", doc="maximum height of points that mark; higher ones only clear"
+    )
+    transform_tolerance: float = param(0.2, unit="s", lo=0.0, doc="accepted, has no effect")
     observation_sources: str = param("", doc="names of the sources, separated by spaces")
     depth_sources: str = param(
         "", doc="ours: names of depth cameras, separated by spaces; a key that upstream does not read"
@@ -124,10 +128,14 @@ class KeepoutParams(StaticParams):
 class InflationParams:
     """Parameters of costmap_2d::InflationLayer."""
 
-    enabled: bool = param(True)
-    inflation_radius: float = param(0.55, unit="m", lo=0.0, hi=50.0, clamps="both")
-    cost_scaling_factor: float = param(10.0, unit="1/m", lo=0.0, hi=100.0, clamps="both")
-    inflate_unknown: bool = param(False)
+    enabled: bool = param(True, doc="use the layer")
+    inflation_radius: float = param(
+        0.55, unit="m", lo=0.0, hi=50.0, clamps="both", doc="distance from obstacles up to which costs are raised"
+    )
+    cost_scaling_factor: float = param(
+        10.0, unit="1/m", lo=0.0, hi=100.0, clamps="both", doc="rate at which costs fall with the distance"
+    )
+    inflate_unknown: bool = param(False, doc="give unknown cells all costs; false: only inscribed and lethal ones")
 
 
 @dataclass(frozen=True)

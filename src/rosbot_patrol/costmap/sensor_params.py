@@ -17,18 +17,18 @@ class SourceParams:
 
     topic: str = param("", doc="topic; empty: the source's name")
     sensor_frame: str = param("", doc="frame of the sensor; empty: the message's")
-    data_type: str = param("PointCloud", choices=("LaserScan", "PointCloud", "PointCloud2"))
+    data_type: str = param("PointCloud", choices=("LaserScan", "PointCloud", "PointCloud2"), doc="type of the messages")
     observation_persistence: float = param(0.0, unit="s", lo=0.0, doc="time for which a scan is used again")
     expected_update_rate: float = param(
         0.0, unit="s", lo=0.0, doc="maximum age of the input; older stops the robot; 0: never"
     )
-    min_obstacle_height: float = param(0.0, unit="m")
-    max_obstacle_height: float = param(2.0, unit="m")
+    min_obstacle_height: float = param(0.0, unit="m", doc="minimum height of points that count")
+    max_obstacle_height: float = param(2.0, unit="m", doc="maximum height of points that count")
     obstacle_range: float = param(2.5, unit="m", lo=0.0, doc="maximum range of hits that are marked")
     raytrace_range: float = param(3.0, unit="m", lo=0.0, doc="maximum range of clearing")
     inf_is_valid: bool = param(False, doc="clear along beams without a hit")
-    clearing: bool = param(False)
-    marking: bool = param(True)
+    clearing: bool = param(False, doc="clear along the beams")
+    marking: bool = param(True, doc="mark the hits")
     stride: int = param(
         4, lo=1, hi=64, doc="ours: use every n-th point of a cloud, or every n-th row and column of an image"
     )
@@ -70,7 +70,7 @@ class DepthSourceParams(SourceParams):
 class RangeSensorParams:
     """Parameters of range_sensor_layer::RangeSensorLayer."""
 
-    enabled: bool = param(True)
+    enabled: bool = param(True, doc="use the layer")
     ns: str = param("", doc="prefix of each topic")
     topics: tuple[str, ...] = param(("/sonar",), doc="topics of type sensor_msgs/Range")
     no_readings_timeout: float = param(

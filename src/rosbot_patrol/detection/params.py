@@ -28,8 +28,8 @@ class FoundObject:
     """Topic with the number of boxes."""
 
     topic: str = param("found_object", doc="number of boxes in each image")
-    queue_size: int = param(1, lo=1)
-    latch: bool = param(False)
+    queue_size: int = param(1, lo=1, doc="length of the publisher's queue")
+    latch: bool = param(False, doc="send the last message to new subscribers")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,8 +37,8 @@ class BoundingBoxes:
     """Topic with the boxes."""
 
     topic: str = param("bounding_boxes", doc="boxes of each image that shows something")
-    queue_size: int = param(1, lo=1)
-    latch: bool = param(False)
+    queue_size: int = param(1, lo=1, doc="length of the publisher's queue")
+    latch: bool = param(False, doc="send the last message to new subscribers")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,8 +46,8 @@ class DetectionImage:
     """Topic with the annotated image."""
 
     topic: str = param("detection_image", doc="image with its boxes drawn, sent only while somebody subscribes")
-    queue_size: int = param(1, lo=1)
-    latch: bool = param(True)
+    queue_size: int = param(1, lo=1, doc="length of the publisher's queue")
+    latch: bool = param(True, doc="send the last message to new subscribers")
 
 
 @dataclass(frozen=True, kw_only=True)

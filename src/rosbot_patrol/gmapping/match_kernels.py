@@ -370,7 +370,7 @@ def match_particles(
         tables: of the particles' maps, shape (N, TY, TX).
         cells: of all maps.
         guesses: the odometry's poses x, y [cells], yaw, shape (N, 3).
-        beams: ends x, y [cells], directions and unit vectors across the walls (0 where there is no line) in the
+        beams: ends x, y [cells], directions and unit normals of the walls (0 without a line) in the
             robot's frame, shape (K, 6).
         headings: before the move, shape (N,).
         deviation: of the odometry's move ahead, to the left [cells] and in turning, shape (3,).
@@ -378,8 +378,8 @@ def match_particles(
         tuning: lstep [cells], astep, halvings, rounds, beams to skip in the search, reach, sigma, lsigma [cells2],
             null [cells2], beams to skip in the likelihood, information of a beam [1/cells2], share of it for a
             beam without a line, least score, shape (13,).
-        poses: becomes the drawn poses, shape (N, 3).
-        fits: becomes score (0 where the match failed), logarithm of the likelihood at the match, the match's x, y
+        poses: filled with the drawn poses, shape (N, 3).
+        fits: filled with the score (0 for a failed match), logarithm of the likelihood at the match, the match's x, y
             [cells], yaw and the variance of the beams' distances from the walls there [cells2], shape (N, 6).
     """
     lstep, astep, halvings, rounds, every, reach_, sigma, lsigma, null, lskip, weight, lonely, least = tuning

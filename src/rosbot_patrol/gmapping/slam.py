@@ -61,7 +61,7 @@ class Slam:
         start: pose of the robot on it; None: the odometry's.
 
     Raises:
-        MapError: the extent or the saved map makes no sense.
+        MapError: the extent or the saved map is invalid.
     """
 
     def __init__(self, params: GmappingParams, *, saved: Grid | None = None, start: Pose2D | None = None) -> None:

@@ -36,9 +36,9 @@ class CompressedParams:
 
     format: str = param("jpeg", choices=("jpeg", "png"), doc="compression of the images")
     jpeg_quality: int = param(80, lo=1, hi=100, doc="quality of JPEG")
-    jpeg_progressive: bool = param(False)
-    jpeg_optimize: bool = param(False)
-    jpeg_restart_interval: int = param(0, lo=0, hi=65535)
+    jpeg_progressive: bool = param(False, doc="write progressive JPEGs")
+    jpeg_optimize: bool = param(False, doc="optimise the Huffman tables")
+    jpeg_restart_interval: int = param(0, lo=0, hi=65535, doc="restart interval of JPEG; 0: none")
     png_level: int = param(9, lo=1, hi=9, doc="compression effort of PNG")
 
     @property

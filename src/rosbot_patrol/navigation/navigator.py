@@ -4,11 +4,11 @@ PLANNING waits for a plan, CONTROLLING drives along it, CLEARING runs the recove
 upstream's result texts. Planning itself runs behind `PlanSource` and may take its time in another thread.
 
 Differs:
-    - A recovery behaviour is cancelled like everything else, at the next step.
-    - A robot whose pose is not known stands still and waits; only `step` with a pose counts against patience.
-    - A new goal that replaces one that is driven to sends no velocity until its plan comes, as upstream, but stops the
-      robot where that takes longer than 0.35 s.
-    - A plan that came before a goal was cancelled or replaced is dropped.
+    - A recovery behaviour can be cancelled at the next step, like everything else.
+    - A robot with an unknown pose stands still and waits; only `step` with a pose counts against patience.
+    - A new goal that replaces the present one sends no velocity until its plan comes, as upstream. If that takes longer
+      than 0.35 s, the robot is stopped.
+    - A plan that was requested before a goal was cancelled or replaced is dropped.
 """
 
 from __future__ import annotations

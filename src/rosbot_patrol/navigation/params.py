@@ -38,7 +38,7 @@ class MoveBaseParams:
     clearing_radius: float = param(
         -1.0, unit="m", doc="the second clearing keeps a square of four times this; default: circumscribed_radius"
     )
-    circumscribed_radius: float = param(0.46, unit="m", lo=0.0)
+    circumscribed_radius: float = param(0.46, unit="m", lo=0.0, doc="default of clearing_radius")
     inscribed_radius: float = param(0.325, unit="m", lo=0.0, doc="accepted, has no effect")
     clearing_rotation_allowed: bool = param(True, doc="turn on the spot to recover")
     recovery_behavior_enabled: bool = param(True, doc="run recovery behaviours at all")

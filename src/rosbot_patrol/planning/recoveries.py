@@ -2,11 +2,11 @@
 
 Differs:
     - All can be cancelled at any step.
-    - The turn is counted by summing wrapped increments, has a time limit, and goes on until something is in the way
-      right ahead; upstream does not begin where any part of the turn is blocked, and so sees less.
-    - What is cleared without `layer_names` are all layers that sense; upstream clears a layer named "obstacles" only.
-    - MoveSlowAndClear tells the local planner that is in use; upstream calls dynamic_reconfigure of the one that
-      `planner_namespace` names.
+    - The turn sums wrapped increments, has a time limit, and goes on until something is right ahead. Upstream does not
+      start if any part of the turn is blocked, and so sees less.
+    - Without `layer_names` all layers with sensors are cleared; upstream clears only a layer named "obstacles".
+    - MoveSlowAndClear slows the local planner in use; upstream calls dynamic_reconfigure of the one named by
+      `planner_namespace`.
 """
 
 from __future__ import annotations

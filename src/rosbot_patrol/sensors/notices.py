@@ -97,7 +97,7 @@ class Notices:
 
         Args:
             watch: the supervisor with the present problems.
-            listed: all sensors, as of `watch.statuses`.
+            listed: all sensors, from `watch.statuses`.
             now: time [s].
             wall: seconds since 1970.
         """

@@ -129,7 +129,7 @@ def load_sensors(path: str | Path, room_names: Mapping[int, str], *, rooms_sourc
 
     Args:
         path: of the file; "" or "none" (roslaunch takes no empty argument) for none: ids are numbers of rooms.
-        room_names: name of each room by number, as of the points file `rooms_source`.
+        room_names: name of each room by number, from the points file `rooms_source`.
         rooms_source: for messages.
 
     Raises:

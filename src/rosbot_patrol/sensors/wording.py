@@ -94,7 +94,7 @@ def text(items: Sequence[Item], *, watched: int, well: int) -> str:
     """The whole notice.
 
     Args:
-        items: what to tell.
+        items: of the notice.
         watched: how many sensors are watched.
         well: how many of them are well.
     """

@@ -37,15 +37,15 @@ def count_beams(
     Args:
         sensor: x, y, yaw of the sensor on the map, shape (3,).
         angles: of the beams in the sensor's frame [rad], shape (K,).
-        ranges: measured, `reach` or more where nothing was hit [m], shape (K,).
+        ranges: measured, `reach` or more without a hit [m], shape (K,).
         distances: of each cell to the nearest obstacle [m], shape (H, W).
         origin_x: lower left corner of the distances [m].
         origin_y: likewise.
         resolution: edge of a cell [m].
         reach: largest range of the sensor [m].
         near: largest distance from an obstacle at which a beam's end is explained [m].
-        out: beams that are explained, that end early, that went through a wall, that hit nothing where the map has a
-            wall, that hit nothing where there is none, shape (5,).
+        out: numbers of beams that are explained, end early, went through a wall, have no hit although the map has a
+            wall, have no hit and no wall, shape (5,).
     """
     height, width = distances.shape
     out[:] = 0

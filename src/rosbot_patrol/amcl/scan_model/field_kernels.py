@@ -130,7 +130,7 @@ def sum_beam_model(
         poses: x, y, yaw of the particles, shape (N, 3).
         mount: x, y, yaw of the sensor on the robot, shape (3,).
         angles: of the beams in the sensor's frame [rad], shape (K,).
-        ranges: measured, `reach` where nothing was hit [m], shape (K,).
+        ranges: measured, `reach` without a hit [m], shape (K,).
         distances: of each cell to the nearest blocked one [m].
         origin_x: lower left corner of the distances [m].
         origin_y: likewise.

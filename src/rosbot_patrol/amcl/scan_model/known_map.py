@@ -27,7 +27,7 @@ class KnownMap:
         rng: source of random numbers.
 
     Raises:
-        MapError: the map is turned, empty, or its place makes no sense.
+        MapError: the map is turned or empty, or its place is invalid.
     """
 
     def __init__(self, grid: Grid, params: AmclParams, rng: np.random.Generator) -> None:

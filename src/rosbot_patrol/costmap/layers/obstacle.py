@@ -39,11 +39,11 @@ class ObstacleLayer(Layer):
     passed: a scan like the previous one changes nothing.
 
     Differs:
-    - Only the robot itself is cleared, without its padding; upstream clears the padding too, so that a slow robot
-      eats its way into an obstacle. It is cleared of what the layers before wrote as well, such as a map's wall that
-      the robot stands in by an error of its pose: upstream's robot cannot plan its way out there.
-    - `forget_unseen_after`, `forget_out_of_view_after` and `forget_beside_after` (0 by default, as upstream, which
-      forgets nothing that no beam clears) let marks go that have not been seen again: see `marks`.
+    - Only the robot itself is cleared, without its padding; upstream clears the padding, too, so that a slow robot
+      erodes obstacles. Marks of earlier layers under the robot are cleared as well, such as a wall of the map that it
+      overlaps by an error of its pose: upstream's robot finds no plan there.
+    - `forget_unseen_after`, `forget_out_of_view_after` and `forget_beside_after` forget marks that have not been seen
+      again: see `marks`. They are 0 by default, as upstream, which only clears marks by beams.
     """
 
     def __init__(

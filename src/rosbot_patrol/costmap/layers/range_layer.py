@@ -58,12 +58,12 @@ class RangeSensorLayer(Layer):
     `mark_threshold` are lethal, cells below `clear_threshold` free, the others are ignored; costs combine by maximum.
 
     Differs:
-    - A cell counts by its part nearest to the cone's axis, and what was met is at least three quarters of a cell thick;
-      upstream looks at cells' middles, of which a cone of 0.1 rad holds none near the sensor.
+    - A cell counts by its part nearest to the cone's axis, and an obstacle is at least three quarters of a cell thick.
+      Upstream uses the centres of cells; a cone of 0.1 rad contains none near the sensor.
     - Probabilities stay between 3 and 251 of 254; upstream's reach 0 and stay there for ever.
-    - A reading of max_range says nothing where `clear_on_max_reading` is false; upstream marks at that distance. One
-      outside the sensor's own limits is left out, -inf apart.
-    - The robot's own cells are set back to a half.
+    - A reading of max_range is ignored if `clear_on_max_reading` is false; upstream marks at that distance. A reading
+      outside the sensor's own limits is ignored, except -inf.
+    - The robot's own cells are reset to one half.
     - `no_readings_timeout` counts from the first update.
     """
 

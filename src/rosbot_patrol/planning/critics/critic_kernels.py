@@ -157,7 +157,7 @@ def cut_plan(plan, passed, local_from_plan, here, window, prune):
         prune: drop the part behind the robot; else start where the plan enters the local costmap.
 
     Returns:
-        Poses inside, shape (M, 3), empty where the nearest is outside; the index of that nearest pose, and how many of
+        Poses inside, shape (M, 3), empty if the nearest is outside; the index of that nearest pose, and how many of
         those returned lie before it. It is not one of a later leg that only passes by: at most 1 m farther along the
         plan than the robot is from its start.
     """

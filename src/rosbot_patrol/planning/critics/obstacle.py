@@ -97,7 +97,7 @@ class ObstacleCritic:
 
         Args:
             costmap: the local costs.
-            pose: where the robot is.
+            pose: of the robot.
             distance: longest distance that it may move [m].
             growth: largest relative growth of the footprint.
             bare: check the robot's own outline, without the padding.

@@ -47,7 +47,7 @@ class Situation:
     """One control cycle; distance fields shared by critics are computed when first needed.
 
     Attributes:
-        pose: where the robot is.
+        pose: of the robot.
         samples: velocities (vx, vy, wz) to score, shape (K, 3).
         ends: their final poses in the local costmap's frame, shape (K, 3).
         coarse: the local costs in cells of about 5 cm.

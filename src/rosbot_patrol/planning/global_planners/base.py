@@ -4,9 +4,9 @@ An unusable start or goal raises an error with the reason. As upstream, the robo
 that cannot be reached is replaced by the nearest reachable point within the tolerance.
 
 Differs from upstream:
-    - A robot that stands within the inscribed radius of an obstacle (localisation is not exact) still gets a plan
-      that leads out of it; upstream finds none and the robot stays stuck.
-    - Where there is no plan, the error says what is in the way and where.
+    - A robot within the inscribed radius of an obstacle (localisation is not exact) still gets a plan that leads out;
+      upstream finds none and the robot stays stuck.
+    - If there is no plan, the error names the obstacle and its place.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
 """Global planner under the name global_planner/GlobalPlanner (matches global_planner 1.17 of the navigation stack).
 
-As upstream, a cell costs neutral_cost + cost_factor * its cost, but no more than lethal_cost - 1; cells of lethal_cost
-- 1 and more cannot be crossed, unknown ones only with `allow_unknown`; the outermost cells of the costmap are
-obstacles unless `outline_map` is false; and headings come from the orientation filter.
+As upstream, a cell costs neutral_cost + cost_factor * its cost, but no more than lethal_cost - 1. Cells of at least
+lethal_cost - 1 are impassable, unknown ones without `allow_unknown`, too. The outermost cells of the costmap are
+obstacles unless `outline_map` is false. Headings come from the orientation filter.
 
 Differs (besides what `base` lists):
-    - The field is the same exact one as navfn's, whatever `use_dijkstra`, `use_quadratic` and `old_navfn_behavior`
-      say: they choose between ways to compute a coarser one, and how upstream rounds to cells.
-    - `default_tolerance` works, for a goal off the costmap too; upstream reads it and does nothing with it.
-    - Interpolated headings before the goal run from the direction of the path to the goal's heading; upstream's start
+    - The field is the same exact one as navfn's, whatever `use_dijkstra`, `use_quadratic` and `old_navfn_behavior`:
+      these choose between coarser computations and upstream's rounding to cells.
+    - `default_tolerance` works, also for a goal off the costmap; upstream reads it and does not use it.
+    - Interpolated headings before the goal run from the path's direction to the goal's heading; upstream's start too
       late by their index.
     - A path over the grid (`use_grid_path`) does not cut the corners of obstacles.
-    - The potential is not published: most of it is not computed.
+    - The potential is not published, because most of it is not computed.
 """
 
 from __future__ import annotations

@@ -1,13 +1,12 @@
 """Global planner under the name navfn/NavfnROS (matches navfn 1.17 of the navigation stack).
 
-As upstream, a cell costs COST_NEUTRAL + COST_FACTOR * its cost, inscribed and lethal cells cannot be crossed, unknown
-ones only with `allow_unknown` (at the highest cost), the robot's own cell is taken as free, and a goal that cannot be
-reached, or that lies off the costmap, is replaced by the nearest point within `default_tolerance`.
+As upstream, a cell costs COST_NEUTRAL + COST_FACTOR * its cost. Inscribed and lethal cells are impassable, and unknown
+ones need `allow_unknown` (at the highest cost). The robot's own cell counts as free. A goal that is unreachable or off
+the costmap is replaced by the nearest point within `default_tolerance`.
 
 Differs (besides what `base` lists):
-    - The field is an exact upwind solution, of the part of the costmap that matters, so plans are smoother and come
-      sooner.
-    - `default_tolerance` is a radius; upstream looks in a square.
+    - The field is an exact upwind solution of the relevant part of the costmap, so plans are smoother and come sooner.
+    - `default_tolerance` is a radius; upstream searches a square.
     - Poses carry the heading of the path; upstream leaves all but the last at zero.
 """
 

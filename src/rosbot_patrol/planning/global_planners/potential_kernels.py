@@ -68,7 +68,7 @@ def propagate(costs, table, sources, source_times, target_x, target_y, limits, t
 
     Args:
         costs: cost of each cell.
-        table: cost of crossing a cell by its cost, inf where it cannot be crossed; shape (256,).
+        table: price of crossing a cell, by its cost; inf if impassable; shape (256,).
         sources: cells (ix, iy) to start from, shape (N, 2), in blocks that have a limit.
         source_times: their times, shape (N,).
         target_x: cell to reach, column.

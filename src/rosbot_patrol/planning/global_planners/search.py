@@ -2,12 +2,12 @@
 
 On a small grid the whole field of arrival times is solved. On a large one:
 
-1. The grid of the cheapest cell of each block (`potential_kernels.BLOCK` cells wide) is solved from the goal. It tells
-   about how far each block is from the goal, and for certain where there is no way at all.
-2. The fine field is solved in a corridor around that grid's best way. This gives a way and its cost.
-3. Where the coarse field leaves open whether a way elsewhere is cheaper by more than `SLACK`, the fine field is solved
-   once more, in all blocks that such a way could pass: those where the time from the start and the least time to the
-   goal together stay below that cost (the pruning of A*, Hart, Nilsson, Raphael 1968, with a bound from above).
+1. The grid of the cheapest cell of each block (`potential_kernels.BLOCK` cells wide) is solved from the goal. It gives
+   the approximate distance of each block from the goal, and proves where no path exists.
+2. The fine field is solved in a corridor around that grid's best path. This gives a path and its cost.
+3. If the coarse field leaves open whether another path is cheaper by more than `SLACK`, the fine field is solved again
+   in all blocks that such a path could pass. Those are the blocks where the time from the start plus the least time to
+   the goal stays below that cost (the pruning of A*, Hart, Nilsson, Raphael 1968, with a bound from above).
 
 The coarse field is no strict bound, because its paths bend at the centres of blocks; `_BENDS` and `_COARSE` allow for
 that.

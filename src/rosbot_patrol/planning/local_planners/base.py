@@ -191,7 +191,7 @@ class SamplingPlanner(LocalPlanner, Generic[P]):
         """Mean obstacle cost of two models of how the base reaches a velocity; both must be free.
 
         Args:
-            view: where the robot is and what it sees.
+            view: input of this cycle.
             samples: velocities (vx, vy, wz), shape (K, 3).
             motion: expected response of the base.
             other: alternative response.

@@ -1,25 +1,25 @@
 """Local planner under the name dwa_local_planner/DWAPlannerROS (matches dwa_local_planner 1.17).
 
-The dynamic window approach (Fox, Burgard, Thrun 1997): of the velocities that one control cycle can reach, each held
-for `sim_time`, it takes the one that scores best by its critics: oscillation, obstacle, goal_front, alignment, path,
-goal and twirling (`rosbot_patrol.planning.critics`). At the goal it stops, then turns to the heading. Parameters have
-upstream's names and dynamic_reconfigure's defaults; distances to plan and goal weigh by the metre, as upstream's
-cells times resolution do (path_distance_bias 32, goal_distance_bias 24, as its documentation has them).
+The dynamic window approach (Fox, Burgard, Thrun 1997): of the velocities reachable in one control cycle, each held for
+`sim_time`, it takes the best by its critics (`rosbot_patrol.planning.critics`): oscillation, obstacle, goal_front,
+alignment, path, goal and twirling. At the goal it stops and turns to the heading. Parameters have upstream's names and
+dynamic_reconfigure's defaults. Distances to plan and goal are weighted per metre, as are upstream's cells times
+resolution (path_distance_bias 32, goal_distance_bias 24, as in its documentation).
 
 Differs:
     - Distances are Euclidean around obstacles and interpolated; upstream counts 4-connected cells.
-    - The swept footprint is checked cell by cell, whatever the steps. `stop_time_buffer` works: a velocity is only
-      admissible if the robot can stop that long before it hits something; upstream reads it only.
-    - A standing base may start with `min_vel_trans` or `min_vel_theta` where one cycle's acceleration gives less;
-      upstream then finds no velocity, or cannot turn on the spot.
-    - Where nothing is free over `sim_time`, slow motions are tried over 0.6 s. A robot whose footprint touches an
-      obstacle may move so that it touches less, back out of it at `min_vel_trans`, and where only the padding touches,
-      move slowly by its bare outline.
-    - The local goal lies about a metre along the plan, beyond what a trajectory reaches; upstream takes the last pose
-      in view, and so stays where it is in a bend. Where something stands on the plan, the way round it counts as the
-      plan; where nothing leads round, it stops short of the place and says so.
+    - The swept footprint is checked cell by cell, whatever the steps. `stop_time_buffer` works: a velocity is
+      admissible only if the robot can stop that long before an obstacle; upstream only reads it.
+    - A standing base may start with `min_vel_trans` or `min_vel_theta` even if one cycle's acceleration gives less.
+      Upstream then finds no velocity, or cannot turn on the spot.
+    - If nothing is free over `sim_time`, slow motions are tried over 0.6 s. A robot whose footprint touches an obstacle
+      may move if it then touches less, or back out at `min_vel_trans`. If only the padding touches, it may move slowly
+      by its bare outline.
+    - The local goal lies about a metre along the plan, beyond the reach of a trajectory; upstream takes the last pose
+      in view and gets stuck in a bend. If something blocks the plan, the way round it becomes the plan; without one,
+      the robot stops short of the place and says so.
     - The latch of `latch_xy_goal_tolerance` is kept when a new plan leads to the same goal.
-    - Names from before Noetic (`max_trans_vel`, ...) are taken, with a warning; upstream warns and ignores them.
+    - Names from before Noetic (`max_trans_vel`, ...) work, with a warning; upstream warns and ignores them.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def survey_ground(view: LocalView, plan: Array, *, behind: int, lookahead: float
     before that. Upstream takes the last pose in view, and so cuts corners or gets stuck in a bend.
 
     Args:
-        view: where the robot is and what it sees.
+        view: input of this cycle.
         plan: the part in view, shape (N, 3).
         behind: how many of its poses lie behind the robot.
         lookahead: distance of the local goal along the plan [m].

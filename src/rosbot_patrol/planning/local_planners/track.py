@@ -54,7 +54,7 @@ class Track:
         """Visible part of the plan in the local frame: from the robot to where it leaves the local costmap.
 
         Args:
-            view: where the robot is and what it sees.
+            view: input of this cycle.
             prune: drop the part behind the robot.
 
         Raises:

@@ -1,26 +1,26 @@
 """Local planner under the name base_local_planner/TrajectoryPlannerROS (matches base_local_planner 1.17).
 
-It samples forward and turning velocities, simulates each for `sim_time`, and takes the one with the least of
-path_distance_bias * distance to the plan + goal_distance_bias * distance to the local goal + occdist_scale * cost;
-at the goal it stops, turns to the heading and is done. Parameters have upstream's names, and the defaults of its
-dynamic_reconfigure file, which win there.
+It samples forward and turning velocities, simulates each for `sim_time`, and takes the one with the smallest
+path_distance_bias * distance to the plan + goal_distance_bias * distance to the local goal + occdist_scale * cost. At
+the goal it stops and turns to the heading. Parameters have upstream's names and the defaults of its dynamic_reconfigure
+file, which take precedence there.
 
 Differs:
-    - Distances are Euclidean around obstacles, interpolated, and judged at the trajectory's end and at a point
-      `heading_lookahead` ahead of it; upstream counts 4-connected cells, and looks ahead only for turns on the spot.
-    - The cost of an obstacle is that of the cells under the robot's centre; upstream takes those under its edges too.
-    - The swept footprint is checked cell by cell, whatever the steps, both for a base that follows within its
-      accelerations and for one that follows at once. `stop_time_buffer` works; upstream reads it only.
-    - Where nothing is free over `sim_time`, slow motions are tried over 0.6 s before it backs up.
-    - It backs up only where the way behind is free, upstream blindly; and after 2 s it looks ahead again, where
-      upstream may turn to and fro for ever.
-    - A robot whose footprint touches an obstacle may move so that it touches less, and where only the padding does,
-      move slowly by its bare outline; upstream finds no trajectory.
-    - The local goal lies about a metre along the plan, beyond what a trajectory reaches; upstream takes the last pose
-      in view, and so cuts corners. Where something stands on the plan, the way round it counts as the plan; where
-      nothing leads round, it stops short of the place and says so.
-    - `simple_attractor` counts the squared distance to the local goal in metres, whatever `meter_scoring`.
-    - `y_vels` defaults to -0.3, -0.1, 0.1, 0.3; the dynamic_reconfigure file has the last sign wrong.
+    - Distances are Euclidean around obstacles and interpolated. They are taken at the trajectory's end and at a point
+      `heading_lookahead` ahead of it. Upstream counts 4-connected cells, and looks ahead only for turns on the spot.
+    - The obstacle cost is that of the cells under the robot's centre; upstream includes those under its edges.
+    - The swept footprint is checked cell by cell, whatever the steps. It is checked both for a base that accelerates
+      within its limits and for one that reaches the velocity at once. `stop_time_buffer` works; upstream only reads it.
+    - If nothing is free over `sim_time`, slow motions are tried over 0.6 s before the robot backs up.
+    - It backs up only if the space behind is free; upstream does so blindly. After 2 s it looks ahead again; upstream
+      may turn to and fro for ever.
+    - A robot whose footprint touches an obstacle may move if it then touches less. If only the padding touches, it may
+      move slowly by its bare outline. Upstream finds no trajectory.
+    - The local goal lies about a metre along the plan, beyond the reach of a trajectory; upstream takes the last pose
+      in view and cuts corners. If something blocks the plan, the way round it becomes the plan; without one, the robot
+      stops short of the place and says so.
+    - `simple_attractor` uses the squared distance to the local goal in metres, whatever `meter_scoring`.
+    - `y_vels` defaults to -0.3, -0.1, 0.1, 0.3; the dynamic_reconfigure file has a wrong sign in the last one.
 """
 
 from __future__ import annotations
