@@ -40,7 +40,7 @@ class ParticleMaps:
         if not all(math.isfinite(size) and 1.0 <= size <= 1e5 for size in sizes):
             raise MapError(
                 "map",
-                f"an extent from {lows} to {highs} m makes no sense, expected xmin < xmax and ymin < ymax,"
+                f"an extent from {lows} to {highs} m is invalid, expected xmin < xmax and ymin < ymax,"
                 " 100000 cells at most to a side",
             )
         self.resolution = resolution

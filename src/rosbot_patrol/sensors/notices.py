@@ -90,7 +90,7 @@ class Notices:
             }
             self._count, self._told = int(memory["count"]), told
         except (KeyError, TypeError, ValueError) as err:
-            log.warning("what was kept of the notices about sensors makes no sense (%r), starting afresh", err)
+            log.warning("the stored notices about sensors are invalid (%r): starting without them", err)
 
     def update(self, watch: Supervisor, listed: Sequence[SensorStatus], now: float, wall: float) -> Notice | None:
         """Notice to send now, None: none; call it about once a second.

@@ -52,4 +52,4 @@ def _require_sense(grid: Grid) -> None:
     grid.info.require_aligned("amcl")
     info = grid.info
     if not (0.0 < info.resolution < math.inf and math.isfinite(info.origin_x + info.origin_y) and grid.cells.size):
-        raise MapError("amcl", f"a map of {info.width} x {info.height} cells of {info.resolution} m makes no sense")
+        raise MapError("amcl", f"a map of {info.width} x {info.height} cells of {info.resolution} m is invalid")
