@@ -1,6 +1,6 @@
-"""What the node amcl does with its inputs, without ROS: scans, the map and given poses in, estimates out.
+"""Core of the node amcl, without ROS: scans, map and given poses in, estimates out.
 
-The node and its replay over a bag both run it.
+The node and its replay over a bag run it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Step:
-    """What one scan brought.
+    """Result of one scan.
 
     Attributes:
         stamp: time of the scan [s].
@@ -46,7 +46,7 @@ class Step:
 
 
 class Fix(NamedTuple):
-    """Where the robot was at the newest scan: map_from_base, its estimate, odom_from_base, time [s]."""
+    """Pose of the robot at the newest scan: map_from_base, its estimate, odom_from_base, time [s]."""
 
     pose: Pose2D
     estimate: Estimate
@@ -55,16 +55,16 @@ class Fix(NamedTuple):
 
 
 class AmclCore:
-    """A Localizer and everything that its node decides. Safe between threads.
+    """A Localizer and all decisions of its node. Thread-safe.
 
     Args:
         params: of amcl.
         frames: transforms.
-        rng: source of all chance.
+        rng: source of random numbers.
 
     Attributes:
         localizer: for reading; it is changed by the methods here.
-        feed: where scans come in and wait for the odometry.
+        feed: queue of scans that wait for the odometry.
         late: number of scans that came after a newer one.
     """
 
@@ -84,12 +84,12 @@ class AmclCore:
 
     @property
     def is_found(self) -> bool:
-        """Whether the robot is localised and not searched for."""
+        """Whether the robot is localised and no search is running."""
         return self.localizer.trust.state is State.LOCALISED and not self.localizer.is_seeking
 
     @property
     def stamp(self) -> float:
-        """Time of the newest scan taken in [s], -inf before the first."""
+        """Time of the newest scan used [s], -inf before the first."""
         return self._stamp
 
     @property
@@ -109,18 +109,18 @@ class AmclCore:
     # Inputs
 
     def configure(self, params: AmclParams) -> None:
-        """Take other parameters from now on; raises MapError if the map cannot be used with them."""
+        """Use other parameters from now on; raises MapError if they do not suit the map."""
         with self._lock:
             self.localizer.reconfigure(params)
             self._params = params
 
     def hear_map(self, grid: Grid) -> None:
-        """Take a map; raises MapError if it cannot be used."""
+        """Use a map; raises MapError if it is invalid."""
         with self._lock:
             self.localizer.set_map(grid)
 
     def hear_initial_pose(self, record: PoseRecord, now: float) -> bool:
-        """Start about a given pose; False, with a warning, if it has to be ignored. `now` [s] is logged."""
+        """Restart around a given pose; False, with a warning, if it has to be ignored. `now` [s] is for the log."""
         try:
             taken = taken_pose(
                 record.pose,
@@ -144,13 +144,13 @@ class AmclCore:
         return True
 
     def localize_globally(self) -> bool:
-        """Start anew from anywhere on the free floor; False if the map has none."""
+        """Restart with particles anywhere on the free floor; False if the map has none."""
         with self._lock:
             started = self._was_placed = self.localizer.localize_globally()
         return started
 
     def seek(self) -> bool:
-        """Search the whole map for the robot; False if that cannot be."""
+        """Search the whole map for the robot; False if that is impossible."""
         with self._lock:
             return self.localizer.seek()
 
@@ -160,7 +160,7 @@ class AmclCore:
             self.localizer.request_update()
 
     def resume(self, params: AmclParams, odom_from_base: Pose2D | None) -> None:
-        """Start from the pose in `params`, unless a pose was given already.
+        """Restart from the pose in `params`, unless a pose was given already.
 
         Args:
             params: with the start.
@@ -173,7 +173,7 @@ class AmclCore:
     # Step
 
     def step(self, placed: PlacedScan) -> Step:
-        """Take in a scan that `feed` has handed out."""
+        """Process a scan from `feed`."""
         scan = placed.scan
         with self._lock:
             outcome = self.localizer.update(scan, placed.odom_from_base, placed.base_from_laser)

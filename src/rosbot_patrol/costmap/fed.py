@@ -1,6 +1,6 @@
-"""A costmap that is fed with records: what a node does with its map, its sensors and the robot's pose, without ROS.
+"""Costmap with its inputs, without ROS: what a node does with its map, its sensors and the robot's pose.
 
-move_base, its replay over a bag and the closed loop run it.
+move_base, its replay over a bag and the closed loop all run it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 class Fault(enum.Enum):
-    """What is wrong with a costmap."""
+    """Kind of a costmap's fault."""
 
     NEW = "has not been updated yet"
     RESIZED = "has another size and has not been updated yet"
@@ -41,26 +41,26 @@ class Fault(enum.Enum):
 class FedCostmap:
     """A LayeredCostmap with the inputs of its layers. Times [s] are of one clock.
 
-    `hear` methods and inputs may be called from other threads than `update`; whoever reads or changes `costmap` itself
-    holds `lock`.
+    The `hear` methods and the inputs may be called from other threads than `update`. Code that reads or changes
+    `costmap` itself must hold `lock`.
 
     Args:
         config: parameters and layers.
         frames: transforms.
         name: "global_costmap" or "local_costmap".
         now: time at the start.
-        keeps_last: whether each update is copied to `last`, for costmaps that are read in each control cycle.
+        keeps_last: copy each update to `last`, for costmaps that are read in each control cycle.
 
     Raises:
         MapError: the mask file of a keep-out layer cannot be used.
 
     Attributes:
         costmap: the layers and their costs.
-        inputs: what the layers see by.
+        inputs: sensor inputs of the layers.
         last: costs after the last update; nobody changes it.
-        fault: why it cannot be driven by, None if it can.
+        fault: reason why the robot must not drive by it, None if it may.
         problem: the same in a sentence, "" if it can.
-        map_problem: why a map in another frame could not be placed at the last update, "" if it could.
+        map_problem: reason why a map in another frame could not be placed at the last update, "" if it could.
         updates: number of updates.
     """
 
@@ -91,7 +91,7 @@ class FedCostmap:
 
     @property
     def map_layers(self) -> list[StaticLayer]:
-        """The layers whose map comes by a topic."""
+        """The layers with a map from a topic."""
         return [layer for layer in self.costmap.static_layers if not _mask_file(layer)]
 
     def _read_masks(self) -> None:
@@ -105,22 +105,22 @@ class FedCostmap:
     # Inputs
 
     def hear_map(self, layer: StaticLayer, grid: Grid, frame: str) -> None:
-        """Give a layer its map, which lies in a frame; raises MapError if it cannot be used."""
+        """Give a layer its map, which is in a frame; raises MapError if it cannot be used."""
         with self.lock:
             layer.set_map(grid)
             self._map_frames[id(layer)] = frame
 
     def hear_map_update(self, layer: StaticLayer, x: int, y: int, cells: np.ndarray) -> None:
-        """Give a layer a part of its map, which begins at a cell."""
+        """Give a layer a part of its map, which starts at a cell."""
         with self.lock:
             layer.update_map(x, y, cells)
 
     def has_map(self, layer: StaticLayer) -> bool:
-        """Whether a layer was given a map."""
+        """Whether a layer has a map."""
         return id(layer) in self._map_frames
 
     def configure(self, params: CostmapParams) -> None:
-        """Take other parameters, `lock` being held; raises ParamError."""
+        """Use other parameters; the caller holds `lock`. Raises ParamError."""
         before = self.costmap.info
         self.costmap.configure(params)
         if self.costmap.info != before:
@@ -131,10 +131,10 @@ class FedCostmap:
     # Updates
 
     def robot_pose(self, now: float) -> Pose2D:
-        """The robot in this costmap's frame.
+        """Pose of the robot in this costmap's frame.
 
         Raises:
-            TransformError: it is not known, or older than `transform_tolerance`.
+            TransformError: it is unknown, or older than `transform_tolerance`.
         """
         pose, stamp = self._frames.lookup_stamped(self.frame, self.base_frame)
         age = now - stamp
@@ -143,7 +143,7 @@ class FedCostmap:
         return pose
 
     def update(self, now: float) -> tuple[Pose2D, list[Bounds]] | None:
-        """Take in what was heard.
+        """Update the layers with the inputs received.
 
         Returns:
             The robot's pose and the areas written; None if there was no update, as `update_frequency` is 0 or the
@@ -172,7 +172,7 @@ class FedCostmap:
             return Grid(self.costmap.info, self.costmap.cells.copy())
 
     def reset(self) -> None:
-        """Forget what was sensed; the map stays."""
+        """Forget sensor data; the map stays."""
         with self.lock:
             self.costmap.reset()
 
@@ -197,12 +197,12 @@ class FedCostmap:
     # Judgement
 
     def is_current(self, now: float) -> bool:
-        """Whether what drives by this costmap can trust it."""
+        """Whether the robot can drive by this costmap."""
         is_blind = any(each.is_blind(now) for each in self.inputs)
         return not self.problem and not is_blind and self.costmap.is_current(now)
 
     def troubles(self, now: float) -> list[str]:
-        """Inputs that are silent or cannot be used, a sentence each."""
+        """Silent or unusable inputs, a sentence each."""
         return [f"{self.name}/{text}" for text in (each.trouble(now) for each in self.inputs) if text]
 
 

@@ -1,7 +1,7 @@
-"""What a costmap sees by: records of scans, clouds, depth pictures and ranges, which wait for their transform.
+"""Sensor inputs of a costmap: records of scans, clouds, depth images and ranges that wait for their transform.
 
-`hear` only decodes what is used of a record (of a depth picture every n-th row and column) and keeps the newest few.
-`take` places them, at their stamps, in the costmap's layers. One thread may hear while another takes.
+`hear` decodes only the used part of a record (of a depth image every n-th row and column) and keeps the newest few.
+`take` adds them to the costmap's layers at their stamps. One thread may hear while another takes.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
-_KEPT = 5  # records that wait for their transform
-_OLDEST = 1.0  # a record that is older than the newest that waits by more waits no longer [s]
-_PATIENCE = 1.0  # if the parameters set no limit, scans that say nothing stop the robot after this time [s]
-_SILENT = 5.0  # if the parameters set no limit, an input that is silent for this time is reported [s]
+_KEPT = 5  # maximum number of records that wait for their transform
+_OLDEST = 1.0  # a record older than the newest waiting one by more is dropped [s]
+_PATIENCE = 1.0  # without a limit in the parameters, unusable scans stop the robot after this time [s]
+_SILENT = 5.0  # without a limit in the parameters, an input silent for this time is reported [s]
 
 
 @dataclass(frozen=True)
@@ -57,13 +57,13 @@ class Input(ABC, Generic[T]):
         name: "layer/source", for messages.
         topic: where its records come from.
         now: time at the start.
-        limit: silence that stops the robot [s], 0 for none.
-        frame: of the sensor, "" for the record's.
-        max_rate: records a second that are looked at, 0 for all.
-        newest_only: of several records only the newest counts.
+        limit: silence that stops the robot [s], 0: none.
+        frame: of the sensor, "": the record's.
+        max_rate: maximum rate of records used [1/s], 0: all.
+        newest_only: of several records use only the newest.
 
     Attributes:
-        refused: why the newest record cannot be used, "" if it can.
+        refused: reason why the newest record cannot be used, "" if it can.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Input(ABC, Generic[T]):
         return not 0.0 <= stamp - self._used < self._period
 
     def _keep(self, stamp: float, frame: str, now: float, decode: Callable[[], T | None]) -> None:
-        """Decode a record unless they come too fast, and let it wait; `decode` may raise ImageError or SensorError."""
+        """Decode a record, unless records come too fast, and queue it; `decode` may raise ImageError or SensorError."""
         self._heard = now
         if not self.is_due(stamp):
             return
@@ -114,7 +114,7 @@ class Input(ABC, Generic[T]):
             self._waiting.append(_Waiting(stamp, self._frame or frame, item))
 
     def take(self, frames: Frames, target: str, now: float) -> None:
-        """Place what waits, in the frame `target`; what cannot be placed yet waits on."""
+        """Place the waiting records in the frame `target`; those that cannot be placed yet keep waiting."""
         later: list[_Waiting[T]] = []
         waiting = list(self._waiting)
         for entry in reversed(waiting) if self._newest_only else waiting:
@@ -132,7 +132,7 @@ class Input(ABC, Generic[T]):
         self._waiting = deque((e for e in later if newest - e.stamp < _OLDEST), maxlen=_KEPT)
 
     def trouble(self, now: float) -> str:
-        """What is wrong with it, "" for nothing."""
+        """Description of a problem, "" for none."""
         if self.refused:
             return f"{self.name}: {self.refused}"
         limit = self._limit or _SILENT
@@ -144,7 +144,7 @@ class Input(ABC, Generic[T]):
         return ""
 
     def is_blind(self, now: float) -> bool:
-        """Whether nothing can be seen by it though records come, so that the robot has to stand."""
+        """Whether no record is usable although records arrive, so that the robot must stop."""
         del now
         return False
 
@@ -167,7 +167,7 @@ class _ObstacleInput(Input[T]):
 
     @property
     def params(self) -> SourceParams:
-        """Of the source."""
+        """Parameters of the source."""
         return self._buffer.params
 
     @property
@@ -176,7 +176,7 @@ class _ObstacleInput(Input[T]):
 
 
 class ScanInput(_ObstacleInput[LaserScan]):
-    """Scans; those that say nothing, or of a laser that cannot be laid level, are as none and stop the robot."""
+    """Scans; unusable ones, or those of a tilted laser, count as missing and stop the robot."""
 
     def __init__(self, name: str, now: float, buffer: ObservationBuffer, layer: ObstacleLayer) -> None:
         super().__init__(name, now, buffer, layer)
@@ -200,11 +200,11 @@ class ScanInput(_ObstacleInput[LaserScan]):
         self._buffer.add(observe_level(level, self.params, self._top))
 
     def trouble(self, now: float) -> str:
-        """What is wrong with it, "" for nothing."""
+        """Description of a problem, "" for none."""
         return f"{self.name}: {self._check.problem}" if self._check.problem else super().trouble(now)
 
     def is_blind(self, now: float) -> bool:
-        """Whether nothing can be seen by it though scans come."""
+        """Whether no scan is usable although scans arrive."""
         return self._check.lasts(now, self._limit or _PATIENCE)
 
 
@@ -229,11 +229,11 @@ class CloudInput(_ObstacleInput["NDArray[np.float64]"]):
 
 
 class DepthInput(Input[DepthPicture]):
-    """Depth pictures, with the camera's optics, which have to be given once.
+    """Depth images, with the camera's calibration, which must arrive once.
 
     Attributes:
-        wants_optics: whether `hear_optics` is waited for.
-        optics_topic: of the optics.
+        wants_optics: whether it waits for `hear_optics`.
+        optics_topic: topic of the calibration.
     """
 
     def __init__(self, name: str, now: float, buffer: ObservationBuffer, params: DepthSourceParams) -> None:
@@ -252,11 +252,11 @@ class DepthInput(Input[DepthPicture]):
         self.wants_optics = True
 
     def hear_optics(self, record: OpticsRecord) -> None:
-        """Take the optics of the camera."""
+        """Set the camera's calibration."""
         self._optics, self.wants_optics = record, False
 
     def hear(self, record: DepthRecord, now: float) -> None:
-        """Keep a picture until the next update."""
+        """Keep an image until the next update."""
         self._keep(record.stamp, record.frame, now, lambda: self._picture(record, now))
 
     def _picture(self, record: DepthRecord, now: float) -> DepthPicture | None:
@@ -307,7 +307,7 @@ def _framed(record: RangeRecord) -> RangeRecord:
 
 
 def make_inputs(costmap: LayeredCostmap, now: float) -> Sequence[Input[Any]]:
-    """All that a costmap's layers see by; `now` [s] is when silence begins to count."""
+    """Inputs of all layers of a costmap; silence counts from `now` [s]."""
     inputs: list[Input[Any]] = []
     for layer in costmap.obstacle_layers:
         for key, buffer in layer.buffers.items():

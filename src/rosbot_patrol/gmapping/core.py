@@ -1,6 +1,6 @@
-"""What the node slam_gmapping does with its inputs, without ROS: scans in, maps and corrections out.
+"""Core of the node slam_gmapping, without ROS: scans in, maps and corrections out.
 
-The node and its replay over a bag both run it.
+The node and its replay over a bag run it.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from rosbot_patrol.tf.frames import Frames
 
 log = logging.getLogger(__name__)
 
-_WAITING = 50  # scans: more than a fast lidar sends before one that tf cannot place is given up and told of
+_WAITING = 50  # scans: more than a fast lidar sends before an unplaceable scan is dropped and reported
 _REPEAT = 10.0  # between two warnings about updates [s]
 
 
 @dataclass(frozen=True)
 class Step:
-    """What one scan brought.
+    """Result of one scan.
 
     Attributes:
         stamp: time of the scan [s].
         outcome: of the update.
-        grid: the map, None if none is due (at most one in `map_update_interval`).
+        grid: the map, None if none is due (at most one per `map_update_interval`).
     """
 
     stamp: float
@@ -41,20 +41,20 @@ class Step:
 
 
 class GmappingCore:
-    """A Slam and everything that its node decides.
+    """A Slam and all decisions of its node.
 
     Args:
-        params: of slam_gmapping; with `map_file` a saved map is gone on with.
+        params: of slam_gmapping; with `map_file` a saved map is extended.
         frames: transforms.
 
     Raises:
-        MapError: the extent or the saved map makes no sense.
+        MapError: the extent or the saved map is invalid.
 
     Attributes:
         slam: the maps and poses.
-        feed: where scans come in and wait for the odometry.
+        feed: queue of scans that wait for the odometry.
         correction: map_from_odom, the identity before the first update.
-        problem: what was wrong with the last update, "" if nothing.
+        problem: problem of the last update, "" for none.
     """
 
     def __init__(self, params: GmappingParams, frames: Frames) -> None:
@@ -64,16 +64,16 @@ class GmappingCore:
         self.problem = ""
         self._params = params
         self._heard = 0
-        self._map_stamp = -math.inf  # of the scan that the map was last made after
+        self._map_stamp = -math.inf  # stamp of the scan after which the last map was made
         self._warned = -math.inf
 
     def is_wanted(self) -> bool:
-        """Count a scan that came; whether it is one to take in: every `throttle_scans`-th is."""
+        """Count a scan; returns whether to use it: every `throttle_scans`-th is used."""
         self._heard += 1
         return (self._heard - 1) % self._params.throttle_scans == 0
 
     def step(self, placed: PlacedScan) -> Step:
-        """Take in a scan that `feed` has handed out."""
+        """Process a scan from `feed`."""
         slam, stamp = self.slam, placed.scan.stamp
         outcome = slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
         if slam.map_from_odom is not None:
@@ -86,7 +86,7 @@ class GmappingCore:
         return Step(stamp, outcome, slam.grid())
 
     def _judge(self, outcome: Outcome, scan: LaserScan) -> None:
-        """Note what is wrong with an update, and warn of it now and then."""
+        """Record the problem of an update, and log it now and then."""
         if outcome.is_blind:
             text = f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"
         elif outcome.failed:

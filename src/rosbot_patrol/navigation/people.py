@@ -1,4 +1,4 @@
-"""Who moves around the robot: scans in, and for whom a command has to wait."""
+"""People who move around the robot: scans in, and whether a command has to wait for them."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from rosbot_patrol.scan import LaserScan, level_scan
 from rosbot_patrol.scan_check import ScanCheck
 from rosbot_patrol.tf.frames import Frames
 
-_LATEST = 1.0  # a scan older than that tells of nobody [s]
+_LATEST = 1.0  # maximum age of a scan [s]
 
 
 class People:
-    """Follows who moves by the scans of one topic. `hear` may come from another thread than all else.
+    """Tracks moving people by the scans of one topic. `hear` may be called from another thread than the rest.
 
     Args:
         frames: transforms.
-        frame: of the odometry, in which the robot's way between two scans is known.
-        movers: parameters of the watch.
-        give_way: parameters of the decision.
+        frame: of the odometry, for the robot's motion between two scans.
+        movers: parameters of the tracking.
+        give_way: parameters of giving way.
     """
 
     def __init__(self, frames: Frames, frame: str, movers: MoverParams, give_way: GiveWayParams) -> None:
         self._frames, self._frame = frames, frame
         self._watch = MoverWatch(movers)
         self._give_way = GiveWay(give_way)
-        self._unseen: LaserScan | None = None  # the newest scan that the watch has not seen
+        self._unseen: LaserScan | None = None  # the newest scan not yet tracked
         self._check = ScanCheck("nobody is waited for")
 
     def hear(self, scan: LaserScan) -> None:
@@ -35,7 +35,7 @@ class People:
         self._unseen = scan
 
     def look(self, now: float) -> None:
-        """Show the newest scan to the watch, once its place is known; `now` [s] is for what is logged."""
+        """Track the newest scan once its place is known; `now` [s] is for the log."""
         scan = self._unseen
         if scan is None:
             return
@@ -49,17 +49,17 @@ class People:
             self._forget(scan)
             return
         except TransformError:
-            return  # not yet: the next look tries again
+            return  # not yet: the next call tries again
         self._forget(scan)
         self._check.clear(now)
         self._watch.see(level.scan, level.pose)
 
     def waits(self, wish: Twist2D, odom_from_base: Pose2D, now: float) -> str:
-        """For whom the robot has to wait instead of driving a velocity, "" for nobody."""
+        """Description of the person to wait for instead of driving a velocity, "" for nobody."""
         return self._give_way.waits(wish, self.movers(now), odom_from_base, now)
 
     def movers(self, now: float) -> list[Mover]:
-        """Who moves."""
+        """The moving people."""
         return self._watch.movers(now) if abs(now - self._watch.stamp) <= _LATEST else []
 
     def _forget(self, scan: LaserScan) -> None:

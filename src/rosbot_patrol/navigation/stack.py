@@ -1,6 +1,6 @@
-"""What the node move_base is made of, wired and stepped without ROS: costmaps, planners, recoveries, people, navigator.
+"""Navigation stack of move_base without ROS: costmaps, planners, recoveries, people and navigator, wired.
 
-move_base, its replay over a bag and the closed loop run it.
+move_base, its replay over a bag and the closed loop all run it.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ _OLD_SENSORS = "Sensor data is out of date, we're not going to allow commanding 
 
 @dataclass(frozen=True)
 class Cycle:
-    """What one control cycle brought.
+    """Result of one control cycle.
 
     Attributes:
         command: of the navigator.
-        reason: why the robot does what it does; a fault of the inputs stands above the navigator's own reason.
+        reason: reason for the robot's behaviour; a fault of the inputs takes precedence over the navigator's reason.
         text: the same in a sentence.
-        pose: the robot in the global costmap's frame, None if it is not known.
+        pose: of the robot in the global costmap's frame, None if unknown.
     """
 
     command: Command
@@ -55,16 +55,16 @@ class NavigationStack:
         now: time at the start.
 
     Raises:
-        ParamError: a parameter makes no sense.
+        ParamError: a parameter is invalid.
         MapError: the mask file of a keep-out layer cannot be used.
 
     Attributes:
         params: of move_base itself.
         global_costmap, local_costmap: fed and updated from outside.
         planner, controller: the global and the local planner.
-        people: who moves around the robot; fed from outside.
+        people: people around the robot; fed from outside.
         navigator: the state machine.
-        departed: says which program that the robot cannot drive without has gone, "" for none.
+        departed: function that names a required program that has gone, "" for none.
     """
 
     def __init__(
@@ -121,17 +121,17 @@ class NavigationStack:
 
     @property
     def costmaps(self) -> tuple[FedCostmap, FedCostmap]:
-        """The global one and the local one."""
+        """The global and the local costmap."""
         return self.global_costmap, self.local_costmap
 
     @property
     def scan_topic(self) -> str:
-        """Topic of the local costmap's first scans, by which people are followed; "" if it takes none."""
+        """Topic of the local costmap's first scans, used to track people; "" if it uses none."""
         scans = self.local_costmap.scan_inputs
         return scans[0].topic if scans else ""
 
     def configure(self, params: MoveBaseParams) -> None:
-        """Take other parameters from the next step on."""
+        """Use other parameters from the next step on."""
         self.params = params
         self.navigator.configure(params, self._make_recoveries(params))
         if "controller_frequency" not in self._group(short_name(params.base_local_planner)):
@@ -139,14 +139,14 @@ class NavigationStack:
             self.controller.set_params(own)
 
     def fit_controller(self) -> None:
-        """Tell the local planner that its costmap has another footprint or resolution."""
+        """Tell the local planner that its costmap's footprint or resolution has changed."""
         costmap = self.local_costmap.costmap
         self.controller.fit(costmap.footprint, resolution=costmap.info.resolution)
 
     # Inputs
 
     def hear_velocity(self, twist: Twist2D, now: float) -> None:
-        """Take the robot's velocity, which came at a time [s]."""
+        """Store the robot's velocity, received at a time [s]."""
         self._velocity = twist, now
 
     def plan(self, start: Pose2D, goal: Pose2D, *, tolerance: float | None = None) -> Array:
@@ -155,7 +155,7 @@ class NavigationStack:
             return self.planner.plan(self.global_costmap.copy(), start, goal, tolerance=tolerance)
 
     def plan_from_robot(self, goal: Pose2D, now: float) -> Array:
-        """Plan from where the robot is; raises PlanningError, or TransformError if that is not known."""
+        """Plan from the robot's pose; raises PlanningError, or TransformError if the pose is unknown."""
         return self.plan(self.global_costmap.robot_pose(now), goal)
 
     # Steps
@@ -173,7 +173,7 @@ class NavigationStack:
         return Cycle(command, reason or command.reason, text or command.text, pose)
 
     def view(self, now: float) -> tuple[NavigatorView | None, Reason | None, str]:
-        """What the navigator sees, None if it must not drive by it; and what is wrong, None and "" if nothing."""
+        """Input of the navigator, None if it must not drive; and the fault and its sentence, if there is one."""
         gone = self.departed()
         if gone:
             return None, Reason.DEPARTED, gone
@@ -208,7 +208,7 @@ class NavigationStack:
         return Pose2D() if frames[0] == frames[1] else self._frames.lookup(*frames)
 
     def _input_fault(self, now: float) -> tuple[Reason | None, str]:
-        """Which input is too old to drive by."""
+        """The input that is too old to drive by."""
         timeout = self.params.odom_timeout
         heard = -math.inf if self._velocity is None else self._velocity[1]
         no_odometry = ""

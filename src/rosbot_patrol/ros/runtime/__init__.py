@@ -1,1 +1,1 @@
-"""What every node shares: start and end, inputs, logs, diagnostics, transforms, files."""
+"""Common parts of all nodes: start and end, inputs, logs, diagnostics, transforms, files."""

@@ -1,4 +1,4 @@
-"""Programs that people type: where nobody answers they end with a sentence; those that roslaunch starts wait."""
+"""Programs started by hand: they end with a sentence if a required program is missing; under roslaunch they wait."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ PATIENCE = 5.0  # [s]
 
 
 class NobodyThere(PatrolError):
-    """A program that others need to answer is not running."""
+    """A required program is not running."""
 
 
 def is_launched() -> bool:
-    """Whether roslaunch started this program: only roslaunch names a log file."""
+    """Whether roslaunch started this program: it gives a name of a log file."""
     return any(word.startswith("__log:=") for word in sys.argv)
 
 
 def require_master(program: str, *, patience: float = PATIENCE, status: int = 1) -> None:
-    """End the program with one sentence where no ROS master answers; nothing where roslaunch started it.
+    """End the program with one sentence if no ROS master answers; under roslaunch do nothing.
 
     Args:
         program: its name.
@@ -39,7 +39,7 @@ def require_master(program: str, *, patience: float = PATIENCE, status: int = 1)
 
 
 def master_problem(patience: float = PATIENCE) -> str:
-    """Why no ROS master can be asked, "" where one answers within `patience` [s]."""
+    """Reason why no ROS master is available, "" if one answers within `patience` [s]."""
     uri = ""
     try:
         uri = rosgraph.get_master_uri()
@@ -47,7 +47,7 @@ def master_problem(patience: float = PATIENCE) -> str:
     except (ValueError, OSError):
         return f"ROS_MASTER_URI is '{uri}', expected http://HOST:PORT"
     answered = threading.Event()
-    # On a thread: a host that does not resolve or a port that never answers would hold it for minutes.
+    # On a thread: an unresolvable host or a silent port would block for minutes.
     threading.Thread(target=_ask, args=(master, answered, time.monotonic() + patience), daemon=True).start()
     if answered.wait(patience):
         return ""
@@ -63,15 +63,15 @@ def _ask(master: Any, answered: threading.Event, until: float) -> None:
 
 
 def require_publisher(subscriber: rospy.Subscriber, who: str, *, patience: float = PATIENCE) -> None:
-    """Wait until somebody publishes what a program listens to.
+    """Wait until a topic has a publisher.
 
     Args:
         subscriber: of the topic.
-        who: the program that should publish it.
-        patience: how long to wait [s].
+        who: name of the program that should publish it.
+        patience: longest wait [s].
 
     Raises:
-        NobodyThere: nobody does.
+        NobodyThere: there is no publisher.
     """
     until = time.monotonic() + patience
     while not rospy.is_shutdown() and not subscriber.get_num_connections():

@@ -1,4 +1,4 @@
-"""Who calls a service, and from which machine."""
+"""Caller of a service: its name and machine."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ _PEER = "rosbot_patrol_peer"  # in a connection's header: the caller's address
 
 
 class CallerService(rospy.Service):  # type: ignore[misc]
-    """A service that knows the address of who calls it."""
+    """A service that knows the address of its caller."""
 
     def handle(self, transport: Any, header: dict[str, str]) -> None:
-        """Note the address beside the caller's name, then answer."""
-        header[_PEER] = ""  # whatever the caller says itself
+        """Record the address beside the caller's name, then answer."""
+        header[_PEER] = ""  # the caller's own entry does not count
         try:
             header[_PEER] = str(transport.socket.getpeername()[0])
-        except OSError as err:  # it has hung up
+        except OSError as err:  # it has disconnected
             log.debug("the address of a caller is not known: %s", err)
         super().handle(transport, header)
 
 
 def caller_of(request: object) -> str:
-    """Who calls a `CallerService`, and from which machine, for people."""
+    """Name and machine of a `CallerService`'s caller, for people."""
     header = getattr(request, "_connection_header", None) or {}
     peer = str(header.get(_PEER, ""))
     is_here = peer.startswith("127.") or peer == "::1"

@@ -1,4 +1,4 @@
-"""A node's health on /diagnostics, once a second of wall time."""
+"""Health of a node on /diagnostics, once a second of wall time."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ OK, WARN, ERROR, STALE = (
 
 
 class Health:
-    """Keeps one status per part of a node and publishes all of them at 1 Hz, and at once when a level changes.
+    """One status for each part of a node, published at 1 Hz, and at once when a level changes.
 
     Args:
-        hardware_id: what the node serves, "" for none.
+        hardware_id: hardware of the node, "" for none.
     """
 
     def __init__(self, hardware_id: str = "") -> None:
@@ -35,7 +35,7 @@ class Health:
         Worker(self._run, name="diagnostics").start()
 
     def set(self, part: str, level: int, message: str, values: Mapping[str, object] | None = None) -> None:
-        """State the health of one part ("" for the node itself)."""
+        """Set the health of one part ("" for the node itself)."""
         name = rospy.get_name().strip("/") + (f": {part}" if part else "")
         status = DiagnosticStatus(
             level=level,
@@ -51,7 +51,7 @@ class Health:
             self._changed.set()
 
     def drop(self, part: str) -> None:
-        """Forget a part, such as a client that has gone."""
+        """Remove a part, such as a client that has gone."""
         with self._lock:
             self._parts.pop(part, None)
 

@@ -1,8 +1,8 @@
-"""A link to a node that says nothing, or no ROS, holds up nobody.
+"""Handshakes of new links on threads of their own, so that a silent peer blocks nobody.
 
-rospy's server reads the header of a new link on the one thread that accepts links, and waits for it without end. Where
-a node's port was another's a moment ago, the master may still send that one a request of XML-RPC there: its first four
-bytes are the length of a header of 1.4 GB, and the node hears no subscriber and no call any more.
+rospy's server reads the header of a new link on the only thread that accepts links, and without a time limit. If a
+node's port belonged to another node a moment ago, the master may still send XML-RPC requests there. The first four
+bytes of such a request stand for a header of 1.4 GB, and the node then accepts no subscriber and no call any more.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from typing import Any
 import rospy
 from rospy.impl.tcpros_base import TCPROSServer
 
-PATIENCE_S = 10.0  # for all of a header, piece by piece
+PATIENCE_S = 10.0  # time for a whole header
 LARGEST = 1 << 20  # bytes of a header; the largest part is the text of a message's definition
 
 _read_header_and_serve = TCPROSServer._tcp_server_callback
 
 
 def install() -> None:
-    """Let each new link of this process be greeted on a thread of its own; before `rospy.init_node`."""
+    """Greet each new link of this process on its own thread; call it before `rospy.init_node`."""
     TCPROSServer._tcp_server_callback = _accept
 
 
@@ -31,7 +31,7 @@ def _accept(server: Any, link: socket.socket, address: tuple[Any, ...]) -> None:
 
 
 def _greet(server: Any, link: socket.socket, address: tuple[Any, ...]) -> None:
-    link.settimeout(PATIENCE_S)  # until rospy takes the link, and sets it to block
+    link.settimeout(PATIENCE_S)  # until rospy takes over the link and makes it blocking
     try:
         first = link.recv(4, socket.MSG_PEEK)
     except OSError as err:

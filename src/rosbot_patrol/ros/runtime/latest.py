@@ -1,4 +1,4 @@
-"""What a callback stores and a step reads."""
+"""Exchange of values between callbacks, which store, and steps, which read."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class Latest(Generic[T]):
-    """The newest value of an input, with the time it was stored; safe between threads."""
+    """The newest value of an input, with the time it was stored; thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -28,7 +28,7 @@ class Latest(Generic[T]):
         return self._value
 
     def take(self) -> T | None:
-        """The newest value, which is then gone."""
+        """Remove and return the newest value."""
         with self._lock:
             value, self._value = self._value, None
             return value
@@ -40,7 +40,7 @@ class Latest(Generic[T]):
 
     @property
     def count(self) -> int:
-        """How many values have come in all."""
+        """Number of values stored so far."""
         return self._count
 
     def fresh(self, now: float, timeout: float) -> bool:
@@ -52,7 +52,7 @@ class Latest(Generic[T]):
 
 
 def drain(source: deque[T]) -> list[T]:
-    """Take all that a queue holds, while others may append to it."""
+    """Take everything from a queue, while others may append to it."""
     items = []
     while source:
         items.append(source.popleft())

@@ -1,4 +1,4 @@
-"""What all nodes share: starting, failing at start in one sentence, and a loop on wall or ROS time."""
+"""Start of all nodes, their failure at start in one sentence, and a loop on wall or ROS time."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ def run_node(
     """Start a node and run `body`; a PatrolError or a bad file is logged in one sentence and the program exits 1.
 
     Args:
-        name: name of the node where the launch file gives none.
+        name: name of the node, unless the launch file gives one.
         body: builds and runs it; returns on shutdown.
-        priority: among the processes of the machine, as far as the system permits it.
-        by_hand: people type this program: without a ROS master it ends, unless roslaunch started it.
+        priority: among the processes of the machine, if the system permits it.
+        by_hand: the program is also started by hand: without a ROS master it ends, unless roslaunch started it.
         init_options: further arguments of `rospy.init_node`.
     """
     if by_hand:
         require_master(name)
-    refused = take(priority)  # before there are other threads: they take after this one
+    refused = take(priority)  # before there are other threads: they inherit it
     greeting.install()
     rospy.init_node(name, **init_options)
     logs.install()
@@ -62,17 +62,17 @@ def run_node(
         rospy.signal_shutdown(str(err))
         sys.stdout.flush()
         os._exit(1)
-    except rospy.ROSException:  # sleeping or publishing while the node ends; topics close before is_shutdown says so
+    except rospy.ROSException:  # sleeping or publishing while the node ends; topics close before is_shutdown is set
         if not is_shutdown_requested():
             raise
         ending.finish()
 
 
 class _Ending:
-    """Ends the node on a thread of its own when a signal comes.
+    """Ends the node on its own thread when a signal arrives.
 
-    rospy does so within the signal handler, on the main thread: where that waits for the master just then, rospy's
-    lock around the master is held, and the node never ends. The main thread must not block without looking at
+    rospy does so within the signal handler, on the main thread. If that thread is just waiting for the master, it holds
+    rospy's lock of the master, and the node never ends. The main thread must not block without checking
     `rospy.is_shutdown`.
     """
 
@@ -86,7 +86,7 @@ class _Ending:
         threading.Thread(target=self._work, name="ending", daemon=True).start()
 
     def finish(self) -> None:
-        """Let a shutdown that is under way tell the master."""
+        """Let a shutdown in progress inform the master."""
         if self._has_come:
             self._done.wait(5.0)
 
@@ -106,19 +106,19 @@ class _Ending:
 
 
 def load_params(cls: type[T], *, ignore: Iterable[str] = (), tree: dict[str, Any] | None = None) -> T:
-    """The node's private parameters through their declaration (one round trip to the master)."""
+    """Load the node's private parameters by their declaration (one round trip to the master)."""
     if tree is None:
         tree = rospy.get_param("~", {}) or {}
     return params.load(cls, tree, name=rospy.get_name() + "/", ignore=ignore)
 
 
 def ros_home() -> Path:
-    """Where ROS keeps a user's files."""
+    """Folder of a user's ROS files."""
     return Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
 
 
 def sender_of(message: object) -> str:
-    """Name of the node that published a message, "" where it did not come by a topic."""
+    """Name of the node that published a message, "" if it did not come by a topic."""
     header = getattr(message, "_connection_header", None) or {}
     return str(header.get("callerid", ""))
 
@@ -129,10 +129,10 @@ def now() -> float:
 
 
 class Worker(threading.Thread):
-    """A thread that a node cannot do without: whatever exception leaves it is logged and ends the node.
+    """A thread that a node cannot work without: any exception that leaves it is logged and ends the node.
 
-    So that no node looks alive with half of it dead; the launch file's respawn brings it back whole. `run_node` sees
-    to it.
+    No node looks alive with a part of it dead; the launch file's respawn restarts it as a whole. `run_node` provides
+    for that.
     """
 
     def __init__(self, target: Callable[[], None] | None = None, *, name: str) -> None:
@@ -151,9 +151,9 @@ def _end_with_worker(args: threading.ExceptHookArgs) -> None:
 
 
 class Loop(Worker):
-    """Calls `step(now)` at a rate of ROS time on its own thread, without hanging when simulated time stops.
+    """Calls `step(now)` at a rate of ROS time on its own thread; it does not hang when simulated time stops.
 
-    A step that takes too long is followed by the next at once; the loop does not catch up.
+    A step that takes too long is followed by the next one at once; the loop does not catch up.
     """
 
     def __init__(self, rate: float, step: Callable[[float], None], *, name: str = "loop") -> None:
@@ -163,11 +163,11 @@ class Loop(Worker):
         self._hurried = False
 
     def set_rate(self, rate: float) -> None:
-        """Another rate from the next step on."""
+        """Use another rate from the next step on."""
         self._period = 1.0 / rate
 
     def hurry(self) -> None:
-        """Have a step at once, besides those that are due; from any thread."""
+        """Run an extra step at once; callable from any thread."""
         self._hurried = True
 
     def run(self) -> None:
@@ -186,5 +186,5 @@ class Loop(Worker):
             self._step(current)
 
     def _wait(self, seconds: float) -> None:
-        # Under simulated time the clock may run faster or slower than the wall: look often, never block for good.
+        # Simulated time may run faster or slower than the wall: check often, never block for ever.
         time.sleep(min(max(seconds / 3.0, 0.001), 0.01))

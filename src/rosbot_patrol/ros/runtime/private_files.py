@@ -1,7 +1,7 @@
-"""What the house's cameras saw, and who is told, is for the robot's user only: files that no other user can read.
+"""Private files: pictures of the house and notices are readable only by the robot's user.
 
-A program that writes into a `state_dir` calls `keep_private` before it does. Files outside are not touched: maps, rooms
-and ROS's own logs keep the mode that the user's umask gives them, unless such a program writes them.
+A program that writes into a `state_dir` calls `keep_private` first. Other files are not touched: maps, rooms and ROS's
+own logs keep the mode given by the user's umask, unless such a program writes them.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ _MAILDIR = ("cur", "new", "tmp")
 
 
 def use_private_umask() -> None:
-    """Make what this program writes from now on readable by its user only."""
+    """Make all files written from now on readable by the user only."""
     os.umask(UMASK)
 
 
 def keep_private(state_dir: Path) -> None:
-    """Make what this program writes readable by its user only, and what lies in `state_dir` from before.
+    """Make all files written from now on, and those already in `state_dir`, readable by the user only.
 
-    Only what the patrol put there is touched: other things in that folder (a home, /tmp) stay as they are. What cannot
-    be changed is said; the program goes on.
+    Only the patrol's own entries are changed: other things in that folder (a home, /tmp) stay as they are. Entries that
+    cannot be changed are logged; the program continues.
     """
     use_private_umask()
     try:
@@ -52,7 +52,7 @@ def _tighten(state_dir: Path, loose: list[Path]) -> None:
     for path in loose:
         try:
             path.chmod(stat.S_IMODE(path.lstat().st_mode) & ~UMASK)
-        except FileNotFoundError:  # another program has used it up
+        except FileNotFoundError:  # another program has removed it
             continue
         except OSError as err:
             problems.append(f"{path}: {err.strerror}")
@@ -63,7 +63,7 @@ def _tighten(state_dir: Path, loose: list[Path]) -> None:
 
 
 def _sort(state_dir: Path) -> tuple[list[Path], list[str]]:
-    """What the patrol put there, with all below, and the names of what else is there. Raises OSError."""
+    """The patrol's own entries with everything below, and the names of other entries. Raises OSError."""
     ours: list[Path] = []
     foreign: list[str] = []
     for entry in os.scandir(state_dir):
@@ -80,7 +80,7 @@ def _sort(state_dir: Path) -> tuple[list[Path], list[str]]:
 
 
 def _below(folder: Path) -> Iterator[Path]:
-    for place, _, files in os.walk(folder):  # goes into no links
+    for place, _, files in os.walk(folder):  # does not follow links
         yield Path(place)
         yield from (path for name in files if not (path := Path(place, name)).is_symlink())
 

@@ -1,6 +1,6 @@
-"""How a node stands to the other processes of its machine.
+"""Priority and memory of a node's process.
 
-The memory of a node that works on large arrays, or pictures, in several threads.
+Memory matters for nodes that work on large arrays, or pictures, in several threads.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import os
 from pathlib import Path
 
 _AUTOGROUP = Path("/proc/self/autogroup")
-_RR = 1  # the least of the real-time priorities: before all that is ordinary, behind who asked for more
+_RR = 1  # the lowest real-time priority: before all ordinary processes
 
 
 class Priority(enum.Enum):
-    """Whom a node goes before: the nice value of each."""
+    """Priority of a node, with its nice value."""
 
     ORDINARY = 0
-    RAISED = -5  # before other ordinary ones
-    CONTROL = -15  # before all that is ordinary, where the system permits real-time scheduling
+    RAISED = -5  # before other ordinary processes
+    CONTROL = -15  # before all ordinary processes, if the system permits real-time scheduling
 
 
 def take(priority: Priority) -> str:
@@ -64,7 +64,7 @@ LARGE = 1 << 20  # [bytes]
 
 
 def share_one_heap() -> bool:
-    """Let all threads take their memory from one place; before there are any.
+    """Let all threads share one heap; call it before there are any.
 
     Otherwise glibc gives threads places of their own, each of which keeps what it has ever used: republish came to 178
     instead of 172 MB within a quarter of an hour. Python's lock keeps the threads from waiting for one another there.
@@ -74,7 +74,7 @@ def share_one_heap() -> bool:
 
 
 def give_back_large_blocks(size: int = LARGE) -> bool:
-    """Let freed blocks of a size [bytes] and more go back to the system at once (mallopt(3) of glibc).
+    """Return freed blocks of at least a size [bytes] to the system at once (mallopt(3) of glibc).
 
     Otherwise glibc raises that bound to 32 MB by itself, and each thread keeps what it has ever used: the copies of a
     costmap of 12 million cells came to 600 MB. Returns whether the C library knows of it.

@@ -1,13 +1,13 @@
-"""Parameters that can be changed while a node runs: dynamic_reconfigure servers made of our declarations.
+"""dynamic_reconfigure servers for parameters that can change at run time, made from our declarations.
 
 Matches dynamic_reconfigure 1.7's servers from outside (`set_parameters`, `parameter_descriptions`,
-`parameter_updates`): `dynparam`, its Python client and rqt_reconfigure take them for its own.
+`parameter_updates`): `dynparam`, its Python client and rqt_reconfigure work with them.
 
 Differs:
-    - What can be changed comes from the parameters' declarations; there are no .cfg files.
-    - A request with a name that is not known or a value of another type is refused as a whole, in a sentence; upstream
-      takes what it can of it. What is out of bounds is clamped, as upstream, and said.
-    - The parameter server is told what was changed, not everything at the start.
+    - The changeable parameters come from the declarations; there are no .cfg files.
+    - A request with an unknown name or a value of another type is refused as a whole, with a sentence; upstream applies
+      the rest. Values out of bounds are clamped, as upstream, with a warning.
+    - The parameter server receives only changes, not everything at the start.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ _GROUP = {"name": "Default", "id": 0, "parent": 0, "type": "", "state": True, "g
 
 
 class ReconfigureServer:
-    """One namespace of parameters.
+    """Server for one namespace of parameters.
 
     Args:
-        namespace: under the node's own, "" for the node itself; one that begins with a slash stands for itself.
-        params: the parameters as they are, a dataclass.
-        names: of those that can be changed.
-        apply: takes the values that change, returns all parameters as they are then; raises ParamError.
+        namespace: below the node's own, "": the node itself; one with a leading slash is absolute.
+        params: present parameters, a dataclass.
+        names: of the changeable ones.
+        apply: applies changed values and returns all parameters; raises ParamError.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class ReconfigureServer:
                 rospy.set_param(f"{self._space}/{name}", value)
 
     def _wanted(self, config: Config) -> dict[str, Any]:
-        """What a request asks for, checked and clamped."""
+        """Requested values, checked and clamped."""
         given = {item.name: item.value for item in (*config.bools, *config.ints, *config.strs, *config.doubles)}
         if given.pop(RESTORE, False):
             return dict(self._first)
@@ -162,7 +162,7 @@ def _bounds(entry: Tunable) -> tuple[Any, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Lists as upstream's texts: "[[x, y], ...]" for pairs, "a,b" for numbers."""
+    """Lists in upstream's text form: "[[x, y], ...]" for pairs, "a,b" for numbers."""
     if not isinstance(value, (list, tuple)):
         return value
     if value and isinstance(value[0], (list, tuple)):

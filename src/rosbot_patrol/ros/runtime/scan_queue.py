@@ -1,4 +1,4 @@
-"""The thread of a node that lives on scans, waiting for them and for tf (tf's MessageFilter, without its locks)."""
+"""Queue between the scan topic and the thread that waits for scans and tf (tf's MessageFilter, without its locks)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ POLL_S, IDLE_S = 0.008, 0.2
 
 
 class ScanQueue:
-    """A ScanFeed that a subscriber fills and a worker waits at.
+    """A ScanFeed that is filled by a subscriber and emptied by a worker.
 
     Args:
         feed: judges and places the scans.
@@ -30,7 +30,7 @@ class ScanQueue:
             self._arrived.set()
 
     def take(self) -> PlacedScan | None:
-        """Take the oldest scan that can be placed, None if none can be now; waits for a few milliseconds at most."""
+        """Take the oldest scan that can be placed, None if there is none; waits for a few milliseconds at most."""
         if not len(self._feed):
             self._arrived.wait(IDLE_S)
         self._arrived.clear()

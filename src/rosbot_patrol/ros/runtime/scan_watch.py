@@ -1,4 +1,4 @@
-"""What amcl and slam_gmapping watch alike: whether the lidar speaks and makes sense, whether the clock went back."""
+"""Supervision of the scan topic, for amcl and slam_gmapping: silence, unusable scans, and a clock set back."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rosbot_patrol.scan_check import ScanCheck
 
 log = logging.getLogger(__name__)
 
-PATIENCE_S = 1.0  # single bad scans among good ones are only logged
-SILENT_S = 15.0  # as upstream's amcl: a lidar that says nothing for so long is warned of
+PATIENCE_S = 1.0  # single unusable scans among good ones are only logged
+SILENT_S = 15.0  # silence after which the lidar is reported, as in upstream's amcl
 
 
 class ScanWatch:
-    """Watches the topic `scan` of a node that lives on it.
+    """Supervises the topic `scan` of a node that depends on it.
 
     Args:
         transforms: forgotten when time goes back.
@@ -29,22 +29,22 @@ class ScanWatch:
         self._last_scan = self._last_time = now()
 
     def hear(self) -> None:
-        """Note that a scan came."""
+        """Record a scan."""
         self._last_scan = now()
 
     def tend(self, current: float) -> str:
-        """Look at the clock and the lidar; to be called each second or so.
+        """Check the clock and the lidar; call it about every second.
 
         Args:
             current: time now [s].
 
         Returns:
-            What is wrong with the lidar, "" if it speaks and makes sense.
+            Problem of the lidar, "" for none.
         """
         if current < self._last_time - 1.0:
             log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
             self._transforms.buffer.clear()
-        if abs(current - self._last_time) > SILENT_S:  # the clock was set, nobody was silent for so long
+        if abs(current - self._last_time) > SILENT_S:  # the clock was set; this is no silence
             self._last_scan = current
         self._last_time = current
         silent = current - self._last_scan

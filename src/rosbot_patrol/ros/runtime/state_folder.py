@@ -1,4 +1,4 @@
-"""The folder in which a guard keeps its state: one for each guard of a machine."""
+"""State folder of a guard, one for each guard of a machine."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from rosbot_patrol.ros.runtime.node import ros_home
 
 log = logging.getLogger(__name__)
 
-_PATIENCE = 5.0  # [s] for a program before this one to end
-_held: list[IO[str]] = []  # locks last as long as the process
+_PATIENCE = 5.0  # [s] for the previous program to end
+_held: list[IO[str]] = []  # the locks last as long as the process
 
 
 def state_folder(given: str | Path | None, namespace: str) -> Path:
-    """Folder of a guard's state: as given, else in ROS's home, so that each namespace has its own.
+    """Folder of a guard's state: the given one, else one in ROS's home for each namespace.
 
     Args:
-        given: the parameter `state_dir`, empty for the default.
-        namespace: of the guard's nodes; "/" for none.
+        given: the parameter `state_dir`, empty: the default.
+        namespace: of the guard's nodes; "/": none.
     """
     if given:
         return Path(given).expanduser()
@@ -30,16 +30,16 @@ def state_folder(given: str | Path | None, namespace: str) -> Path:
 
 
 def claim_folder(folder: Path, name: str) -> None:
-    """Keep a guard's state folder for this process, so that no second guard mixes its missions with ours.
+    """Lock a guard's state folder for this process, so that no second guard uses it.
 
-    A folder that cannot be written is not locked: who writes there says so.
+    A folder that cannot be written is not locked: the programs that write there report it.
 
     Args:
         folder: of the state.
-        name: of the parameter that gives it, for the error.
+        name: of its parameter, for the error.
 
     Raises:
-        ParamError: another patrol of this machine has it.
+        ParamError: another patrol on this machine uses it.
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -62,6 +62,6 @@ def _is_taken(lock: IO[str]) -> bool:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
-    except OSError as err:  # a disk that knows no locks
+    except OSError as err:  # a file system without locks
         log.warning("%s cannot be locked against a second patrol: %s", lock.name, err)
     return True

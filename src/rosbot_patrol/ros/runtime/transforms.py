@@ -1,4 +1,4 @@
-"""tf at the edge: planar look-ups that never wait, and one listener a node."""
+"""tf at the edge: planar look-ups that never wait, and one listener per node."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from rosbot_patrol.geometry import Pose2D, Transform
 
 
 class _Listener(tf2_ros.TransformListener):
-    """Remembers who told where a frame is, too."""
+    """A listener that also stores which node published each frame."""
 
     def __init__(self, buffer: tf2_ros.Buffer) -> None:
         self.told: dict[str, tuple[str, str]] = {}  # frame: (its parent, name of the node)
         super().__init__(buffer, tcp_nodelay=True)
 
     def callback(self, data: TFMessage) -> None:
-        """Take in transforms that move."""
+        """Store moving transforms."""
         super().callback(data)
         who = data._connection_header.get("callerid", "")
         for each in data.transforms:
             self.told[each.child_frame_id.lstrip("/")] = (each.header.frame_id.lstrip("/"), who)
 
     def connected(self) -> set[str]:
-        """Names of the nodes whose transforms come; rospy drops a connection as soon as its other end has died."""
+        """Names of the nodes with a live connection; rospy drops a connection as soon as its other end dies."""
         return {getattr(connection, "callerid_pub", "") for connection in self.tf_sub.impl.connections}
 
 
@@ -39,9 +39,9 @@ class Transforms:
         self._listener = _Listener(self.buffer)
 
     def departed(self, frame: str) -> str:
-        """Who has gone of those who told where a frame is in the frames above it, in a sentence; else empty.
+        """Sentence about a publisher of the frames above this one that has gone; else empty.
 
-        Much sooner known than that a transform is old: within milliseconds on one host.
+        This is known much sooner than the age of a transform: within milliseconds on one host.
         """
         connected = self._listener.connected()
         frame, seen = frame.lstrip("/"), set[str]()
@@ -57,7 +57,7 @@ class Transforms:
         """Look up `target_from_source` in space at a time [s], the newest for None.
 
         Raises:
-            TransformError: it is not known, or not at that time.
+            TransformError: it is unknown, or unknown at that time.
         """
         when = rospy.Time(0) if stamp is None else rospy.Time.from_sec(stamp)
         return self._find(target, source, when)[0]
