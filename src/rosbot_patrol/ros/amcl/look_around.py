@@ -1,7 +1,7 @@
-"""The robot's turn on the spot while amcl searches for it: one scan may fit in many places, a turn's scans in fewer.
+"""Turn of the robot on the spot while amcl searches: one scan may fit many places, the scans of a turn fit fewer.
 
-It is driven on `~cmd_vel`, on which amcl is silent at all other times. In our launch files that is a source of
-twist_mux above move_base, with the collision guard behind it.
+Commands go to `~cmd_vel`; at all other times amcl publishes nothing there. In our launch files that topic is a source
+of twist_mux with a higher priority than move_base, and the collision guard comes after it.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ PARAMS = SpinParams(spin_speed=0.6)
 
 
 class LookAround:
-    """Turns the robot once when asked to.
+    """Turns the robot once on request.
 
     Args:
         transforms: the node's tf.
         odom: frame of the odometry.
         base: frame of the robot.
-        is_over: whether the robot has been found, so that the turn may end early.
+        is_over: function that returns whether the robot has been found, so that the turn may end early.
     """
 
     def __init__(self, transforms: Transforms, odom: str, base: str, is_over: Callable[[], bool]) -> None:
@@ -45,13 +45,13 @@ class LookAround:
         self._publisher = rospy.Publisher("~cmd_vel", Twist, queue_size=1)
 
     def start(self) -> None:
-        """Begin a turn, or a new one."""
+        """Start a turn, or start it again."""
         with self._lock:
             self._spin = Spin(math.tau, params=PARAMS)
             self._wanted.set()
 
     def watch(self) -> None:
-        """Be ready to turn."""
+        """Start the thread that turns."""
         Worker(self._work, name="look around").start()
 
     def _work(self) -> None:

@@ -1,4 +1,4 @@
-"""Where amcl's map comes from: the service `static_map`, or the topic `map`."""
+"""Source of amcl's map: the service `static_map`, or the topic `map`."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ ASK_AGAIN_S = 0.5
 
 
 class MapSource:
-    """Gets the map and hands it on.
+    """Gets the map and passes it on.
 
     Args:
         params: of amcl.
-        take: takes a map; raises MapError where it cannot be used.
+        take: function that takes a map; raises MapError if it cannot be used.
     """
 
     def __init__(self, params: AmclParams, take: Callable[[Grid], None]) -> None:
@@ -36,7 +36,7 @@ class MapSource:
         self._subscriber: rospy.Subscriber | None = None
 
     def start(self) -> None:
-        """Ask or listen."""
+        """Call the service or subscribe to the topic."""
         if self._params.use_map_topic:
             self._subscriber = rospy.Subscriber("map", GridMsg, self._message, queue_size=1)
         else:
@@ -60,7 +60,7 @@ class MapSource:
             self._subscriber.unregister()
 
     def take(self, message: OccupancyGrid, source: str) -> bool:
-        """Take a map; False, with a sentence that names the source, where it cannot be used."""
+        """Pass on a map; False, with a log line that names the source, if it cannot be used."""
         frame = message.header.frame_id
         if frame.lstrip("/") != self._frame:
             log.warning(

@@ -5,20 +5,25 @@ Matches amcl of ROS Noetic's navigation 1.17: topics `scan`, `initialpose`, `map
 `request_nomotion_update`, `set_map`; the map from the service `static_map`; parameters in `AmclParams`, with the pose
 saved to them for a respawn, and dynamic_reconfigure. Written from Probabilistic Robotics and upstream's documentation.
 
-Beyond upstream: `~health` says whether the estimate is to be believed, by how well the scans agree with the map there.
-Where they contradict it, a second filter searches the whole map (`~seek`), and hands over what it finds. The service
-`~relocalize` starts that search by hand, with one turn of the robot on the spot, driven on `~cmd_vel`.
+Beyond upstream: `~health` publishes the trust in the estimate, from the agreement of scans and map. If they disagree, a
+second filter searches the whole map (`~seek`) and hands over its result. The service `~relocalize` starts that search
+by hand, with one turn of the robot on the spot, driven on `~cmd_vel`.
 
-Differs: within the best cluster particles that fit the newest scan count for more, where upstream takes the plain
-mean: with the tutorial's few updates that is 5 cm off instead of 25. All particles in one bin ask for the fewest
-particles, upstream's rule then asks for the most. The weights of `likelihood_field` and `beam` count to the third
-power, or somebody beside the robot leads it astray where updates are few. The averages behind the recovery are of a
-beam's fit, so that more or fewer beams are no cause for random poses. Draws follow an even sequence instead of
-independent numbers. A new map keeps the pose that the filter has. A pose that was saved in another run of a
-simulation is not taken, to one of this run the way since is added. An odometry that jumps, with the clock or
-without, began anew and is no motion; a scan that is older than one taken in is left out. Only bins of some weight
-link clusters, so that random poses do not chain the house together. A turned map is refused with a sentence.
-dynamic_reconfigure: see `amcl_tuning`.
+Differs:
+- Within the best cluster, particles that fit the newest scan count for more; upstream takes the plain mean. With the
+  tutorial's rare updates that is 5 cm off instead of 25.
+- Particles that are all in one bin need the fewest particles; upstream's rule then needs the most.
+- The weights of `likelihood_field` and `beam` count to the third power; otherwise a person beside the robot leads it
+  astray when updates are rare.
+- The averages behind the recovery are of the fit per beam, so that a changed number of beams causes no random poses.
+- Draws follow an even sequence instead of independent numbers.
+- A new map keeps the filter's pose. A pose saved in another run of a simulation is not used; to one of this run the
+  motion since then is added.
+- An odometry that jumps, with or without the clock, has restarted and is no motion. A scan older than the newest one is
+  ignored.
+- Only bins of some weight link clusters, so that random poses do not link the whole house.
+- A turned map is refused with a sentence.
+- dynamic_reconfigure: see `tuning`.
 """
 
 from __future__ import annotations
@@ -163,7 +168,7 @@ class AmclNode:
             self._outputs.send_cloud(step.particles, step.stamp)
 
     def _resume(self, placed: PlacedScan) -> None:
-        """Start from what an amcl before this one saved, if that is of this run."""
+        """Start from the pose saved by an earlier amcl of this run."""
         own = self._saved.own(self._params, placed.scan.stamp)
         then = None if own is not None else self._saved.odometry(self._params, placed.odom_from_base)
         if own is not None or then is not None:

@@ -1,4 +1,4 @@
-"""What amcl says: pose, particles, map -> odom, and whether it is to be believed."""
+"""Outputs of amcl: pose, particles, map -> odom, and trust in the estimate."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from rosbot_patrol.ros.runtime.diagnostics import OK, WARN
 
 
 class AmclOutputs:
-    """The topics of amcl.
+    """Topics of amcl.
 
     Args:
-        params: of amcl; those that change while it runs are set anew.
+        params: of amcl; replaced when they change at run time.
     """
 
     def __init__(self, params: AmclParams) -> None:
@@ -44,7 +44,7 @@ class AmclOutputs:
             self._broadcaster.sendTransform(transform_to_msg(correction, self._global, self._odom, ahead))
 
     def send_pose(self, estimate: Estimate, stamp: float) -> None:
-        """The pose and how sure it is."""
+        """Send the pose and its covariance."""
         message = PoseWithCovarianceStamped()
         message.header.frame_id, message.header.stamp = self._global, time_to_msg(stamp)
         message.pose.pose = pose2d_to_pose(estimate.pose)
@@ -55,7 +55,7 @@ class AmclOutputs:
         self._pose.publish(message)
 
     def send_cloud(self, poses: NDArray[np.float64], stamp: float) -> None:
-        """The particles, shape (N, 3), as often as `gui_publish_rate` allows."""
+        """Send the particles, shape (N, 3), at most at `gui_publish_rate`."""
         rate = self.params.gui_publish_rate
         if rate > 0.0 and 0.0 <= stamp - self._last_cloud < 1.0 / rate:
             return
@@ -63,7 +63,7 @@ class AmclOutputs:
         self._cloud.publish(pose_array_to_msg(poses, self._global, stamp))
 
     def send_health(self, trust: Trust, estimate: Estimate | None, stamp: float, *, seeking: bool) -> None:
-        """Whether the estimate is to be believed."""
+        """Send the trust in the estimate."""
         message = LocalizationHealth(
             state=trust.state.name.lower(), belief=trust.belief, seeking=seeking, why=trust.reason
         )
@@ -81,7 +81,7 @@ def spread_of(estimate: Estimate) -> list[float]:
 
 
 def verdict(trust: Trust, estimate: Estimate | None, params: AmclParams, *, seeking: bool) -> tuple[int, str]:
-    """What /diagnostics says of an estimate that is being made: level and sentence."""
+    """Level and sentence for /diagnostics on an estimate."""
     if trust.state is State.LOST:
         action = "the whole map is searched" if seeking else "set an initial pose or call ~relocalize"
         return WARN, f"the robot is lost: {trust.reason}; {action}"

@@ -1,9 +1,8 @@
-"""The pose that amcl saves to its parameters `initial_*`, and when it did so.
+"""Pose saved by amcl in its parameters `initial_*`, with its time.
 
-As upstream: a node that is started again goes on from there. But a master may outlive a simulation, and in the next one
-the robot stands at its start again, with a clock that begins anew. So the time is saved too; where the first scan is
-older than it, what was saved belongs to another run and is given up for the defaults. And so is the odometry, by which
-the way is known that the robot went since.
+As upstream, a restarted node continues from there. But a master may outlive a simulation; in the next one the robot is
+at its start again, and the clock starts again. Therefore the time is saved, too: if the first scan is older, the saved
+pose belongs to another run and is replaced by the defaults. The odometry is saved for the motion since.
 """
 
 from __future__ import annotations
@@ -24,23 +23,23 @@ NAMES = tuple(f"initial_{key}" for key in ("pose_x", "pose_y", "pose_a", "cov_xx
 SAVED = "~saved_pose"
 ODOMETRY = ("odom_x", "odom_y", "odom_a")
 SLACK_S = 1.0
-FAR_M = 3.0  # a robot whose amcl is gone stops; odometry that is farther off began anew
+FAR_M = 3.0  # a robot without amcl stops; odometry farther away than this has restarted
 
 
 class SavedPose:
-    """What a node before this one saved, and what this one saves."""
+    """Pose saved by an earlier node, and by this one."""
 
     def __init__(self) -> None:
         self._before = self._found = _read(rospy.get_param(SAVED, None))
         self._last: tuple[float, ...] = ()
 
     def own(self, params: AmclParams, stamp: float) -> AmclParams | None:
-        """The start without what was saved in another run, None where nothing is to be changed.
+        """Start without a pose saved in another run, None if nothing needs to change.
 
-        A value that a launch file has set since is not the saved one, and stays.
+        A value set by a launch file since then is not the saved one, and stays.
 
         Args:
-            params: as read at the start.
+            params: read at the start.
             stamp: of the first scan [s].
         """
         before, self._before = self._before, {}
@@ -59,10 +58,10 @@ class SavedPose:
         return replace(params, **defaults)
 
     def odometry(self, params: AmclParams, now: Pose2D) -> Pose2D | None:
-        """odom_from_base at the saved pose, None where it is not known or was set anew since.
+        """odom_from_base at the saved pose, None if it is unknown or has restarted since.
 
         Args:
-            params: as read at the start; a pose in them that is not the saved one has no odometry.
+            params: read at the start; a pose other than the saved one has no odometry.
             now: odom_from_base at the first scan.
         """
         found = self._found
@@ -72,7 +71,7 @@ class SavedPose:
         return then if math.dist(then[:2], now[:2]) < FAR_M else None
 
     def save(self, values: tuple[float, ...], stamp: float, odometry: Pose2D) -> None:
-        """Set the parameters `NAMES`; raises what rospy.set_param raises."""
+        """Set the parameters `NAMES`; raises the errors of rospy.set_param."""
         if values == self._last:
             return
         pose = dict(zip(NAMES, values, strict=True))

@@ -1,4 +1,4 @@
-"""What of amcl can be changed while it runs, by dynamic_reconfigure, in upstream's names.
+"""Parameters of amcl that can change at run time, by dynamic_reconfigure, with upstream's names.
 
 Differs: frames, `use_map_topic` and `first_map_only` cannot be changed; upstream's `restore_defaults` goes back to the
 values at start. The particles stay, upstream draws them anew about the last pose. Only what was changed is written to
@@ -65,9 +65,9 @@ class AmclTuning:
     """The dynamic_reconfigure server of amcl.
 
     Args:
-        params: as they are.
+        params: present parameters.
         prefix: amcl's name and a slash, for messages.
-        take: gets the parameters as they are after a change.
+        take: called with the parameters after a change.
     """
 
     def __init__(self, params: AmclParams, prefix: str, take: Callable[[AmclParams], None]) -> None:

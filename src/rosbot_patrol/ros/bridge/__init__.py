@@ -1,1 +1,1 @@
-"""rosserial's serial_node: from motion sensors to ROS topics; and the virtual sensors."""
+"""serial_node, the bridge from motion sensors to ROS topics; and virtual sensors."""

@@ -1,4 +1,4 @@
-"""Subscriptions and services of ROS on behalf of one rosserial device; what it publishes: serial_publishers."""
+"""Subscriptions and services of ROS for one rosserial device."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ log = logging.getLogger(__name__)
 QUEUE_SIZE = 100
 SERVICE_TIMEOUT = 5.0
 
-# What a device, a service or the master can do to a call: none of it may end the bridge.
+# Errors that a device, a service or the master can cause in a call: none may end the bridge.
 _CALL_ERRORS = (
     ProtocolError,
     rospy.ServiceException,
     rospy.ROSException,
-    TransportException,  # the service's program was killed in the middle of a call
+    TransportException,  # the service's program was killed during a call
     genpy.SerializationError,
     OSError,
-    ValueError,  # an answer with a text that is no UTF-8
+    ValueError,  # an answer with text that is not UTF-8
 )
 
 Send = Callable[[int, bytes], None]
 
 
 def message_class(message_type: str) -> Any:
-    """The class of "package/Type"; raises ProtocolError where it is not built here."""
+    """Class of a message type "package/Type"; raises ProtocolError if it is not built here."""
     if message_type in ESP_TRIGGER_TYPES:
         return EspTrigger  # both names mean the same message, and the other package may be absent
     try:
@@ -55,7 +55,7 @@ def message_class(message_type: str) -> Any:
 
 
 def service_class(service_type: str) -> Any:
-    """The class of a service "package/Type"; raises ProtocolError where it is not built here."""
+    """Class of a service type "package/Type"; raises ProtocolError if it is not built here."""
     try:
         found = roslib.message.get_service_class(service_type)
     except (ImportError, ValueError) as err:
@@ -66,7 +66,7 @@ def service_class(service_type: str) -> Any:
 
 
 def check_md5(info: TopicInfo, here: Any) -> None:
-    """Compare the definitions of device and workspace; raises ProtocolError that shows both."""
+    """Compare the definitions of device and workspace; raises ProtocolError with both."""
     if info.md5 == here._md5sum:
         return
     if find_old_type(info.message_type, info.md5, here._md5sum):
@@ -85,20 +85,20 @@ def _definition(cls: Any) -> str:
 
 
 def _definition_of(md5: str) -> str:
-    """The definition that a device has, where a message known to this process is it; a device tells its sum only."""
+    """Definition used by a device, if a message type in this process has its MD5 sum."""
     classes = [cls for cls in genpy.Message.__subclasses__() if getattr(cls, "_md5sum", "") == md5]
     return f"as {classes[0]._type}: {_definition(classes[0])}" if classes else "a definition not known here"
 
 
 def serialize(message: Any) -> bytes:
-    """A message as bytes."""
+    """Serialise a message."""
     buffer = io.BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
 
 
 class Subscription:
-    """What ROS publishes on a topic goes to the device."""
+    """Forwards messages of a ROS topic to the device."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         cls = message_class(info.message_type)
@@ -124,7 +124,7 @@ class Subscription:
 
 
 class DeviceService:
-    """A service that the device offers to ROS: requests go out under one topic id, answers come under another."""
+    """A service that the device offers to ROS: requests use one topic id, answers another."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self._cls = service_class(info.message_type)
@@ -136,18 +136,18 @@ class DeviceService:
         self._service: rospy.Service | None = None
 
     def set_answer_topic(self, info: TopicInfo) -> None:
-        """Where the device's answers come from; raises ProtocolError."""
+        """Set the topic of the device's answers; raises ProtocolError."""
         check_md5(info, self._cls._response_class)
 
     def set_request_topic(self, info: TopicInfo) -> None:
-        """Where requests go; from now on ROS can call. Raises ProtocolError."""
+        """Set the topic of requests; from now on ROS can call. Raises ProtocolError."""
         check_md5(info, self._cls._request_class)
         self._request_id = info.topic_id
         if self._service is None:
             self._service = rospy.Service(self._name, raw_service(self._cls), self._call)
 
     def receive(self, data: bytes) -> None:
-        """An answer came; raises ProtocolError."""
+        """Process an answer; raises ProtocolError."""
         answer = raw_from(self._cls._response_class, data, self._info)
         if self._answers.empty():
             self._answers.put_nowait(answer)
@@ -159,7 +159,7 @@ class DeviceService:
 
     def _call(self, request: Any) -> Any:
         with self._one_at_a_time:
-            while not self._answers.empty():  # one that came too late for the call before
+            while not self._answers.empty():  # an answer too late for the previous call
                 self._answers.get_nowait()
             if self._request_id is None:
                 raise rospy.ServiceException(f"{self._name}: the device has not announced it fully")
@@ -171,7 +171,7 @@ class DeviceService:
 
 
 class ServiceCaller:
-    """A ROS service that the device calls; calls wait on a thread of their own, so the device is read on."""
+    """A ROS service that the device calls, on its own thread, so that reading from the device continues."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self._cls = service_class(info.message_type)
@@ -183,16 +183,16 @@ class ServiceCaller:
         Worker(self._run, name=f"calls {info.name}").start()
 
     def set_request_topic(self, info: TopicInfo) -> None:
-        """Where the device's requests come from; raises ProtocolError."""
+        """Set the topic of the device's requests; raises ProtocolError."""
         check_md5(info, self._cls._request_class)
 
     def set_answer_topic(self, info: TopicInfo) -> None:
-        """Where answers go; raises ProtocolError."""
+        """Set the topic of answers; raises ProtocolError."""
         check_md5(info, self._cls._response_class)
         self._answer_id = info.topic_id
 
     def receive(self, data: bytes) -> None:
-        """A request came; raises ProtocolError where too many wait."""
+        """Queue a request; raises ProtocolError if too many wait."""
         try:
             self._requests.put_nowait(data)
         except queue.Full as err:

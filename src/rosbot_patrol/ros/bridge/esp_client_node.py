@@ -1,4 +1,4 @@
-"""esp_client: a virtual ESP32 with a motion sensor, to try the bridge with; needs no ROS master.
+"""esp_client: a virtual ESP32 with a motion sensor, to test the bridge; needs no ROS master.
 
 rosrun rosbot_patrol esp_client --id 2 --port 11412 --trigger
 """

@@ -1,6 +1,6 @@
-"""Messages of devices as bytes: checked against their definition, and passed on without being read.
+"""Layouts of messages as bytes: checked against their definition and passed on without deserialisation.
 
-A text that is no UTF-8, or a number that Python would write otherwise, so comes out as it went in.
+So text that is not UTF-8, and numbers that Python would write differently, are passed on unchanged.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _SIZES |= {f"{sign}int{bits}": bits // 8 for sign in ("", "u") for bits in (8, 1
 
 
 class Run(NamedTuple):
-    """Bytes of a fixed number: `size`, and where among them the bools are."""
+    """A run of bytes of fixed `size`, and the positions of its bools."""
 
     size: int
     flags: tuple[int, ...] = ()
 
 
 class Many(NamedTuple):
-    """An array with its length before it, such as a text: `parts` of each element."""
+    """An array with a length prefix, such as a text: `parts` of each element."""
 
     parts: tuple[Any, ...]  # Run and Many
 
@@ -42,20 +42,20 @@ _TEXT = Many((Run(1),))
 
 @dataclass(frozen=True)
 class Layout:
-    """A message type whose messages all have one size.
+    """A message type of fixed size.
 
     Attributes:
-        size: of the message [bytes]; flags: where its bools are.
+        size: of the message [bytes]; flags: positions of its bools.
     """
 
     size: int
     flags: tuple[int, ...] = ()
 
     def check(self, data: bytes, info: TopicInfo) -> bytes:
-        """The message as it is to be sent, each bool 0 or 1.
+        """The bytes to send, with each bool 0 or 1.
 
         Raises:
-            ProtocolError: it has another size.
+            ProtocolError: the message has another size.
         """
         if len(data) != self.size:
             raise ProtocolError(
@@ -71,7 +71,7 @@ class VaryingLayout:
     parts: Parts
 
     def check(self, data: bytes, info: TopicInfo) -> bytes:
-        """As of `Layout`; raises ProtocolError where the bytes end too early or too late."""
+        """As in `Layout`; raises ProtocolError if the bytes are too few or too many."""
         flags: list[int] = []
         try:
             end = _walk(self.parts, data, 0, flags)
@@ -86,7 +86,7 @@ class VaryingLayout:
 
 @cache
 def layout(cls: Any) -> Layout | VaryingLayout:
-    """How the messages of a class lie in memory."""
+    """Layout of a class's messages."""
     parts = _parts(cls._slot_types)
     if not parts:
         return Layout(0)
@@ -97,23 +97,23 @@ def layout(cls: Any) -> Layout | VaryingLayout:
 
 @cache
 def raw_message(cls: Any) -> Any:
-    """A class of the same messages for rospy that keeps their bytes, in `_buff`."""
+    """Class of the same messages for rospy that stores their bytes in `_buff`."""
     known = {name: getattr(cls, name) for name in ("_type", "_md5sum", "_full_text", "_slot_types")}
     return type(cls.__name__, (rospy.AnyMsg,), {"__slots__": [], **known})
 
 
 @cache
 def raw_service(cls: Any) -> Any:
-    """A class of the same service for rospy whose messages keep their bytes."""
+    """Class of the same service for rospy with messages that store their bytes."""
     messages = {name: raw_message(getattr(cls, name)) for name in ("_request_class", "_response_class")}
     return type(cls.__name__, (), {"_type": cls._type, "_md5sum": cls._md5sum, **messages})
 
 
 def raw_from(cls: Any, data: bytes, info: TopicInfo) -> Any:
-    """A message of `raw_message(cls)` with these bytes.
+    """Message of `raw_message(cls)` with these bytes.
 
     Raises:
-        ProtocolError: they are no such message.
+        ProtocolError: they are not such a message.
     """
     message = raw_message(cls)()
     message._buff = layout(cls).check(data, info)
@@ -146,7 +146,7 @@ def _parts_of(name: str) -> Parts:
 
 
 def _walk(parts: Parts, data: bytes, at: int, flags: list[int]) -> int:
-    """Where parts that begin `at` end; notes bools. May be beyond the end; raises struct.error."""
+    """End of parts that begin `at`, with positions of bools; may exceed the data. Raises struct.error."""
     for part in parts:
         if isinstance(part, Run):
             flags += [at + flag for flag in part.flags]
@@ -161,7 +161,7 @@ def _walk_array(parts: Parts, count: int, data: bytes, at: int, flags: list[int]
     is_plain = all(isinstance(part, Run) and not part.flags for part in parts)
     if is_plain:
         return at + count * sum(part.size for part in parts)
-    if count > len(data) - at:  # an element has a byte at least
+    if count > len(data) - at:  # an element has at least one byte
         raise struct.error("too short")
     for _ in range(count):
         at = _walk(parts, data, at, flags)

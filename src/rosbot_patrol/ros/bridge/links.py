@@ -1,4 +1,4 @@
-"""What a bridge tells the supervision of sensors: who is heard on which connection, on /sensors/links."""
+"""Links of a bridge on /sensors/links, for the supervision: which sensor is heard over which connection."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rosbot_patrol.sensors.links import Links
 from rosbot_patrol.sensors.problems import Link
 
 PERIOD = 1.0
-SHORTEST = 0.1  # [s] between two messages, however much changes
+SHORTEST = 0.1  # [s] minimum time between messages
 
 
 class LinkTeller:
-    """Keeps the links and publishes them: once a second, and at once when a connection comes or goes."""
+    """Stores the links and publishes them: once a second, and at once when a connection begins or ends."""
 
     def __init__(self) -> None:
         self._links = Links()
@@ -27,18 +27,18 @@ class LinkTeller:
         self._lock = threading.Lock()
         self._changed = threading.Event()
         self._is_started = False
-        # in simulated time a device's clock goes at another pace, which is no fault of it
+        # under simulated time a device's clock runs at another rate, which is no fault of the device
         self._compares_clocks = not rospy.get_param("/use_sim_time", False)
         self._publisher = rospy.Publisher("sensors/links", SensorLinks, queue_size=5)
 
     def start(self) -> None:
-        """Begin to publish; a bridge on which no sensor is expected does so with the first that it hears."""
+        """Start publishing; a bridge without expected sensors starts with the first one that it hears."""
         if not self._is_started:
             self._is_started = True
             Worker(self._run, name="links").start()
 
     def heard(self, client: Client, sensor_id: int, now: float, *, move: bool) -> None:
-        """A sensor's message came."""
+        """Record a sensor's message."""
         with self._lock:
             is_new = self._links.heard(sensor_id, client.peer, now, move=move)
             if is_new:
@@ -48,14 +48,14 @@ class LinkTeller:
             self._changed.set()
 
     def logged(self, client: Client, text: str) -> None:
-        """A device logged something."""
+        """Record a device's log line."""
         with self._lock:
             changed = self._links.logged(client.peer, text)
         if changed:
             self._changed.set()
 
     def closed(self, client: Client) -> None:
-        """A connection has ended."""
+        """Record the end of a connection."""
         with self._lock:
             was_heard = self._links.closed(client.peer)
             self._clients.pop(client.peer, None)
@@ -74,7 +74,7 @@ class LinkTeller:
             try:
                 self._publisher.publish(message)
             except rospy.ROSException:
-                return  # the node ends
+                return  # the node is ending
             time.sleep(SHORTEST)
 
     def _of_peer(self, peer: str) -> tuple[bool, float | None]:
@@ -101,7 +101,7 @@ def _message(link: Link) -> SensorLink:
 
 
 def links_from_msg(message: SensorLinks) -> list[Link]:
-    """The links of a message; those that make no sense are left out."""
+    """Links of a message; invalid ones are ignored."""
     return [
         Link(
             sensor_id=each.id,

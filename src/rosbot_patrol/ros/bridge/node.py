@@ -45,12 +45,12 @@ from rosbot_patrol.sensors.registry import Change, MotionSensors, SensorStatus
 log = logging.getLogger(__name__)
 
 GLOBAL_TCP_PORT = "/rosserial_embeddedlinux/tcp_port"
-SWITCH_INTERVAL = 0.0005  # a message waits no longer for a thread that writes diagnostics [s]; Python's own: 0.005
+SWITCH_INTERVAL = 0.0005  # longest wait of a message for a thread that writes diagnostics [s]; Python's default: 0.005
 _LEVELS = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR, logging.CRITICAL)
 
 
 class RosSide:
-    """Gives the devices' messages to ROS and the other way round (`rosserial.dispatch.Handler`)."""
+    """Exchanges messages between devices and ROS (`rosserial.dispatch.Handler`)."""
 
     def __init__(self, sensor_timeout: float) -> None:
         self.server: SerialServer | None = None
@@ -62,7 +62,7 @@ class RosSide:
         self._channels: dict[Client, dict[tuple[str, str], Any]] = {}
 
     def advertise(self, policy: Policy) -> None:
-        """Advertise what the lists allow before the first device comes, so that its first message finds listeners."""
+        """Advertise the permitted topics before the first device connects, so that its messages have subscribers."""
         for rule in policy.publish:
             if "*" not in (rule.name, rule.message_type):
                 self._publishers.advertise(rule.name, message_class(rule.message_type))
@@ -99,15 +99,15 @@ class RosSide:
             self._channels[client]["called", info.name].receive(data)
 
     def flush(self) -> None:
-        """Publish what came in."""
+        """Publish the messages received."""
         self._publishers.flush()
 
     def tick(self) -> None:
-        """Publish what had to wait."""
+        """Publish delayed messages."""
         self._publishers.tick()
 
     def closed(self, client: Client) -> None:
-        """Withdraw the device's subscriptions and services."""
+        """Remove the device's subscriptions and services."""
         self.links.closed(client)
         for channel in self._channels.pop(client, {}).values():
             channel.close()
@@ -118,19 +118,19 @@ class RosSide:
         return stamp.secs, stamp.nsecs
 
     def device_log(self, client: Client, level: int, text: str) -> None:
-        """To the console and /rosout, at the device's level."""
+        """Log on the console and /rosout, at the device's level."""
         self.links.logged(client, text)
         log.log(_LEVELS[min(level, len(_LEVELS) - 1)], "%s: %s", client.peer, text)
 
     def parameter(self, name: str) -> object:
-        """A ROS parameter; raises ProtocolError where it is not set."""
+        """Value of a ROS parameter; raises ProtocolError if it is not set."""
         try:
             return rospy.get_param(name)
         except KeyError as err:
             raise ProtocolError("", f"parameter {name} is not set") from err
 
     def look_at_sensors(self, now: float) -> list[SensorStatus]:
-        """All sensors as they are; the log is told which of them has just fallen silent."""
+        """State of all sensors; logs those that have just become silent."""
         with self.sensors_lock:
             events = self.sensors.tick(now)
             statuses = self.sensors.statuses(now)
@@ -165,7 +165,7 @@ class RosSide:
 
 
 def _parameters() -> SerialNodeParams:
-    """Private parameters, upstream's global ones and the arguments, in rising order of weight."""
+    """Private parameters, upstream's global ones and the arguments, in rising order of precedence."""
     tree = dict(rospy.get_param("~", {}) or {})
     if "tcp_port" not in tree:
         tree["tcp_port"] = rospy.get_param(GLOBAL_TCP_PORT, DEFAULT_TCP_PORT)
@@ -216,11 +216,11 @@ def body() -> None:
         server.attach(params.port, params.baud)
         what = params.port
     gc.collect()
-    gc.freeze()  # what is there by now stays: looking through it again stopped everything for 40 ms
+    gc.freeze()  # objects created so far stay; collecting them again would stop everything for 40 ms
     rospy.on_shutdown(server.stop)
     Worker(Report(server, ros_side.look_at_sensors, what).run, name="report").start()
     if policy.restricted:
-        time.sleep(SETTLING)  # sensors wait meanwhile: what they are told to have arrived shall find its listeners
+        time.sleep(SETTLING)  # sensors wait meanwhile: acknowledged messages must reach their subscribers
     server.run()
     server.close()
 

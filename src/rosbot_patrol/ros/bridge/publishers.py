@@ -1,11 +1,11 @@
-"""What devices publish, handed to ROS as the bytes that came: no thread, no queue and no message object in between.
+"""Publishers of the devices' messages: received bytes go to ROS without a thread, a queue or a message object.
 
-A message is checked against its definition and sent on as it is; only a header is numbered by ROS. All of one moment go
-to a subscriber in one piece. A subscriber that does not read holds nobody up: what it has not taken waits, up to a
-bound, and then the oldest go.
+A message is checked against its definition and sent unchanged; only a header is numbered by ROS. All messages of one
+moment go to a subscriber in one piece. A subscriber that does not read blocks nobody: its messages wait up to a limit,
+then the oldest are dropped.
 
-rospy negotiates with the subscribers; then this writes to their connections itself (`Publisher.impl.connections` of
-rospy 1.16), as rospy would have a thread per subscriber do it, which cost half of the bridge's time and up to 5 ms.
+rospy negotiates with the subscribers; then this module writes to their connections itself (`Publisher.impl.connections`
+of rospy 1.16). rospy would use a thread per subscriber, which cost half of the bridge's time and up to 5 ms.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from rosbot_patrol.rosserial.protocol.topics import TopicInfo
 
 log = logging.getLogger(__name__)
 
-SETTLING = 1.0  # subscribers hear of a new publisher through the master [s]
-HELD = 1000  # messages kept for them meanwhile
-WAITING = 1 << 20  # bytes kept for a subscriber that does not read
+SETTLING = 1.0  # time for subscribers to learn of a new publisher from the master [s]
+HELD = 1000  # messages stored for them meanwhile
+WAITING = 1 << 20  # bytes stored for a subscriber that does not read
 
 
 class Outlet:
-    """The way to one subscriber: never waits.
+    """Non-blocking output to one subscriber.
 
     Args:
         connection: rospy's, header exchanged; name: of the topic, for messages.
 
     Attributes:
-        lost: messages that it will never get.
+        lost: number of dropped messages.
     """
 
     def __init__(self, connection: Any, name: str) -> None:
@@ -51,19 +51,19 @@ class Outlet:
         self._silent_until = 0.0
 
     def put(self, data: bytes, messages: int) -> None:
-        """Send, or keep until it reads again; raises OSError where the subscriber has gone."""
+        """Send, or store until it reads again; raises OSError if the subscriber has gone."""
         self._waiting.append((data, messages))
         self._bytes += len(data)
         self.flush()
         while self._bytes > WAITING and len(self._waiting) > 1:
-            dropped, count = self._waiting[1]  # the first may be half sent
+            dropped, count = self._waiting[1]  # the first may be partly sent
             del self._waiting[1]
             self._bytes -= len(dropped)
             self.lost += count
             self._complain()
 
     def flush(self) -> None:
-        """Send what it takes; raises OSError where the subscriber has gone."""
+        """Send as much as it accepts; raises OSError if the subscriber has gone."""
         while self._waiting:
             data, messages = self._waiting[0]
             link = self.connection.socket
@@ -90,7 +90,7 @@ class Outlet:
 
 
 class Topic:
-    """One ROS publisher; in its first second it keeps messages back until the subscribers have found it."""
+    """One ROS publisher; in its first second it holds messages back until the subscribers have found it."""
 
     def __init__(self, name: str, cls: Any) -> None:
         self.cls = cls
@@ -106,7 +106,7 @@ class Topic:
         self._outlets: list[Outlet] = []
 
     def put(self, info: TopicInfo, data: bytes) -> None:
-        """Take a message, to be sent by `flush`; raises ProtocolError where it is none of this type."""
+        """Queue a message for `flush`; raises ProtocolError if it is not of this type."""
         old = find_old_type(info.message_type, info.md5, self.cls._md5sum)
         data = self._layout.check(old.upgrade(data) if old else data, info)
         if self._has_header:
@@ -116,7 +116,7 @@ class Topic:
         self._batch.append(struct.pack("<I", len(data)) + data)
 
     def flush(self, now: float) -> None:
-        """Send what was put, and what a subscriber had not taken."""
+        """Send queued messages, and those that a subscriber has not accepted yet."""
         if self._opens_at:
             if now < self._opens_at:
                 return
@@ -138,17 +138,17 @@ class Topic:
                     outlet.flush()
             except OSError as err:
                 log.debug("%s: %s has gone: %s", self._name, outlet.connection.endpoint_id, err)
-                outlet.connection.close()  # rospy forgets it
+                outlet.connection.close()  # rospy then drops it
         impl.message_data_sent += len(data)
 
     def _numbered(self, data: bytes) -> bytes:
-        """With the header's number as ROS counts."""
+        """The message with the header's sequence number, as ROS counts."""
         self._seq += 1
         return struct.pack("<I", self._seq & 0xFFFFFFFF) + data[4:]
 
 
 class Publishers:
-    """ROS publishers that the devices share; they stay advertised when a device goes, as upstream's do."""
+    """ROS publishers shared by the devices; they stay advertised after a device has gone, as in upstream."""
 
     def __init__(self) -> None:
         self._by_name: dict[str, Topic] = {}
@@ -162,7 +162,7 @@ class Publishers:
         self._resolved[info.name] = self.advertise(info.name, cls)
 
     def advertise(self, name: str, cls: Any) -> Topic:
-        """Advertise a topic where it is not yet; raises ProtocolError."""
+        """Advertise a topic, unless it is advertised already; raises ProtocolError."""
         name = rospy.resolve_name(name)
         known = self._by_name.get(name)
         if known is None:
@@ -175,13 +175,13 @@ class Publishers:
         return known
 
     def put(self, info: TopicInfo, data: bytes) -> None:
-        """Take the bytes of a device, to be published by `flush`; raises ProtocolError."""
+        """Queue a device's bytes for `flush`; raises ProtocolError."""
         topic = self._resolved[info.name]
         topic.put(info, data)
         self._full.add(topic)
 
     def flush(self) -> None:
-        """Publish what was put since."""
+        """Publish the queued messages."""
         if self._full:
             now = time.monotonic()
             for topic in self._full:
@@ -189,7 +189,7 @@ class Publishers:
             self._full.clear()
 
     def tick(self) -> None:
-        """Publish what had to wait, for a subscriber that did not read or for the first ones to come."""
+        """Publish delayed messages, for slow or new subscribers."""
         now = time.monotonic()
         for topic in self._by_name.values():
             topic.flush(now)

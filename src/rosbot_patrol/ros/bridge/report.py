@@ -1,6 +1,6 @@
-"""What serial_node says about itself on /diagnostics: the bridge, its sensors and its clients, once a second.
+"""Report of serial_node on /diagnostics once a second: the bridge, its sensors and its clients.
 
-What devices send, byte for byte, on `~bytes`, for bags: `replay --node serial_node` takes it in again.
+And the topic `~bytes` with the devices' bytes, for bags: `replay --node serial_node` reads it.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ PERIOD = 1.0
 
 
 class Report:
-    """Tells /diagnostics of clients and sensors.
+    """Publishes clients and sensors on /diagnostics.
 
     Args:
-        sensors: gives the sensors as they are at a time [s].
-        what: the port or device that the server serves.
+        sensors: function that returns the sensors at a time [s].
+        what: port or device of the server.
     """
 
     def __init__(self, server: SerialServer, sensors: Callable[[float], list[SensorStatus]], what: str) -> None:
@@ -35,7 +35,7 @@ class Report:
         self._what = what
         self._health = Health("rosserial")
         self._parts: set[str] = set()
-        self._strange = (0, 0)  # connections turned away, things refused
+        self._strange = (0, 0)  # refused connections, refused requests
         self._strange_since = float("-inf")
         self._ended = threading.Event()
 
@@ -92,7 +92,7 @@ class Report:
 
 
 class SerialTap:
-    """A Tap that publishes."""
+    """A Tap that publishes bytes."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("~bytes", SerialBytes, queue_size=1000)
@@ -102,11 +102,11 @@ class SerialTap:
         self._send(SerialBytes.OPENED, client, b"")
 
     def data(self, client: Client, data: bytes) -> None:
-        """Bytes came."""
+        """Bytes arrived."""
         self._send(SerialBytes.DATA, client, data)
 
     def closed(self, client: Client) -> None:
-        """It ended."""
+        """A connection ended."""
         self._send(SerialBytes.CLOSED, client, b"")
 
     def _send(self, event: int, client: Client, data: bytes) -> None:

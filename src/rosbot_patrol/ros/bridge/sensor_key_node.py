@@ -1,4 +1,4 @@
-"""sensor_key: makes the key by which a motion sensor proves to the bridge who it is; needs no ROS master.
+"""sensor_key: makes the key by which a motion sensor proves its identity to the bridge; needs no ROS master.
 
 rosrun rosbot_patrol sensor_key 2 --file ~/.config/rosbot_patrol/sensor_keys.yaml
 """
@@ -13,7 +13,7 @@ from rosbot_patrol.rosserial.protocol.keys import add_key, c_define, new_key, ya
 
 
 def main() -> None:
-    """Make one key, print it for bridge and firmware, and put it into the bridge's file where one is named."""
+    """Make one key, print it for bridge and firmware, and add it to the bridge's file if one is named."""
     parser = argparse.ArgumentParser(prog="sensor_key", description="Makes the key of a motion sensor.")
     parser.add_argument("id", type=int, help="the sensor's id, 0 to 255")
     parser.add_argument("--file", default="", help="add it to this key file, which is made where it is not there")

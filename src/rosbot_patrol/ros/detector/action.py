@@ -1,4 +1,4 @@
-"""The action check_for_objects: pictures that somebody wants looked at, each answered with its own boxes."""
+"""Action check_for_objects: each picture sent as a goal is answered with its own boxes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_PENDING = 10
 
 
 class Goal:
-    """A picture to be looked at, and whom to answer."""
+    """A picture to examine, and its client."""
 
     def __init__(self, handle: actionlib.ServerGoalHandle) -> None:
         self._handle = handle
@@ -25,25 +25,25 @@ class Goal:
         self._over = False
 
     def is_of(self, handle: actionlib.ServerGoalHandle) -> bool:
-        """Whether it came with this handle."""
+        """Whether the goal has this handle."""
         return bool(self._handle == handle)
 
     def picture(self) -> tuple[Picture, Header]:
-        """The picture and its header; ImageError where it cannot be read."""
+        """The picture and its header; ImageError if it cannot be read."""
         image = self._handle.get_goal().image
         return picture_from_msg(image), image.header
 
     def finish(self, boxes: BoundingBoxes) -> None:
-        """Answer; nothing where it was cancelled meanwhile."""
+        """Send the result, unless the goal was cancelled meanwhile."""
         result = CheckForObjectsResult(id=self._handle.get_goal().id, bounding_boxes=boxes)
         self._end(lambda: self._handle.set_succeeded(result))
 
     def abort(self, reason: str) -> None:
-        """Answer that it cannot be done."""
+        """Report that the goal cannot be done."""
         self._end(lambda: self._handle.set_aborted(text=reason))
 
     def cancel(self) -> None:
-        """The client wants no answer any more: preempted."""
+        """Preempt the goal: the client wants no result any more."""
         self._end(self._handle.set_canceled)
 
     def _end(self, answer: Callable[[], None]) -> None:
@@ -52,21 +52,21 @@ class Goal:
                 return
             self._over = True
             answer()
-            # actionlib keeps a goal in a cycle of references until Python collects those: 1 MB each with its picture
+            # actionlib keeps a goal in a reference cycle until Python collects it: 1 MB each with its picture
             self._handle.get_goal().image.data = b""
 
     @property
     def over(self) -> bool:
-        """Whether it needs no answer any more."""
+        """Whether it needs no result any more."""
         return self._over
 
 
 class CheckForObjects:
-    """The server; keeps goals until the detector takes them.
+    """The action server; stores goals until the detector takes them.
 
     Args:
         name: of the action.
-        notify: called when a goal has come.
+        notify: called when a goal arrives.
     """
 
     def __init__(self, name: str, notify: Callable[[], None]) -> None:
@@ -85,7 +85,7 @@ class CheckForObjects:
         return bool(self._goals)
 
     def take(self) -> Goal | None:
-        """The oldest goal that still wants an answer."""
+        """The oldest goal that still needs a result."""
         with self._lock:
             while self._goals:
                 goal = self._goals.popleft()

@@ -1,4 +1,4 @@
-"""A camera topic: only its newest picture, and a watch over whether it is alive."""
+"""Camera topic: keeps only the newest picture, and supervises the camera."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ BUFFER_SIZE = 16 * 2**20
 
 
 class Camera:
-    """Subscribes, keeps the newest picture that has not been looked at, and tells of a silent or frozen camera.
+    """Keeps the newest unprocessed picture, and reports a silent or frozen camera.
 
     Args:
         topic: base name of the topic.
         transport: raw, compressed or compressedDepth.
-        timeout: silence that means it has stopped [s] of wall time.
-        frozen_timeout: sameness that means it is frozen [s] of wall time, 0 for never.
-        health: where to tell.
-        notify: called when a picture has come.
-        once: leave out a picture that comes again (same stamp), and tell on ~camera_ok how the camera is.
-        mode: how compressed pictures are decoded: unchanged, color or gray.
+        timeout: silence after which it counts as stopped [s] of wall time.
+        frozen_timeout: time of unchanging pictures after which it counts as frozen [s] of wall time, 0: never.
+        health: of the node.
+        notify: called when a picture arrives.
+        once: ignore a repeated picture (same stamp), and publish the camera's state on ~camera_ok.
+        mode: decoding of compressed pictures: unchanged, color or gray.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Camera:
     ) -> None:
         self._kind = Image if transport == "raw" else CompressedImage
         self._transport = transport
-        base = rospy.resolve_name(topic)  # a remap is of the base name, as in image_transport
+        base = rospy.resolve_name(topic)  # a remap applies to the base name, as in image_transport
         self._topic = base if transport == "raw" else f"{base}/{transport}"
         self._lock = threading.Lock()
         self._newest: Image | CompressedImage | None = None
@@ -82,13 +82,13 @@ class Camera:
         return self._newest is not None
 
     def take(self) -> Image | CompressedImage | None:
-        """The newest message that has not been taken."""
+        """Take the newest unprocessed message."""
         with self._lock:
             message, self._newest = self._newest, None
             return message
 
     def decode(self, message: Image | CompressedImage) -> Picture:
-        """The picture in a message; ImageError where it cannot be read."""
+        """Decode the picture of a message; ImageError if it cannot be read."""
         picture: Picture
         if not isinstance(message, CompressedImage):
             picture = picture_from_msg(message)
@@ -101,11 +101,11 @@ class Camera:
         return picture
 
     def accept(self) -> None:
-        """State that a picture could be looked at."""
+        """Report that a picture was usable."""
         self._refused = ""
 
     def refuse(self, problem: str) -> None:
-        """State that a picture could not be looked at; said once for the same reason."""
+        """Report that a picture was unusable; logged once per reason."""
         if problem != self._refused:
             log.error("%s: %s", self._topic, problem)
         self._refused = problem
@@ -113,7 +113,7 @@ class Camera:
     def _on_picture(self, message: Image | CompressedImage) -> None:
         stamp = message.header.stamp
         with self._lock:
-            # the camera's own time and some of its bytes: what a frozen driver repeats
+            # a frozen driver repeats the camera's own time and some of its bytes
             self._watch.note(time.monotonic(), bytes(message.data[::997]))
             if self._once and stamp == self._last_stamp and not stamp.is_zero():
                 return  # the same picture again
@@ -167,7 +167,7 @@ class Camera:
         self._health.set(PART, level, state.value, values)
 
     def _who_publishes(self) -> str:
-        """Who publishes the topic and as what type, or where there are pictures instead."""
+        """Publisher and type of the topic, or other topics with pictures."""
         try:
             master = rosgraph.Master(rospy.get_name())
             publishers = dict(master.getSystemState()[0])
@@ -189,7 +189,7 @@ class Camera:
 
 
 def _describe(message: Image | CompressedImage) -> str:
-    """Size and encoding of a picture, as far as its message says."""
+    """Size and encoding of a picture, as given in its message."""
     if isinstance(message, CompressedImage):
         return f"'{message.format}'"
     return f"{message.width}x{message.height} {message.encoding}"

@@ -1,4 +1,4 @@
-"""Whether there is a display that a window can be opened on."""
+"""Check for a display on which a window can be opened."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 
 
 def display_problem() -> str:
-    """Why no window can be opened, "" where one can. (OpenCV's Qt ends the program if it finds no display.)"""
+    """Reason why no window can be opened, "" if one can. (OpenCV's Qt ends the program without a display.)"""
     name = os.environ.get("DISPLAY", "")
     if not name:
         return "DISPLAY is not set"

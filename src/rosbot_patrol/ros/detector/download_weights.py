@@ -1,4 +1,4 @@
-"""The program download_weights: a network's weights into the folder where darknet_ros looks for them.
+"""Program download_weights: downloads a network's weights to darknet_ros's folder.
 
 rosrun rosbot_patrol download_weights yolov2-tiny
 """
@@ -24,7 +24,7 @@ BAR_PERIOD = 0.2
 
 
 def main() -> None:
-    """Run the program; exit status 1 where the file could not be had."""
+    """Run the program; exit status 1 if the file is not available."""
     try:
         sys.exit(run([word for word in sys.argv[1:] if ":=" not in word]))  # __name:=... are roslaunch's
     except KeyboardInterrupt:
@@ -33,7 +33,7 @@ def main() -> None:
 
 
 def run(arguments: list[str]) -> int:
-    """Fetch what the arguments name; the exit status."""
+    """Download the files named by the arguments; returns the exit status."""
     parser = argparse.ArgumentParser(prog="download_weights", description="Fetch a network's weights for darknet_ros.")
     parser.add_argument("name", nargs="?", help="of the network; without it, all that are known are listed")
     parser.add_argument("--folder", type=Path, help="where to put it; default: where the launch files look")
@@ -54,7 +54,7 @@ def run(arguments: list[str]) -> int:
 
 
 def get(entry: WeightsFile, folder: Path, cfg: Path, url: str) -> int:
-    """Fetch one file and check it against its network; the exit status."""
+    """Download one file and check it against its network; returns the exit status."""
     target = folder / entry.file
     try:
         if target.exists():
@@ -80,7 +80,7 @@ def get(entry: WeightsFile, folder: Path, cfg: Path, url: str) -> int:
 
 
 class Bar:
-    """Draws how far it is; without a terminal, a line for each tenth.
+    """Progress bar; without a terminal, a line for each tenth.
 
     Args:
         size: of the whole file [bytes].
@@ -94,7 +94,7 @@ class Bar:
         self._tenth = -1
 
     def __call__(self, have: int) -> None:
-        """So many bytes are there."""
+        """Show the number of bytes."""
         now = time.monotonic()
         if self._begun is None:
             self._begun = (now, have)

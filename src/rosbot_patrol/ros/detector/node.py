@@ -1,4 +1,4 @@
-"""The node darknet_ros: finds objects in a camera's pictures.
+"""Node darknet_ros: detects objects in a camera's pictures.
 
 Matches darknet_ros 1.1.5 (leggedrobotics/darknet_ros 1027a28): parameters, topics, types, action, thresholds, what is
 sent and when.
@@ -69,7 +69,7 @@ def _body() -> None:
 
 
 def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBoxes:
-    """Detections of the picture with this header."""
+    """Message with the detections of the picture with this header."""
     msg = BoundingBoxes(header=Header(stamp=image_header.stamp, frame_id="detection"), image_header=image_header)
     msg.bounding_boxes = [
         BoundingBox(
@@ -87,7 +87,7 @@ def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBo
 
 
 class DarknetNode:
-    """Wires one detector to its topics; `step` looks at one picture.
+    """Connects one detector to its topics; `step` processes one picture.
 
     Args:
         params: its parameters.
@@ -116,7 +116,7 @@ class DarknetNode:
         rospy.Service("~enable", SetBool, self._on_enable)
 
     def run(self) -> None:
-        """Look at pictures until shutdown; the window needs the main thread."""
+        """Process pictures until shutdown; the window needs the main thread."""
         worker = Worker(self._work, name="detection")
         worker.start()
         if self._window is not None:
@@ -125,12 +125,12 @@ class DarknetNode:
             worker.join(0.2)
 
     def step(self) -> bool:
-        """Answer one goal or look at the newest picture; whether there was anything to do."""
+        """Process one goal or the newest picture; returns whether there was one."""
         goal = self._action.take()
         if goal is not None:
             self._answer(goal)
             return True
-        message = self._camera.take()  # also while switched off: what came then is not looked at later
+        message = self._camera.take()  # also while switched off, so that old pictures are not processed later
         if not self._standby.is_wanted() or message is None or not self._enabled:
             return False
         started = time.monotonic()
@@ -170,7 +170,7 @@ class DarknetNode:
         self._drawn = _publisher(out.detection_image, Image)
 
     def _answer(self, goal: Any) -> None:
-        """Look at the picture of an action's goal; it is published like a camera's, as upstream does."""
+        """Process the picture of a goal; it is published like a camera's picture, as in upstream."""
         try:
             picture, header = goal.picture()
             found = self._detector.detect(picture)
@@ -219,7 +219,7 @@ class DarknetNode:
 
 
 class _Console:
-    """Prints rate and objects when what is seen changes, and now and then."""
+    """Prints rate and objects when the objects change, and now and then."""
 
     def __init__(self) -> None:
         self._counted = 0
@@ -227,7 +227,7 @@ class _Console:
         self._told: tuple[str, ...] | None = None
 
     def tell(self, found: Sequence[Detection], now: float) -> None:
-        """Called for each picture."""
+        """Print, if due; called for each picture."""
         if self._since is None:
             self._since = now
         self._counted += 1
@@ -241,7 +241,7 @@ class _Console:
 
 
 def _by_class(found: Sequence[Detection]) -> list[str]:
-    """Of each class the best probability, and how many there are."""
+    """Best probability and number of detections of each class."""
     best: dict[str, list[float]] = {}
     for one in found:
         best.setdefault(one.name, []).append(one.probability)
@@ -249,7 +249,7 @@ def _by_class(found: Sequence[Detection]) -> list[str]:
 
 
 def _private(name: str) -> str:
-    """A name as upstream resolves it: below the node's own, unless it starts with a slash."""
+    """Resolve a name as upstream does: below the node's own, unless it starts with a slash."""
     return name if name.startswith(("/", "~")) else "~" + name
 
 

@@ -1,4 +1,4 @@
-"""The node republish: takes pictures in one transport and sends them in another.
+"""Node republish: converts pictures from one transport to another.
 
     republish IN_TRANSPORT in:=BASE [OUT_TRANSPORT] out:=BASE
 
@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 TRANSPORTS = ("raw", "compressed", "compressedDepth")
 USAGE = f"usage: republish IN_TRANSPORT in:=BASE [OUT_TRANSPORT] out:=BASE, transports {', '.join(TRANSPORTS)}"
 IDLE_WAIT = 0.25
-# of upstream's publishers: without a meaning here
+# of upstream's publishers: not used here
 FOREIGN_KEYS = ("enable",)
 
 
@@ -95,7 +95,7 @@ def _body() -> None:
 
 
 class Output:
-    """One topic that pictures go out on, while somebody listens.
+    """One output topic, used only while it has subscribers.
 
     Args:
         topic: its full name.
@@ -107,21 +107,21 @@ class Output:
 
     @property
     def is_heard(self) -> bool:
-        """Whether somebody listens."""
+        """Whether the topic has subscribers."""
         return bool(self._publisher.get_num_connections())
 
     def send(self, picture: Picture, message: Image | CompressedImage) -> None:
-        """Send a picture with the header of the message it came in; ImageError where it cannot be."""
+        """Send a picture with its original header; ImageError if that is impossible."""
         self._publisher.publish(message if isinstance(message, Image) else picture_to_msg(picture, message.header))
 
 
 class CompressedOutput(Output):
-    """One that compresses; its parameters lie under its topic, and can be changed while it runs.
+    """A compressed output; its parameters are below its topic and can change at run time.
 
     Args:
         topic: its full name.
-        params: how they are declared.
-        codec: makes format text and bytes of a picture.
+        params: declaration of its parameters.
+        codec: function that compresses a picture to format text and bytes.
     """
 
     def __init__(self, topic: str, params: type[Any], codec: Callable[[Picture, Any], tuple[str, bytes]]) -> None:
@@ -133,7 +133,7 @@ class CompressedOutput(Output):
         ReconfigureServer(topic, self._params, self._names, self._change)
 
     def send(self, picture: Picture, message: Image | CompressedImage) -> None:
-        """As of any output."""
+        """Send a picture, as in `Output`."""
         text, data = self._codec(picture, self._params)
         self._publisher.publish(CompressedImage(header=message.header, format=text, data=data))
 
@@ -179,7 +179,7 @@ class Republisher:
                     raise
 
     def step(self) -> None:
-        """Send the newest picture on."""
+        """Send the newest picture."""
         message = self._input.take()
         heard = [output for output in self._outputs if output.is_heard]
         if message is None or not heard:

@@ -1,4 +1,4 @@
-"""A detector that stands in for another one, as the robot's for the PC's: it works while the other says nothing."""
+"""Standby of a detector: the robot's own works only while the PC's is silent."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ PART = "standing in"
 
 
 class Standby:
-    """Listens for another node on the topic that counts objects, which a detector sends with each picture.
+    """Listens to another node's topic with the number of objects, which a detector sends for each picture.
 
-    Times are of the wall clock: a machine that is gone is gone for both.
+    Times are of the wall clock.
 
     Args:
-        topic: the count's.
-        after: the other has to be silent for so long [s]; 0: there is no other.
-        health: gets what it does.
+        topic: of the number of objects.
+        after: silence of the other after which it works [s]; 0: there is no other.
+        health: of the node.
     """
 
     def __init__(self, topic: str, after: float, health: Health) -> None:
@@ -35,7 +35,7 @@ class Standby:
             rospy.Subscriber(topic, ObjectCount, self._hear, queue_size=1)
 
     def is_wanted(self) -> bool:
-        """Whether it has to look at pictures now; says so where that changes."""
+        """Whether it has to process pictures now; logs changes."""
         if self._after <= 0.0:
             return True
         is_working = time.monotonic() - self._heard > self._after

@@ -1,4 +1,4 @@
-"""A window with the newest picture, where there is a display."""
+"""Window with the newest picture, if there is a display."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""explore: drives the robot by move_base until the map of `map` has no border to the unknown, drives it home and ends.
+"""explore: drives the robot by move_base until the map has no frontier, then home, and ends.
 
-Beside slam_gmapping (`simulation_gmapping.launch explore:=true`). `~save_map` names the map to write at the end, as
-`map_saver -f` does. `~frontiers` shows the borders in rviz.
+It runs beside slam_gmapping (`simulation_gmapping.launch explore:=true`). `~save_map` names the map to write at the
+end, as with `map_saver -f`. `~frontiers` shows the frontiers in rviz.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Explore:
         self._move_base = MoveBase(self._frame)
 
     def run(self) -> None:
-        """Until all is explored, or the node is ended."""
+        """Run until everything is explored, or the node is shut down."""
         said, since = "", 0.0
         rate = rospy.Rate(RATE)
         while not rospy.is_shutdown():

@@ -1,16 +1,19 @@
-"""slam_gmapping: a map of the surroundings and the robot's place on it, from odometry and a lidar.
+"""slam_gmapping: map of the surroundings and the robot's pose on it, from odometry and a lidar.
 
 Matches slam_gmapping of ROS Noetic (gmapping 1.4): topic `scan` and tf in; `map` and `map_metadata` (latched),
 `~entropy` and tf map -> odom out, that stamped now + tf_delay every transform_publish_period; service `dynamic_map`;
 parameters in `GmappingParams`. Written from Grisetti, Stachniss, Burgard 2007 and upstream's documentation.
 
-Differs: a map's cell lies where its origin says, where upstream's lies half a cell off. The search for the best fit is
-refined by Gauss-Newton across the walls, the proposal is the Gaussian of match and odometry, and the odometry errs by
-the way between updates, not by the number of scans. Beams that graze a wall do not wear it away within a scan. A scan
-of another number of beams is taken as it is, upstream drops it. A beam that met nothing (inf) frees the floor where
-`maxRange` is range_max or more. The entropy is that of the weights and comes with each update. A saved map may be gone
-on with (`map_file`, `initial_pose_x`, `_y`, `_a`). A clock that goes back or an odometry that jumps is a restart, not
-a motion. The parameters llsample* and lasample* are accepted without effect.
+Differs:
+- A map's cell lies where its origin says; upstream's lies half a cell off.
+- The search for the best fit is refined by Gauss-Newton across the walls. The proposal is the Gaussian of match and
+  odometry. Odometry noise grows with the distance between updates, not with the number of scans.
+- Beams that graze a wall do not erode it within a scan. A scan with another number of beams is used; upstream drops it.
+  A beam without a hit (inf) frees the floor if `maxRange` is at least range_max.
+- The entropy is that of the weights and comes with each update.
+- A saved map can be extended (`map_file`, `initial_pose_x`, `_y`, `_a`).
+- A clock that goes back or an odometry that jumps is a restart, not a motion.
+- The parameters llsample* and lasample* are accepted without effect.
 """
 
 from __future__ import annotations
@@ -48,7 +51,7 @@ class GmappingNode:
         params: of slam_gmapping.
 
     Raises:
-        MapError: the extent or the saved map makes no sense.
+        MapError: the extent or the saved map is invalid.
     """
 
     def __init__(self, params: GmappingParams) -> None:
@@ -59,7 +62,7 @@ class GmappingNode:
         self._scans = ScanQueue(self._core.feed)
         self._watch = ScanWatch(self._transforms, self._core.feed.check)
         self._map: GridMsg | None = None
-        self._sent_stamp = -math.inf  # of the transform last told
+        self._sent_stamp = -math.inf  # of the last transform sent
         self._lock = threading.Lock()  # of the map's message
         self._health = Health()
         self._broadcaster = tf2_ros.TransformBroadcaster()
@@ -115,7 +118,7 @@ class GmappingNode:
     def _send_transform(self, current: float) -> None:
         delay = self._params.tf_delay
         stamp = current + (delay if delay >= 0.0 else self._params.transform_publish_period)
-        if stamp == self._sent_stamp:  # the clock stood, and tf warns of what it has heard
+        if stamp == self._sent_stamp:  # the clock stands still, and tf warns of repeated transforms
             return
         self._sent_stamp = stamp
         self._broadcaster.sendTransform(

@@ -1,4 +1,4 @@
-"""map_saver: waits for one map on `map`, writes it to disk, and ends.
+"""map_saver: waits for one map on `map`, writes it to the disk, and ends.
 
 Matches map_saver of ROS Noetic's navigation 1.17: `map_saver [--occ 65] [--free 25] [-f map]`, `map:=TOPIC`; the
 pgm and the yaml are the same byte for byte.
@@ -39,7 +39,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def arguments_of(words: list[str]) -> argparse.Namespace:
-    """The command line (remappings taken off): occ, free, f; raises ParamError."""
+    """Parse the command line (without remappings): occ, free, f; raises ParamError."""
     parser = _Parser(prog="map_saver", description="Save one map to disk.", allow_abbrev=False)
     parser.add_argument("--occ", type=int, default=65, help="from here on a cell is a wall, 1 to 100")
     parser.add_argument("--free", type=int, default=25, help="up to here a cell is free, 0 to 100")
@@ -55,7 +55,7 @@ def arguments_of(words: list[str]) -> argparse.Namespace:
 
 
 def wait_for_map() -> Grid | None:
-    """The first map that comes, None at shutdown; raises MapError where it makes no sense."""
+    """Wait for the first map, None at shutdown; raises MapError if it is invalid."""
     inbox: Latest[OccupancyGrid] = Latest()
     arrived = threading.Event()
 

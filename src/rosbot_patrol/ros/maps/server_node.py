@@ -1,4 +1,4 @@
-"""map_server: a map from disk, latched on `map`, and on request.
+"""map_server: publishes a map from the disk on `map` (latched), and on request.
 
 Matches map_server of ROS Noetic's navigation 1.17: argument `FILE.yaml`, or a picture and its resolution (deprecated);
 latched topics `map` and `map_metadata`; services `static_map` (nav_msgs/GetMap) and `change_map` (nav_msgs/LoadMap);
@@ -54,7 +54,7 @@ class MapServer:
     Args:
         frame: of the map.
         grid: the first map.
-        path: where it came from.
+        path: of its file.
     """
 
     def __init__(self, frame: str, grid: Grid, path: str) -> None:
@@ -111,11 +111,11 @@ class MapServer:
 
 
 def read_from_arguments(arguments: list[str], params: MapServerParams) -> tuple[Grid, str]:
-    """The map that the command line names, and the file it names.
+    """Read the map named by the command line; returns it and its file.
 
     Raises:
         MapError: the map cannot be used.
-        ParamError: the arguments make no sense.
+        ParamError: the arguments are invalid.
     """
     if len(arguments) == 1:
         return read_grid(read_map_file(arguments[0])), arguments[0]

@@ -1,1 +1,1 @@
-"""ROS messages to records and arrays, and back."""
+"""Conversion between ROS messages and records or arrays."""

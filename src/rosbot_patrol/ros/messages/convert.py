@@ -1,4 +1,4 @@
-"""Messages <-> plain records, in pairs. Nothing here computes."""
+"""Conversion between messages and plain records, in pairs, without computation."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def pose2d_to_pose(pose: Pose2D) -> Pose:
 
 
 def pose2d_from_pose(msg: Pose, what: str = "a pose's orientation") -> Pose2D:
-    """The planar part of a pose; ValueError where something is not finite. `what` is for the warning of a zero one."""
+    """Planar part of a pose; ValueError if a value is not finite. `what` is for the warning of a zero one."""
     if not (math.isfinite(msg.position.x) and math.isfinite(msg.position.y)):
         raise ValueError(f"({msg.position.x}, {msg.position.y}) is no position")
     q = msg.orientation
@@ -47,12 +47,12 @@ def pose_to_msg(pose: Pose2D, frame: str, stamp: float) -> PoseStamped:
 
 
 def pose_from_msg(msg: PoseStamped) -> tuple[Pose2D, str, float]:
-    """Pose, frame (no leading slash), stamp [s]; ValueError as `pose2d_from_pose`."""
+    """Pose, frame (no leading slash), stamp [s]; ValueError as in `pose2d_from_pose`."""
     return pose2d_from_pose(msg.pose), msg.header.frame_id.lstrip("/"), msg.header.stamp.to_sec()
 
 
 def initial_pose_from_msg(msg: PoseWithCovarianceStamped) -> PoseRecord:
-    """A pose with its covariance for amcl; ValueError as `pose2d_from_pose`."""
+    """Pose with its covariance for amcl; ValueError as in `pose2d_from_pose`."""
     pose = pose2d_from_pose(msg.pose.pose, "the orientation of an initial pose")
     covariance = np.array(msg.pose.covariance, dtype=np.float64).reshape(6, 6)
     return PoseRecord(msg.header.frame_id.lstrip("/"), msg.header.stamp.to_sec(), pose, covariance)
@@ -92,12 +92,12 @@ def scan_to_msg(scan: LaserScan) -> LaserScanMsg:
     msg.angle_min, msg.angle_increment = scan.angle_min, scan.angle_increment
     msg.angle_max = scan.angle_min + scan.angle_increment * max(len(scan.ranges) - 1, 0)
     msg.range_min, msg.range_max = scan.range_min, scan.range_max
-    msg.ranges = scan.ranges.astype(np.float32)  # rospy packs numpy arrays as they are
+    msg.ranges = scan.ranges.astype(np.float32)  # rospy serialises numpy arrays directly
     return msg
 
 
 def scan_from_msg(msg: LaserScanMsg) -> LaserScan:
-    """A scan as a record; a stamp of 0 is none (NaN)."""
+    """Record of a scan; a stamp of 0 becomes NaN."""
     return LaserScan(
         stamp=msg.header.stamp.to_sec() or math.nan,
         frame_id=msg.header.frame_id.lstrip("/"),
@@ -141,14 +141,14 @@ def grid_to_msg(grid: Grid, frame: str, stamp: float, load_time: float = 0.0) ->
 
 
 def grid_from_msg(msg: OccupancyGrid, source: str) -> Grid:
-    """An occupancy grid as int8 cells (-1 unknown, 0 to 100); subscribe by `numpy_msg(OccupancyGrid)`.
+    """Occupancy grid as int8 cells (-1 unknown, 0 to 100); subscribe with `numpy_msg(OccupancyGrid)`.
 
     Args:
         msg: the map.
-        source: topic or service that it came by, for the error.
+        source: its topic or service, for the error.
 
     Raises:
-        MapError: its size, its origin or its resolution makes no sense.
+        MapError: its size, origin or resolution is invalid.
     """
     try:
         info = grid_info_from_msg(msg.info)

@@ -1,4 +1,4 @@
-"""Occupancy grids over topics and services without a Python object for each cell.
+"""Fast messages with large arrays: occupancy grids and pose arrays without a Python object per element.
 
 A map of 1984 x 1984 cells takes 3 ms this way, against 56 ms through rospy's own lists.
 
@@ -41,12 +41,12 @@ class SetMapFast(SetMap):
 
 
 class PoseArrayOfRows(PoseArray):  # type: ignore[misc]
-    """A PoseArray that is only sent: its poses are rows x, y, z, qx, qy, qz, qw of one array, shape (N, 7)."""
+    """A PoseArray for sending only: its poses are rows x, y, z, qx, qy, qz, qw of one array, shape (N, 7)."""
 
     __slots__ = ("rows",)
 
     def serialize(self, buff: Any) -> None:
-        """Write the message as its type says."""
+        """Write the message in its type's format."""
         frame = self.header.frame_id.encode()
         stamp = self.header.stamp
         head = struct.pack("<3II", self.header.seq, stamp.secs, stamp.nsecs, len(frame))
@@ -55,7 +55,7 @@ class PoseArrayOfRows(PoseArray):  # type: ignore[misc]
 
 
 def pose_array_to_msg(poses: NDArray[np.float64], frame: str, stamp: float) -> PoseArrayOfRows:
-    """Planar poses of shape (N, 3) as a message to be sent."""
+    """Message with planar poses of shape (N, 3), for sending."""
     message = PoseArrayOfRows()
     message.header.frame_id, message.header.stamp = frame, time_to_msg(stamp)
     rows = np.zeros((len(poses), 7))

@@ -1,4 +1,4 @@
-"""Pictures <-> sensor_msgs/Image."""
+"""Conversion between pictures and sensor_msgs/Image."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rosbot_patrol.images.encodings import Picture, pack, unpack
 
 
 def picture_from_msg(msg: Image) -> Picture:
-    """A picture; ImageError where encoding or sizes make no sense."""
+    """Picture of a message; ImageError if encoding or sizes are invalid."""
     return unpack(
         msg.data,
         msg.encoding,
@@ -21,7 +21,7 @@ def picture_from_msg(msg: Image) -> Picture:
 
 
 def picture_to_msg(picture: Picture, header: Header) -> Image:
-    """A picture as a message with this header."""
+    """Message of a picture, with this header."""
     data, step = pack(picture)
     return Image(
         header=header,

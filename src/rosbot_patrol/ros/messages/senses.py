@@ -1,4 +1,4 @@
-"""Messages that the patrol hears -> the records of its senses."""
+"""Conversion of the messages that the patrol receives to records."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def trigger_from_msg(msg: EspTrigger) -> TriggerRecord:
 
 
 def boxes_from_msg(msg: BoundingBoxes) -> BoxesRecord:
-    """What the detector saw; the picture's time where it is told, else the message's."""
+    """Detections of a message, with the picture's time if given, else the message's."""
     boxes = tuple(
         Box(label=b.Class, probability=b.probability, xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax)
         for b in msg.bounding_boxes
@@ -34,28 +34,28 @@ def boxes_from_msg(msg: BoundingBoxes) -> BoxesRecord:
 
 
 def count_from_msg(msg: ObjectCount) -> CountRecord:
-    """How much the detector saw."""
+    """Number of detections."""
     return CountRecord(msg.header.stamp.to_sec(), msg.count)
 
 
 def lens_from_msg(msg: CameraInfo) -> LensRecord:
-    """A camera's frame and lens; raises ValueError if it describes none."""
+    """Frame and lens of a camera; raises ValueError if it describes none."""
     return lens_record(msg.header.frame_id, msg.K, width=msg.width, height=msg.height)
 
 
 def image_from_msg(msg: Image) -> ImageRecord:
-    """A picture, not yet unpacked."""
+    """A picture, not unpacked yet."""
     stamp, is_big_endian = msg.header.stamp.to_sec(), bool(msg.is_bigendian)
     return ImageRecord(stamp, msg.height, msg.width, msg.encoding, is_big_endian, msg.step, msg.data)
 
 
 def battery_from_msg(msg: BatteryState) -> Battery:
-    """What the battery says, as of no time yet."""
+    """State of the battery, without a time."""
     is_charging = msg.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_CHARGING
     return battery_of(msg.percentage, msg.voltage, is_present=bool(msg.present), is_charging=is_charging)
 
 
 def look_from_msg(msg: SensorEvent) -> LookRecord:
-    """The room that a sensor's event asks to look at."""
+    """Room that a sensor's event asks to look at."""
     is_asked = msg.kind == SensorEvent.LOOK and msg.active
     return LookRecord(msg.room if is_asked else -1, msg.text)

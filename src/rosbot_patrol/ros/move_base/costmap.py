@@ -1,4 +1,4 @@
-"""One costmap of move_base on ROS: its update loop and its topics."""
+"""One costmap of move_base as a ROS node's part: its update loop and its topics."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from rosbot_patrol.ros.runtime.node import Loop
 
 log = logging.getLogger(__name__)
 
-_REPEAT_S = 10.0  # between two lines about one problem
-_START_GRACE_S = 3.0  # wall time in which a transform that is not there yet is no fault
+_REPEAT_S = 10.0  # between two log lines about one problem
+_START_GRACE_S = 3.0  # wall time in which a missing transform is no fault
 
 
 class CostmapNode:
-    """The loop that keeps a costmap up to date, and its topics: maps and sensors in, `~<name>/` out.
+    """Update loop of a costmap, and its topics: maps and sensors in, `~<name>/` out.
 
     Args:
         costmap: fed and updated from here.
@@ -94,7 +94,7 @@ class CostmapNode:
 
     @property
     def departed_map(self) -> str:
-        """The topic of a map whose publisher has gone, "" for none."""
+        """Topic of a map whose publisher has gone, "" for none."""
         for layer, subscriber in self._maps:
             if self.costmap.has_map(layer) and subscriber.get_num_connections() == 0:
                 return str(subscriber.resolved_name)
@@ -103,16 +103,16 @@ class CostmapNode:
     # ---- updates
 
     def start(self) -> None:
-        """Begin to update."""
+        """Start updating."""
         self._loop.start()
 
     def configure(self, params: CostmapParams) -> None:
-        """Take other parameters, the costmap's lock being held; raises ParamError."""
+        """Use other parameters; the caller holds the costmap's lock. Raises ParamError."""
         self.costmap.configure(params)
         self._loop.set_rate(params.update_frequency or 1.0)
 
     def update(self, now: float) -> None:
-        """Update once, and publish what is to be shown."""
+        """Update once, and publish."""
         if self.costmap.params.update_frequency == 0.0:
             return
         found = self.costmap.update(now)
@@ -129,7 +129,7 @@ class CostmapNode:
     def _complain(self, fault: Fault | None, problem: str) -> None:
         """Log a fault when it begins."""
         if fault and self.costmap.updates == 0 and time.monotonic() - self._born < _START_GRACE_S:
-            return  # the other nodes are starting too
+            return  # the other nodes are still starting
         if fault and fault is not self._said:
             more = self._repeats.due(fault.name, time.monotonic())
             if more is not None:

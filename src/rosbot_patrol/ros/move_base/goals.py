@@ -1,4 +1,4 @@
-"""The action server of move_base and its simple goal topic: they set or clear the goal, nothing else."""
+"""Action server and simple goal topic of move_base; they only set or clear the goal."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ log = logging.getLogger(__name__)
 
 
 class GoalRefusedError(Exception):
-    """A goal that cannot be worked on; its text is the action's result text."""
+    """A goal is refused; the text becomes the action's result text."""
 
 
 def read_pose(msg: PoseStamped, frame: str, transforms: Frames) -> Pose2D:
-    """A pose of make_plan in a frame: as upstream, whatever its orientation.
+    """Convert a pose for make_plan to a frame; as upstream, with any orientation.
 
     Raises:
-        GoalRefusedError: something of it is not finite, or its frame is not known.
+        GoalRefusedError: a value is not finite, or its frame is unknown.
     """
     try:
         pose = pose2d_from_pose(msg.pose, "the orientation of a pose for make_plan")
@@ -38,10 +38,10 @@ def read_pose(msg: PoseStamped, frame: str, transforms: Frames) -> Pose2D:
 
 
 def read_goal(msg: PoseStamped, frame: str, transforms: Frames) -> Pose2D:
-    """A goal message in a frame.
+    """Convert a goal message to a frame.
 
     Raises:
-        GoalRefusedError: its quaternion is none (upstream's text), its position is none, or its frame is not known.
+        GoalRefusedError: its quaternion (upstream's text) or position is invalid, or its frame is unknown.
     """
     q, p = msg.pose.orientation, msg.pose.position
     length = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
@@ -68,12 +68,12 @@ def _in_frame(pose: Pose2D, source: str, frame: str, transforms: Frames) -> Pose
 
 
 class GoalServer:
-    """Goals come in by the action `move_base` and by `move_base_simple/goal`.
+    """Accepts goals by the action `move_base` and by `move_base_simple/goal`.
 
     Args:
-        frame: that goals are wanted in.
+        frame: target frame of goals.
         transforms: the node's tf listener.
-        notify: called, on another thread, when a goal has come or was cancelled.
+        notify: called, on another thread, when a goal arrives or is cancelled.
     """
 
     def __init__(self, frame: str, transforms: Frames, notify: Callable[[], None]) -> None:
@@ -87,7 +87,7 @@ class GoalServer:
         rospy.Subscriber("move_base_simple/goal", PoseStamped, self._on_simple, queue_size=1)
 
     def start(self) -> None:
-        """Take goals."""
+        """Start accepting goals."""
         self._server.start()
 
     def _on_simple(self, msg: PoseStamped) -> None:
@@ -98,16 +98,16 @@ class GoalServer:
 
     @property
     def is_active(self) -> bool:
-        """Whether a goal is worked on."""
+        """Whether a goal is active."""
         return bool(self._server.is_active())
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether the goal that is worked on was cancelled, with no other to follow."""
+        """Whether the active goal was cancelled without a new one."""
         return bool(self._server.is_preempt_requested()) and not self._server.is_new_goal_available()
 
     def take(self, now: float) -> Pose2D | None:
-        """A new goal in the global frame, once; None where there is none or it was refused (and told so)."""
+        """Take a new goal in the global frame; None if there is none or it was refused (and the client informed)."""
         if not self._server.is_new_goal_available():
             return None
         goal = self._server.accept_new_goal()
@@ -123,18 +123,18 @@ class GoalServer:
         return pose
 
     def finish(self, outcome: Outcome) -> None:
-        """Tell the client how it ended."""
+        """Send the result to the client."""
         if not self._server.is_active():
             return
         end = self._server.set_succeeded if outcome.succeeded else self._server.set_aborted
         end(MoveBaseResult(), outcome.text)
 
     def preempt(self) -> None:
-        """Tell the client that its cancelling was done."""
+        """Confirm the cancelling to the client."""
         if self._server.is_active():
             self._server.set_preempted()
 
     def feedback(self, pose: Pose2D, now: float) -> None:
-        """Tell the client where the robot is."""
+        """Send the robot's pose to the client."""
         if self._server.is_active():
             self._server.publish_feedback(MoveBaseFeedback(base_position=pose_to_msg(pose, self._frame, now)))

@@ -11,7 +11,7 @@ Differs:
     - A goal in a frame that tf does not know is aborted at once with the planner's text, instead of after recoveries.
     - It stands still for somebody whose way it would cross, and goes on when they have passed (`~give_way`).
     - Topics that nobody listens to are not built.
-    - dynamic_reconfigure: see `move_base_tuning`.
+    - dynamic_reconfigure: see `tuning`.
 """
 
 from __future__ import annotations

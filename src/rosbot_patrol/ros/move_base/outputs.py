@@ -1,4 +1,4 @@
-"""What move_base publishes: velocities, plans, recovery status and its health."""
+"""Outputs of move_base: velocities, plans, recovery status and health."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _HEALTH_PERIOD = 1.0
 
 
 class Outputs:
-    """The topics of move_base that are not the action's or the costmaps'; nobody listening, nothing is built.
+    """Topics of move_base other than the action's and the costmaps'; without subscribers nothing is built.
 
     Args:
         global_name: namespace of the global planner's plan.
@@ -42,11 +42,11 @@ class Outputs:
         self._recovery = rospy.Publisher("move_base/recovery_status", RecoveryStatus, queue_size=1)
 
     def send(self, twist: Twist2D) -> None:
-        """A velocity to the base."""
+        """Send a velocity to the base."""
         self._cmd.publish(twist_to_msg(twist))
 
     def publish(self, command: Command, controller: LocalPlanner, time: float) -> None:
-        """What a step of the navigator wants done and shown."""
+        """Publish the results of a navigator's step."""
         if command.twist is not None:
             self.send(command.twist)
         if command.recovery is not None:
@@ -73,7 +73,7 @@ class Outputs:
 
 
 class HealthTeller:
-    """Tells on /diagnostics, once a second, how move_base is.
+    """Publishes move_base's health on /diagnostics once a second.
 
     Args:
         costmaps: the global one and the local one.

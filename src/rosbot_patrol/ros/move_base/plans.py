@@ -1,4 +1,4 @@
-"""Planning on a thread of its own, so that the control cycle never waits for it."""
+"""Planning on its own thread, so that the control cycle never waits for it."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ log = logging.getLogger(__name__)
 
 
 class PoseUnknownError(PlanningError):
-    """There is no start to plan from."""
+    """The robot's pose, the start of a plan, is unknown."""
 
 
 class ThreadedPlans:
     """A PlanSource that plans on a worker thread.
 
     Args:
-        stack: plans.
+        stack: makes the plans.
     """
 
     def __init__(self, stack: NavigationStack) -> None:
@@ -36,25 +36,25 @@ class ThreadedPlans:
         Worker(self._run, name="planner").start()
 
     def request(self, goal: Pose2D) -> None:
-        """Begin to plan; the result of an earlier request is forgotten."""
+        """Start planning; the result of an earlier request is dropped."""
         with self._wake:
             self._goal, self._result, self._busy = goal, None, True
             self._ticket += 1
             self._wake.notify()
 
     def poll(self) -> PlanResult | None:
-        """The result, once."""
+        """Take the result, once."""
         with self._lock:
             result, self._result = self._result, None
             return result
 
     @property
     def is_busy(self) -> bool:
-        """Whether a request is worked on."""
+        """Whether a request is open."""
         return self._busy
 
     def drop(self) -> None:
-        """Forget what is worked on."""
+        """Drop the open request."""
         with self._lock:
             self._ticket += 1
             self._goal, self._result, self._busy = None, None, False

@@ -1,4 +1,4 @@
-"""The topics that a costmap sees by: each message becomes a record for an input of the costmap."""
+"""Sensor topics of a costmap: each message becomes a record for one of its inputs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rosbot_patrol.ros.runtime.node import now
 
 
 def cloud_from_msg(msg: PointCloud2 | PointCloud) -> CloudRecord:
-    """A point cloud as a record; its points are not copied."""
+    """Record of a point cloud; its points are not copied."""
     stamp, frame = msg.header.stamp.to_sec(), msg.header.frame_id.lstrip("/")
     if isinstance(msg, PointCloud):
         return CloudRecord(stamp, frame, msg.points)
@@ -29,7 +29,7 @@ def cloud_from_msg(msg: PointCloud2 | PointCloud) -> CloudRecord:
 
 
 def depth_from_msg(msg: Image) -> DepthRecord:
-    """A picture as a record; its bytes are not copied."""
+    """Record of an image; its bytes are not copied."""
     return DepthRecord(
         stamp=msg.header.stamp.to_sec(),
         frame=msg.header.frame_id.lstrip("/"),
@@ -43,7 +43,7 @@ def depth_from_msg(msg: Image) -> DepthRecord:
 
 
 def optics_from_msg(msg: CameraInfo) -> OpticsRecord:
-    """The size and the pinhole of a camera."""
+    """Size and pinhole parameters of a camera."""
     return OpticsRecord(msg.width, msg.height, Optics(msg.K[0], msg.K[4], msg.K[2], msg.K[5]))
 
 
@@ -60,7 +60,7 @@ def range_from_msg(msg: Range) -> RangeRecord:
 
 
 class _DepthTopics:
-    """The topic of a depth camera, and its camera_info until that has come."""
+    """Topic of a depth camera, and its camera_info until it has arrived."""
 
     def __init__(self, source: DepthInput) -> None:
         self._input = source
@@ -88,7 +88,7 @@ def _subscribe(topic: str, kind: type, callback: Callable[[Any], None], *, buff_
 
 
 def subscribe_inputs(costmap: FedCostmap) -> None:
-    """Subscribe to everything that a costmap's layers see by."""
+    """Subscribe to the topics of all inputs of a costmap."""
     for each in costmap.inputs:
         if isinstance(each, ScanInput):
             _subscribe(each.topic, LaserScanMsg, _hearer(each, scan_from_msg), buff_size=2**18)

@@ -1,8 +1,8 @@
-"""What of move_base can be changed while it drives, by dynamic_reconfigure, in upstream's namespaces and names.
+"""Parameters of move_base that can change at run time, by dynamic_reconfigure, with upstream's names.
 
-Differs: `base_global_planner` and `base_local_planner` cannot be changed (upstream loads another plug-in); the goal
-tolerances of TrajectoryPlannerROS can; what of `conservative_reset_dist` and `clearing_rotation_allowed` is changed
-holds from the next recovery on (upstream: from the next start on); a costmap that is resized keeps its map.
+Differs: `base_global_planner` and `base_local_planner` cannot change (upstream loads another plug-in); the goal
+tolerances of TrajectoryPlannerROS can. Changes of `conservative_reset_dist` and `clearing_rotation_allowed` hold from
+the next recovery on (upstream: from the next start on). A costmap that is resized keeps its map.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ LAYERS: dict[type, tuple[str, ...]] = {
 
 
 class Tuning:
-    """The dynamic_reconfigure servers of move_base.
+    """dynamic_reconfigure servers of move_base.
 
     Args:
         prefix: move_base's name and a slash, for messages.
@@ -83,7 +83,7 @@ class Tuning:
         self._servers: list[ReconfigureServer] = []
 
     def offer_node(self, params: MoveBaseParams, take: Callable[[MoveBaseParams], None]) -> None:
-        """move_base's own; `take` gets them as they are after a change."""
+        """Serve move_base's own parameters; `take` is called with them after a change."""
         now = params
 
         def apply(changes: dict[str, Any]) -> MoveBaseParams:
@@ -97,7 +97,7 @@ class Tuning:
         self._servers.append(ReconfigureServer("", params, MOVE_BASE, apply))
 
     def offer_planner(self, space: str, planner: GlobalPlanner | LocalPlanner) -> None:
-        """A planner's, if it can; a plan that is worked on is made by what was."""
+        """Serve a planner's parameters, if it has any; a plan in progress uses the old ones."""
         names, params = getattr(planner, "tunable", ()), getattr(planner, "params", None)
         if not names or params is None:
             return
@@ -109,7 +109,7 @@ class Tuning:
         self._servers.append(ReconfigureServer(space, params, names, apply))
 
     def offer_costmap(self, node: CostmapNode, after: Callable[[], None]) -> None:
-        """A costmap's and its layers'; `after` is called when its own have changed."""
+        """Serve the parameters of a costmap and its layers; `after` is called when its own have changed."""
         costmap = node.costmap
 
         def apply(changes: dict[str, Any]) -> CostmapParams:

@@ -1,4 +1,4 @@
-"""sensors: prints a table of all motion sensors, as sensor_watch knows them.
+"""sensors: prints a table of all motion sensors, as known to sensor_watch.
 
 rosrun rosbot_patrol sensors [--follow]
 
@@ -23,7 +23,7 @@ WELL = ("ok", "waiting", "disabled", "unwatched")
 
 
 def table(message: SensorStates) -> str:
-    """One line a sensor, what is wrong with it below, and the sentence about all of them."""
+    """One line per sensor, with its problems below, and the sentence about all of them."""
     rows = [HEAD, *(_row(sensor) for sensor in message.sensors)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEAD))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

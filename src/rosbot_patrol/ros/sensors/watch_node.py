@@ -1,12 +1,11 @@
-"""sensor_watch: knows which motion sensor is well, and tells who asks, and the owner, when one is not.
+"""sensor_watch: supervises the motion sensors, and notifies the owner when one fails.
 
 Listens to /motion_trigger, whoever publishes there, to the bridges' /sensors/links and to the patrol's /patrol/alive: a
-patrol that is dead or hangs answers nobody, and cannot say so itself. The patrol's /patrol/arming says which rooms are
-guarded; until it is heard, and where the patrol has gone, all are. Publishes /sensors/states
-(latched), /sensors/events and /diagnostics, and tells the owner through the outbox in ~state_dir, which it shares with
-the patrol but needs no other node to deliver.
+patrol that is dead or hangs cannot report itself. The patrol's /patrol/arming says which rooms are guarded; until it is
+heard, and after the patrol has gone, all are. Publishes /sensors/states (latched), /sensors/events and /diagnostics.
+Notifies the owner through the outbox in ~state_dir, which it shares with the patrol.
 
-All durations are of the wall: sensors send their heartbeats in real time, whatever /clock does.
+All durations are wall times: sensors send their heartbeats in real time, whatever /clock does.
 """
 
 from __future__ import annotations
@@ -51,8 +50,8 @@ log = logging.getLogger(__name__)
 
 STEP = 0.25  # [s] of the wall
 REPORT_EVERY = 4  # steps
-STATES_EVERY = 20  # steps, where nothing changes
-MAX_WAITING = 20_000  # messages between two steps; more than a flood can need
+STATES_EVERY = 20  # steps without a change
+MAX_WAITING = 20_000  # messages between two steps; more than any flood
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,13 +70,13 @@ GROUPS = (SensorWatchParams, WatchTimes, NoticeTimes, LookTimes, MailParams)
 
 
 def load_group(cls: type, tree: Mapping[str, Any]) -> Any:
-    """One of the groups that share the node's flat namespace; only the first warns of unknown names."""
+    """Load one of the groups that share the node's flat namespace; only the first warns of unknown names."""
     others = {name for other in GROUPS if other is not cls for name, *_ in declared(other)}
     return load_params(cls, tree=dict(tree), ignore=others | (set(tree) if cls is not GROUPS[0] else set()))
 
 
 def load_list(params: SensorWatchParams) -> SensorList:
-    """The sensors, checked against rooms and simulator; raises ParamError."""
+    """Load the sensors file, checked against rooms and simulator; raises ParamError."""
     rooms = load_rooms(Path(params.path_to_params).expanduser())
     sensors = load_sensors(params.sensors, {room.id: room.name for room in rooms}, rooms_source=rooms.source)
     if sensors.has_file and params.motion_sensors:
@@ -99,7 +98,7 @@ class SensorWatch:
         self._health = Health("motion sensors")
         self._post = OwnerPost(load_group(MailParams, tree), folder, self._health)
         self._watch = Supervisor(sensors, load_group(WatchTimes, tree), time.monotonic())
-        self._guarded: frozenset[int] | None = None  # rooms, None for all
+        self._guarded: frozenset[int] | None = None  # guarded rooms, None: all
         self._notices = Notices(
             load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory), is_guarded=self._is_guarded
         )
@@ -112,7 +111,7 @@ class SensorWatch:
         log.info("watching %s", where)
 
     def run(self) -> None:
-        """Watch until shutdown."""
+        """Supervise until shutdown."""
         self._triggers: deque[tuple[int, bool, str, float]] = deque(maxlen=MAX_WAITING)
         self._links: deque[tuple[SensorLinks, float, float]] = deque(maxlen=1000)
         self._patrol: deque[tuple[str, float]] = deque(maxlen=10)
@@ -139,14 +138,14 @@ class SensorWatch:
         self._guarded = None if message.all_rooms else frozenset(message.rooms)
 
     def _on_links(self, message: SensorLinks) -> None:
-        # in simulated time both stamps are of one clock
+        # under simulated time both stamps are of one clock
         offset = 0.0 if self._simulated else message.header.stamp.to_sec() - rospy.get_time()
         self._links.append((message, offset, time.monotonic()))
 
     # -- step
 
     def _is_guarded(self, room: int | None) -> bool:
-        """Whether motion in a room means anything; what is not known counts as guarded."""
+        """Whether a room is guarded, so that motion means something; unknown counts as guarded."""
         guarded = self._guarded
         is_patrol_gone = any(key.kind is Kind.PATROL_GONE for key in self._watch.problems())
         return guarded is None or room is None or room in guarded or is_patrol_gone
@@ -202,7 +201,7 @@ class SensorWatch:
             self._remember(now)
 
     def _remember(self, now: float) -> None:
-        """Keep what was told, once the notices are on the disk themselves."""
+        """Store which notices were sent, after the notices themselves are on the disk."""
         try:
             write_json(self._memory, self._notices.snapshot())
         except OSError as err:
@@ -213,12 +212,12 @@ class SensorWatch:
 
 
 def to_post(notice: Notice) -> PostNotice:
-    """The notice as the outbox takes it."""
+    """Convert a notice for the outbox."""
     return PostNotice(id=notice.id, wall=time.time(), kind="sensor", subject=notice.subject, text=notice.text)
 
 
 def read_memory(path: Path) -> Mapping[str, Any] | None:
-    """What was told before the program ended; None where there is nothing that makes sense."""
+    """Read which notices were sent before the program ended; None if there is nothing valid."""
     try:
         return read_json(path)
     except StateError as err:
