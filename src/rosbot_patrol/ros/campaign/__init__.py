@@ -1,1 +1,1 @@
-"""Whole houses as child processes: campaigns, system tests and benchmarks drive them."""
+"""Whole houses as child processes, for campaigns, system tests and benchmarks."""

@@ -1,4 +1,4 @@
-"""One life of a house in a crash campaign: patrols with an intruder, in which programs are killed, until all are."""
+"""One life of a house in a crash campaign: patrols with an intruder and killed programs, until all are killed."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.ros.campaign.house import House, HouseError, Master, child_pids
 from rosbot_patrol.ros.campaign.mail_sink import MailSink
 
-HOUSE = "flat"  # its rooms are near: short patrols
+HOUSE = "flat"  # its rooms are close together: short patrols
 PATROLS = 4  # in one life
 READY, ENDS, MOMENT, DELIVERED = 120.0, 240.0, 60.0, 40.0  # longest waits [s]
-FORGOTTEN = 20.0  # a patrol that rests for so long has forgotten a call [s]
+FORGOTTEN = 20.0  # time at rest after which a patrol has forgotten a call [s]
 JOURNAL = "journal.jsonl"
 
 
 class CrashLife:
-    """A house from its start until all of it is killed, or it has had its patrols.
+    """A house from its start until everything is killed, or its patrols are over.
 
     Args:
-        folder: with the journal, the guard's state and the mails; those of earlier lives stay.
+        folder: with the journal, the guard's state and the mails, including those of earlier lives.
         root: of the package.
         seed: of the campaign.
         kills: of the whole campaign.
@@ -56,7 +56,7 @@ class CrashLife:
         self._states: list[PatrolState] = []
 
     def run(self) -> None:
-        """Play it. Raises HouseError where the house does not come up or go on."""
+        """Run it. Raises HouseError if the house does not start or hangs."""
         os.environ["ROS_HOME"] = os.environ["ROS_LOG_DIR"] = str(self._folder / "ros")
         self._master = Master(self._folder / "roscore.log")
         sink = MailSink(self._folder / "smtp")
@@ -100,10 +100,10 @@ class CrashLife:
         return state is not None and state.state == PatrolState.IDLE and not state.queue
 
     def _finish(self, call: Mapping[str, Any], since: int) -> None:
-        """Wait for the verdict of a call, and write it down."""
+        """Wait for the verdict of a call, and record it."""
         until, rested = time.monotonic() + ENDS, time.monotonic()
         while not self._verdict(call["room"], since):
-            self._house.wait(lambda: True, 1.0, "a verdict")  # says so where the launch has ended
+            self._house.wait(lambda: True, 1.0, "a verdict")  # raises if the launch has ended
             if not self._is_at_rest():
                 rested = time.monotonic()
             if time.monotonic() > until or time.monotonic() - rested > FORGOTTEN:
@@ -116,9 +116,9 @@ class CrashLife:
         self._journal.add("verdict", call=call["call"], verdict=verdict, there=there, wall=time.time())
 
     def _verdict(self, room: int, since: int) -> str:
-        """The verdict of a mission to a room that has ended since a state, "" before that.
+        """Verdict of a mission to a room that ended after a state, "" before that.
 
-        That the patrol rests after it is not enough: a mission that it forgot in a restart has ended without one.
+        It is not enough that the patrol is at rest: a mission forgotten in a restart has ended without a verdict.
         """
         states = self._states[since:]
         own = [i for i, s in enumerate(states) if s.mission and s.room_id == room]
@@ -155,7 +155,7 @@ class CrashLife:
         return known[moment]() or self._verdict(room, since) != ""
 
     def _pids(self) -> dict[str, int]:
-        """Process of each node of the launch, by name."""
+        """Process of each node in the launch, by name."""
         found = {}
         for pid in child_pids(self._house.pid):
             with suppress(OSError):
@@ -165,12 +165,12 @@ class CrashLife:
         return found
 
     def _kill_all(self) -> None:
-        """As when the power goes: launch, nodes and master at once, and this program with them."""
+        """Kill launch, nodes, master and this program at once, as in a power cut."""
         self._house.kill()
         self._master.kill()
         os._exit(0)
 
 
 def waiting(state_dir: Path) -> int:
-    """Notices that no transport has taken yet."""
+    """Notices not yet accepted by a transport."""
     return sum(1 for _ in (state_dir / "outbox").glob("[0-9]*.notice"))

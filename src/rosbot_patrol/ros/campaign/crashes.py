@@ -1,4 +1,4 @@
-"""A crash campaign: lives of a house after each other, on one state folder, and the books at its end."""
+"""Crash campaign: successive lives of a house on one state folder, and the balance at the end."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from rosbot_patrol.ros.campaign.mail_sink import kept_mails
 from rosbot_patrol.ros.campaign.runner import Job, Runner, own_space
 
 LIFE = 1200.0  # longest life [s]
-_FRUITLESS = 3  # lives after each other in which nothing was killed
+_FRUITLESS = 3  # successive lives without a kill before giving up
 
 log = logging.getLogger(__name__)
 
 
 class CrashCampaign:
-    """The kills of a folder.
+    """Crash campaign in a folder.
 
     Args:
         folder: of the campaign.
         seed: of it.
-        kills: how many.
+        kills: number of kills.
         wrap: command to run each life under.
     """
 
@@ -48,7 +48,7 @@ class CrashCampaign:
         self._fruitless = 0
 
     def run(self) -> int:
-        """Go on to the end; the exit status."""
+        """Continue to the end; returns the exit status."""
         prefix = own_space()
         runner = Runner(1, prefix, self._wrap, self._done)
         self._tell()
@@ -66,7 +66,7 @@ class CrashCampaign:
         return 0 if books.is_clean else 1
 
     def books(self) -> Books:
-        """What has come of it so far."""
+        """Balance so far."""
         state = self.folder / "state"
         mails = kept_mails((self.folder / "mail" / "new", self.folder / "smtp"))
         return balance(
@@ -74,7 +74,7 @@ class CrashCampaign:
         )
 
     def _lives(self, space: bool) -> Iterator[Job]:
-        """Lives until every patrol was called for, and one more where all were killed at the end."""
+        """Run lives until every patrol was called for, and one more if everything was killed at the end."""
         while True:
             lines = self._journal.read()
             if next_patrol(lines) >= self._patrols and not everything_killed(lines):
@@ -105,7 +105,7 @@ class CrashCampaign:
 
 
 def kept_records(state_dir: Path) -> list[KeptRecord]:
-    """What the guard keeps of its missions. Raises StoreError."""
+    """The guard's records of its missions. Raises StoreError."""
     incidents: list[Incident | None] = []
     if (state_dir / NAME).is_file():
         with IncidentStore(state_dir, read_only=True) as store:
@@ -125,7 +125,7 @@ def kept_records(state_dir: Path) -> list[KeptRecord]:
 
 
 def _verified(state_dir: Path) -> str | None:
-    """What the check of the database says, "" for all well; None where there is none to check."""
+    """Result of the database check, "" if all is well; None if there is nothing to check."""
     if not (state_dir / NAME).is_file():
         return None
     with IncidentStore(state_dir, read_only=True) as store:
@@ -134,7 +134,7 @@ def _verified(state_dir: Path) -> str | None:
 
 
 def summary_json(books: Books) -> str:
-    """The books for a program."""
+    """Balance for a program."""
     return json.dumps(
         {
             "kills": dict(books.kills),

@@ -1,7 +1,7 @@
-"""The whole house as a child process, driven and watched from outside: for system tests, benchmarks and campaigns.
+"""The whole house as a child process, driven and observed from outside: for system tests, benchmarks, campaigns.
 
-It only uses what a user has: `roslaunch`, topics and services. One process may run several houses one after another
-on one master.
+It uses only a user's means: `roslaunch`, topics and services. One process may run several houses one after another on
+one master.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from rosbot_patrol.srv import MoveActor, RemoveActor, SpawnActor
 
 
 class HouseError(PatrolError):
-    """The house did not come up or did not do what was waited for."""
+    """The house did not start, or an expected event did not happen."""
 
 
 class Master:
-    """A roscore of one's own, and this process as a node of it on wall time.
+    """Our own roscore, with this process as a node on wall time.
 
     Args:
         log: of the roscore.
@@ -60,7 +60,7 @@ class Master:
         rospy.init_node("house_watch", anonymous=True, disable_signals=True)
 
     def kill(self) -> None:
-        """End it at once, as `kill -9` does."""
+        """Kill it at once, as `kill -9` does."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._core.pid, signal.SIGKILL)
 
@@ -71,7 +71,7 @@ class Master:
 
 
 def end_group(process: subprocess.Popen[bytes], grace_s: float = 20.0) -> None:
-    """End a process that leads its own group: interrupt, then kill what is left of the group."""
+    """End a process that leads its own group: interrupt it, then kill the rest of the group."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGINT)
     with contextlib.suppress(subprocess.TimeoutExpired):
@@ -96,7 +96,7 @@ def child_pids(pid: int) -> list[int]:
 
 @dataclass
 class Mission:
-    """What was seen of one mission, by ground truth.
+    """Observations of one mission, from ground truth.
 
     Attributes:
         turned: the look-around at the room's point, before any further viewpoint [rad].
@@ -116,7 +116,7 @@ class Mission:
 
     @property
     def is_at_point(self) -> bool:
-        """Whether it looks around at the room's point; it may go on to further viewpoints, and turn there, too."""
+        """Whether it looks around at the room's point; further viewpoints, with turns there, may follow."""
         if not self.states or self.states[-1] != PatrolState.LOOKING:
             return False
         return not any("further viewpoint" in why for why in self.why)
@@ -126,11 +126,11 @@ class House:
     """One launch of the guarded house.
 
     Args:
-        folder: where logs, mails and state go.
+        folder: for logs, mails and state.
         launch: package and file for roslaunch.
-        plain: give the launch file no argument but those named here.
-        before: command that starts roslaunch, as one that enters another host.
-        arguments: arguments of the launch file; `ns` is where its topics are looked for.
+        plain: give the launch file only the arguments named here.
+        before: command that starts roslaunch, such as one that enters another host.
+        arguments: of the launch file; `ns` is the namespace of its topics.
     """
 
     def __init__(
@@ -174,11 +174,11 @@ class House:
         self.stop()
 
     def name(self, relative: str) -> str:
-        """A topic or service of this house as seen from the root."""
+        """Absolute name of a topic or service of this house."""
         return self._inside + relative
 
     def start(self, environment: Mapping[str, str] | None = None) -> None:
-        """Launch it; does not wait."""
+        """Launch it, without waiting."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with self.log.open("wb") as out:
             self._process = subprocess.Popen(
@@ -198,7 +198,7 @@ class House:
         ]
 
     def stop(self) -> None:
-        """End every process of it."""
+        """End all its processes."""
         for subscriber in self._subscribers:
             subscriber.unregister()
         self._subscribers = []
@@ -212,9 +212,9 @@ class House:
             )
 
     def kill(self) -> None:
-        """End every process of it at once, as `kill -9` does."""
+        """Kill all its processes at once, as `kill -9` does."""
         if self._process is not None:
-            # roslaunch first: it would end its nodes politely. They lead groups of their own.
+            # roslaunch first, because it would end its nodes politely. The nodes lead their own groups.
             nodes = list(child_pids(self._process.pid))
             for pid in [self._process.pid, *nodes]:
                 with contextlib.suppress(ProcessLookupError):
@@ -224,12 +224,12 @@ class House:
 
     @property
     def is_running(self) -> bool:
-        """Whether the launch has not ended."""
+        """Whether the launch is still running."""
         return self._process is not None and self._process.poll() is None
 
     @property
     def pid(self) -> int:
-        """Of roslaunch. Raises HouseError where there is none."""
+        """Process id of roslaunch. Raises HouseError if there is none."""
         if self._process is None:
             raise HouseError("the house is not started")
         return self._process.pid
@@ -240,10 +240,10 @@ class House:
         return time.monotonic() - self.started
 
     def wait(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
-        """Wait for something on wall time.
+        """Wait for a condition on wall time.
 
         Raises:
-            HouseError: it did not come, or the launch ended.
+            HouseError: it did not become true, or the launch ended.
         """
         deadline = time.monotonic() + timeout
         while not condition():
@@ -255,7 +255,7 @@ class House:
             time.sleep(0.02)
 
     def log_end(self, lines: int = 40) -> str:
-        """The last lines of the launch's output."""
+        """Last lines of the launch's output."""
         text = self.log.read_text(encoding="utf-8", errors="replace") if self.log.exists() else ""
         return "\n".join(text.splitlines()[-lines:])
 

@@ -1,4 +1,4 @@
-"""A mail server that keeps all it is given, each as a file, and says how often which mail came."""
+"""Mail server that stores every mail in a file, and counts copies of each mail."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ INCIDENT = "X-Rosbot-Patrol-Incident"
 
 
 class MailSink:
-    """Speaks SMTP (RFC 5321, no extensions) on a port of this machine; every mail is on the disk before it says so.
+    """Speaks SMTP (RFC 5321, no extensions) on a local port; every mail is on the disk before it is acknowledged.
 
     Args:
         folder: of the mails.
-        port: of the server, 0 for any.
+        port: of the server, 0: any.
 
     Raises:
         OSError: the port is taken.
@@ -45,7 +45,7 @@ class MailSink:
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
     def stop(self) -> None:
-        """Take no more."""
+        """Accept no more mails."""
         self._server.shutdown()
         self._server.server_close()
 
@@ -53,7 +53,7 @@ class MailSink:
 class _Session(socketserver.StreamRequestHandler, ABC):
     @abstractmethod
     def keep(self, mail: bytes) -> None:
-        """Take a mail; when it returns the mail is on the disk."""
+        """Store a mail; when it returns, the mail is on the disk."""
 
     def handle(self) -> None:
         with contextlib.suppress(ConnectionError):
@@ -87,7 +87,7 @@ class _Session(socketserver.StreamRequestHandler, ABC):
 
 
 def kept_mails(folders: Iterable[Path]) -> list[KeptMail]:
-    """The mails about incidents in folders of files (a Maildir's `new`, or those above)."""
+    """Mails about incidents in folders of files (a Maildir's `new`, or those above)."""
     found = []
     for folder in folders:
         for path in sorted(folder.iterdir()) if folder.is_dir() else []:

@@ -1,11 +1,11 @@
-"""campaign: many seeded patrols of the simulated houses, each judged against what really was there.
+"""campaign: many seeded patrols of the simulated houses, each compared with ground truth.
 
     rosrun rosbot_patrol campaign FOLDER --patrols 60
     rosrun rosbot_patrol campaign FOLDER --patrols 100 --faults    # something breaks in every other one
     rosrun rosbot_patrol campaign FOLDER --only 17        # one of them again
     rosrun rosbot_patrol campaign FOLDER --crash 200      # patrols in which programs are killed
 
-Run again it goes on where it stopped. Exit status: 0, or 1 where anything was not as it should have been.
+A second run continues where the first stopped. Exit status: 0, or 1 if anything deviated from the expectation.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ from rosbot_patrol.ros.campaign.house import HouseError
 from rosbot_patrol.ros.campaign.patrol import play
 from rosbot_patrol.ros.campaign.runner import Job, Runner, own_space, raise_loopback
 
-KEPT_FOR_GOOD = (RESULT, PLAN, "scenario.yaml", "mail")  # of a patrol that went as it should
+KEPT_FOR_GOOD = (RESULT, PLAN, "scenario.yaml", "mail")  # files kept of a patrol without deviations
 
 
 def package_root() -> Path:
-    """The folder with worlds and maps: the package's, wherever it is installed."""
+    """Folder with worlds and maps: the package's, wherever it is installed."""
     return Path(rospkg.RosPack().get_path("rosbot_patrol"))
 
 
 def options(arguments: list[str]) -> argparse.Namespace:
-    """The command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(
         prog="campaign", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -64,13 +64,13 @@ def options(arguments: list[str]) -> argparse.Namespace:
     )
     parser.add_argument("--faults", action="store_true", help="something breaks in every other patrol")
     parser.add_argument("--life", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # the program in its own space
+    parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # run inside its own network and process space
     parser.add_argument("--space", action="store_true", help=argparse.SUPPRESS)
     return parser.parse_args(arguments)
 
 
 class Campaign:
-    """The patrols of a folder."""
+    """Patrols of a folder."""
 
     def __init__(self, given: argparse.Namespace) -> None:
         self._given = given
@@ -83,7 +83,7 @@ class Campaign:
         self._here = 0
 
     def run(self) -> int:
-        """Play what has not been played; the exit status."""
+        """Run the patrols that have not run yet; returns the exit status."""
         numbers = self._given.only or range(self._given.patrols)
         wanted = [n for n in numbers if self._given.only or self._folder.result(n) is None]
         self._total = len(set(numbers) | {r.number for r in self._folder.results()})
@@ -164,7 +164,7 @@ class Campaign:
         return "Not as they should be, each with the command that plays it again:\n" + "\n".join(lines)
 
     def command(self, result: Result) -> str:
-        """What plays a patrol again."""
+        """Command that repeats a patrol."""
         houses = f" --houses {' '.join(self._given.houses)}" if tuple(self._given.houses) != HOUSES else ""
         folder, faults = f"again-{result.number}", " --faults" if self._given.faults else ""
         return f"rosrun rosbot_patrol campaign {folder} --seed {result.seed}{houses}{faults} --only {result.number}"
@@ -180,7 +180,7 @@ class Campaign:
 
 
 def in_its_space(given: argparse.Namespace) -> int:
-    """The program as it was started by itself: one patrol, or one life of a crash campaign; the exit status."""
+    """Run the program as a child started by itself: one patrol, or one life of a crash campaign; the exit status."""
     if given.space:
         raise_loopback()
     status = 0
@@ -200,7 +200,7 @@ def main() -> None:
     """Run the program."""
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s")
     given = options(sys.argv[1:])
-    for number in (signal.SIGINT, signal.SIGTERM):  # in the background a shell has SIGINT ignored
+    for number in (signal.SIGINT, signal.SIGTERM):  # a shell ignores SIGINT in background programs
         signal.signal(number, signal.default_int_handler)
     try:
         if given.one or given.life:
@@ -211,4 +211,4 @@ def main() -> None:
         sys.exit(Campaign(given).run())
     except (PatrolError, OSError) as err:
         print(f"campaign: {err}", file=sys.stderr)
-        sys.exit(2)  # 1 says that a patrol was not as it should be
+        sys.exit(2)  # 1 means a patrol with a deviation

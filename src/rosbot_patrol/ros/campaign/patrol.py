@@ -1,4 +1,4 @@
-"""Plays one patrol of a campaign in the real house, and writes down what came of it."""
+"""Runs one patrol of a campaign in the real house, and records the result."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from rosbot_patrol.ros.campaign.house import House, HouseError, Master
 from rosbot_patrol.ros.campaign.mail_sink import kept_mails
 from rosbot_patrol.ros.campaign.watch import CampaignWatch, Recording
 
-READY = 120.0  # for the house to be on guard [s]
-MAIL = 20.0  # for a mail after the mission [s]
-HOME = 0.35  # from where it began, the robot is home [m]
-NEXT = 1.0  # after a mission, the next one has begun if one waits [s], simulated
+READY = 120.0  # longest wait for the house to be on guard [s]
+MAIL = 20.0  # longest wait for a mail after the mission [s]
+HOME = 0.35  # distance from the start at which the robot is home [m]
+NEXT = 1.0  # simulated time after a mission in which a waiting one has begun [s]
 
 Times = dict[str, float]
 
@@ -38,10 +38,10 @@ log = logging.getLogger(__name__)
 
 
 def play(folder: Path, root: Path, limit: float) -> Result:
-    """Play the patrol that a folder holds.
+    """Run the patrol planned in a folder.
 
     Args:
-        folder: with the plan; gets the result, mails, state and log.
+        folder: with the plan; receives the result, mails, state and log.
         root: of the package.
         limit: for all of it [s] of real time.
     """
@@ -81,7 +81,7 @@ def play(folder: Path, root: Path, limit: float) -> Result:
 
 
 def _wait_for_the_end(house: House, watch: CampaignWatch, patrol: Patrol, until: float) -> None:
-    """Until the mission to the room is over and its mail is there."""
+    """Wait until the mission to the room is over and its mail has arrived."""
 
     def is_over() -> bool:
         end = _mission(watch.heard, patrol.room)[1]
@@ -97,12 +97,12 @@ def _wait_for_the_end(house: House, watch: CampaignWatch, patrol: Patrol, until:
 
 
 def _notices(house: House) -> list[KeptMail]:
-    """The mails about incidents; one about a motion sensor that is silent is none of them."""
+    """Mails about incidents, without those about silent motion sensors."""
     return kept_mails((house.maildir / "new",))
 
 
 def _mission(heard: Recording, room: int) -> tuple[int | None, int | None]:
-    """Where the states of the first mission to a room begin, and where the rest after it."""
+    """Indices of the states where the first mission to a room begins, and where the rest after it begins."""
     begin = next((i for i, s in enumerate(heard.states) if s.message.mission and s.message.room_id == room), None)
     if begin is None:
         return None, None
@@ -122,7 +122,7 @@ def evaluate(
     contacts: list[str],
     wall_s: float,
 ) -> Result:
-    """Judge a recording, and what the guard kept of it, by the truth."""
+    """Compare a recording, and the guard's own records, with ground truth."""
     found = load_house(patrol.house, root)
     floor = Floor(found.bodies, found.rooms)
     begin, end = _mission(heard, patrol.room)
@@ -175,7 +175,7 @@ def evaluate(
 
 
 def _times(heard: Recording, patrol: Patrol, begin: int | None, end: int | None) -> tuple[Times, float | None]:
-    """Seconds from the trigger to what followed, and when the verdict was told."""
+    """Seconds from the trigger to later events, and the time of the verdict."""
     if begin is None:
         return {}, None
     start = next((t for t, room in heard.triggers if room == patrol.room), heard.states[begin].time)
@@ -209,7 +209,7 @@ def _from_view(there: Presence, heard: Recording) -> Times:
 
 
 def _kept(state_dir: Path, mission: str | None) -> Incident | None:
-    """The guard's own record of a mission, None where it keeps none."""
+    """The guard's own record of a mission, None without one."""
     if mission is None or not (state_dir / NAME).is_file():
         return None
     try:
@@ -221,7 +221,7 @@ def _kept(state_dir: Path, mission: str | None) -> Incident | None:
 
 
 def _share(heard: Recording, begin: int | None, end: int | None) -> float | None:
-    """The share of the floor that the guard has told during a mission, None where it told none."""
+    """Share of the floor reported by the guard during a mission, None if it reported none."""
     if begin is None:
         return None
     shares = [float(s.message.share_seen) for s in heard.states[begin : None if end is None else end + 1]]

@@ -1,4 +1,4 @@
-"""TCP ports for masters and bridges of one's own, in benchmarks and tests."""
+"""Free TCP ports for masters and bridges, in benchmarks and tests."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import contextlib
 import random
 import socket
 
-FIRST, END = 20000, 32768  # Linux gives connections those from END on
+FIRST, END = 20000, 32768  # Linux assigns ports from END on to connections
 
 
 def free_port() -> int:
-    """A port that nobody has, and that no connection gets before it is listened on."""
+    """A free port that no connection gets before it is listened on."""
     while True:
         port = random.SystemRandom().randrange(FIRST, END)
         with socket.socket() as probe, contextlib.suppress(OSError):

@@ -1,8 +1,8 @@
-"""Starts programs that may fail, several at once, each in a space of its own and within a time, and goes on.
+"""Runner of programs that may fail: several at once, each isolated and within a time limit.
 
-A network and process space of its own for each of the houses that run side by side, where the system gives them.
+Houses that run side by side each get their own network and process space, if the system provides them.
 
-In such a space every house has the same ports, and all that was started in it ends with it.
+In such a space every house uses the same ports, and everything started in it ends with it.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 
-GRACE = 30.0  # beyond a program's own limit [s]
+GRACE = 30.0  # time beyond a program's own limit [s]
 
-_LIMIT = ("timeout", "--foreground", "-s", "KILL")  # inside of a wrapping lock, which may be waited for without end
+_LIMIT = ("timeout", "--foreground", "-s", "KILL")  # inside a wrapping lock, because the wait for the lock has no limit
 _KILLED = (137, -signal.SIGKILL)
 
 
@@ -32,8 +32,8 @@ class Job:
 
     Attributes:
         name: for people.
-        command: with its arguments; log: where its words go.
-        limit: that it is given to end by itself [s].
+        command: with its arguments; log: file of its output.
+        limit: time in which it should end by itself [s].
     """
 
     name: str
@@ -46,10 +46,10 @@ class Runner:
     """Runs jobs.
 
     Args:
-        jobs: at once.
-        prefix: command that gives each a space of its own; where it is empty they run one after another.
-        wrap: a command to run each under, such as a lock.
-        done: told of each that ended: its job, and what was wrong, "" if nothing.
+        jobs: number of jobs at once.
+        prefix: command that isolates each job; if it is empty, they run one after another.
+        wrap: command around each job, such as a lock.
+        done: called when a job ends, with the job and its problem, "" if none.
     """
 
     def __init__(self, jobs: int, prefix: Sequence[str], wrap: Sequence[str], done: Callable[[Job, str], None]) -> None:
@@ -62,7 +62,7 @@ class Runner:
     def run(self, jobs: Iterable[Job]) -> None:
         """Run all; returns when the last has ended, or after `stop`.
 
-        Raises what `jobs` or `done` raise; no further job is begun then.
+        Raises the errors of `jobs` or `done`; no further job is started then.
         """
         waiting = iter(jobs)
         pool = ThreadPoolExecutor(self._count)
@@ -70,12 +70,12 @@ class Runner:
         pool.shutdown(wait=False)
         while wait(futures, 0.2).not_done:  # in pieces, so that Ctrl-C is heard
             if any(future.done() and future.exception() for future in futures):
-                self._stopped.set()  # those that run may end
+                self._stopped.set()  # running jobs may end
         for future in futures:
             future.result()
 
     def stop(self) -> None:
-        """End those that run, and begin none."""
+        """End the running jobs, and start no more."""
         self._stopped.set()
         with self._lock:
             for process in self._running:
@@ -116,7 +116,7 @@ class Runner:
 
 def _end(process: subprocess.Popen[bytes]) -> None:
     with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)  # the leader of a space takes all in it along
+        os.killpg(process.pid, signal.SIGKILL)  # killing the leader of a space ends everything in it
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(10.0)
 
@@ -126,7 +126,7 @@ _SIOCSIFFLAGS, _UP_AND_RUNNING = 0x8914, 0x41
 
 
 def own_space() -> list[str]:
-    """The command that gives what follows it a space of its own; empty where the system refuses."""
+    """Command that isolates the command after it; empty if the system refuses."""
     for prefix in (_SPACE, [_SPACE[0], "--user", "--map-root-user", *_SPACE[1:]]):
         try:
             if subprocess.run([*prefix, "true"], capture_output=True, timeout=20.0).returncode == 0:
@@ -137,6 +137,6 @@ def own_space() -> list[str]:
 
 
 def raise_loopback() -> None:
-    """Make localhost work in a space of one's own. Raises OSError."""
+    """Make localhost work in an isolated space. Raises OSError."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
         fcntl.ioctl(any_socket, _SIOCSIFFLAGS, struct.pack("16sh", b"lo", _UP_AND_RUNNING))

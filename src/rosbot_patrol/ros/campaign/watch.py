@@ -1,4 +1,4 @@
-"""Writes down what happens during a patrol: the robot's and the actors' true poses, and what the guard tells."""
+"""Recording of a patrol: true poses of the robot and the actors, and the guard's messages."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rosbot_patrol.simulation.scenario.file import PLAYED
 
 @dataclass
 class State:
-    """One state of the patrol, as it was told at a simulated time [s]."""
+    """One state of the patrol, received at a simulated time [s]."""
 
     time: float
     message: PatrolState
@@ -30,7 +30,7 @@ class State:
 
 @dataclass
 class Recording:
-    """What was heard. Times are simulated [s]."""
+    """Recorded messages. Times are simulated [s]."""
 
     robot: tuple[list[float], list[Pose2D]] = field(default_factory=lambda: ([], []))
     actors: dict[str, tuple[list[float], list[Pose2D]]] = field(default_factory=dict)
@@ -43,15 +43,15 @@ class Recording:
     is_played: bool = False
 
     def robot_track(self) -> Track:
-        """The robot's true way."""
+        """True poses of the robot."""
         return Track(*self.robot)
 
     def actor_tracks(self) -> dict[str, Track]:
-        """The true ways of all others."""
+        """True poses of the actors."""
         return {name: Track(*track) for name, track in self.actors.items()}
 
     def localisation(self) -> tuple[float, float] | None:
-        """Mean and largest error of the pose [m]."""
+        """Mean and largest error of the estimated pose [m]."""
         track = self.robot_track()
         errors = [distance(truth, pose) for time, pose in self.estimates if (truth := _between(track, time))]
         return (sum(errors) / len(errors), max(errors)) if errors else None
@@ -65,7 +65,7 @@ def _between(track: Track, time: float) -> Pose2D | None:
 
 
 class CampaignWatch:
-    """Listens, from before the house starts to its end."""
+    """Listens from before the house's start to its end."""
 
     def __init__(self) -> None:
         self.heard = Recording()
@@ -84,7 +84,7 @@ class CampaignWatch:
         ]
 
     def stop(self) -> None:
-        """Hear nothing more."""
+        """Stop listening."""
         for subscriber in self._subscribers:
             subscriber.unregister()
 

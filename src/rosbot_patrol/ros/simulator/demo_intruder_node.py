@@ -1,4 +1,4 @@
-"""The intruder of the demonstration: once the robot is on guard, a person walks into a room of the simulated house."""
+"""Intruder of the demo: once the robot is on guard, a person walks into a room of the simulated house."""
 
 from __future__ import annotations
 

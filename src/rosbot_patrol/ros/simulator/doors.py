@@ -1,4 +1,4 @@
-"""Doors of the simulator from outside: ~spawn_door and ~set_door."""
+"""Door services of the simulator: ~spawn_door and ~set_door."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from rosbot_patrol.srv import (
     SpawnDoorResponse,
 )
 
-_WIDTH, _HEIGHT = 0.9, 2.0  # of a door whose size is not said [m]
+_WIDTH, _HEIGHT = 0.9, 2.0  # default size of a door [m]
 
 
 class DoorServices:
     """The two services.
 
     Args:
-        engine: where the doors are.
-        ask: does something on the simulation's thread, and returns its result or raises its PatrolError.
+        engine: of the simulation.
+        ask: runs an action on the simulation's thread; returns its result or raises its PatrolError.
     """
 
     def __init__(self, engine: Engine, ask: Callable[[Callable[[], Any]], Any]) -> None:

@@ -1,4 +1,4 @@
-"""draw_world: a picture of a world file from above.
+"""draw_world: draws a picture of a world file from above.
 
 rosrun rosbot_patrol draw_world WORLD OUT.png [--width PIXELS] [--rooms FILE] [--sensors FILE]
 """
@@ -21,13 +21,13 @@ from rosbot_patrol.simulation.render.from_above import WorldPicture, draw_world
 from rosbot_patrol.simulation.sdf.world import load_world
 from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
-_FINER = 2  # drawn that many times larger, for smooth edges
+_FINER = 2  # factor of the drawing's size, for smooth edges
 _ROOM = (20, 60, 160)
 _SENSOR = (190, 40, 30)
 
 
 def main() -> None:
-    """Read the arguments, draw, write the file; what is wrong is said in a sentence."""
+    """Read the arguments, draw, write the file; errors are printed in a sentence."""
     parser = argparse.ArgumentParser(prog="draw_world", description=__doc__)
     parser.add_argument("world", help="SDF file")
     parser.add_argument("out", type=Path, help="picture: png or jpg")
@@ -56,13 +56,13 @@ def main() -> None:
 
 
 def _own_arguments(arguments: list[str]) -> list[str]:
-    """Without the remappings that roslaunch and rosrun add."""
+    """Arguments without the remappings added by roslaunch and rosrun."""
     return [argument for argument in arguments if ":=" not in argument]
 
 
 def _mark(image: Image.Image, picture: WorldPicture, rooms: str, sensors: str) -> None:
     draw = ImageDraw.Draw(image)
-    scale = picture.pixels.shape[1] / (picture.high[0] - picture.low[0])  # pixels a metre
+    scale = picture.pixels.shape[1] / (picture.high[0] - picture.low[0])  # pixels per metre
     for room in load_rooms(Path(rooms)) if rooms else ():
         x, y = picture.pixel_of(room.pose[0], room.pose[1])
         radius = 0.2 * scale
@@ -80,7 +80,7 @@ def _mark(image: Image.Image, picture: WorldPicture, rooms: str, sensors: str) -
 
 
 def _write(image: Image.Image, text: str, place: tuple[float, float], height: float) -> None:
-    """Pillow's own letters, made as high as wanted: it comes with no font of another size."""
+    """Write text of any height; Pillow's own font has only one size."""
     letters = Image.new("L", (6 * len(text), 11))
     ImageDraw.Draw(letters).text((0, 0), text, fill=255)
     factor = height / letters.height

@@ -1,4 +1,4 @@
-"""Faults of the simulator from outside: ~set_fault, ~clear_fault, ~list_faults, and what is in force on ~faults."""
+"""Fault services of the simulator: ~set_fault, ~clear_fault, ~list_faults, and the active faults on ~faults."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from rosbot_patrol.srv import (
 
 
 class FaultServices:
-    """The services, the latched topic, and the poor links of the virtual sensors.
+    """Services, latched topic, and the poor links of the virtual sensors.
 
     Args:
-        engine: what breaks.
+        engine: of the simulation.
         clients: the sensors' links, by id.
-        ask: does something on the simulation's thread, and returns its result or raises its PatrolError.
-        health: is told what is in force.
+        ask: runs an action on the simulation's thread; returns its result or raises its PatrolError.
+        health: of the node; shows the active faults.
         seed: of the poor links.
     """
 
@@ -57,7 +57,7 @@ class FaultServices:
         rospy.Service("~list_faults", Trigger, self._list)
 
     def follow(self) -> None:
-        """Tell what has changed, and hand on what befalls the sensors' links; the simulation's thread calls it."""
+        """Publish changes and apply faults to the sensors' links; called on the simulation's thread."""
         for sensor in self._engine.motion_sensors.restarted():
             self._clients[sensor].reboot()
         if self._engine.faults.changes == self._told:
@@ -99,7 +99,7 @@ class FaultServices:
 
 
 def _tree(request: SetFaultRequest) -> dict[str, Any]:
-    """The request as the mapping that a scenario's file would hold."""
+    """Mapping of a request, as in a scenario file."""
     try:
         values = yaml.safe_load(request.values or "{}")
         target = yaml.safe_load(request.target) if request.target else None

@@ -1,4 +1,4 @@
-"""What the simulator sends: values of the engine as messages."""
+"""Messages of the simulator from the engine's values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _KINDS = {"fire_hydrant": "hydrant"}
 
 
 def header(stamp: float, frame: str) -> Header:
-    """Time [s] and frame."""
+    """Header with time [s] and frame."""
     return Header(stamp=time_to_msg(stamp), frame_id=frame)
 
 
@@ -39,7 +39,7 @@ def odometry_msg(
     z: float = 0.0,
     exact: bool = False,
 ) -> Odometry:
-    """Pose and velocity of the base, with the covariance of Gazebo's drive plug-in (a tenth of it where exact)."""
+    """Pose and velocity of the base, with the covariance of Gazebo's drive plug-in (a tenth of it if exact)."""
     msg = Odometry(header=header(stamp, frame), child_frame_id=child)
     place = msg.pose.pose
     place.position = Point(pose.x, pose.y, z)
@@ -55,7 +55,7 @@ def odometry_msg(
 
 
 def imu_msg(reading: ImuReading, params: ImuParams, stamp: float, frame: str = "imu_link") -> Imu:
-    """A sample of the inertial unit; roll and pitch of a base on a level floor are as sure as its heading."""
+    """A sample of the IMU; roll and pitch of a base on a level floor are as certain as its heading."""
     msg = Imu(header=header(stamp, frame))
     msg.orientation = Quaternion(*quaternion_from_yaw(reading.yaw))
     msg.angular_velocity = Vector3(*reading.rates)
@@ -104,7 +104,7 @@ def battery_msg(battery: Battery, stamp: float, frame: str = "base_link") -> Bat
 def joints_msg(
     robot: RobotDescription, angles: tuple[float, float], speeds: tuple[float, float], stamp: float
 ) -> JointState:
-    """Angles and speeds of every joint that moves; those that nothing drives (casters) stay at zero."""
+    """Angles and speeds of every movable joint; joints without a drive (casters) stay at zero."""
     turns = {joint: i for i, side in enumerate((robot.left, robot.right)) for joint in side}
     driven = [(hinge.forward, turns.get(hinge.joint)) for hinge in robot.hinges]
     return JointState(
@@ -116,7 +116,7 @@ def joints_msg(
 
 
 def contacts_msg(touches: list[Touch], stamp: float, robot_link: str) -> Contacts:
-    """What the robot touches."""
+    """Objects that the robot touches."""
     return Contacts(
         header=header(stamp, "map"),
         contacts=[
@@ -134,7 +134,7 @@ def contacts_msg(touches: list[Touch], stamp: float, robot_link: str) -> Contact
 
 
 def camera_info_msg(camera: Intrinsics, stamp: float, frame: str) -> CameraInfo:
-    """The pinhole."""
+    """Calibration of the pinhole camera."""
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     return CameraInfo(
         header=header(stamp, frame),
@@ -163,7 +163,7 @@ def image_msg(picture: np.ndarray, encoding: str, stamp: float, frame: str) -> I
 
 
 def cloud_msg(colour: np.ndarray, depth: np.ndarray, camera: Intrinsics, stamp: float, frame: str) -> PointCloud2:
-    """Depth as points in the optical frame, with the colour that upstream packs into the float `rgb`."""
+    """Depth as points in the optical frame, with colours packed into the float `rgb` as upstream."""
     height, width = depth.shape
     points = np.empty((height, width, 4), dtype=np.float32)
     points[..., 0] = depth * ((np.arange(width, dtype=np.float32) - camera.cx) / camera.fx)

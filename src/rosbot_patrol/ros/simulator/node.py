@@ -1,4 +1,4 @@
-"""simulator: the house, the robot and its sensors in place of Gazebo.
+"""simulator: the house, the robot and its sensors, in place of Gazebo.
 
 Matches what gazebo_ros and rosbot_description publish for the ROSbot: topics, types, frames (see the tables in the
 README), `/clock` and the transform odom -> base_link.
@@ -56,8 +56,8 @@ log = logging.getLogger(__name__)
 
 _HEALTH_PERIOD = 1.0
 _PAUSED_PERIOD = 0.05
-_FOLLOW_PERIOD = 0.002  # between looks at a clock of 100 Hz [s]
-_BEHIND = 0.5  # what is farther behind the clock is late for the nodes that listen [s]
+_FOLLOW_PERIOD = 0.002  # time between checks of a clock of 100 Hz [s]
+_BEHIND = 0.5  # longest delay behind the clock without a report [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,14 +95,14 @@ class SimulatorParams(EngineParams):
 
     @property
     def engine(self) -> EngineParams:
-        """What the engine takes of them."""
+        """Parameters of the engine."""
         return dataclasses.replace(
             self, motion=dataclasses.replace(self.motion, prewarmed=self.prewarmed and self.motion.prewarmed)
         )
 
 
 class Simulator:
-    """Runs the engine on one thread, in step with the wall or with the nodes that listen."""
+    """Runs the engine on one thread, in step with the wall clock or with the listening nodes."""
 
     def __init__(self, p: SimulatorParams) -> None:
         scenario = read_scenario(p.scenario) if p.scenario else None
@@ -174,7 +174,7 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """End the sensors' links and give the engine back."""
+        """Close the sensors' links and release the engine."""
         for client in self._clients.values():
             client.stop(0.0)
         self._engine.close()
@@ -185,7 +185,7 @@ class Simulator:
             self._shared.restart(self._engine.now)
 
     def _follow(self, shared: SharedClock) -> None:
-        """Advance once the shared clock has come so far."""
+        """Advance to the shared clock's time."""
         if shared.is_due(self._engine.now + TICK):
             self._advance()
         else:
@@ -257,7 +257,7 @@ def _port(place: SensorPlace, p: SimulatorParams) -> int:
 
 
 def _set_by(scenario: Scenario, p: SimulatorParams) -> SimulatorParams:
-    """The parameters with what a scenario says in their place."""
+    """Parameters with a scenario's settings."""
     setting, start = scenario.setting, scenario.robot or Start(x=p.x, y=p.y, yaw=p.yaw)
     return dataclasses.replace(
         p,

@@ -1,4 +1,4 @@
-"""Everything that the simulator publishes, each at its rate of simulated time and only where somebody listens."""
+"""Publishers of the simulator, each at its rate of simulated time and only with subscribers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rosbot_patrol.simulation.engine import STEP, Engine
 TICK = 0.01  # of /clock [s]
 STEPS_PER_TICK = round(TICK / STEP)
 
-_RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")  # advertised before a robot is there
+_RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")  # advertised before there is a robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,13 +42,13 @@ class RateParams:
 
 
 class Outputs:
-    """The publishers; `publish(tick)` sends what is due. One thread calls it, that of the simulation.
+    """The publishers; `publish(tick)` sends what is due. Only the simulation's thread calls it.
 
     Args:
-        engine: what is simulated.
-        rates: how often.
-        exact_odometry: /odom tells the truth, as Gazebo's does.
-        shared: the time that another node tells; None: /clock is published.
+        engine: of the simulation.
+        rates: of the topics.
+        exact_odometry: /odom is ground truth, as Gazebo's.
+        shared: clock of another node; None: publish /clock.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Outputs:
         ]
 
     def publish(self, tick: int) -> None:
-        """Send the time and what is due at a tick; nothing more once the node is told to end."""
+        """Publish the time and what is due at a tick; nothing more after the node's shutdown."""
         try:
             self._publish(tick)
         except rospy.ROSException:  # a topic is closed
@@ -215,6 +215,6 @@ class Outputs:
 
 
 def is_due(tick: int, rate: float) -> bool:
-    """Whether a thing of a rate [Hz] falls on a tick: the first at or after each whole period."""
+    """Whether a topic with a rate [Hz] is due at a tick: the first at or after each whole period."""
     per_tick = rate * TICK
     return math.floor(tick * per_tick + 1e-9) > math.floor((tick - 1) * per_tick + 1e-9)

@@ -1,4 +1,4 @@
-"""How fast the simulated clock may run: against the wall, and against the nodes that have to keep up."""
+"""Pace of the simulated clock: against the wall clock, and against the nodes that have to keep up."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from rosbot_patrol.ros.runtime.node import sender_of
 
 log = logging.getLogger(__name__)
 
-_BEHIND = 0.25  # what the clock has lost beyond this is not caught up [s]
-_CATCHING_UP = 1.5  # how much faster than its rate it may run to catch up; it never jumps
-_SET_BACK = 1.0  # a clock that falls back this far has begun anew [s]
+_BEHIND = 0.25  # a larger delay is not caught up [s]
+_CATCHING_UP = 1.5  # largest factor of its rate while catching up; it never jumps
+_SET_BACK = 1.0  # a clock that goes back this far has restarted [s]
 _REPORT = 10.0
 _TF = "tf:"
 _LOOK = 0.0005
-_PATIENCE = 2.0  # [s] wall time for a node to answer
+_PATIENCE = 2.0  # wall time for a node to answer [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ class Pace:
     """Holds a real-time factor; 0 runs as fast as the consumers keep up.
 
     Args:
-        rate: simulated seconds in a second.
+        rate: simulated seconds per second.
         clock: wall time [s]; sleep: waits on it.
     """
 
@@ -60,12 +60,12 @@ class Pace:
         self.restart(0.0)
 
     def restart(self, sim: float) -> None:
-        """Begin anew at a simulated time."""
+        """Restart at a simulated time."""
         self._wall, self._sim = self._clock(), sim
         self._last_wall, self._last_sim = self._wall, sim
 
     def wait(self, sim: float) -> None:
-        """Sleep until the wall has reached a simulated time."""
+        """Sleep until the wall clock has reached a simulated time."""
         if self._rate <= 0.0:
             return
         due = self._wall + (sim - self._sim) / self._rate
@@ -81,10 +81,10 @@ class Pace:
 
 
 class SharedClock:
-    """Keeps a simulation to ROS's time, which another node tells on /clock (or the wall, without /use_sim_time).
+    """Follows ROS time from another node's /clock (or the wall clock, without /use_sim_time).
 
     Args:
-        now: ROS time [s], 0 before it is known.
+        now: function that returns ROS time [s], 0 before it is known.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -93,23 +93,23 @@ class SharedClock:
         self.ahead = 0.0  # ROS time minus simulated time [s]
 
     def restart(self, sim: float) -> None:
-        """Begin anew at a simulated time."""
+        """Restart at a simulated time."""
         now = self._now()
         self._is_set, self.ahead = now > 0.0, round(now - sim, 2)
 
     def is_due(self, sim: float) -> bool:
-        """Whether ROS's time has reached a simulated time; a clock that was set back begins anew."""
+        """Whether ROS time has reached a simulated time; restarts if the clock was set back."""
         if not self._is_set or self.behind(sim) < -_SET_BACK:
             self.restart(sim)
         return self._is_set and self.behind(sim) >= 0.0
 
     def behind(self, sim: float) -> float:
-        """How far a simulated time lies behind ROS's [s]."""
+        """Delay of a simulated time behind ROS time [s]."""
         return self._now() - (sim + self.ahead)
 
 
 def refuse_second_clock() -> None:
-    """Raise WorldError where another node publishes /clock: two clocks make time jump for every node."""
+    """Raise WorldError if another node publishes /clock: two clocks make time jump for every node."""
     own, master = rospy.get_name(), rosgraph.Master(rospy.get_name())
     published, _, _ = master.getSystemState()
     tellers = {node for topic, nodes in published if topic == "/clock" for node in nodes}
@@ -120,7 +120,7 @@ def refuse_second_clock() -> None:
 
 
 def _answers(uri: str) -> bool:
-    """Whether a node's port is open; the master keeps the names of nodes that were killed."""
+    """Whether a node's port is open; the master keeps the names of killed nodes."""
     place = urlparse(uri)
     try:
         socket.create_connection((place.hostname, place.port), _PATIENCE).close()
@@ -130,10 +130,10 @@ def _answers(uri: str) -> bool:
 
 
 class Lockstep:
-    """Waits for topics that speak steadily, so that the clock does not outrun who publishes them.
+    """Waits for topics with steady messages, so that the clock does not outrun their nodes.
 
-    A topic is waited for from its first message on. One that stays silent holds the clock up once, for the patience;
-    then it is idle until it speaks again.
+    A topic is waited for after its first message. If it falls silent, the clock stops once for the patience; then the
+    topic is idle until its next message.
 
     Args:
         params: which topics, and how long.
@@ -168,13 +168,13 @@ class Lockstep:
                 rospy.Subscriber(topic, rospy.AnyMsg, self._hear, callback_args=topic, queue_size=1, tcp_nodelay=True)
 
     def note(self, topic: str, node: str) -> None:
-        """A topic has spoken; from any thread."""
+        """Record a message of a topic; callable from any thread."""
         self._nodes[topic] = node
         self._idle.discard(topic)
         self._heard[topic] = self._now()
 
     def wait(self) -> None:
-        """Return when every topic that is not idle has spoken within the slack; a silent one is idle from then on."""
+        """Return when every topic that is not idle has a message within the slack; a silent one becomes idle."""
         late = self._late()
         if not late:
             return
@@ -191,11 +191,11 @@ class Lockstep:
 
     @property
     def idle(self) -> tuple[str, ...]:
-        """Topics that have spoken once, and that the clock goes on without, each with its node."""
+        """Idle topics, each with its node."""
         return tuple(map(self._name, sorted(self._idle)))
 
     def take_waited(self) -> dict[str, float]:
-        """Wall time that the clock waited for each topic since this was last asked [s], by topic and node."""
+        """Wall time spent waiting for each topic since the last call [s], by topic and node."""
         waited, self._waited = self._waited, {}
         return {self._name(topic): seconds for topic, seconds in waited.items()}
 

@@ -1,4 +1,4 @@
-"""Folders of ROS packages and Gazebo models by name, for the meshes of a URDF and the models of a world."""
+"""Folders of ROS packages and Gazebo models by name, for meshes of a URDF and models of a world."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from rosbot_patrol.simulation.robot.urdf import FindPackage
 
 
 def model_folders(more: Iterable[str] = ()) -> list[str]:
-    """Where Gazebo looks for models and their files: folders given here, GAZEBO_MODEL_PATH, its own, its resources."""
+    """Folders of Gazebo's models: those given, GAZEBO_MODEL_PATH, Gazebo's own, its resources."""
     given, resources = (os.environ.get(f"GAZEBO_{what}_PATH", "").split(":") for what in ("MODEL", "RESOURCE"))
     return [*more, *filter(None, given), os.path.expanduser("~/.gazebo/models"), *filter(None, resources)]
 
 
 def package_finder(folders: Sequence[str] = ()) -> FindPackage:
-    """Looks a name up in folders, then where Gazebo looks, then among the packages of ROS_PACKAGE_PATH."""
+    """Function that finds a name in folders, then in Gazebo's, then among the packages of ROS_PACKAGE_PATH."""
     packages = rospkg.RosPack()
     places = model_folders(folders)
 

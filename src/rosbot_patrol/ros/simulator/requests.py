@@ -1,4 +1,4 @@
-"""Services of the simulator: requests of other threads, done by the simulation's thread between two ticks."""
+"""Services of the simulator: requests of other threads, run by the simulation's thread between two ticks."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from rosbot_patrol.srv import (
     StepSimulationResponse,
 )
 
-_PATIENCE = 10.0  # wall time that a request waits for the simulation [s]
+_PATIENCE = 10.0  # longest wall time that a request waits for the simulation [s]
 _MOST_TICKS = 1000
 
 
@@ -46,9 +46,9 @@ class Requests:
     """Advertises the services; the simulation's thread calls `serve` between two ticks.
 
     Args:
-        engine: what is asked to change.
-        set_paused: pauses or goes on.
-        advance: lets a paused simulation go on for some ticks; raises PatrolError where it is not paused.
+        engine: of the simulation.
+        set_paused: pauses or continues.
+        advance: runs a paused simulation for some ticks; raises PatrolError if it is not paused.
     """
 
     def __init__(self, engine: Engine, set_paused: Callable[[bool], None], advance: Callable[[int], None]) -> None:
@@ -72,7 +72,7 @@ class Requests:
         rospy.Service("gazebo/unpause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(False)))
 
     def serve(self) -> None:
-        """Do what has been asked for."""
+        """Run the waiting requests."""
         while not self._queue.empty():
             action, future = self._queue.get_nowait()
             if not future.set_running_or_notify_cancel():
@@ -83,7 +83,7 @@ class Requests:
                 future.set_exception(err)
 
     def ask(self, action: Callable[[], Any]) -> Any:
-        """The result of an action that the simulation's thread does; raises the PatrolError that it raises."""
+        """Run an action on the simulation's thread; returns its result or raises its PatrolError."""
         future: Future[Any] = Future()
         self._queue.put((action, future))
         try:

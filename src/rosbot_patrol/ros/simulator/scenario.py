@@ -1,4 +1,4 @@
-"""A scenario in the running simulator: what happens to the patrol comes from /patrol/state, what is played goes out."""
+"""Scenario in the running simulator: events of the patrol come from /patrol/state, played events are published."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _EVENTS = {
 
 
 class ScenarioRunner:
-    """Plays a scenario; every method is called by the simulation's thread.
+    """Plays a scenario; every method is called on the simulation's thread.
 
     Args:
-        scenario: what is to happen.
-        engine: where.
+        scenario: the events.
+        engine: of the simulation.
         clients: the sensors' links, by id.
         is_watched: begin only when somebody listens to what is played, so that a watch that starts late on a busy
             machine misses nothing; for so long nothing that happens counts.
@@ -51,11 +51,11 @@ class ScenarioRunner:
 
     @property
     def waiting(self) -> tuple[str, ...]:
-        """What has not happened yet."""
+        """Events that have not happened yet."""
         return self._player.waiting
 
     def advance(self) -> None:
-        """Do what is due; before each step of the engine."""
+        """Play what is due; call it before each step of the engine."""
         if self._watch_until is not None and self._waits_for_its_watch(self._watch_until):
             return
         while not self._events.empty():

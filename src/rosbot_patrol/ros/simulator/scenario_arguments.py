@@ -1,4 +1,4 @@
-"""scenario_arguments FILE: checks a scenario and prints what it decides as arguments for roslaunch, one a line."""
+"""scenario_arguments FILE: checks a scenario and prints its settings as arguments for roslaunch, one per line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rosbot_patrol.simulation.scenario.file import read_scenario
 
 
 def main() -> None:
-    """Print `name:=value` lines; exit status 1 and a sentence where the file is wrong."""
+    """Print `name:=value` lines; exit status 1 and a sentence if the file is wrong."""
     if len(sys.argv) != 2:
         sys.exit("usage: scenario_arguments FILE")
     try:

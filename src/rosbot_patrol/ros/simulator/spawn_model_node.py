@@ -1,4 +1,4 @@
-"""gazebo_ros's spawn_model on our simulator: puts the robot that a URDF describes into a running world.
+"""gazebo_ros's spawn_model for our simulator: puts the robot of a URDF into a running world.
 
 Matches gazebo_ros 2.9 `spawn_model` where the tutorial needs it.
 
@@ -46,7 +46,7 @@ def _description(options: argparse.Namespace) -> str:
 
 
 def _service() -> str:
-    """The running simulator's service, wherever it is named: in this namespace, or Gazebo's for all robots."""
+    """Full name of the running simulator's service: in this namespace, or Gazebo's for all robots."""
     for name in map(rospy.resolve_name, SERVICES):
         try:
             rospy.wait_for_service(name, timeout=PATIENCE / len(SERVICES))
@@ -57,7 +57,7 @@ def _service() -> str:
 
 
 def main() -> None:
-    """Wait for the simulator, hand it the description, end."""
+    """Wait for the simulator, pass it the description, end."""
     options, rest = _parse(rospy.myargv(sys.argv)[1:])
 
     def spawn() -> None:

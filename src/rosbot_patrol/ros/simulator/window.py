@@ -1,4 +1,4 @@
-"""A window that shows the simulated house from above, following the robot; needs a display."""
+"""Window with the simulated house from above, following the robot; needs a display."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PERIOD = 0.1  # of wall time [s]
 
 
 class Window:
-    """Draws by the camera's renderer, ten times a second of wall time; closing the window ends the drawing only."""
+    """Draws with the camera's renderer, ten times a second of wall time; closing the window only ends the drawing."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
@@ -28,7 +28,7 @@ class Window:
             log.warning("gui: there is no display, the simulation runs without a window")
 
     def show(self) -> None:
-        """Draw when it is time to."""
+        """Draw if it is due."""
         now = time.monotonic()
         if not self._open or now < self._due:
             return

@@ -1,11 +1,11 @@
-"""docs/launch.md, made from the launch files: `scripts/parameter_tables` writes it together with docs/parameters.md."""
+"""docs/launch.md, made from the launch files; `scripts/parameter_tables` writes it together with docs/parameters.md."""
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-# Launch files in the order of the page, each with its purpose.
+# Launch files in the page's order, each with its purpose.
 FILES = {
     "rosbot_patrol": "The whole guard, simulated or on the robot; `scripts/patrol` takes the same arguments.",
     "demo": "The simulated house with an intruder: what `scripts/patrol` runs.",
@@ -40,12 +40,12 @@ A default that depends on other arguments is shown as `...`. This page is made f
 
 
 def launch_page(folder: Path) -> str:
-    """The whole page, from the launch files in a folder."""
+    """Make the whole page from the launch files in a folder."""
     return _INTRODUCTION + "".join(_section(folder / f"{name}.launch", purpose) for name, purpose in FILES.items())
 
 
 def _section(path: Path, purpose: str) -> str:
-    """Heading, purpose and table of one launch file; a comment before a group of arguments is a row of its own."""
+    """Heading, purpose and table of one launch file; a comment before a group of arguments becomes a row."""
     parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     rows, group = [], ""
     for node in ElementTree.parse(path, parser).getroot():

@@ -1,8 +1,8 @@
-"""mark_rooms FILE: the points that are clicked in rviz ("Publish Point") become the patrol's points file.
+"""mark_rooms FILE: writes the patrol's points file from points clicked in rviz ("Publish Point").
 
-The first is the base, each further one a room; the number of a room is the id of its motion sensor. Each is checked on
-the map of `map` (whether the robot can stand, turn and get there), and its name asked for on the terminal. The file is
-written after each; where it is there already, its rooms stay and more are added. `~markers` shows them in rviz.
+The first point is the base, each further one a room; the number of a room is the id of its motion sensor. Each point is
+checked on the map of `map`: can the robot stand, turn and get there? Its name is asked for on the terminal. The file is
+written after each point; if it exists, its rooms stay and more are added. `~markers` shows the points in rviz.
 
 Subscribes `clicked_point` (geometry_msgs/PointStamped, of any frame that tf knows) and `map`.
 """
@@ -46,7 +46,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Terminal:
-    """Lines typed, read by a thread of its own, so that a shutdown need not wait for one."""
+    """Lines typed, read by its own thread, so that a shutdown need not wait for one."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[str | None] = queue.Queue()
@@ -58,7 +58,7 @@ class _Terminal:
         self._lines.put(None)
 
     def ask(self, question: str) -> str | None:
-        """What was answered; None at the end of the input or at shutdown."""
+        """Ask for a line; None at the end of the input or at shutdown."""
         print(question, end=" ", flush=True)
         while not rospy.is_shutdown():
             try:
@@ -69,11 +69,11 @@ class _Terminal:
 
 
 class MarkRooms:
-    """Takes clicks in and writes the file.
+    """Handles clicks and writes the file.
 
     Args:
         path: of the points file.
-        is_new: begin anew, whatever it holds.
+        is_new: start an empty file, whatever it holds.
     """
 
     def __init__(self, path: Path, *, is_new: bool) -> None:
@@ -88,7 +88,7 @@ class MarkRooms:
         rospy.Subscriber("clicked_point", PointStamped, self._clicks.put, queue_size=10)
 
     def run(self) -> None:
-        """Until the input ends, or the node does."""
+        """Run until the end of the input, or shutdown."""
         for room in self._marks.rooms:
             print(f"{room.title} at ({room.pose.x:.2f}, {room.pose.y:.2f})")
         self._show()
@@ -115,7 +115,7 @@ class MarkRooms:
         print(f'Click on {what} with "Publish Point" in rviz. Ctrl-C ends.', flush=True)
 
     def _take(self, click: PointStamped) -> bool:
-        """One click; False where no more is to come."""
+        """Handle one click; False if no more are to come."""
         try:
             x, y = self._place(click)
             problem = self._marks.problem(self._floor(), x, y)
@@ -139,7 +139,7 @@ class MarkRooms:
         return True
 
     def _name(self, x: float, y: float) -> str | None:
-        """The name for a place, "" to leave it out, None where no more is to come."""
+        """Name for a place, "" to skip it, None if no more are to come."""
         number = len(self._marks.rooms)
         what = f"room {number}" if number else "the base"
         while True:
@@ -150,7 +150,7 @@ class MarkRooms:
             print(f"{problem}; another one?")
 
     def _place(self, click: PointStamped) -> tuple[float, float]:
-        """In map [m]. Raises TransformError."""
+        """Position in map [m]. Raises TransformError."""
         frame = click.header.frame_id.lstrip("/")
         if frame in ("", FRAME):
             return click.point.x, click.point.y
@@ -158,7 +158,7 @@ class MarkRooms:
         return pose.x, pose.y
 
     def _floor(self) -> Floor:
-        """Of the newest map. Raises MapError."""
+        """Floor of the newest map. Raises MapError."""
         message = self._map.get()
         topic = rospy.resolve_name("map")
         if message is None:
@@ -173,7 +173,7 @@ class MarkRooms:
 
 
 def arguments_of(words: list[str]) -> argparse.Namespace:
-    """The command line (remappings taken off): file, new; raises ParamError."""
+    """Parse the command line (without remappings): file, new; raises ParamError."""
     parser = _Parser(prog="mark_rooms", description="Points clicked in rviz become the patrol's points file.")
     parser.add_argument("file", metavar="FILE", type=Path, help="points file to write, or to add rooms to")
     parser.add_argument("--new", action="store_true", help="begin anew, whatever FILE holds")

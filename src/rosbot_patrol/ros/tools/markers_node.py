@@ -1,6 +1,6 @@
-"""Rooms and motion sensors as markers for rviz, on `~markers` (latched); the room that the patrol is about is lit.
+"""Markers of rooms and motion sensors for rviz, on `~markers` (latched); the mission's room is highlighted.
 
-A sensor is red while it reports motion, black where it is silent, yellow where something else is wrong with it.
+A sensor is red while it reports motion, black when silent, yellow with another problem.
 """
 
 from __future__ import annotations

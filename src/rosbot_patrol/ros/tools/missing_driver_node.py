@@ -1,4 +1,4 @@
-"""Says that a hardware driver is not installed; started by the thin packages that stand in its place."""
+"""Message that a hardware driver is not installed; started by the thin packages in its place."""
 
 from __future__ import annotations
 

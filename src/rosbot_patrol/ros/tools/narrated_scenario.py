@@ -1,4 +1,4 @@
-"""Watches a scenario from outside: tells what is played, and whether its expectation holds once it is over."""
+"""Observer of a scenario: reports its events, and whether its expectation holds at the end."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from rosbot_patrol.simulation.scenario.file import PLAYED, Expect, Outcome, disa
 
 
 class ScenarioWatch:
-    """Decides when a scenario is over, and what has disappointed.
+    """Decides when a scenario is over, and which expectations failed.
 
     Args:
         file: of the scenario.
         simulator: name of the node that plays it.
-        tell: is told each thing that is played, in a sentence.
+        tell: called with a sentence for each event.
     """
 
     def __init__(self, file: str, simulator: str, tell: Callable[[str], None]) -> None:
@@ -30,11 +30,11 @@ class ScenarioWatch:
         self._topic = f"{simulator}/scenario"
 
     def start(self) -> None:
-        """Listen to what is played: it may begin."""
+        """Listen to the events; the scenario may begin."""
         rospy.Subscriber(self._topic, String, self._on_act, queue_size=100)
 
     def is_over(self, narrator: Narrator) -> bool:
-        """Whether nothing more is to come, or its time has passed."""
+        """Whether no more events are to come, or the time has passed."""
         if narrator.on_guard_at is None:
             return False
         if self._on_guard_at is None:
@@ -50,7 +50,7 @@ class ScenarioWatch:
         )
 
     def judge(self, narrator: Narrator) -> list[str]:
-        """A sentence for each thing that came otherwise than expected."""
+        """A sentence for each failed expectation."""
         outcome = Outcome(
             verdicts={m.room_id: m.verdict for m in narrator.missions if m.verdict},
             missions=narrator.ended,

@@ -1,8 +1,8 @@
 """narrator: prints one plain sentence for each step of the patrol; with ~exit_after_mission it ends with the mission.
 
-Exit status: 0, or 3 where the verdict is not ~expect_verdict, 4 where ~time_limit passed, 5 where a confirmed
-intruder's mail was not delivered within ~delivery_wait, 6 where the robot did not come home. With ~scenario it ends
-with the scenario instead, with 7 where what the scenario expects does not hold.
+Exit status: 0; 3 if the verdict is not ~expect_verdict; 4 after ~time_limit; 5 if a confirmed intruder's mail was not
+delivered within ~delivery_wait; 6 if the robot did not come home. With ~scenario it ends with the scenario instead,
+with 7 if an expectation of the scenario fails.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class NarratorNode:
         ]
 
     def run(self) -> int:
-        """Tell until the end; the exit status."""
+        """Narrate until the end; returns the exit status."""
         p = self.params
         if p.patience and not p.time_limit and not is_launched():
             require_publisher(self._subscribers[1], "patrol_robot", patience=p.patience)

@@ -1,4 +1,4 @@
-"""docs/parameters.md, docs/launch.md and the tree of docs/architecture.md: `scripts/parameter_tables` writes them."""
+"""Generated pages: docs/parameters.md, docs/launch.md, tree of docs/architecture.md; `scripts/parameter_tables`."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ SCENARIO: list[tuple[str, type]] = [
 
 
 def _groups(prefix: str, cls: type, group: object = None) -> list[tuple[str, type, object]]:
-    """A declaration and the ones nested in it, with their namespaces and the defaults that hold there."""
+    """A declaration and those nested in it, with their namespaces and defaults."""
     found = [(prefix, cls, group)]
     hints = typing.get_type_hints(cls)
     for field, (name, _, default, _) in zip(dataclasses.fields(cls), declared(cls, group), strict=True):
@@ -148,7 +148,7 @@ def _groups(prefix: str, cls: type, group: object = None) -> list[tuple[str, typ
 
 
 def document() -> str:
-    """The whole page."""
+    """Make the whole page."""
     lines = [
         "# Parameters",
         "",
@@ -179,7 +179,7 @@ def document() -> str:
 
 
 def pages(root: Path) -> dict[Path, str]:
-    """The generated pages of a checkout, and what they should say."""
+    """Generated pages of a checkout, with their contents."""
     architecture = root / "docs/architecture.md"
     return {
         root / "docs/parameters.md": document(),
@@ -189,7 +189,7 @@ def pages(root: Path) -> dict[Path, str]:
 
 
 def main() -> int:
-    """Write the pages, or with --check compare them; exit status 1 where one is out of date."""
+    """Write the pages, or with --check compare them; exit status 1 if one is out of date."""
     found = pages(Path(sys.argv[1]))
     if "--check" in sys.argv[2:]:
         old = [path for path, text in found.items() if not path.exists() or path.read_text(encoding="utf-8") != text]

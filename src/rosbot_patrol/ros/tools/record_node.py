@@ -1,4 +1,4 @@
-"""record: a bag of a patrol, to be replayed as a regression test: what the guard heard, and what it did.
+"""record: records a bag of a patrol, to replay it as a regression test: the guard's inputs and outputs.
 
     rosrun rosbot_patrol record NAME.bag                    # until Ctrl-C
     rosrun rosbot_patrol record NAME.bag --duration 120     # [s] of ROS's time
@@ -34,19 +34,19 @@ DID = (
     "/amcl_pose", "/amcl/health", "/move_base/goal", "/move_base/status", "/move_base/result", "/move_base/cancel",
     "/cmd_vel", "/cmd_vel/move_base", "/cmd_vel/patrol", "/patrol/state", "/patrol/alerts", "/diagnostics",
 )  # fmt: skip
-SHARED = ("/clock", "/diagnostics")  # by all guards of one master
-LEAST_FREE = 500  # [MB] on the disk to begin with
+SHARED = ("/clock", "/diagnostics")  # shared by all guards of one master
+LEAST_FREE = 500  # [MB] of free disk space needed at the start
 
 
 def topics(also: Sequence[str] = (), *, camera: bool = True, namespace: str = "/") -> list[str]:
-    """What is recorded of the guard in a namespace; names given by hand count as ROS resolves them there."""
+    """Topics to record for the guard in a namespace; topics given by hand are resolved there as in ROS."""
     own = [*HEARD, *(CAMERA if camera else ()), *DID]
     inside = [name if name in SHARED else namespace.rstrip("/") + name for name in own]
     return [*inside, *(resolve_name(name, ns_join(namespace, "record")) for name in also)]
 
 
 def command(file: Path, wanted: Sequence[str], *, duration: float = 0.0) -> list[str]:
-    """The command line of rosbag."""
+    """Command line of rosbag."""
     lasting = [f"--duration={duration:g}"] if duration > 0.0 else []
     return ["rosrun", "rosbag", "record", "--lz4", "--buffsize=256", *lasting, "-O", str(file), *wanted]
 
@@ -63,7 +63,7 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _problem(file: Path) -> str:
-    """Why there can be no bag, "" where there can."""
+    """Reason why no bag can be recorded, "" if one can."""
     if file.suffix != ".bag":
         return f"{file}: a bag's name ends in .bag"
     if file.exists():
@@ -77,7 +77,7 @@ def _problem(file: Path) -> str:
 
 
 def record(given: argparse.Namespace) -> int:
-    """Record; rosbag's exit status."""
+    """Record; returns rosbag's exit status."""
     file = given.file.resolve()
     problem = _problem(file)
     if problem:

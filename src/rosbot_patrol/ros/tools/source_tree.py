@@ -1,4 +1,4 @@
-"""The tree of folders in docs/architecture.md, made from the packages' docstrings by `scripts/parameter_tables`."""
+"""Tree of folders in docs/architecture.md, made from the packages' docstrings by `scripts/parameter_tables`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ BEGIN, END = "<!-- tree: begin -->\n", "<!-- tree: end -->\n"
 
 
 def with_tree(page: str, source: Path) -> str:
-    """The page with the tree between its two markers as the folders below `source` are now.
+    """The page with the present tree of folders below `source` between its two markers.
 
     Raises:
         ValueError: the page lacks a marker.
@@ -22,7 +22,7 @@ def with_tree(page: str, source: Path) -> str:
 
 
 def tree(source: Path) -> str:
-    """One row a package, with the first line of its docstring."""
+    """One row per package, with the first line of its docstring."""
     rows = ["| folder | what it is |", "|---|---|"]
     for init in sorted(source.rglob("__init__.py"), key=lambda path: path.parent.parts):
         place = init.parent.relative_to(source)
