@@ -18,11 +18,11 @@ class PriorityParams:
     """Priorities of the mission queue; the greatest number goes first."""
 
     priority_trigger: int = param(
-        40, lo=0, hi=100, doc="priority of a room whose motion sensor called; the greatest number goes first"
+        40, lo=0, hi=100, doc="priority of a motion sensor's call; the greatest number goes first"
     )
-    priority_action: int = param(30, lo=0, hi=100, doc="priority of a room requested by a program or a person")
-    priority_silent_sensor: int = param(20, lo=0, hi=100, doc="priority of a room whose sensor has fallen silent")
-    priority_schedule: int = param(10, lo=0, hi=100, doc="priority of a room in a scheduled round")
+    priority_action: int = param(30, lo=0, hi=100, doc="priority of a request by a program or a person")
+    priority_silent_sensor: int = param(20, lo=0, hi=100, doc="priority of a look at a room with a silent sensor")
+    priority_schedule: int = param(10, lo=0, hi=100, doc="priority of a scheduled round")
     preempt: bool = param(
         True, doc="a motion sensor's call sends a scheduled look, or a look at a silent sensor, back to the queue"
     )

@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 class ModeSpec:
     """What a mode guards: the groups armed_away, armed_home and night of the file."""
 
-    rooms: Any = param("all", doc="rooms whose sensors count: all, or a list by number or name")
+    rooms: Any = param("all", doc="guarded rooms: all, or a list by number or name")
     exit_delay: float = param(30.0, unit="s", lo=0.0, hi=600.0, doc="time to leave the house after arming")
     entry_delay: float = param(
         0.0, unit="s", lo=0.0, hi=600.0, doc="time that notices wait after a call from an entry room"

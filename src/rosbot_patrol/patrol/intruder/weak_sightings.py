@@ -48,7 +48,7 @@ class SuspectParams:
     side_angle: float = param(
         0.6, unit="rad", lo=0.05, hi=3.1, doc="viewing directions this far apart count as separate sides"
     )
-    weak_error: float = param(0.6, unit="m", lo=0.05, doc="ignore sightings whose position error is larger")
+    weak_error: float = param(0.6, unit="m", lo=0.05, doc="maximum position error of a sighting that counts")
     weak_apart: float = param(0.7, unit="m", lo=0.1, doc="sightings farther apart than this are two objects")
 
 

@@ -42,7 +42,7 @@ class ViewpointParams:
     viewpoints_time: float = param(150.0, unit="s", lo=0.0, doc="time after which no further viewpoint is started")
     look_again: bool = param(
         True,
-        doc="if nobody was found but sensor or lidar noticed motion, search the earlier views once more",
+        doc="if nobody was found but sensor or lidar noticed motion, search once more what was seen before it",
     )
     viewpoint_gain: float = param(
         0.01, lo=0.0, hi=1.0, doc="minimum share of the floor that a viewpoint must newly show"

@@ -151,7 +151,7 @@ class MotionRebooting(SensorFault):
     """The device restarts: its link breaks, and the sensor is blind while it warms up."""
 
     kind: ClassVar[str] = "motion_rebooting"
-    every: float = param(0.0, unit="s", lo=0.0, check=finite, doc="time until the next restart; 0: only one")
+    every: float = param(0.0, unit="s", lo=0.0, check=finite, doc="interval between restarts; 0: a single restart")
 
 
 @dataclass(frozen=True, kw_only=True)
