@@ -1,1 +1,1 @@
-"""Navigation driven in a simulated world without ROS."""
+"""Closed loop: the navigation drives a simulated robot, without ROS."""

@@ -1,4 +1,4 @@
-"""Plans made at once that come later, as if another thread had made them: what stands in for move_base's planner."""
+"""Plans computed at once but delivered later, in place of move_base's planning thread."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from rosbot_patrol.planning.interfaces import Array
 
 
 class DelayedPlans:
-    """A PlanSource on a clock of the caller's.
+    """A PlanSource on the caller's clock.
 
     Args:
         plan: poses from where the robot is to a goal (shape (n, 3), x, y [m], yaw [rad]); may raise PlanningError or
             TransformError, which become the request's result.
         clock: time now [s].
-        delay: from a request to its result [s].
+        delay: time from a request to its result [s].
     """
 
     def __init__(self, plan: Callable[[Pose2D], Array], clock: Callable[[], float], delay: float) -> None:
@@ -25,7 +25,7 @@ class DelayedPlans:
         self._result: tuple[float, PlanResult] | None = None
 
     def request(self, goal: Pose2D) -> None:
-        """Ask for a plan; what was asked for before is dropped."""
+        """Request a plan; an earlier request is dropped."""
         try:
             result = PlanResult(poses=self._plan(goal))
         except PlanningError as err:
@@ -35,7 +35,7 @@ class DelayedPlans:
         self._result = self._clock() + self._delay, result
 
     def poll(self) -> PlanResult | None:
-        """The result, once, when its time has come."""
+        """Take the result, once, when its time has come."""
         if self._result is None or self._clock() < self._result[0]:
             return None
         (_, result), self._result = self._result, None
@@ -43,9 +43,9 @@ class DelayedPlans:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a result is to come."""
+        """Whether a result is pending."""
         return self._result is not None
 
     def drop(self) -> None:
-        """Forget what was asked for."""
+        """Drop the request."""
         self._result = None

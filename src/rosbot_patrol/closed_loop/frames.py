@@ -1,4 +1,4 @@
-"""The transforms that a robot's programs see, kept by a closed loop as robot_state_publisher, base and amcl would."""
+"""Transforms of a closed loop, as robot_state_publisher, base and amcl would publish them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MAP, ODOM, BASE = "map", "odom", "base_link"
 
 
 def tree_of(robot: RobotDescription) -> TransformTree:
-    """A tree with the robot's sensors on its base."""
+    """Tree with the robot's sensors on its base."""
     tree = TransformTree()
     mounts = [*robot.ranges, *(mount for mount in (robot.laser, robot.camera) if mount is not None)]
     tree.add_all((_edge_of(mount) for mount in mounts), is_static=True)
@@ -19,7 +19,7 @@ def tree_of(robot: RobotDescription) -> TransformTree:
 
 
 def add_pose(tree: TransformTree, parent: str, child: str, pose: Pose2D, stamp: float) -> None:
-    """Tell where a frame is in another at a time [s]; a second pose for the same time is left out."""
+    """Add the pose of a frame in another at a time [s]; a second pose for the same time is ignored."""
     tree.add(Edge(parent, child, stamp, pose.x, pose.y, 0.0, *quaternion_from_yaw(pose.yaw)))
 
 

@@ -1,8 +1,7 @@
-"""The robot's own programs in one process with the simulator, on its clock: amcl, costmaps, move_base, guard.
+"""Closed loop: the robot's own programs (amcl, costmaps, move_base, guard) in one process with the simulator.
 
-What runs in several nodes on a robot runs here step by step, with the same objects and parameters, so that a drive is
-repeatable bit for bit and many times faster than real time. Times that messages and threads take are stood in for by
-`Delays`.
+The programs of several nodes run here step by step, with the same objects and parameters. So a drive is repeatable bit
+for bit and many times faster than real time. `Delays` stands for the times that messages and threads take.
 """
 
 from __future__ import annotations
@@ -35,12 +34,12 @@ from rosbot_patrol.simulation.engine import STEP, Engine
 from rosbot_patrol.yaml_files import read_mapping
 
 _START_VARIANCE = (0.01, 0.01, 0.005)  # of x, y [m^2] and yaw [rad^2]
-_GLOBAL_EVERY = 5  # cycles between two updates of the global costmap
+_GLOBAL_EVERY = 5  # number of cycles between updates of the global costmap
 
 
 @dataclass(frozen=True, kw_only=True)
 class Delays:
-    """What messages and threads take [s]: from a scan to the command that it leads to, and from a request to a plan."""
+    """Delays of messages and threads [s]: from a scan to its command, and from a request to its plan."""
 
     command: float = 0.05
     plan: float = 0.2
@@ -48,7 +47,7 @@ class Delays:
 
 @dataclass(frozen=True, kw_only=True)
 class StackParams:
-    """Parameters of the programs, as their nodes read them.
+    """Parameters of the programs, as read by their nodes.
 
     Attributes:
         move_base: move_base's private namespace.
@@ -60,7 +59,7 @@ class StackParams:
 
 
 def read_profile(folder: Path) -> StackParams:
-    """A profile's yaml files, such as those of `config/tuned`; raises ParamError."""
+    """Read a profile's yaml files, such as those of `config/tuned`; raises ParamError."""
     tree = read_move_base(folder)
     known = read_mapping(folder / "amcl.yaml", keys="of amcl")
     amcl = {k: v for k, v in known.items() if not k.endswith("_frame_id")}
@@ -69,14 +68,14 @@ def read_profile(folder: Path) -> StackParams:
 
 @dataclass
 class Drive:
-    """What a drive to one goal gave.
+    """Result of a drive to one goal.
 
     Attributes:
-        outcome: move_base's, None where it took longer than it was given.
+        outcome: move_base's, None after the time limit.
         seconds: simulated time.
         planned: length of the first plan [m].
-        contacts: what was touched, with the time of the first touch of each bout.
-        waited: time in which it stood for someone [s].
+        contacts: touched objects, with the time of each first touch.
+        waited: time of waiting for people [s].
         recoveries: names of the behaviours run.
         error: from the goal, by ground truth [m].
     """
@@ -98,7 +97,7 @@ class ClosedLoop:
         engine: with the robot in it.
         known: the map.
         params: of the programs.
-        delays: of what stands between them.
+        delays: between them.
         seed: of amcl.
     """
 
@@ -144,16 +143,16 @@ class ClosedLoop:
 
     @property
     def map_pose(self) -> Pose2D:
-        """map_from_base, as amcl believes."""
+        """map_from_base, as estimated by amcl."""
         return compose(self._map_from_odom, self.odom_pose)
 
     @property
     def global_costmap(self) -> LayeredCostmap:
-        """The one that plans are made on."""
+        """Costmap on which plans are made."""
         return self.stack.global_costmap.costmap
 
     def drive_to(self, goal: Pose2D, timeout: float, *, each_step: Callable[[], None] = lambda: None) -> Drive:
-        """Drive to a goal in the frame of the map, for at most a time [s]; `each_step` is called after each."""
+        """Drive to a goal in the map frame, with a time limit [s]; `each_step` is called after each step."""
         self.drive = Drive()
         begin = self.now
         self._tick()
@@ -194,7 +193,7 @@ class ClosedLoop:
         self._touching = set(touching)
 
     def _tick(self) -> None:
-        """One scan, and everything that follows from it."""
+        """Process one scan with all its consequences."""
         now, odom = self.now, self.odom_pose
         add_pose(self._tree, ODOM, BASE, odom, now)
         self._see(now)
@@ -211,7 +210,7 @@ class ClosedLoop:
             self._commands.append((now + self._delays.command, verdict.twist))
 
     def _see(self, now: float) -> None:
-        """Show a scan to all programs; amcl and the guard take it level."""
+        """Pass a scan to all programs; amcl and the guard take it level."""
         scan = self.engine.scan()
         for costmap in self.stack.costmaps:
             for each in costmap.scan_inputs:
@@ -239,5 +238,5 @@ class ClosedLoop:
 
     @property
     def plan(self) -> Array:
-        """The plan that is followed, in the local costmap's frame."""
+        """Plan being followed, in the local costmap's frame."""
         return self.stack.controller.visible_plan

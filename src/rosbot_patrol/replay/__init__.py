@@ -1,1 +1,1 @@
-"""Recorded bags run through the cores of the nodes, offline and the same each time."""
+"""Replay of recorded bags through the cores of the nodes, offline and repeatable."""

@@ -1,4 +1,4 @@
-"""A test case of a replay: NAME.replay.yaml beside a bag.
+"""Test case of a replay: NAME.replay.yaml beside a bag.
 
     bag: house.bag
     node: amcl
@@ -12,7 +12,7 @@
     tolerances: {poses.x: 0.1}
     optional: false                 # true: the test is skipped where the bag is not there
 
-Paths are taken from the folder of the yaml.
+Paths are relative to the folder of the yaml.
 """
 
 from __future__ import annotations
@@ -56,17 +56,17 @@ class CaseParams:
 
 @dataclass(frozen=True)
 class Case:
-    """One replay and what has to come of it.
+    """One replay and its expected result.
 
     Attributes:
         path: of the yaml.
         bag: the bag.
-        setup: what is replayed.
+        setup: the replay.
         remaps: topics of the bag by the node's names.
-        expected: where the stored result lies.
-        fields: how it is compared.
-        is_optional: as a test it is skipped where the bag is not there.
-        named: fields that somebody gave a tolerance for.
+        expected: path of the stored result.
+        fields: tolerances of the comparison.
+        is_optional: as a test, skip it if the bag is missing.
+        named: fields with a given tolerance.
     """
 
     path: Path
@@ -106,10 +106,10 @@ def read_case(path: Path) -> Case:
 
 
 def run_case(case: Case, *, told: Callable[[float], None] = lambda _share: None) -> Result:
-    """Replay a case; the result says where it comes from.
+    """Replay a case; the result names its origin.
 
     Raises:
-        PatrolError: bag, parameters or map cannot be used, or a tolerance is for what the result has not.
+        PatrolError: bag, parameters or map cannot be used, or a tolerance names a field that the result lacks.
     """
     replay = build_replay(case.setup)
     with Bag(case.bag) as bag:
@@ -129,10 +129,10 @@ def _tree(path: Path, loaded: CaseParams) -> Mapping[str, Any] | None:
 
 
 def with_tolerances(fields: Mapping[str, Field], given: Mapping[str, Any], *, name: str) -> dict[str, Field]:
-    """Fields with other tolerances; what is given comes last, so that its wildcards win.
+    """Fields with other tolerances; the given ones come last, so that their wildcards win.
 
     Raises:
-        ParamError: a tolerance is no number, or less than 0.
+        ParamError: a tolerance is not a number, or negative.
     """
     found = dict(fields)
     for key, value in given.items():
@@ -149,7 +149,7 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def _check_names(given: Iterable[str], result: Result) -> None:
-    """Refuse tolerances for what a result has not; raises ParamError, which names the nearest."""
+    """Reject tolerances for missing fields; raises ParamError, which names the nearest field."""
     names = field_names(result)
     for key in given:
         if not any(_fits(each, key) for each in names):

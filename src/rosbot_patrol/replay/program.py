@@ -1,4 +1,4 @@
-"""replay: a bag through the objects of a node, offline and as fast as they go, the same result each time.
+"""replay: runs a bag through a node's core, offline, as fast as possible, with the same result each time.
 
     rosrun rosbot_patrol replay house.bag                          # what is in it, and what can be replayed
     rosrun rosbot_patrol replay house.bag --node amcl --map house.yaml --record amcl.npz
@@ -6,7 +6,7 @@
     rosrun rosbot_patrol replay house.bag --node slam_gmapping scan:=/front_scan --save-map my_house
     rosrun rosbot_patrol replay house.replay.yaml                  # a test case; --record refreshes it
 
-Exit status: 0 the same (or nothing to compare with), 1 it differs, 2 something given cannot be used.
+Exit status: 0 no difference (or nothing to compare with), 1 a difference, 2 an argument cannot be used.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from rosbot_patrol.replay.results.tables import Result, load_result, save_result
 from rosbot_patrol.replay.runner import chosen_topics
 
 SAME, DIFFERS, BAD_INPUT = 0, 1, 2
-BAR, EVERY_S = 30, 0.1  # width of the progress bar, and how often it is drawn
+BAR, EVERY_S = 30, 0.1  # width of the progress bar, and time between updates
 
 
 def parser() -> argparse.ArgumentParser:
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Do what the command line says; returns the exit status."""
+    """Run the command line; returns the exit status."""
     remaps = dict(word.split(":=", 1) for word in arguments if ":=" in word)
     options = parser().parse_args([word for word in arguments if ":=" not in word])
     try:
@@ -94,7 +94,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _case(options: argparse.Namespace, remaps: Mapping[str, str]) -> Case:
-    """What the command line, or the case that it names, says."""
+    """Case from the command line, or from the file that it names."""
     given = _tolerances(options.tolerance)
     if options.bag.name.endswith(SUFFIX):
         case = read_case(options.bag)
@@ -143,7 +143,7 @@ def _replayed(case: Case, *, is_quiet: bool) -> Result:
 
 
 def _judge(case: Case, result: Result, options: argparse.Namespace) -> int:
-    """Store or compare, and draw."""
+    """Store or compare the result, and draw plots."""
     if options.save_map:
         if "map" not in result.grids:
             raise ParamError("--save-map", f"{result.node} makes no map")
@@ -178,7 +178,7 @@ def _say(options: argparse.Namespace, text: str) -> None:
 
 
 def _list(path: Path) -> int:
-    """What is in a bag, and of which nodes it can be replayed."""
+    """Print a bag's contents, and the nodes that can be replayed with it."""
     with Bag(path) as bag:
         sys.stdout.write(f"{path}: {bag.duration:.1f} s\n")
         counts, width = bag.counts(), max(map(len, bag.topics), default=0)
@@ -202,11 +202,11 @@ class _Bar:
 
     @property
     def elapsed(self) -> float:
-        """Since it was made [s]."""
+        """Time since its creation [s]."""
         return time.perf_counter() - self._begin
 
     def show(self, share: float) -> None:
-        """Draw it, where that is due."""
+        """Draw it, if due."""
         if not self._is_shown or time.perf_counter() - self._drawn < EVERY_S:
             return
         self._drawn = time.perf_counter()
@@ -216,6 +216,6 @@ class _Bar:
         sys.stderr.flush()
 
     def clear(self) -> None:
-        """Take it away."""
+        """Remove it."""
         if self._is_shown:
             sys.stderr.write("\r\x1b[K")

@@ -1,4 +1,4 @@
-"""Bags as tests: each NAME.replay.yaml (see `case`) below the folders given is one.
+"""pytest plug-in for bags: each NAME.replay.yaml (see `case`) below the given folders is a test.
 
 pytest -p rosbot_patrol.replay.pytest_plugin FOLDER
 pytest -p rosbot_patrol.replay.pytest_plugin FOLDER --replay-record     # store what comes of each as expected
@@ -21,14 +21,14 @@ from rosbot_patrol.replay.results.tables import Result, load_result, save_result
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The two options."""
+    """Add the two options."""
     group = parser.getgroup("replay", "bags replayed as tests")
     group.addoption("--replay-record", action="store_true", help="store what comes of each replay as expected")
     group.addoption("--replay-plots", metavar="FOLDER", help="draw the replays that differ there")
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.File | None:
-    """Take each NAME.replay.yaml."""
+    """Collect each NAME.replay.yaml."""
     if not file_path.name.endswith(SUFFIX):
         return None
     found: pytest.File = CaseFile.from_parent(parent, path=file_path)
@@ -36,15 +36,15 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Fil
 
 
 class CaseFile(pytest.File):
-    """A yaml, which is one test."""
+    """A yaml with one test."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """The test, by the yaml's name."""
+        """The test, named after the yaml."""
         yield CaseItem.from_parent(self, name=self.path.name.removesuffix(SUFFIX))
 
 
 class DiffersError(Exception):
-    """What came of a replay is not what was stored."""
+    """The result of a replay differs from the stored one."""
 
     def __init__(self, case: Case, differences: list[Difference], pictures: Path | None) -> None:
         lines = [f"{case.setup.node} over {case.bag} differs from {case.expected}:"]
@@ -55,7 +55,7 @@ class DiffersError(Exception):
 
 
 class CaseItem(pytest.Item):
-    """One replay, compared with what was stored."""
+    """One replay, compared with the stored result."""
 
     def runtest(self) -> None:
         """Replay, then compare or store."""
@@ -80,11 +80,11 @@ class CaseItem(pytest.Item):
         return own
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """What differs, or why it cannot be used, without a trace."""
+        """Differences, or the reason why it cannot run, without a traceback."""
         if isinstance(excinfo.value, (DiffersError, PatrolError)):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """Where it stands."""
+        """Its location."""
         return self.path, None, f"replay {self.name}"

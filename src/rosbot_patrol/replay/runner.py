@@ -1,4 +1,4 @@
-"""What all replays share: what a node hears, and a bag fed to it on the bag's own clock."""
+"""Common part of all replays: the inputs of a node, and a bag fed to it on the bag's own clock."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 
 @dataclass(frozen=True, kw_only=True)
 class Input:
-    """One topic that a node hears.
+    """One input topic of a node.
 
     Attributes:
-        name: as the node calls it.
-        topic: where the bag should have it, "" for the name.
-        types: of message, in ROS 1's spelling, any of which will do.
-        is_needed: nothing can be replayed without it.
-        instead: what else to give where it is needed and not there.
+        name: in the node.
+        topic: its default topic in the bag, "": the name.
+        types: accepted message types, in ROS 1's spelling.
+        is_needed: the replay is impossible without it.
+        instead: what the user can give if it is needed and missing.
     """
 
     name: str
@@ -34,24 +34,24 @@ class Input:
 
 
 class Replay(Protocol):
-    """A node's pure object and what its node does around it."""
+    """A node's core and its node's own work, over a bag."""
 
     @property
     def inputs(self) -> Sequence[Input]:
-        """What it hears."""
+        """Inputs of the node."""
 
     @property
     def kinds(self) -> Mapping[str, Kind]:
-        """What becomes of the messages that it hears, by their types."""
+        """Conversion of the messages, by their types."""
 
     def begin(self, names: Collection[str]) -> None:
-        """Which of the inputs will be heard, told before the first."""
+        """Note which inputs will be heard, before the first record."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Take in a record of the input of that name, recorded at a time [s]."""
+        """Process a record of the input of that name, recorded at a time [s]."""
 
     def finish(self) -> Result:
-        """What came of it."""
+        """Result of the replay."""
 
 
 def run_replay(
@@ -67,7 +67,7 @@ def run_replay(
         bag: open.
         replay: of a node.
         remaps: topics of the bag by the names of the inputs, where they differ.
-        told: called with the share that is done, after each record.
+        told: called after each record with the share done.
 
     Raises:
         BagError: a needed topic is missing or of another type, or the bag is broken.
@@ -81,10 +81,10 @@ def run_replay(
 
 
 def chosen_topics(bag: Bag, inputs: Sequence[Input], remaps: Mapping[str, str]) -> dict[str, str]:
-    """The inputs' names by the bag's topics.
+    """Names of the inputs, by the bag's topics.
 
     Raises:
-        BagError: a topic is missing or of another type; names those that could be meant.
+        BagError: a topic is missing or of another type; names likely ones.
     """
     unknown = sorted(set(remaps) - {each.name for each in inputs})
     if unknown:

@@ -1,1 +1,1 @@
-"""Recordings: bag files and CARMEN logs as records."""
+"""Recordings as records: bag files and CARMEN logs."""

@@ -1,7 +1,7 @@
-"""Bags of ROS 1 (a file) and ROS 2 (a folder), read in the order of time without ROS.
+"""Reader of ROS 1 bags (a file) and ROS 2 bags (a folder), in the order of time, without ROS.
 
-rosbags reads them, by the message definitions that stand in the bag itself. One chunk of the bag is in memory at a
-time, and some hundred bytes for each message's place in the file: pictures of many GB cost nothing.
+rosbags reads them, by the message definitions in the bag itself. One chunk of the bag is in memory at a time, plus some
+hundred bytes for each message's place in the file: many GB of pictures cost nothing.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rosbot_patrol.replay.bags.definitions import definition_problem, know_heade
 from rosbot_patrol.replay.bags.records import ANY, KINDS, Kind
 from rosbot_patrol.replay.bags.ros1_reader import LenientReader
 
-# What rosbags and the decompressors raise where bytes make no sense.
+# Errors of rosbags and the decompressors for invalid bytes.
 BROKEN = (
     AnyReaderError,
     *ReaderErrors,
@@ -43,7 +43,7 @@ NS = 1e-9
 
 
 class Record(NamedTuple):
-    """One message: when it was recorded [s], on which topic, and what it became (`records.Kind`)."""
+    """One message: time of its recording [s], topic, and its record (`records.Kind`)."""
 
     time: float
     topic: str
@@ -51,7 +51,7 @@ class Record(NamedTuple):
 
 
 class Bag:
-    """A bag that is open for reading; a context manager.
+    """A bag opened for reading; a context manager.
 
     Args:
         path: of a ROS 1 bag, or the folder of a ROS 2 one.
@@ -74,7 +74,7 @@ class Bag:
             know_headers(self._reader.typestore)
         except BROKEN as err:
             raise BagError(self.path, _open_problem(self.path, err)) from err
-        self.done = 0.0  # share of the bag's time that is read
+        self.done = 0.0  # share of the bag's time read so far
 
     def __enter__(self) -> Bag:
         return self
@@ -91,12 +91,12 @@ class Bag:
 
     @property
     def start(self) -> float:
-        """When the first message was recorded [s], 0 where there is none."""
+        """Time of the first message [s], 0 if there is none."""
         return self._reader.start_time * NS if self._reader.message_count else 0.0
 
     @property
     def duration(self) -> float:
-        """From the first message to the last [s]."""
+        """Time from the first message to the last [s]."""
         return max(self._reader.duration, 0) * NS if self._reader.message_count else 0.0
 
     @property
@@ -105,19 +105,19 @@ class Bag:
         return {each.topic: ros1_name(each.msgtype) for each in self._reader.connections}
 
     def counts(self) -> dict[str, int]:
-        """How many messages each topic has."""
+        """Number of messages of each topic."""
         return {topic: info.msgcount for topic, info in self._reader.topics.items()}
 
     def find(self, topic: str) -> str | None:
-        """A topic as the bag spells it, with or without the first slash; None where it is not there."""
+        """A topic as spelled in the bag, found with or without the first slash; None if it is missing."""
         return next((known for known in self.topics if known.lstrip("/") == topic.lstrip("/")), None)
 
     def records(self, topics: Iterable[str], kinds: Mapping[str, Kind] = KINDS) -> Iterator[Record]:
-        """The messages of some topics in the order in which they were recorded.
+        """Messages of some topics in the order of recording.
 
         Args:
             topics: of the bag.
-            kinds: what becomes of messages, by their types.
+            kinds: conversion of messages, by their types.
 
         Raises:
             BagError: a topic is not there, of a type that `kinds` has not, its definition lacks a field, or its bytes
@@ -172,7 +172,7 @@ class Bag:
 
 
 def ros1_name(message_type: str) -> str:
-    """sensor_msgs/msg/LaserScan as ROS 1 spells it."""
+    """Type name in ROS 1 spelling, from sensor_msgs/msg/LaserScan."""
     return message_type.replace("/msg/", "/")
 
 
@@ -182,7 +182,7 @@ def _said(err: Exception) -> str:
 
 
 def _open_problem(path: Path, err: Exception) -> str:
-    """Why a bag cannot be opened, and what to do."""
+    """Reason why a bag cannot be opened, and what to do."""
     said = _said(err)
     if isinstance(err, TypesysError):
         return f"its message definitions cannot be used ({said}): record it anew or leave out topics by `rosbag filter`"

@@ -1,11 +1,11 @@
-"""Lidar logs in CARMEN's text format: FLASER and ROBOTLASER1 lines as scans with poses, and odometry made from poses.
+"""Reader of lidar logs in CARMEN's text format: FLASER and ROBOTLASER1 lines as scans with poses; simulated odometry.
 
     FLASER n r1 .. rn x y theta odom_x odom_y odom_theta ipc_time host logger_time
     ROBOTLASER1 type start_angle field_of_view resolution range_max accuracy remission_mode n r1 .. rn m s1 .. sm
         laser_x laser_y laser_theta robot_x robot_y robot_theta tv rv forward side turn ipc_time host logger_time
 
-An FLASER covers half a turn, from -pi/2 on; its beams are pi/n or, with n odd, pi/(n - 1) apart. The pose kept is the
-laser's own, which is the reference of a corrected log. Lines of other kinds are passed over.
+An FLASER covers half a turn, starting at -pi/2; its beams are pi/n or, with n odd, pi/(n - 1) apart. The pose kept is
+the laser's own, which is the reference of a corrected log. Lines of other kinds are skipped.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 RANGE_MAX = 40.0  # m; beams beyond are misses
 TURN_PER_TURN, TURN_PER_METRE = 0.02, 0.005
 DRIVE_PER_METRE, DRIVE_PER_TURN = 0.02, 0.005
-STILL = 0.01  # m; a shorter way has no direction to speak of
+STILL = 0.01  # m; a shorter motion has no meaningful direction
 
 
 class LogError(PatrolError):
@@ -39,7 +39,7 @@ class LogError(PatrolError):
 
 
 class LoggedScan(NamedTuple):
-    """One scan and the pose that the log gives for it."""
+    """One scan and its pose in the log."""
 
     scan: LaserScan
     pose: Pose2D
@@ -54,10 +54,10 @@ class CarmenLog:
 
 
 def read_log(path: Path | str, *, range_max: float = RANGE_MAX) -> CarmenLog:
-    """All scans of a log, plain or gzipped.
+    """Read all scans of a log, plain or gzipped.
 
     Raises:
-        LogError: the file cannot be read, a line of it makes no sense, or it holds no scan.
+        LogError: the file cannot be read, a line of it is invalid, or it holds no scan.
     """
     scans, poses = [], []
     try:
@@ -80,7 +80,7 @@ def _lines(path: Path) -> Iterator[str]:
 
 
 def parse_lines(lines: Iterator[str], *, name: str = "log", range_max: float = RANGE_MAX) -> Iterator[LoggedScan]:
-    """The scans among a log's lines; raises LogError, which names the line."""
+    """Scans from a log's lines; raises LogError, which names the line."""
     for number, line in enumerate(lines, 1):
         words = line.split()
         kind = words[0] if words else ""
@@ -150,7 +150,7 @@ def _scan(ranges: Array, start: float, step: float, range_max: float, stamp: flo
 
 
 def noisy_odometry(poses: Array, rng: np.random.Generator) -> Array:
-    """What wheels would have said of a way: its moves as a turn, a drive and a turn, each with Gaussian noise.
+    """Simulate wheel odometry along poses: each move is a turn, a translation and a turn, with Gaussian noise.
 
     Standard deviations: each turn `TURN_PER_TURN` of itself + `TURN_PER_METRE` for each metre driven, the drive
     `DRIVE_PER_METRE` of itself + `DRIVE_PER_TURN` for each radian turned. A drive backwards is one, not two half turns;

@@ -1,4 +1,4 @@
-"""Which fields of a recorded message are needed, held against the definition that the bag brings with it."""
+"""Check of the needed fields of a recorded message against the definition in the bag."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ POSE_ESTIMATE = STAMP | _below("pose.pose", _POSE) | {"pose.covariance": "float[
 
 
 def know_headers(store: Typestore) -> None:
-    """Let a plain `Header` be that of std_msgs wherever it stands in a message, as in ROS 1.
+    """Let a plain `Header` stand for that of std_msgs anywhere in a message, as in ROS 1.
 
-    rosbags takes it so for a message's first field alone; darknet_ros_msgs/BoundingBoxes has another one.
+    rosbags does so only for a message's first field; darknet_ros_msgs/BoundingBoxes has another one.
     """
     header = store.fielddefs.get("std_msgs/msg/Header")
     named = {detail for _, fields in store.fielddefs.values() for _, (node, detail) in fields if node == Nodetype.NAME}
@@ -51,11 +51,11 @@ def know_headers(store: Typestore) -> None:
 
 
 def definition_problem(fielddefs: Mapping[str, Any], message_type: str, needed: Mapping[str, str]) -> str:
-    """What of the needed fields a definition lacks or has of another type, "" where it has all.
+    """Needed fields that a definition lacks or has with another type, "" if it has all.
 
     Args:
         fielddefs: rosbags' definitions by type: (constants, fields).
-        message_type: the one to look at.
+        message_type: the type to check.
         needed: dotted names ("[]" behind a list) and their kinds: int, float, string, int[], float[].
     """
     for name, kind in needed.items():
@@ -68,7 +68,7 @@ def definition_problem(fielddefs: Mapping[str, Any], message_type: str, needed: 
 
 
 def _kind_of(fielddefs: Mapping[str, Any], message_type: str, path: Sequence[str]) -> str:
-    """The kind of a field, "" where there is none."""
+    """Kind of a field, "" if there is none."""
     name, rest = path[0].removesuffix("[]"), path[1:]
     descriptor = dict(fielddefs[message_type][1]).get(name) if message_type in fielddefs else None
     if descriptor is None:

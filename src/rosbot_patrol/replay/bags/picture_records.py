@@ -1,4 +1,4 @@
-"""Pictures of a bag, raw or compressed, as the detector takes them."""
+"""Records of pictures in a bag, raw or compressed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosbot_patrol.replay.bags.records import Kind, Refused, stamp_of
 
 
 class PictureRecord(NamedTuple):
-    """sensor_msgs/Image or CompressedImage: when it was taken [s], and the picture."""
+    """sensor_msgs/Image or CompressedImage: time of the picture [s], and the picture."""
 
     stamp: float
     picture: Picture
@@ -28,7 +28,7 @@ def _raw(message: Any) -> PictureRecord | Refused:
 
 
 def _compressed(message: Any) -> PictureRecord | Refused:
-    codec = importlib.import_module("rosbot_patrol.images.compressed")  # only where there are such, as simplejpeg
+    codec = importlib.import_module("rosbot_patrol.images.compressed")  # only if needed, because it loads simplejpeg
     try:
         picture = codec.decompress(message.format, bytes(message.data))
     except ImageError as err:

@@ -1,8 +1,8 @@
-"""Messages from their bytes in ROS 1, several times faster than by a general deserialiser.
+"""Fast readers of ROS 1 messages from their bytes, several times faster than a general deserialiser.
 
-Those that come by the thousand, and those of an action, whose dozen of nested types a deserialiser would be made for
-at each opening of a bag. Only for the definitions whose md5 sums stand here; all other messages, and all of ROS 2, are
-rosbags' to read.
+They cover frequent messages, and those of an action, because a deserialiser for its dozen of nested types would be made
+at each opening of a bag. They apply only to definitions with the MD5 sums given here; rosbags reads all other messages,
+and all of ROS 2.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _TRANSFORM = struct.Struct("<7d")  # x, y, z and the quaternion
 
 
 def read_scan(raw: bytes) -> LaserScan:
-    """A sensor_msgs/LaserScan; a stamp of 0 is none (NaN).
+    """Read a sensor_msgs/LaserScan; a stamp of 0 becomes NaN.
 
     Raises:
         struct.error, ValueError: the bytes end too early.
@@ -52,7 +52,7 @@ def read_scan(raw: bytes) -> LaserScan:
 
 
 def read_count(raw: bytes) -> tuple[float, int]:
-    """A darknet_ros_msgs/ObjectCount: when the picture was taken [s], and how many objects were in it.
+    """Read a darknet_ros_msgs/ObjectCount: time of the picture [s], and number of objects.
 
     Raises:
         struct.error: the bytes end too early.
@@ -62,7 +62,7 @@ def read_count(raw: bytes) -> tuple[float, int]:
 
 
 def read_image(raw: bytes) -> tuple[float, int, int, str, bool, int, memoryview]:
-    """A sensor_msgs/Image: time [s], height and width [px], encoding, is big-endian, bytes of a row, all rows.
+    """Read a sensor_msgs/Image: time [s], height and width [px], encoding, is big-endian, bytes of a row, all rows.
 
     Raises:
         struct.error, ValueError: the bytes end too early or the encoding is no text.
@@ -80,7 +80,7 @@ def read_image(raw: bytes) -> tuple[float, int, int, str, bool, int, memoryview]
 
 
 def read_goal(raw: bytes) -> str:
-    """The id of a move_base_msgs/MoveBaseActionGoal.
+    """Read the id of a move_base_msgs/MoveBaseActionGoal.
 
     Raises:
         struct.error, ValueError: the bytes end too early or the id is no text.
@@ -89,7 +89,7 @@ def read_goal(raw: bytes) -> str:
 
 
 def read_result(raw: bytes) -> tuple[str, int, str]:
-    """A move_base_msgs/MoveBaseActionResult: id of the goal, its status (actionlib_msgs/GoalStatus), what was said.
+    """Read a move_base_msgs/MoveBaseActionResult: goal id, status (actionlib_msgs/GoalStatus), text.
 
     Raises:
         struct.error, ValueError: the bytes end too early or the texts are none.
@@ -101,13 +101,13 @@ def read_result(raw: bytes) -> tuple[str, int, str]:
 
 
 def _goal_id(raw: bytes) -> tuple[str, int]:
-    """The text of the actionlib_msgs/GoalID behind the header, and where it ends."""
+    """Text of the actionlib_msgs/GoalID after the header, and its end."""
     *_, length = _HEADER.unpack_from(raw)
     return _text(raw, _HEADER.size + length + _TIME.size)
 
 
 def _text(raw: bytes, at: int) -> tuple[str, int]:
-    """A string at a place, and where it ends."""
+    """String at a position, and its end."""
     (length,) = _COUNT.unpack_from(raw, at)
     at += _COUNT.size
     if at + length > len(raw):
@@ -116,7 +116,7 @@ def _text(raw: bytes, at: int) -> tuple[str, int]:
 
 
 def read_transforms(raw: bytes) -> list[Edge]:
-    """A tf2_msgs/TFMessage.
+    """Read a tf2_msgs/TFMessage.
 
     Raises:
         struct.error, ValueError: the bytes end too early or a name is no text.

@@ -1,6 +1,6 @@
-"""What the messages of a bag become: plain records that know no ROS.
+"""Records of the messages in a bag, independent of ROS.
 
-Messages come as bytes and as rosbags' objects, whose fields are named as in ROS 2 (stamp.sec, stamp.nanosec).
+Messages arrive as bytes or as rosbags' objects with ROS 2 field names (stamp.sec, stamp.nanosec).
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ class MapRecord(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """A message that is whole, but says something that makes no sense; the nodes leave it out with a warning."""
+    """A complete message with invalid contents; the nodes ignore it with a warning."""
 
     problem: str
 
 
 @dataclass(frozen=True)
 class Kind:
-    """One message type that a replay can use.
+    """A message type that a replay can use.
 
     Attributes:
-        convert: makes the record of a message as rosbags gives it.
-        needed: fields that the definition must have.
-        fast: makes the same of ROS 1 bytes.
-        md5: of the one definition that `fast` knows; ANY: the bytes do not matter.
+        convert: function that makes the record of a rosbags message.
+        needed: required fields of the definition.
+        fast: function that makes the record of ROS 1 bytes.
+        md5: of the definition that `fast` supports; ANY: the bytes do not matter.
     """
 
     convert: Callable[[Any], Any]
@@ -54,12 +54,12 @@ class Kind:
 
 
 def stamp_of(stamp: Any) -> float:
-    """A message's time [s]."""
+    """Time of a message [s]."""
     return float(stamp.sec + stamp.nanosec / 1e9)
 
 
 def scan_of(message: Any) -> LaserScan:
-    """sensor_msgs/LaserScan; a stamp of 0 is none (NaN)."""
+    """Record of sensor_msgs/LaserScan; a stamp of 0 becomes NaN."""
     return LaserScan(
         stamp=stamp_of(message.header.stamp) or math.nan,
         frame_id=message.header.frame_id.lstrip("/"),
@@ -72,7 +72,7 @@ def scan_of(message: Any) -> LaserScan:
 
 
 def edges_of(message: Any) -> list[Edge]:
-    """tf2_msgs/TFMessage."""
+    """Record of tf2_msgs/TFMessage."""
     return [_edge(each) for each in message.transforms]
 
 
@@ -83,7 +83,7 @@ def _edge(message: Any) -> Edge:
 
 
 def map_of(message: Any) -> MapRecord | Refused:
-    """nav_msgs/OccupancyGrid; refused where its size or its origin makes no sense."""
+    """Record of nav_msgs/OccupancyGrid; refused if its size or origin is invalid."""
     origin = _pose(message.info.origin, "the orientation of a map's origin in the bag")
     if isinstance(origin, Refused):
         return origin
@@ -103,7 +103,7 @@ def map_of(message: Any) -> MapRecord | Refused:
 
 
 def pose_of(message: Any) -> PoseRecord | Refused:
-    """geometry_msgs/PoseWithCovarianceStamped; refused where it is no pose."""
+    """Record of geometry_msgs/PoseWithCovarianceStamped; refused if it is no pose."""
     pose = _pose(message.pose.pose, "the orientation of a pose in the bag")
     if isinstance(pose, Refused):
         return pose

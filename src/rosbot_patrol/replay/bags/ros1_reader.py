@@ -1,7 +1,7 @@
-"""rosbags' reader of ROS 1 bags, as lenient with a topic's own header as rosbag is.
+"""rosbags' reader of ROS 1 bags, as tolerant of a topic's header as rosbag.
 
-rosbags takes `latching` for a number and gives up the whole bag where it is none; rosbag takes any text. An empty
-message definition is that of ROS noetic, where the MD5 sum is.
+rosbags expects a number in `latching` and rejects the whole bag otherwise; rosbag accepts any text. An empty message
+definition is replaced by that of ROS noetic if the MD5 sum matches.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ LATCHED = ("1", "true")
 
 
 class LenientReader(Reader):
-    """Reads the headers of topics by itself, all else as rosbags does."""
+    """Reads the topics' headers itself, and everything else as rosbags does."""
 
     def read_connection(self) -> Connection:
         """Read a connection record from the current position; raises ReaderError."""
@@ -49,7 +49,7 @@ def _latching(header: Header) -> int | None:
 
 @cache
 def _definition_of(message_type: str, md5: str) -> str:
-    """The definition of a type of ROS noetic with that MD5 sum, empty where there is none."""
+    """Definition of a type in ROS noetic with that MD5 sum, empty if there is none."""
     try:
         definition, found = get_typestore(Stores.ROS1_NOETIC).generate_msgdef(message_type)
     except TypesysError:

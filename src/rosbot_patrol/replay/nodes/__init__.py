@@ -1,1 +1,1 @@
-"""Nodes fed from recordings."""
+"""Replays of the nodes, fed from recordings."""

@@ -1,8 +1,8 @@
-"""The rosserial bridge over a bag: one Session for each recorded connection, fed with the bytes as they came.
+"""The rosserial bridge over a bag: one Session for each recorded connection, fed with the recorded bytes.
 
-The bag has them where serial_node ran with `~record_bytes` (topic `~bytes`, rosbot_patrol/SerialBytes). Topics and
-types are taken as the lists allow them; whether ROS knows a type is not asked. What a device is to prove by a key
-cannot be replayed: the challenge was another.
+The bag has them if serial_node ran with `~record_bytes` (topic `~bytes`, rosbot_patrol/SerialBytes). Topics and types
+are accepted by the allow-lists alone; whether ROS knows a type is not checked. Proofs with keys cannot be replayed,
+because the challenge was another one.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from rosbot_patrol.rosserial.server.policy import Policy
 from rosbot_patrol.rosserial.server.session import Session
 
 OPENED, DATA, CLOSED = 0, 1, 2  # rosbot_patrol/SerialBytes
-TICK_S = 0.5  # between two looks for what did not come
+TICK_S = 0.5  # time between two checks for missing frames [s]
 
 INPUTS = (Input(name="serial_node/bytes", types=("rosbot_patrol/SerialBytes",)),)
 FIELDS = {
@@ -46,7 +46,7 @@ FIELDS = {
 
 
 class BytesRecord(NamedTuple):
-    """rosbot_patrol/SerialBytes: when [s], what happened, on which connection, from which address, its bytes."""
+    """rosbot_patrol/SerialBytes: time [s], event, connection, address, bytes."""
 
     stamp: float
     event: int
@@ -68,11 +68,11 @@ KINDS: dict[str, Kind] = {
 
 
 class SerialReplay:
-    """The sessions of a bridge.
+    """Sessions of a bridge.
 
     Args:
-        policy: what devices may do.
-        silence_timeout: hang up on a device not heard of for that long [s].
+        policy: permissions of devices.
+        silence_timeout: silence after which a device is disconnected [s].
     """
 
     inputs = INPUTS
@@ -88,10 +88,10 @@ class SerialReplay:
         self._events = Rows(STAMP, "peer", "kind", "text")
 
     def begin(self, names: Collection[str]) -> None:
-        """Which of the inputs will be heard: there is one."""
+        """Note which inputs will be heard; not needed here."""
 
     def hear(self, name: str, now: float, content: BytesRecord) -> None:
-        """Take in what happened on a connection."""
+        """Process an event of a connection."""
         self._tick(now)
         if content.event == OPENED:
             self._open(content, now)
@@ -100,10 +100,10 @@ class SerialReplay:
         elif content.peer in self._sessions:
             self._receive(content, now)
         else:
-            self._counts["unopened"] += 1  # it began before the bag, or was hung up on
+            self._counts["unopened"] += 1  # it began before the bag, or was closed by us
 
     def finish(self) -> Result:
-        """Messages of the devices, what else happened, and how much came and was answered."""
+        """Result: messages of the devices, other events, and counts."""
         tables = {"messages": self._messages.table(), "events": self._events.table()}
         return Result("serial_node", counts=self._counts, tables=tables)
 
@@ -150,7 +150,7 @@ class SerialReplay:
 
 
 def _said(event: Event) -> str:
-    """What an event tells, in a line."""
+    """Text of an event in one line."""
     match event:
         case Announced():
             return f"{TopicId(event.kind).name.lower()} {event.info.name} {event.info.message_type}"

@@ -1,4 +1,4 @@
-"""darknet_ros over a bag: its detector looks at each picture (the node leaves out those that it is too slow for)."""
+"""darknet_ros over a bag: its detector processes each picture (the node skips those it is too slow for)."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ FIELDS = {
 
 
 class DetectorReplay:
-    """A detector and what its node does with a picture.
+    """A detector and its node's processing of a picture.
 
     Args:
         detector: ready to run.
-        topic: where the bag should have the pictures, if it is not told.
+        topic: default topic of the pictures in the bag.
     """
 
     kinds = KINDS
@@ -40,10 +40,10 @@ class DetectorReplay:
         self._refused = 0
 
     def begin(self, names: Collection[str]) -> None:
-        """Which of the inputs will be heard: there is one."""
+        """Note which inputs will be heard; not needed here."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Look at a picture; one that cannot be looked at is counted and left out."""
+        """Process a picture; an unusable one is counted and ignored."""
         if not isinstance(content, PictureRecord):
             self._refused += 1
             return
@@ -57,7 +57,7 @@ class DetectorReplay:
             self._boxes.add(content.stamp, one.name, one.probability, one.xmin, one.ymin, one.xmax, one.ymax)
 
     def finish(self) -> Result:
-        """All boxes, and how many each picture has."""
+        """Result: all boxes, and their number in each picture."""
         counts = {"pictures": len(self._pictures), "refused": self._refused, "boxes": len(self._boxes)}
         tables = {"pictures": self._pictures.table(), "boxes": self._boxes.table()}
         return Result("darknet_ros", counts=counts, tables=tables)

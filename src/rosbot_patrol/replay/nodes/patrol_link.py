@@ -1,4 +1,4 @@
-"""move_base as the patrol of a bag knew it: its answers, each to the goal of the same number."""
+"""move_base as recorded in a patrol's bag: its answers, matched to goals by their number."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rosbot_patrol.replay.nodes.patrol_records import GoalRecord, OutcomeRecord
 
 
 class BagLink:
-    """Answers to goals. The n-th goal of the replay is taken for the n-th of the bag, and ends when that ended."""
+    """Answers to goals: the n-th goal of the replay gets the answer of the bag's n-th goal, at its time."""
 
     def __init__(self) -> None:
         self._heard = -math.inf
@@ -18,24 +18,24 @@ class BagLink:
         self._tag, self._sent = "", 0
 
     def hear_status(self, now: float) -> None:
-        """The server lives."""
+        """The server is alive."""
         self._heard = now
 
     def hear_goal(self, record: GoalRecord) -> None:
-        """A goal that was sent then."""
+        """Record a goal of the bag."""
         if record.goal not in self._goals:
             self._goals.append(record.goal)
 
     def hear_outcome(self, record: OutcomeRecord) -> None:
-        """How a goal ended then."""
+        """Record the end of a goal in the bag."""
         self._outcomes[record.goal] = record
 
     def send(self, goal: Goal) -> None:
-        """A goal of the replay."""
+        """Send a goal of the replay."""
         self._tag, self._sent = goal.tag, self._sent + 1
 
     def state(self, now: float) -> GoalLink:
-        """How server and goal stand at a time [s]."""
+        """State of server and goal at a time [s]."""
         is_up = now - self._heard < SILENCE
         if not self._tag:
             return GoalLink(is_up=is_up)

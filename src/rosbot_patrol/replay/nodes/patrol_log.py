@@ -1,4 +1,4 @@
-"""What a patrol said and did in a replay, as tables; events are compared in their order, each with its time."""
+"""Result of a patrol's replay, as tables; events are compared in order, each with its time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TABLES = {
     "ignored": ("room", "why"),
     "words": ("kind", "text"),
 }
-LATE_S = 0.5  # an event may come so much sooner or later
+LATE_S = 0.5  # tolerance of an event's time
 
 FIELDS = {
     **{f"{table}.rows": Field(is_by_order=True) for table in TABLES},
@@ -35,14 +35,14 @@ FIELDS = {
 
 
 class PatrolLog:
-    """Gathers the tables."""
+    """Collects the tables."""
 
     def __init__(self) -> None:
         self._rows = {name: Rows(STAMP, *columns) for name, columns in TABLES.items()}
         self._is_turning = False
 
     def note(self, now: float, commands: Commands, mission: Mission | None) -> None:
-        """Take what a step at a time [s] answered."""
+        """Record the results of a step at a time [s]."""
         out = commands
         if out.report is not None:
             self._note_report(now, out)
@@ -82,6 +82,6 @@ class PatrolLog:
             self._rows["words"].add(now, word.kind, word.text)
 
     def result(self, *, steps: int) -> Result:
-        """All of it."""
+        """The whole result."""
         counts = {"steps": steps, **{name: len(rows) for name, rows in self._rows.items()}}
         return Result("patrol_robot", counts=counts, tables={name: rows.table() for name, rows in self._rows.items()})

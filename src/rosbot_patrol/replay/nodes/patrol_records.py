@@ -1,4 +1,4 @@
-"""What the messages that the patrol hears become: plain records that know no ROS."""
+"""Records of the messages that the patrol receives, independent of ROS."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ LOOK = "look"  # rosbot_patrol/SensorEvent.LOOK
 
 
 class GoalRecord(NamedTuple):
-    """move_base_msgs/MoveBaseActionGoal: id of the goal."""
+    """move_base_msgs/MoveBaseActionGoal: goal id."""
 
     goal: str
 
 
 class OutcomeRecord(NamedTuple):
-    """move_base_msgs/MoveBaseActionResult: id of the goal, its status (actionlib_msgs/GoalStatus), what was said."""
+    """move_base_msgs/MoveBaseActionResult: goal id, status (actionlib_msgs/GoalStatus), text."""
 
     goal: str
     status: int
@@ -39,7 +39,7 @@ class OutcomeRecord(NamedTuple):
 
 
 class ModeRecord(NamedTuple):
-    """rosbot_patrol/Arming: the mode, the rooms that count (None: all), quiet hours, the entry delay's seconds, why."""
+    """rosbot_patrol/Arming: mode, guarded rooms (None: all), quiet hours, entry delay [s], reason."""
 
     mode: str
     rooms: frozenset[int] | None
@@ -55,7 +55,7 @@ class StopRecord(NamedTuple):
 
 
 class AliveRecord(NamedTuple):
-    """Of a message only that it came."""
+    """Arrival of a message, without its contents."""
 
 
 def _boxes(message: Any) -> BoxesRecord:
@@ -67,7 +67,7 @@ def _boxes(message: Any) -> BoxesRecord:
 
 
 def _lens(message: Any) -> LensRecord | Refused:
-    k = message.K if hasattr(message, "K") else message.k  # as ROS 1 and ROS 2 name it
+    k = message.K if hasattr(message, "K") else message.k  # names in ROS 1 and ROS 2
     try:
         return lens_record(message.header.frame_id, k, width=message.width, height=message.height)
     except ValueError as err:

@@ -1,1 +1,1 @@
-"""Results of a replay: tables, comparison with stored ones, plots."""
+"""Results of a replay: tables, comparison with stored results, plots."""

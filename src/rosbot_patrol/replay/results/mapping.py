@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mapping:
-    """What came of a log.
+    """Result for a log.
 
     Attributes:
-        slam: as it stands at the end.
-        poses: of the best particle at each scan, by the odometry where a scan brought no update, shape (N, 3).
+        slam: its final state.
+        poses: of the best particle at each scan, from the odometry without an update, shape (N, 3).
         updates: number of updates.
-        resamplings: how often the particles were drawn anew.
+        resamplings: number of resamplings.
     """
 
     slam: Slam
@@ -44,7 +44,7 @@ def map_log(
     """Map a whole log.
 
     Args:
-        scans: in their order.
+        scans: in order.
         odometry: of the robot at each scan, shape (N, 3).
         params: of slam_gmapping.
         base_from_laser: of the level scans, None for the robot's own pose.
@@ -63,7 +63,7 @@ def map_log(
 
 
 def _poses(odometry: Array, last_update: NDArray[np.int64], trajectory: Array) -> Array:
-    """The trajectory's poses, carried on by the odometry between the updates, shape (N, 3)."""
+    """Poses of the trajectory, extended by the odometry between updates, shape (N, 3)."""
     rows, numbers = [], {int(scan): k for k, scan in enumerate(np.unique(last_update[last_update >= 0]))}
     for row, update in zip(odometry, last_update, strict=True):
         if update < 0:  # nothing was seen yet

@@ -1,8 +1,8 @@
-"""How good a trajectory is, by the relations between its poses.
+"""Quality of a trajectory by the relations between its poses.
 
 Kuemmerle, Steder, Dornhege, Ruhnke, Grisetti, Stachniss, Kleiner: On measuring the accuracy of SLAM algorithms (2009).
-The moves between pairs of poses are compared, not the poses themselves: an early small turn does not count for all that
-comes after it.
+Moves between pairs of poses are compared instead of the poses themselves, so that a small early turn does not affect
+everything after it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Pairs = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class RelationErrors:
-    """Mean and standard deviation of the errors of relations: of their length [m] and of their turn [rad]; how many."""
+    """Mean and standard deviation of the relations' errors: in length [m] and in turn [rad]; their number."""
 
     shift: float
     shift_std: float
@@ -31,13 +31,13 @@ class RelationErrors:
 
 
 def consecutive_pairs(count: int) -> Pairs:
-    """Each pose and the next, shape (count - 1, 2)."""
+    """Pairs of successive poses, shape (count - 1, 2)."""
     first = np.arange(max(count - 1, 0))
     return np.column_stack((first, first + 1))
 
 
 def revisit_pairs(reference: Array, *, radius: float = 3.0, gap: int = 100) -> Pairs:
-    """Poses that lie within `radius` [m] of each other and more than `gap` scans apart, shape (M, 2)."""
+    """Pairs of poses within `radius` [m] of each other and more than `gap` scans apart, shape (M, 2)."""
     found = [np.empty((0, 2), dtype=np.int64)]
     for i in range(len(reference) - gap - 1):
         later = reference[i + gap + 1 :, :2]
@@ -47,7 +47,7 @@ def revisit_pairs(reference: Array, *, radius: float = 3.0, gap: int = 100) -> P
 
 
 def moves_between(poses: Array, pairs: Pairs) -> Array:
-    """The second pose of each pair seen from the first, shape (M, 3)."""
+    """Second pose of each pair relative to the first, shape (M, 3)."""
     first, second = poses[pairs[:, 0]], poses[pairs[:, 1]]
     c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
     dx, dy = (second - first)[:, :2].T
