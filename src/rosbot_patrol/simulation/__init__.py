@@ -1,1 +1,1 @@
-"""The simulated house, robot, sensors and people."""
+"""Simulation of the house, the robot, its sensors and people."""

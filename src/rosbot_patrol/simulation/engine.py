@@ -1,4 +1,4 @@
-"""The simulation itself: a world, a robot in it, its sensors and the actors, advanced step by step.
+"""Engine of the simulation: a world with robot, sensors and actors, advanced step by step.
 
 Exact: the same seed and the same calls at the same simulated times give the same data bit for bit. Noise belongs to a
 sample's number, not to who asked before. Nothing here knows of wall time.
@@ -145,7 +145,7 @@ class Engine:
             self._robot.imu.reset(self._robot.start.yaw)
 
     def close(self) -> None:
-        """Give physics and renderer back."""
+        """Release physics and renderer."""
         if self._camera is not None:
             self._camera.close()
         self._physics.close()
@@ -154,7 +154,7 @@ class Engine:
 
     @property
     def has_camera(self) -> bool:
-        """Whether there is a renderer to take pictures by."""
+        """Whether there is a renderer for pictures."""
         return self._camera is not None
 
     @property
@@ -174,7 +174,7 @@ class Engine:
 
     @property
     def robot(self) -> Equipment:
-        """The robot's parts; raises WorldError where there is no robot."""
+        """Parts of the robot; raises WorldError if there is no robot."""
         if self._robot is None:
             raise _no_robot()
         return self._robot
@@ -185,14 +185,14 @@ class Engine:
             self._robot.drive.command(twist, self.now)
 
     def remove_robot(self) -> None:
-        """Take the robot out; raises WorldError where there is none."""
+        """Remove the robot; raises WorldError if there is none."""
         if self._robot is None:
             raise _no_robot()
         self._physics.remove_robot()
         self._robot = None
 
     def carry(self, pose: Pose2D) -> None:
-        """Carry the robot elsewhere without its odometry noticing; raises WorldError if there is no room for it."""
+        """Carry the robot to another place unnoticed by its odometry; raises WorldError if there is no room for it."""
         robot = self.robot
         name = f"robot '{robot.description.name}'"
         if not all(map(math.isfinite, pose)):
@@ -220,7 +220,7 @@ class Engine:
     # Sensors ---------------------------------------------------------------------------------------------------------
 
     def scan(self) -> LaserScan:
-        """One sweep of the lidar."""
+        """One scan of the lidar."""
         robot = self.robot
         frame, base_from_laser = robot.laser
         scene = self.ways.cut(robot.lidar_height).plus(self.population.cut(robot.lidar_height))
@@ -230,7 +230,7 @@ class Engine:
         )  # fmt: skip
 
     def level_scan(self) -> LevelScan:
-        """One sweep of the lidar, laid level in base_link; raises LaserTilted where it cannot be."""
+        """One scan of the lidar, laid level in base_link; raises LaserTilted if that is impossible."""
         return level_scan(self.scan(), self.robot.laser_transform, "base_link")
 
     def ranges(self) -> dict[str, float]:
@@ -244,11 +244,11 @@ class Engine:
         }
 
     def imu(self) -> ImuReading:
-        """One sample of the inertial unit."""
+        """One sample of the IMU."""
         return self.robot.imu.read(self._noise("imu"))
 
     def picture(self, *, colour: bool = True, depth: bool = True) -> Picture:
-        """One picture of the camera; always from the same thread.
+        """One picture of the camera; call it always from the same thread.
 
         Args:
             colour: add exposure and noise to the colour; without it the colour may stay as drawn.
@@ -284,7 +284,7 @@ class Engine:
         return self._camera.view(above, self.population, shown)
 
     def warm_up(self) -> None:
-        """Take one of each measurement, so that the first that counts does not come late."""
+        """Take one of each measurement, so that the first real one is not late."""
         robot = self.robot
         if robot.base_from_laser is not None:
             self.scan()

@@ -1,4 +1,4 @@
-"""Plays a scenario on an engine, each thing at its exact simulated time; one thread, that of the simulation."""
+"""Player of a scenario on an engine, each event at its exact simulated time; on the simulation's thread."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _act(entry: Timed, text: str, do: Callable[[], object]) -> _Act:
 
 
 class ScenarioPlayer:
-    """Does what a scenario says; `advance` comes before each step of the engine.
+    """Plays a scenario; call `advance` before each step of the engine.
 
     Args:
         scenario: what is to happen.
@@ -62,17 +62,17 @@ class ScenarioPlayer:
 
     @property
     def waiting(self) -> tuple[str, ...]:
-        """What has not happened yet."""
+        """Events that have not happened yet."""
         return tuple(act.text for act in self._waiting)
 
     def event(self, name: str) -> None:
-        """Something has happened to the patrol, now; only the first time counts."""
+        """Report an event of the patrol; only the first of its kind counts."""
         if name not in self._events:
             self._events[name] = self._engine.now
             self._next = -math.inf
 
     def advance(self) -> None:
-        """Do what is due; the first call is the event `start`.
+        """Play what is due; the first call is the event `start`.
 
         Raises:
             WorldError: it cannot be done, such as a box where the robot stands.
@@ -131,7 +131,7 @@ class ScenarioPlayer:
             self._engine.population.move_actor(name, path, way.speed, way.loop, pause=way.pause, yields=way.yields)
 
     def _check(self) -> None:
-        """That what is named is there."""
+        """Check that the named objects exist."""
         s, engine = self._scenario, self._engine
         actors = [*(a.name for a in s.actors), *(a.name for a in engine.population.walkers)]
         for i, walk in enumerate(s.walks):

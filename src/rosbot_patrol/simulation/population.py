@@ -1,4 +1,4 @@
-"""Everything in a world that comes, goes or moves and is not the robot, in step with the physics."""
+"""Population of a world: everything that comes, goes or moves except the robot, in step with the physics."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Population:
 
     @property
     def walkers(self) -> tuple[Walker, ...]:
-        """The actors, in the order in which they came."""
+        """The actors, in the order of arrival."""
         return tuple(self._walkers.values())
 
     @property
     def doors(self) -> tuple[Door, ...]:
-        """The doors that open and close."""
+        """The movable doors."""
         return tuple(self._doors.values())
 
     def __iter__(self) -> Iterator[Walker | Door]:
@@ -56,7 +56,7 @@ class Population:
         return name in self._walkers or name in self._doors
 
     def begin(self, actors: Iterable[ActorPlace], doors: Iterable[DoorPlace]) -> None:
-        """Place what a world's file names; an actor whose path there leads through a wall walks it, with a warning."""
+        """Place the actors of a world's file; a path through a wall is walked, with a warning."""
         for door in doors:
             self.spawn_door(door)
         for actor in actors:
@@ -79,19 +79,19 @@ class Population:
                 self._physics.move(walker.name, walker.matrix)
 
     def cut(self, height: float) -> Slice:
-        """What a plane at a height [m] meets of all of them."""
+        """Cut of all of them with a plane at a height [m]."""
         return together([mover.cut(height) for mover in self])
 
     def sight(self, eye: Sequence[float], points: Sequence[Sequence[float]]) -> float:
-        """How many of some points are seen from another, 0 none to 1 all; each x, y, z [m]. Actors hide nothing."""
+        """Share of some points visible from another, 0 to 1; each x, y, z [m]. Actors hide nothing."""
         return self._ways.sight.share(eye, points, self._doors.values())
 
     def cut_of_doors(self, height: float) -> Slice:
-        """What a plane at a height [m] meets of the doors."""
+        """Cut of the doors with a plane at a height [m]."""
         return together([door.cut(height) for door in self._doors.values()])
 
     def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D, *, posture: str = "") -> str:
-        """Place an actor; returns its name, made up where it is "".
+        """Place an actor; returns its name, generated if it is "".
 
         Raises:
             WorldError: the name is taken, the model, look or posture unknown, or the robot stands there.
@@ -117,7 +117,7 @@ class Population:
         pause: float = 0.0,
         yields: bool = True,
     ) -> None:
-        """Let an actor walk along points, or put it somewhere (one point, speed 0).
+        """Let an actor walk along points, or place it somewhere (one point, speed 0).
 
         Raises:
             WorldError: there is none of that name, numbers that make no sense, a wall across the path, or the robot
@@ -139,7 +139,7 @@ class Population:
             raise _robot_is_there(f"actor '{name}'")
 
     def roam_actor(self, name: str, radius: float, speed: float, *, pause: float = 2.0) -> None:
-        """Let an actor wander within a radius [m] of where it is, as name and seed have it; raises WorldError."""
+        """Let an actor roam within a radius [m], determined by name and seed; raises WorldError."""
         walker = self._actor(name)
 
         def is_free(start: Pose2D, goal: Pose2D) -> bool:
@@ -150,14 +150,14 @@ class Population:
         walker.roam(radius, speed, noise_of(self._seed, f"ways of {name}"), is_free, pause=pause)
 
     def remove(self, name: str) -> None:
-        """Take an actor or a door out; raises WorldError where there is none of that name."""
+        """Remove an actor or a door; raises WorldError if there is none of that name."""
         if self._doors.pop(name, None) is None:
             self._actor(name)
             del self._walkers[name]
         self._physics.remove(name)
 
     def spawn_door(self, place: DoorPlace) -> None:
-        """Hang a door, closed.
+        """Add a door, closed.
 
         Raises:
             WorldError: the name is taken, the leaf is none, or the robot stands there.
@@ -172,7 +172,7 @@ class Population:
         self._doors[name] = door
 
     def set_door(self, name: str, opening: float, speed: float = SPEED) -> None:
-        """Begin to open (1) or close (0) a door at a speed [rad/s], 0 at once; raises WorldError."""
+        """Start opening (1) or closing (0) a door at a speed [rad/s], 0: at once; raises WorldError."""
         if name not in self._doors:
             raise WorldError(f"door '{name}'", f"is not there (there: {', '.join(self._doors) or 'none'})")
         door = self._doors[name]
@@ -209,7 +209,7 @@ class Population:
         self._ways.add(body)
 
     def remove_box(self, name: str) -> None:
-        """Take a box away; raises WorldError where there is none of that name."""
+        """Remove a box; raises WorldError if there is none of that name."""
         if name not in self.boxes:
             raise WorldError(f"box '{name}'", f"is not there (there: {', '.join(self.boxes) or 'none'})")
         del self.boxes[name]

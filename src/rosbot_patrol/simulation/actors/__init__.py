@@ -1,1 +1,1 @@
-"""Who and what moves: people, pets, doors."""
+"""Actors of the simulation: people, pets, doors."""

@@ -1,4 +1,4 @@
-"""Doors: leaves on upright hinges that open and close at a speed, and stop before the robot and before who walks.
+"""Doors: leaves on upright hinges that move at a speed and stop in front of the robot and people.
 
 A leaf pushes nothing and cannot be pushed: the robot meets a wall. It opens by an angle about its hinge, between 0 (as
 the world's file has it, closed) and its swing.
@@ -72,7 +72,7 @@ def plain_door(
 
 
 class Door:
-    """A door that is moved.
+    """A movable door.
 
     Args:
         place: leaf and hinge.
@@ -97,12 +97,12 @@ class Door:
 
     @property
     def angle(self) -> float:
-        """How far it is turned from closed [rad]."""
+        """Angle from the closed position [rad]."""
         return self.opening * self.swing
 
     @property
     def is_moving(self) -> bool:
-        """Whether it is not yet where it was told to go."""
+        """Whether it has not reached its target yet."""
         return self.opening != self._target
 
     @property
@@ -111,10 +111,10 @@ class Door:
         return from_pose2d(self._hinge(self.opening)) @ self._axis_from_body
 
     def pose_parts(self) -> Matrix | None:
-        """Nothing of the leaf moves against it."""
+        """None: no part of the leaf moves by itself."""
 
     def set(self, opening: float, speed: float = SPEED) -> None:
-        """Begin to open or close.
+        """Start opening or closing.
 
         Args:
             opening: 0 closed to 1 open.
@@ -152,11 +152,11 @@ class Door:
         return True
 
     def distance_to(self, x: float, y: float) -> float:
-        """From a point to the nearest of the leaf, in the plane [m]."""
+        """Distance from a point to the leaf, in the plane [m]."""
         return self._distance(x, y, self.opening)
 
     def cut(self, height: float) -> Slice:
-        """What a plane at a height [m] meets of the leaf as it stands, in the frame of the world."""
+        """Cut of a plane at a height [m] with the present leaf, in the world frame."""
         if height not in self._cuts:
             closed = Body(name=self.name, kind="door", pose=self._axis_from_body, collisions=self.body.collisions)
             self._cuts[height] = slice_bodies([closed], height)

@@ -1,4 +1,4 @@
-"""What an actor consists of: its body, how its limbs stand while it walks, and where a plane cuts it."""
+"""Figures of actors: body, limbs in motion, and their cuts with a plane."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _KNEE = 0.8  # a cut below meets legs that swing [m]
 
 
 class Figure(Protocol):
-    """The body of an actor, about its own frame: on the floor, x forward.
+    """Body of an actor in its own frame: on the floor, x forward.
 
     Attributes:
         body: shapes and looks; placed by who owns it.
@@ -61,7 +61,7 @@ class Figure(Protocol):
         """body_from_visuals, shape (number of visuals, 4, 4), after `phase` cycles at a speed; None: never moved."""
 
     def cut(self, height: float, phase: float, speed: float) -> Slice:
-        """What a plane at a height [m] meets."""
+        """Cut with a plane at a height [m]."""
 
 
 class PersonFigure:

@@ -1,4 +1,4 @@
-"""What people look like: named looks, looks by chance, and looks that are reserved for tests.
+"""Appearance of people: named looks, random looks, and looks reserved for tests.
 
 The generator of training pictures draws with `draw_look`, which never gives a reserved height, colour or a mask; the
 system test's intruders have such, so that the network is tested on people whom it has never seen.
@@ -21,7 +21,7 @@ HEIGHTS = (1.50, 1.95)
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """What a person looks like.
+    """Appearance of a person.
 
     Attributes:
         height [m]; build: 1 is usual, 0.8 slight, 1.3 heavy.
@@ -126,7 +126,7 @@ LOOKS: dict[str, Look] = {
 
 
 def look_named(name: str) -> Look:
-    """A look by its name.
+    """Look with a name.
 
     Raises:
         WorldError: there is no such look; names those that there are.
@@ -137,14 +137,14 @@ def look_named(name: str) -> Look:
 
 
 def is_reserved(look: Look) -> bool:
-    """Whether a look is kept for tests: its height, a mask, or a strong colour of a reserved hue."""
+    """Whether a look is reserved for tests: by height, mask, or a strong colour of a reserved hue."""
     coloured = [look.top, look.bottom, look.hat, look.shoes, *([look.backpack] if look.backpack else [])]
     tall = RESERVED_HEIGHTS[0] <= look.height <= RESERVED_HEIGHTS[1]
     return tall or look.mask is not None or any(_is_reserved_colour(c) for c in coloured)
 
 
 def draw_look(rng: np.random.Generator) -> Look:
-    """A look by chance, never a reserved one."""
+    """Random look, never a reserved one."""
     height = float(rng.uniform(*HEIGHTS))
     while RESERVED_HEIGHTS[0] <= height <= RESERVED_HEIGHTS[1]:
         height = float(rng.uniform(*HEIGHTS))

@@ -1,4 +1,4 @@
-"""People and fire hydrants as bodies of the scene, and how a person's limbs stand while walking, sitting or crouching.
+"""People and fire hydrants as bodies of the scene, with limb poses for walking, sitting and crouching.
 
 A person's frame is on the floor between the feet, x forward. One posture is reserved for tests, as some looks are
 (`looks.py`): the generator of training pictures never uses it.
@@ -33,7 +33,7 @@ __all__ = [
 
 
 def person_body(name: str, look: Look | None = None) -> Body:
-    """A person who stands at the world's origin; its visuals are moved by `person_pose_parts`."""
+    """A person at the world's origin; `person_pose_parts` moves its visuals."""
     look = look or LOOKS["visitor"]
     poses = person_pose_parts(look)
     visuals = tuple(

@@ -1,4 +1,4 @@
-"""The parts of a human figure as triangles: limbs and trunk drawn out over elliptic sections.
+"""Meshes of a human figure: limbs and trunk as lofts over elliptic sections.
 
 A section is (z, half width along x, half width along y, middle's x), from the top of the part to its bottom, in
 metres, in the frame of the joint that carries the part.

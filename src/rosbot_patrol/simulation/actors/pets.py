@@ -1,4 +1,4 @@
-"""Cats and dogs: bodies of triangles, warm but no intruders, whose paws stay where they are put while they walk.
+"""Cats and dogs: meshes, warm but no intruders; standing paws stay in place while the pet walks.
 
 A pet's frame is on the floor under the middle of its trunk, x forward. Sizes are those of real ones: the lidar's plane
 (0.16 m) meets the lower trunk of a cat and the legs of most dogs; a range sensor meets the legs.
@@ -27,7 +27,7 @@ _DARK: Colour = (0.04, 0.03, 0.03)
 
 @dataclass(frozen=True, kw_only=True)
 class PetLook:
-    """What a pet looks like.
+    """Appearance of a pet.
 
     Attributes:
         height: at the shoulder [m]; length: of the trunk, in heights; depth, width: of the trunk, in heights.
@@ -48,12 +48,12 @@ class PetLook:
 
     @property
     def leg_radius(self) -> float:
-        """Thickness of a leg where a lidar meets it [m]."""
+        """Thickness of a leg at the lidar's height [m]."""
         return 0.062 * self.height
 
     @property
     def cycle(self) -> float:
-        """Way that it walks while each leg takes one step [m]."""
+        """Distance of one step of each leg [m]."""
         return 0.75 * self.height
 
 
@@ -101,13 +101,13 @@ def pet_named(model: str, name: str) -> PetLook:
 
 
 def draw_pet(model: str, rng: np.random.Generator) -> PetLook:
-    """A look of a cat or a dog by chance."""
+    """Random look of a cat or a dog."""
     known = list(PETS[model].values())
     return known[int(rng.integers(len(known)))]
 
 
 def pet_body(name: str, look: PetLook) -> Body:
-    """A pet that stands at the world's origin; its visuals are moved by `pet_pose_parts`."""
+    """A pet at the world's origin; `pet_pose_parts` moves its visuals."""
     visuals = tuple(
         Visual(shape=shape, pose=pose, material=Material(rgba=(*colour, 1.0)))
         for (_, shape, colour), pose in zip(_figure(look), pet_pose_parts(look), strict=True)

@@ -1,4 +1,4 @@
-"""Posters: a board on a wall with the picture of a person on it.
+"""Posters: boards on a wall with the picture of a person.
 
 The picture is the person's own body pressed flat, so that colour and outline are a person's and depth is a board's.
 """

@@ -1,4 +1,4 @@
-"""Actors that stand, walk along points, wander and stop: people, pets and fire hydrants, in the plane.
+"""Walking actors in the plane: people, pets and fire hydrants that stand, walk along points, roam and stop.
 
 A walker gathers speed and loses it as legs can, turns before it sets off, and stops before the robot and before a
 door's leaf until those have gone. It knows nothing of walls: `ways.Ways` refuses a path through one. Who wanders stops
@@ -36,10 +36,10 @@ _PATIENCE = 2.0  # who wanders and is held up goes elsewhere after [s]
 
 
 class Obstacle(Protocol):
-    """Something that moves, and that a walker does not walk into."""
+    """A moving obstacle that walkers avoid."""
 
     def distance_to(self, x: float, y: float) -> float:
-        """From a point to the nearest of it [m]."""
+        """Distance from a point [m]."""
 
 
 @dataclass(frozen=True)
@@ -86,31 +86,31 @@ class Walker:
 
     @property
     def body(self) -> Body:
-        """Its shapes and looks."""
+        """Body for the scene."""
         return self._figure.body
 
     @property
     def is_walking(self) -> bool:
-        """Whether it moves on now."""
+        """Whether it is moving now."""
         return self._pace > 0.0
 
     @property
     def has_arrived(self) -> bool:
-        """Whether it stands at the end of its way, or was given none."""
+        """Whether it stands at the end of its path, or has none."""
         return not self._path and self._roaming is None
 
     @property
     def speed(self) -> float:
-        """How fast it walks now [m/s]."""
+        """Present speed [m/s]."""
         return self._pace
 
     @property
     def is_roaming(self) -> bool:
-        """Whether it wanders about."""
+        """Whether it is roaming."""
         return self._roaming is not None
 
     def distance_to(self, x: float, y: float) -> float:
-        """From a point to its cylinder [m], 0 inside."""
+        """Distance from a point to its cylinder [m], 0 inside."""
         return max(math.hypot(x - self.pose.x, y - self.pose.y) - self.radius, 0.0)
 
     @property
@@ -120,22 +120,22 @@ class Walker:
 
     @property
     def warmth(self) -> float:
-        """How far a motion sensor notices it, as a share of how far it notices a person."""
+        """Range at which a motion sensor notices it, relative to a person."""
         return self._figure.warmth
 
     @property
     def warm_heights(self) -> tuple[float, ...]:
-        """Of the points that stand for its warm surface, above the floor [m]."""
+        """Heights above the floor of the points on its warm surface [m]."""
         return self._figure.warm_heights
 
     @property
     def radius(self) -> float:
-        """Of the upright cylinder that holds it, limbs apart [m]."""
+        """Radius of the upright cylinder around it, without limbs [m]."""
         return self._figure.radius
 
     @property
     def look_name(self) -> str:
-        """Name of the look, "" of what has none."""
+        """Name of its look, "" if it has none."""
         return self._figure.look
 
     @property
@@ -146,7 +146,7 @@ class Walker:
     def walk(
         self, path: Sequence[Pose2D], speed: float, loop: bool = False, *, pause: float = 0.0, yields: bool = True
     ) -> None:
-        """Walk along points; a single point with speed 0 puts it there.
+        """Walk along points; a single point with speed 0 places it there.
 
         Args:
             path: points; it turns to the yaw of the last.
@@ -181,7 +181,7 @@ class Walker:
         *,
         pause: float = 2.0,
     ) -> None:
-        """Wander about the place where it stands, from one free place to another, until told otherwise.
+        """Roam around its place, from one free place to another, until told otherwise.
 
         Args:
             radius: it stays within [m].
@@ -235,7 +235,7 @@ class Walker:
         return self._figure.pose_parts(self._phase, self._pace)
 
     def cut(self, height: float) -> Slice:
-        """What a plane at a height [m] meets of it, in the frame of the world."""
+        """Cut with a plane at a height [m], in the world frame."""
         return self._figure.cut(height, self._phase, self._pace).placed(self.pose)
 
     def _check(self, speed: float, pause: float) -> None:
@@ -245,7 +245,7 @@ class Walker:
             raise WorldError(f"actor '{self.name}'", f"cannot pause for {pause} s")
 
     def _pace_for(self, error: float, gap: float, dt: float) -> float:
-        """The next speed, as what is ahead and the legs allow it [m/s]."""
+        """Next speed, limited by obstacles ahead and by the legs [m/s]."""
         if abs(error) >= _SHARP:
             return max(self._pace - _BRAKE * dt, 0.0) if self._pace > _LAST_STEP else 0.0
         at_goal = self._pace_at_goal()
@@ -267,7 +267,7 @@ class Walker:
         return heading if abs(error) <= most else wrap_angle(self.pose.yaw + math.copysign(most, error))
 
     def _is_in_the_way(self, moved: Pose2D, robot: Pose2D | None, obstacles: Sequence[Obstacle]) -> bool:
-        """Whether a move would bring it nearer to something that it is near to already; turning is always free."""
+        """Whether a move would bring it closer to something already close; turning is always free."""
         if (
             self.yields
             and robot is not None
@@ -286,7 +286,7 @@ class Walker:
             self._path, self._held_up = [], 0.0
 
     def _finds_a_way(self) -> bool:
-        """Whether one who wanders has thought of a place to go to."""
+        """Whether it has found a place to roam to."""
         if self._roaming is None:
             return False
         centre, rng = self._roaming.centre, self._roaming.rng

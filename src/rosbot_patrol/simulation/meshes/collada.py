@@ -1,4 +1,4 @@
-"""Read COLLADA files (pycollada) as Gazebo classic does: <unit> scales, <up_axis> is not looked at.
+"""Reader of COLLADA files (pycollada), as in Gazebo classic: <unit> scales, <up_axis> is ignored.
 
 That is gazebo-classic's issue 1305: what stands right in Gazebo stands right here. Only shapes and their colours are
 taken. What is wrong elsewhere in the file (lamps, cameras, animations) does not matter, a material that is missing

@@ -1,4 +1,4 @@
-"""The mean colour of a picture that a mesh or material wears: the camera here shows colours, not foreign pictures."""
+"""Mean colours of textures: the camera here shows a texture as one colour."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Rgba = tuple[float, float, float, float]
 
 
 def picture_near(name: str, base: Path) -> Path | None:
-    """A texture's file: beside what names it, or in the folders where Gazebo's models keep theirs."""
+    """File of a texture: beside the file that names it, or in the folders of Gazebo's models."""
     plain = Path(name.removeprefix("file://"))
     places = [
         base / plain,
@@ -25,7 +25,7 @@ def picture_near(name: str, base: Path) -> Path | None:
 
 @functools.lru_cache(maxsize=256)
 def mean_colour(path: Path) -> Rgba | None:
-    """Mean colour of a picture's file, what is transparent left out; None, with a warning, where it is no picture."""
+    """Mean colour of an image file without transparent pixels; None, with a warning, if it is no image."""
     from PIL import Image  # only for worlds with textures
 
     try:
@@ -40,7 +40,7 @@ def mean_colour(path: Path) -> Rgba | None:
 
 
 def worn_colour(names: Iterable[str], base: Path) -> Rgba | None:
-    """Mean colour of the first of some textures that is found."""
+    """Mean colour of the first texture found."""
     for name in names:
         path = picture_near(name, base)
         if path is not None:

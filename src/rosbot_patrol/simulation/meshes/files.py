@@ -1,4 +1,4 @@
-"""Read triangles from mesh files: STL (binary or text), Wavefront OBJ with its colours, and COLLADA (`collada`).
+"""Reader of mesh files: STL (binary or text), Wavefront OBJ with its colours, and COLLADA (`collada`).
 
 Units and axes are taken as Gazebo classic takes them: metres and z up in STL and OBJ.
 """

@@ -1,4 +1,4 @@
-"""What a mesh file comes to: triangles of one name and one colour each."""
+"""Parts of a mesh file: triangles with one name and one colour each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Triangles = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 @dataclass(frozen=True)
 class MeshPart:
-    """Triangles of one name and one colour.
+    """Triangles with one name and one colour.
 
     Attributes:
         name: of the object or node in the file, "" where it has none.
@@ -37,7 +37,7 @@ def merged(parts: tuple[MeshPart, ...]) -> Triangles:
 
 
 def compact(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
-    """Only the vertices that the faces use; indices that are out of range stay so."""
+    """Keep only the vertices used by faces; indices out of range stay out of range."""
     if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
         return vertices, faces
     used, places = np.unique(faces, return_inverse=True)

@@ -1,1 +1,1 @@
-"""Bodies that push and fall: PyBullet."""
+"""Physics of bodies that push and fall: PyBullet."""

@@ -1,4 +1,4 @@
-"""pybullet, imported without the line about its build that it writes to every console."""
+"""pybullet, imported without the build message that it prints on every console."""
 
 from __future__ import annotations
 

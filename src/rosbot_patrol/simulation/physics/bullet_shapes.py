@@ -1,4 +1,4 @@
-"""Collision shapes for PyBullet: what of a body the robot can touch, in portions that PyBullet takes."""
+"""Collision shapes for PyBullet: the touchable parts of a body, in portions that PyBullet accepts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def bounds_of(part: Collision, world_from_body: Matrix) -> Bounds:
 
 
 def touchable(body: Body) -> tuple[list[Collision], Bounds]:
-    """The parts of a body that can stop the robot where it stands, and their common bounds, shape (2, 3)."""
+    """Parts of a body that can stop the robot, and their common bounds, shape (2, 3)."""
     kept, bounds = [], []
     for part in body.collisions:
         if part.shape.kind == "plane":
@@ -58,7 +58,7 @@ def touchable(body: Body) -> tuple[list[Collision], Bounds]:
 
 
 def shapes_of(parts: Sequence[Collision], client: int, world_from_body: Matrix | None = None) -> list[int]:
-    """PyBullet's numbers of the shapes that make up some parts, at least one for a part.
+    """PyBullet's ids of the shapes of some parts, at least one per part.
 
     Args:
         parts: boxes, cylinders, spheres, capsules and meshes about the body's origin.
@@ -77,7 +77,7 @@ def shapes_of(parts: Sequence[Collision], client: int, world_from_body: Matrix |
 
 
 def single_shape(parts: Sequence[Collision], client: int) -> int:
-    """One shape for all parts, as the link of a robot needs it; with meshes or many parts the hull about them."""
+    """One shape for all parts, as a robot's link needs it; for meshes or many parts their convex hull."""
     if len(parts) <= _MOST_PARTS and all(part.shape.kind != "mesh" for part in parts):
         return _compound(parts, client)
     return _hull(_merged(parts)[0], client)

@@ -1,4 +1,4 @@
-"""Which of the things that stand still are near the robot: only those need to be in the physics."""
+"""Static bodies near the robot: only those need to be in the physics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _SLACK = 0.5  # the robot may go that far before the set is looked at again [m]
 
 
 class NearBodies:
-    """Bodies by name with their bounds, and those of them that are near a point that moves."""
+    """Bodies by name with their bounds, and those close to a moving point."""
 
     def __init__(self) -> None:
         self._reach = 0.5
@@ -21,23 +21,23 @@ class NearBodies:
         self._centre: tuple[float, float] | None = None
 
     def set_reach(self, reach: float) -> None:
-        """Say how far from the point a body matters [m]."""
+        """Set the distance from the point at which a body matters [m]."""
         self._reach = reach
         self._centre = None
 
     def add(self, name: str, bounds: NDArray[np.float64]) -> None:
-        """Put a body with its lowest and highest x, y, z, shape (2, 3)."""
+        """Add a body with its lowest and highest x, y, z, shape (2, 3)."""
         self._bounds[name] = bounds
         self._table = self._centre = None
 
     def remove(self, name: str) -> None:
-        """Take a body out."""
+        """Remove a body."""
         del self._bounds[name]
         self._near.discard(name)
         self._table = self._centre = None
 
     def update(self, x: float, y: float) -> tuple[list[str], list[str]]:
-        """Names that have become near and names that are so no more, now that the point is at (x, y)."""
+        """Names that have become near or no longer are, with the point at (x, y)."""
         if self._centre is not None and math.hypot(x - self._centre[0], y - self._centre[1]) <= _SLACK:
             return [], []
         self._centre = (x, y)

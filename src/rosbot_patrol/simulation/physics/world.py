@@ -46,7 +46,7 @@ class Touch:
 
 
 class Physics:
-    """One PyBullet world; `close` gives it back."""
+    """One PyBullet world; `close` releases it."""
 
     def __init__(self, dt: float) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
@@ -66,7 +66,7 @@ class Physics:
         )
 
     def add(self, body: Body) -> None:
-        """Put a body that nothing pushes away; planes and bodies without shapes are left out."""
+        """Add an immovable body; planes and bodies without shapes are skipped."""
         if body.name in self._ids or body.name in self._still:
             raise WorldError("world", f"the name '{body.name}' is used twice")
         if body.static:
@@ -79,7 +79,7 @@ class Physics:
             self._put(body)
 
     def remove(self, name: str) -> None:
-        """Take a body out."""
+        """Remove a body."""
         if self._still.pop(name, None) is not None:
             self._near.remove(name)
         self._take(name)
@@ -87,7 +87,7 @@ class Physics:
         self._stepping_over.discard(name)
 
     def move(self, name: str, world_from_body: Matrix) -> None:
-        """Put a body elsewhere; one that stood still is taken for one that moves from now on."""
+        """Move a body; a static one counts as moving from now on."""
         still = self._still.pop(name, None)
         if still is not None:
             self._near.remove(name)
@@ -100,7 +100,7 @@ class Physics:
             )
 
     def let_step_over(self, name: str, is_so: bool = True) -> None:
-        """Say whether a body that is moved steps over the robot: both touch, but neither stops or pushes the other."""
+        """Set whether a moving body steps over the robot: both touch, but neither stops or pushes the other."""
         (self._stepping_over.add if is_so else self._stepping_over.discard)(name)
         self._let_touch(name)
 
@@ -136,7 +136,7 @@ class Physics:
             pybullet.removeBody(number, physicsClientId=self._client)
 
     def _refresh(self) -> None:
-        """Bring in what has come near the robot, take out what it has left behind."""
+        """Add bodies that have come near the robot, remove those left behind."""
         if self._robot is not None:
             (x, _), (y, _), _ = self._joint_states()
             self._refresh_at(x, y)
@@ -213,13 +213,13 @@ class Physics:
         return Twist2D(c * vx + s * vy, c * vy - s * vx, wz)
 
     def set_pose(self, pose: Pose2D) -> None:
-        """Put the robot elsewhere, at rest."""
+        """Place the robot elsewhere, at rest."""
         for joint, value in zip(_JOINTS, pose, strict=True):
             pybullet.resetJointState(self._robot, joint, value, 0.0, physicsClientId=self._client)
         self._refresh()
 
     def blocker_at(self, pose: Pose2D) -> str | None:
-        """Name of what the robot would stand in at a pose, None where it has room; it stays as it is, moving or not."""
+        """Name of the body that the robot would overlap at a pose, None if it has room; the robot stays as it is."""
         before = self._joint_states()
         self.set_pose(pose)
         stuck = self.blocker()
@@ -242,7 +242,7 @@ class Physics:
         pybullet.stepSimulation(physicsClientId=self._client)
 
     def touches(self) -> list[Touch]:
-        """What the robot touches now."""
+        """Present contacts of the robot."""
         if self._robot is None:
             return []
         found = []
@@ -260,7 +260,7 @@ class Physics:
         return found
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release everything."""
         if self._client >= 0:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = -1
@@ -270,7 +270,7 @@ class Physics:
         return [(s[0], s[1]) for s in states]
 
     def blocker(self) -> str | None:
-        """Name of what the robot stands in, None where it has room (or is not there)."""
+        """Name of the body that the robot overlaps, None if it has room (or is absent)."""
         if self._robot is None:
             return None
         pybullet.performCollisionDetection(physicsClientId=self._client)

@@ -1,1 +1,1 @@
-"""Pictures of a world: OpenGL, a small software renderer, and from above."""
+"""Rendering of pictures: OpenGL, a small software renderer, and a view from above."""

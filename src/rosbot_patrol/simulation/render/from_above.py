@@ -1,4 +1,4 @@
-"""A picture of a whole world from high above, north up, without what hangs over the rooms."""
+"""Picture of a whole world from above, north up, without anything above the rooms."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FAR = 4.0  # heights of the camera in widths of the world: nearly a plan
 
 @dataclass(frozen=True)
 class WorldPicture:
-    """Pixels, RGB, shape (height, width, 3), and what part of the world they show.
+    """Pixels, RGB, shape (height, width, 3), and the part of the world that they show.
 
     Attributes:
         low, high: lower left and upper right corner on the floor, x, y [m].

@@ -1,4 +1,4 @@
-"""The renderer's programs in GLSL: place a vertex by its visual's matrix, light it, and shade what is seen.
+"""Shader programs in GLSL: transform vertices by their visual's matrix, light and shade them.
 
 Sun and room light a corner; a lamp, where there is one, lights each fragment, since a wall has only four corners.
 """

@@ -1,4 +1,4 @@
-"""The camera's picture by PyBullet's TinyRenderer, for machines without EGL: the same content, some 20 times slower.
+"""Camera's picture by PyBullet's TinyRenderer, for machines without EGL: the same content, some 20 times slower.
 
 Differs from `renderer.EglRenderer`: plain colours instead of textures, and a light of PyBullet's own.
 """

@@ -1,4 +1,4 @@
-"""A battery of three lithium-ion cells: charge, voltage under load."""
+"""Battery of three lithium-ion cells: charge, and voltage under load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The robot as its URDF describes it: shapes, wheels, mass, and where each frame and sensor sits on the base.
+"""Robot description from a URDF: shapes, wheels, mass, and the places of frames and sensors on the base.
 
 The base is the link that no joint carries. Driven wheels are named by their joints, by parameter or by the plug-in of a
 drive in the file, or else found: continuous joints whose axis lies across the robot, left and right of its middle,

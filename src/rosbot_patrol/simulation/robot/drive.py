@@ -1,4 +1,4 @@
-"""How the base moves: commands become wheel speeds, wheel speeds become a motion of the base, with slip.
+"""Drive of the base: commands to wheel speeds, wheel speeds to a motion of the base, with slip.
 
 A skid-steered base turns by dragging its wheels sideways. Bullet's contact model turns a four-wheeled body badly (the
 result depends on the time step more than on the friction), so the base is driven as a planar body whose velocity

@@ -1,4 +1,4 @@
-"""The parts of a robot that stands in a world: drive, odometry, battery, inertial unit, and where its sensors sit."""
+"""Equipment of a robot in a world: drive, odometry, battery, IMU, and the places of its sensors."""
 
 from __future__ import annotations
 

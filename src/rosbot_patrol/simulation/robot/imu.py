@@ -1,4 +1,4 @@
-"""An inertial unit: turning rate and acceleration with bias and noise, and the heading that it integrates itself."""
+"""IMU: turning rate and acceleration with bias and noise, and the integrated heading."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wheel-encoder odometry: counts ticks, and believes in a wheel radius and a track that are not quite true."""
+"""Wheel-encoder odometry: counts ticks, with slightly wrong wheel radius and track width."""
 
 from __future__ import annotations
 

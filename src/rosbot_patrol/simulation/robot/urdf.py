@@ -1,4 +1,4 @@
-"""Read a URDF: links with their shapes, joints with their axes, and the tree that they form.
+"""Reader of a URDF: links with shapes, joints with axes, and their tree.
 
 Meshes are looked up as ROS and Gazebo name them (package://, model://, file://, or a path beside the file). Of the
 <gazebo> extensions only the places of the sensors and the joints of a differential or skid-steer drive are read.

@@ -1,1 +1,1 @@
-"""Scenario files: who comes when, and what breaks."""
+"""Scenario files: people's comings and goings, and faults."""

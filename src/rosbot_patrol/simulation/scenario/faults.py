@@ -1,4 +1,4 @@
-"""Everything that can be broken on command: one declaration for each kind of fault, checked as parameters are.
+"""Faults that can be caused on command: one declaration per kind, checked as parameters are.
 
     fault = read_fault({"kind": "odometry_slip", "factor": 0.3, "duration": 5.0}, source="a service")
 

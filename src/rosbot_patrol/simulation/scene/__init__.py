@@ -1,1 +1,1 @@
-"""What stands in a world: bodies, shapes, lines of sight, floor plan."""
+"""Scene of a world: bodies, shapes, lines of sight, floor plan."""

@@ -1,4 +1,4 @@
-"""A box that is put into a running world."""
+"""Boxes placed in a running world."""
 
 from __future__ import annotations
 

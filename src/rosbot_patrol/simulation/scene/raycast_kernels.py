@@ -1,4 +1,4 @@
-"""Rays in the plane against segments and circles: exact, and only for the beams that an obstacle can cover."""
+"""Inner loops of ray casting in the plane against segments and circles: exact, only for beams that can hit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a simulated world is made of, for physics and for the camera alike: bodies with shapes, poses and looks.
+"""Bodies of a simulated world, for physics and camera alike: shapes, poses and materials.
 
 Poses are homogeneous matrices of shape (4, 4), `world_from_body`, `body_from_visual` (metres, x forward, z up).
 """

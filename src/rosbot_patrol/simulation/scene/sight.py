@@ -1,4 +1,4 @@
-"""Lines of sight in space, exact against the collision shapes: over a table a person is seen, behind a sofa no cat."""
+"""Lines of sight in space, exact against the collision shapes: a person is seen over a table, no cat behind a sofa."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a straight line meets triangles: bounds first, then each triangle (Moeller and Trumbore 1997)."""
+"""Inner loop: does a straight line meet triangles? Bounds first, then each triangle (Moeller and Trumbore 1997)."""
 
 from __future__ import annotations
 

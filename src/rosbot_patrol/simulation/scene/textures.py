@@ -1,4 +1,4 @@
-"""Procedural textures: small pictures that a material's colour is multiplied by, made from a seed, none from a file.
+"""Procedural textures: small seeded images that a material's colour is multiplied by.
 
 A texture repeats every `metres`, or, with `metres` 0, fills the face that it lies on once.
 """

@@ -1,4 +1,4 @@
-"""Where actors can walk: not through what stands there, as cuts through the world at a few heights tell it."""
+"""Paths of actors: walkable floor from cuts through the world at a few heights."""
 
 from __future__ import annotations
 

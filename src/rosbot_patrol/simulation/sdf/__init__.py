@@ -1,1 +1,1 @@
-"""Gazebo's world and model files (SDF)."""
+"""Reader of Gazebo's world and model files (SDF)."""

@@ -1,9 +1,9 @@
-"""Bodies of an SDF world: put together, told apart by their names, and stood in for.
+"""Bodies of an SDF world: joined, uniquely named, and placed on the floor.
 
-A floor that stands proud: houses whose floor is a slab of some centimetres, on which everything in them stands.
+Some houses have a floor slab of a few centimetres, on which everything stands.
 
-In Gazebo the robot drives on top of it; here the floor is at height 0. So such a world is let down until the top of
-its slab is there.
+In Gazebo the robot drives on top of it; here the floor is at height 0. Therefore such a world is lowered until the top
+of its slab is at height 0.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from rosbot_patrol.simulation.sdf.shapes import PLANE
 
 
 def instead(part: Collision) -> Visual:
-    """What a collision shape is shown as where nothing else is: floors darker than what stands on them."""
+    """Visual for a collision shape without one: floors are darker than things on them."""
     is_floor = part.shape.kind == "box" and min(part.shape.size[:2]) > 2.0 > part.shape.size[2]
     shade = (0.50, 0.48, 0.45, 1.0) if is_floor else (0.74, 0.71, 0.66, 1.0)
     return Visual(shape=part.shape, pose=part.pose, material=Material(rgba=shade))
 
 
 def together(body: Body, parts: Iterable[Body]) -> Body:
-    """A body with what stands fast on it."""
+    """A body joined with the parts fixed to it."""
     for part in parts:
         pose = inverse(body.pose) @ part.pose
         body = replace(

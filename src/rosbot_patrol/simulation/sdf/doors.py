@@ -1,4 +1,4 @@
-"""Doors of an SDF model: a link that speaks of a door, on a revolute joint about an upright axis."""
+"""Doors of an SDF model: a link named like a door, on a revolute joint with an upright axis."""
 
 from __future__ import annotations
 

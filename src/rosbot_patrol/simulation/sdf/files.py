@@ -1,4 +1,4 @@
-"""Where the models and meshes of a world are found: `model://NAME` on a path, the right file by model.config."""
+"""Files of a world's models and meshes: `model://NAME` on a path, and the right file by model.config."""
 
 from __future__ import annotations
 

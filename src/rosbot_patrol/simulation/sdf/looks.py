@@ -1,4 +1,4 @@
-"""Colours of SDF materials: written out, or by the name of a script, of Gazebo's own or of a model."""
+"""Colours of SDF materials: given directly, or by the name of a script of Gazebo or of a model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Material scripts of Ogre, as Gazebo's models bring them: only the colour, or the mean of the texture, is taken."""
+"""Ogre material scripts of Gazebo's models: only the colour, or the mean of the texture, is used."""
 
 from __future__ import annotations
 

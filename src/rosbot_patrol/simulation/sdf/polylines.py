@@ -1,4 +1,4 @@
-"""<polyline> geometry, as of Gazebo's model editor: outlines pulled up to a height; one within another is a hole."""
+"""<polyline> geometry, as from Gazebo's model editor: outlines extruded to a height; one inside another is a hole."""
 
 from __future__ import annotations
 

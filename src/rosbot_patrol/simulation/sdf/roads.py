@@ -1,4 +1,4 @@
-"""The <road>s of a world: strips that are seen on the ground, and over which the robot drives."""
+"""<road>s of a world: visible strips on the ground that the robot can drive over."""
 
 from __future__ import annotations
 

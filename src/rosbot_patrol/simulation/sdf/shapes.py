@@ -1,4 +1,4 @@
-"""The shapes of SDF: <geometry> of a <collision> or <visual>, meshes read from their files."""
+"""Shapes of SDF: <geometry> of a <collision> or <visual>, with meshes read from their files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the <state> of a world says: where models and links were when Gazebo saved it, how large, what came and went."""
+"""<state> of a world: poses and scales of models and links when Gazebo saved it, and insertions and deletions."""
 
 from __future__ import annotations
 

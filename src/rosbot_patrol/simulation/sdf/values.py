@@ -1,4 +1,4 @@
-"""Numbers, sizes and poses as SDF writes them, checked; every error names file and element."""
+"""Numbers, sizes and poses in SDF, checked; every error names file and element."""
 
 from __future__ import annotations
 

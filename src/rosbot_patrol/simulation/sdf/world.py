@@ -1,4 +1,4 @@
-"""A simulated world: the bodies of an SDF file (1.4 to 1.7, as Gazebo classic writes them), and who walks about in it.
+"""A simulated world: bodies and actors of an SDF file (1.4 to 1.7, as written by Gazebo classic).
 
 Read: models, nested ones too, links, poses and the frames they are relative to, <include> on a search path, the
 <state> that overrides poses and sizes, populations, box, cylinder, sphere, capsule, ellipsoid, plane, polyline and mesh

@@ -1,4 +1,4 @@
-"""The XML of SDF files as people have them: Gazebo's own reader forgives more than the standard does, and so does this.
+"""Tolerant XML reader for SDF files, because Gazebo's own reader accepts more than the standard allows.
 
 Forgiven: something before the XML declaration, "--" in comments, prefixes that nothing declares, the root <gazebo> of
 SDF before 1.4. Told, with what to do about it: templates that nobody expanded, and poses as SDF 1.0 wrote them.

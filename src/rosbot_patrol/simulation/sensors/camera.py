@@ -1,4 +1,4 @@
-"""The RGB-D camera: a renderer's pictures with the limits and the noise of the real one."""
+"""RGB-D camera: a renderer's pictures with the limits and the noise of a real one."""
 
 from __future__ import annotations
 

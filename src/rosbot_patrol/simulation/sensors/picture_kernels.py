@@ -1,4 +1,4 @@
-"""Pixels of the camera: depth from what OpenGL stores, and noise and limits of the real sensor, one pass each."""
+"""Inner loops over the camera's pixels: depth from OpenGL's values, noise and limits of the real sensor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion sensors of a house: what each one's lens can see, and its output with the faults in force."""
+"""Motion sensors of a house: what each lens sees, and the output with the active faults."""
 
 from __future__ import annotations
 

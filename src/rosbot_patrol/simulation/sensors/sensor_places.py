@@ -1,4 +1,4 @@
-"""The file that says where the motion sensors of a house hang; `sensors.sensor_file` reads it too, for who they are."""
+"""Reader of the file with the motion sensors' positions; `sensors.sensor_file` reads their identities from it, too."""
 
 from __future__ import annotations
 
