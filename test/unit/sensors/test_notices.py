@@ -178,9 +178,9 @@ def test_what_was_told_outlives_the_program():
 @pytest.mark.parametrize(
     "memory", [{"told": 5}, {"count": 1, "told": [["burnt", 1, "", 0.0]]}, {"count": "x", "told": []}]
 )
-def test_a_memory_that_makes_no_sense_is_said_and_forgotten(memory, caplog):
+def test_a_memory_that_is_invalid_is_said_and_forgotten(memory, caplog):
     Notices(NoticeTimes(), 0.0, memory)
-    assert "makes no sense" in caplog.text
+    assert "about sensors are invalid" in caplog.text
 
 
 def test_the_robot_looks_once_for_each_silence():
