@@ -1,4 +1,4 @@
-"""Calls that started no mission, one JSON line each: what a disarmed house's sensors saw, or those the robot passed."""
+"""Log of calls that started no mission, one JSON line each: of a disarmed house, or caused by the robot itself."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from pathlib import Path
 
 from rosbot_patrol.patrol.records.commands import Ignored
 
-MOST = 1 << 20  # [bytes] before the file becomes the old one
+MOST = 1 << 20  # [bytes] at which the file becomes the old one
 
 
 class IgnoredLog:
-    """A file and the one before it.
+    """A log file and its predecessor.
 
     Args:
         path: of the file.
@@ -22,7 +22,7 @@ class IgnoredLog:
         self._path = path
 
     def add(self, calls: tuple[Ignored, ...]) -> None:
-        """Write some down. Raises OSError."""
+        """Write some calls. Raises OSError."""
         if self._path.exists() and self._path.stat().st_size > MOST:
             self._path.replace(self._path.with_suffix(".old.jsonl"))
         with self._path.open("a", encoding="utf-8") as file:

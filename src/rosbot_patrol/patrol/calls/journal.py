@@ -1,9 +1,9 @@
-"""Calls of sensors, on disk before they count as taken: one line each, so that a kill right after loses none.
+"""Journal of sensors' calls: each is on the disk before it counts as taken, so that a kill loses none.
 
-A line is written within the callback that took the call. Once the patrol's own memory, which says up to which line it
-has taken them, is on disk, they are dropped. The mark beside the file tells number, size and checksum of what was
-written, so that a file that was emptied, cut or changed meanwhile is found out. It is written after each line and
-before lines are dropped: a kill between the two leaves more lines than the mark tells, never fewer.
+A line is written within the callback of the call. Lines are dropped after the patrol's own memory, which says up to
+which line it has taken them, is on the disk. The mark beside the file holds number, size and checksum of the lines, so
+that a file that was emptied, truncated or changed is detected. It is written after each line and before lines are
+dropped: a kill between the two leaves more lines than the mark says, never fewer.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class _Mark:
-    """What was written: number of the last line, size and CRC-32 of all of them."""
+    """Contents of the journal: number of the last line, size and CRC-32 of all lines."""
 
     last: int = 0
     size: int = 0
@@ -31,15 +31,15 @@ class _Mark:
 
 
 class Journal:
-    """Numbered lines of room and time. A disk that takes nothing fails no start: `add` says so.
+    """Numbered lines of room and time. A disk that fails does not prevent the start: `add` reports it.
 
     Args:
-        path: of the file; its folder is made.
-        taken: number of the last line that the memory knows.
+        path: of the file; its folder is created.
+        taken: number of the last line in the memory.
 
     Attributes:
-        left: (number, room, seconds since 1970) of the lines that it does not know.
-        damage: what happened to calls that are not in `left` as they should be, in one sentence; "" for nothing.
+        left: (number, room, seconds since 1970) of the lines not in the memory.
+        damage: one sentence on lost calls, "" if there are none.
     """
 
     def __init__(self, path: Path, taken: int) -> None:
@@ -47,7 +47,7 @@ class Journal:
         self.left: list[tuple[int, int, float]] = []
         self.damage = ""
         self._taken, self._is_read = taken, False
-        self._is_cut = False  # the last line was cut short: what comes is no part of it
+        self._is_cut = False  # the last line is incomplete: new text is not a part of it
         self._mark = _Mark(last=taken)
         try:
             self._recall()
@@ -55,7 +55,7 @@ class Journal:
             self.damage = f"{path} cannot be read ({err}): calls of motion sensors from before the start may be lost"
 
     def add(self, room_id: int, wall: float) -> int:
-        """Write a line down to the disk; its number. Raises OSError: the call is not on disk."""
+        """Write a line to the disk; returns its number. Raises OSError: the call is not on the disk."""
         if not self._is_read:
             self._recall()
         number = self._mark.last + 1
@@ -68,7 +68,7 @@ class Journal:
         return number
 
     def drop(self, taken: int) -> None:
-        """Forget the lines where the memory on disk knows all of them. Raises OSError."""
+        """Drop the lines if the memory on the disk includes all of them. Raises OSError."""
         if taken >= self._mark.last and self._mark.size:
             mark = _Mark(last=self._mark.last)
             self._write_mark(mark)
@@ -114,7 +114,7 @@ class Journal:
     def _read_mark(self) -> _Mark | None:
         try:
             tree = read_json(self._mark_path)
-            if tree is None:  # of an earlier version, or the first start
+            if tree is None:  # from an earlier version, or at the first start
                 return None
             return _Mark(last=int(tree["last"]), size=int(tree["size"]), crc=int(tree["crc"]))
         except (StateError, ValueError, KeyError, TypeError, OverflowError) as err:
@@ -127,7 +127,7 @@ class Journal:
             try:
                 number, room_id, wall = json.loads(line)
                 found.append((int(number), int(room_id), float(wall)))
-            except (ValueError, TypeError, OverflowError):  # cut short by a kill: its callback had not ended
+            except (ValueError, TypeError, OverflowError):  # truncated by a kill: its callback had not ended
                 if line.strip():
                     log.warning("%s: a line makes no sense and is left out: %r", self._path, line[:60])
         return found

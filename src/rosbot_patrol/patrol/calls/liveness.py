@@ -1,4 +1,4 @@
-"""Until when the patrol listened, so that after a restart it is known which calls it cannot have heard."""
+"""Time until which the patrol listened: after a restart it tells which calls were missed."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import math
 import os
 from pathlib import Path
 
-_EVERY = 1.0  # between two signs of life [s]
-_SLACK = 0.3  # clocks and messages are late by so much at most [s]
+_EVERY = 1.0  # time between two signs of life [s]
+_SLACK = 0.3  # largest delay of clocks and messages [s]
 
 
 class Vigil:
-    """Signs of life in a file's time of change; no more than that is written.
+    """Signs of life as a file's modification time; nothing else is written.
 
     Args:
-        path: of the file; its folder is made.
-        wall: seconds since 1970, now: from here on calls are heard.
-        most: a gap that is longer than that is not looked into [s].
+        path: of the file; its folder is created.
+        wall: seconds since 1970 now: from here on calls are heard.
+        most: longest gap that is evaluated [s].
 
     Attributes:
-        problem: why the file cannot be read or made, "" where it can; `step` tries on.
+        problem: reason why the file cannot be read or created, "" if it can; `step` keeps trying.
     """
 
     def __init__(self, path: Path, wall: float, most: float = 3600.0) -> None:
@@ -28,7 +28,7 @@ class Vigil:
         self.problem = ""
         try:
             gone = path.stat().st_mtime if path.exists() else -math.inf
-            if 0.0 <= wall - gone <= most:  # else for too long, or the clock was set
+            if 0.0 <= wall - gone <= most:  # else the gap is too long, or the clock was set
                 self._gone = gone
             self.step(wall)
         except OSError as err:
@@ -36,11 +36,11 @@ class Vigil:
 
     @property
     def has_gap(self) -> bool:
-        """Whether there was a time in which nobody listened."""
+        """Whether there was a time without a listener."""
         return self._gone is not None
 
     def step(self, wall: float) -> None:
-        """Give a sign of life where one is due. Raises OSError."""
+        """Write a sign of life if it is due. Raises OSError."""
         if not 0.0 <= wall - self._touched < _EVERY:
             self._touched = wall
             self._path.parent.mkdir(parents=True, exist_ok=True)
@@ -48,9 +48,9 @@ class Vigil:
             os.utime(self._path, (wall, wall))
 
     def end(self) -> None:
-        """It was ended in order: what is called from now on is not missed."""
+        """Record an orderly end: later calls are not missed."""
         self._path.unlink(missing_ok=True)
 
     def missed(self, wall: float) -> bool:
-        """Whether a call at a time (seconds since 1970) came when nobody listened."""
+        """Whether a call at a time (seconds since 1970) came while nobody listened."""
         return self._gone is not None and self._gone - _SLACK <= wall <= self._began + _SLACK

@@ -1,9 +1,9 @@
-"""Whether the robot itself is what a motion sensor sees.
+"""Own motion: whether the robot itself triggered a motion sensor.
 
-A sensor's call is put down to the robot only where the robot moved past that room within the last seconds, its detector
-and camera were awake the whole time, and nothing that could be a person is in view. The call is noted in the mission's
-record. A sensor that still calls when the robot has gone on is followed: so somebody who walks behind the robot is
-looked for as soon as it has left, and not taken for it.
+A call is attributed to the robot only if the robot moved past that room within the last seconds, its detector and
+camera worked the whole time, and nothing in view could be a person. The call is noted in the mission's record. A sensor
+that still calls after the robot has left is followed: so a person who walks behind the robot is looked for as soon as
+it has left.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class _Sample:
 
 
 class OwnMotion:
-    """Where the robot was in the last seconds.
+    """Positions of the robot in the last seconds.
 
     Args:
-        radius: so near to a room's point its sensor sees the robot [m].
-        memory: how long a sensor's call may take to get here, and its output to fall again [s].
+        radius: distance from a room's point within which its sensor sees the robot [m].
+        memory: longest delay of a sensor's call, including the fall of its output [s].
     """
 
     def __init__(self, radius: float, memory: float) -> None:
@@ -41,12 +41,12 @@ class OwnMotion:
         self._samples: deque[_Sample] = deque()
 
     def see(self, now: float, pose: Pose2D | None, *, awake: bool) -> None:
-        """Note where the robot is.
+        """Record the robot's position.
 
         Args:
             now: steady time [s].
-            pose: in map, None where it is not known.
-            awake: detector and camera speak.
+            pose: in map, None if unknown.
+            awake: detector and camera work.
         """
         last = self._samples[-1] if self._samples else None
         if last and now - last.at < PERIOD:
@@ -61,7 +61,7 @@ class OwnMotion:
             self._samples.popleft()
 
     def explains(self, room: Room, now: float) -> bool:
-        """Whether a call of the room's sensor now is the robot's own doing."""
+        """Whether the robot itself explains a call of the room's sensor now."""
         near = [s for s in self._samples if now - s.at <= self._memory and self._is_near(room, s.pose)]
         return any(s.moved for s in near) and all(s.awake for s in near)
 

@@ -1,4 +1,4 @@
-"""What asks for a room to be looked at.
+"""Mission queue: one entry per waiting room, the most urgent first, in order of arrival among equals.
 
 The rooms that wait for a mission: one entry a room, the most urgent first, in order of arrival among equals.
 """
@@ -28,7 +28,7 @@ class PriorityParams:
     )
 
     def of(self, origin: Origin) -> int:
-        """The priority of what an origin asks for."""
+        """Priority of requests from an origin."""
         return {
             Origin.TRIGGER: self.priority_trigger,
             Origin.ACTION: self.priority_action,
@@ -39,13 +39,13 @@ class PriorityParams:
 
 
 class MissionQueue:
-    """Requests that wait."""
+    """Waiting requests."""
 
     def __init__(self) -> None:
         self._waiting: dict[int, Request] = {}
 
     def add(self, request: Request) -> bool:
-        """Queue a request; False where its room waits already: then the more urgent of the two counts."""
+        """Queue a request; False if its room is waiting already: then the more urgent one counts."""
         kept = self._waiting.get(request.room_id)
         if kept is None:
             self._waiting[request.room_id] = request
@@ -57,25 +57,25 @@ class MissionQueue:
         return False
 
     def put_back(self, request: Request) -> None:
-        """Queue a request before all others of its priority."""
+        """Queue a request in front of all others of its priority."""
         others = {room: kept for room, kept in self._waiting.items() if room != request.room_id}
         self._waiting = {request.room_id: request, **others}
 
     def find(self, room_id: int) -> Request | None:
-        """What waits for a room."""
+        """Waiting request of a room."""
         return self._waiting.get(room_id)
 
     def pop(self) -> Request:
-        """The most urgent, among equals the one that waits longest."""
+        """Remove and return the most urgent request, the oldest among equals."""
         first = next(iter(self))
         return self._waiting.pop(first.room_id)
 
     def remove(self, request: Request) -> None:
-        """Take out one that waits. Raises KeyError."""
+        """Remove a waiting request. Raises KeyError."""
         del self._waiting[request.room_id]
 
     def drop(self, *origins: Origin) -> list[Request]:
-        """Take out what these origins asked for; all where none is named."""
+        """Remove the requests of these origins; all if none is named."""
         dropped = [request for request in self if not origins or request.origin in origins]
         for request in dropped:
             del self._waiting[request.room_id]

@@ -1,4 +1,4 @@
-"""What has been said a moment ago, so that a sender in a loop does not flood the log."""
+"""Recently logged messages, so that a sender in a loop does not flood the log."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 
 
 class Repeats:
-    """Remembers when something was last said about each room.
+    """Remembers when a message about each room was last logged.
 
     Args:
-        period: so long nothing more is said about it [s].
+        period: minimum time between two messages about a room [s].
     """
 
     def __init__(self, period: float = 10.0) -> None:
@@ -17,7 +17,7 @@ class Repeats:
         self._said: dict[int, float] = {}
 
     def is_news(self, room_id: int, now: float) -> bool:
-        """Whether to say it now; if so it counts as said. `now` may go back."""
+        """Whether to log it now; if so it counts as logged. `now` may go back."""
         if 0.0 <= now - self._said.get(room_id, -math.inf) < self._period:
             return False
         self._said[room_id] = now

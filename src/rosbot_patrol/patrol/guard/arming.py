@@ -1,11 +1,11 @@
-"""What is guarded: the modes armed_away, armed_home, night and disarmed, with delays to leave and to come in.
+"""Arming: the modes armed_away, armed_home, night and disarmed, with exit and entry delays.
 
-- Arming runs through the exit delay first: a sensor that calls meanwhile starts no mission.
-- A call from an entry room begins the entry delay. The mission starts at once, and all it sees is kept; but notices
-  wait until the delay is over, and are dropped (and stay on record) where the owner disarms before.
-- Disarming ends at once what sensors and rounds called for.
-- A mode is kept over restarts. A fresh install is armed_away, without delays, so that the first patrol mails.
-- A clock that is set cannot make a delay longer than it is.
+- Arming starts with the exit delay: a sensor's call during it starts no mission.
+- A call from an entry room starts the entry delay. The mission starts at once and everything it sees is kept. Notices
+  wait for the end of the delay; if the owner disarms before, they are dropped (and stay on record).
+- Disarming ends missions started by sensors and rounds at once.
+- The mode survives restarts. A fresh install is armed_away without delays, so that the first patrol mails.
+- Setting the clock cannot make a delay longer.
 - `armed` means armed_away.
 """
 
@@ -57,7 +57,7 @@ class ArmingFile:
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """A mode as it holds in a house: rooms (None for all) and delays [s]."""
+    """A mode in a particular house: rooms (None: all) and delays [s]."""
 
     rooms: frozenset[int] | None = None
     exit_delay: float = 0.0
@@ -66,7 +66,7 @@ class Mode:
 
 @dataclass(frozen=True, kw_only=True)
 class ArmingRules:
-    """The file, held against the rooms of the house."""
+    """Contents of the file, checked against the rooms of the house."""
 
     first_mode: str = "armed_away"
     modes: Mapping[str, Mode] = field(default_factory=lambda: {name: Mode() for name in MODES})
@@ -76,7 +76,7 @@ class ArmingRules:
 
 
 def load_rules(path: str, rooms: Rooms) -> ArmingRules:
-    """Read config/arming.yaml; "" gives the rules without delays.
+    """Read config/arming.yaml; "" gives rules without delays.
 
     Raises:
         ParamError: it cannot be read or is wrong; names the file and the key.
@@ -105,7 +105,7 @@ class Arming:
 
     Args:
         rules: of the file.
-        memory: what `snapshot` gave before the program ended.
+        memory: the last `snapshot` before the program ended.
 
     Attributes:
         mode: one of MODES.
@@ -121,7 +121,7 @@ class Arming:
             self._recall(memory)
 
     def snapshot(self) -> dict[str, Any]:
-        """What has to outlive the program, for JSON."""
+        """State that must survive a restart, for JSON."""
         return {"mode": self.mode, "exit_until": self._exit_until, "entry_until": self._entry_until}
 
     def _recall(self, memory: Mapping[str, Any]) -> None:
@@ -137,11 +137,11 @@ class Arming:
         """Change the mode.
 
         Args:
-            name: of the mode, as people type it.
+            name: of the mode, as typed.
             wall: seconds since 1970.
 
         Returns:
-            Whether it was taken, and one sentence.
+            Whether it was accepted, and one sentence.
         """
         mode = parse_mode(name)
         if mode is None:
@@ -156,7 +156,7 @@ class Arming:
         return True, f"the mode is {mode} now, it was {was}{after}"
 
     def follow(self, missions: Mapping[str, int], wall: float) -> None:
-        """Begin the entry delay where a mission, by id, answers a call from an entry room that is new."""
+        """Start the entry delay if a mission, by id, answers a new call from an entry room."""
         delay = self._rules.modes[self.mode].entry_delay
         for mission, room_id in missions.items():
             if mission not in self._seen and room_id in self._rules.entry_rooms and delay and not self._entry_until:
@@ -165,7 +165,7 @@ class Arming:
         self._seen = set(missions)
 
     def step(self, wall: float) -> Guarded:
-        """What is guarded now, at `wall` seconds since 1970."""
+        """What is guarded at `wall` seconds since 1970."""
         mode = self._rules.modes[self.mode]
         self._exit_until = _still(self._exit_until, wall, mode.exit_delay)
         self._entry_until = _still(self._entry_until, wall, mode.entry_delay)
@@ -179,7 +179,7 @@ class Arming:
         )
 
     def exit_left(self, wall: float) -> float:
-        """Seconds of the exit delay that are left."""
+        """Remaining seconds of the exit delay."""
         return max(self._exit_until - wall, 0.0) if self._exit_until is not None else 0.0
 
     def _why(self, wall: float) -> str:
@@ -191,12 +191,12 @@ class Arming:
 
 
 def _still(until: float | None, wall: float, delay: float) -> float | None:
-    """The end of a delay while it runs; a clock that went back does not make it longer."""
+    """End of a running delay; a clock that went back does not make it longer."""
     return until if until is not None and 0.0 < until - wall <= delay else None
 
 
 def read_memory(path: Path) -> Mapping[str, Any]:
-    """What was kept of the mode; empty, and said, where it cannot be used."""
+    """Read the stored mode; empty, with a warning, if it cannot be used."""
     try:
         return read_json(path) or {}
     except StateError as err:

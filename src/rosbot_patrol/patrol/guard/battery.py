@@ -1,4 +1,4 @@
-"""Whether the battery is low: two thresholds, so that a robot at rest whose battery recovers a little stays at home."""
+"""Low battery, by two thresholds: a robot at rest stays at home although its battery recovers a little."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosbot_patrol.patrol.records.inputs import Battery
 
 log = logging.getLogger(__name__)
 
-_OTHER = 0.8  # below this part of battery_low_voltage it is another battery: cells are cut off before
+_OTHER = 0.8  # below this share of battery_low_voltage it must be another battery: cells are cut off before
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class BatteryParams:
 
 
 def check_battery(params: BatteryParams, prefix: str = "") -> None:
-    """Raise ParamError where the thresholds contradict each other."""
+    """Raise ParamError if the thresholds contradict each other."""
     if params.battery_ok <= params.battery_low:
         raise ParamError(
             f"{prefix}battery_ok", f"is {params.battery_ok:g}, expected more than battery_low {params.battery_low:g}"
@@ -51,10 +51,10 @@ def battery_of(share: float, voltage: float, *, is_present: bool, is_charging: b
     """A battery from the fields of sensor_msgs/BatteryState.
 
     Args:
-        share: field `percentage`. Drivers that do not measure it leave NaN, or C++'s 0 with `present` false.
+        share: field `percentage`; drivers without it send NaN, or 0 with `present` false.
         voltage: [V]; NaN and 0 are unknown.
-        is_present: field `present`; drivers that leave it false may still tell a share.
-        is_charging: whether it hangs at the charger.
+        is_present: field `present`; drivers that leave it false may still send a share.
+        is_charging: whether it is being charged.
     """
     is_known = 0.0 <= share <= 1.0 and (share > 0.0 or is_present)
     return Battery(
@@ -65,7 +65,7 @@ def battery_of(share: float, voltage: float, *, is_present: bool, is_charging: b
 
 
 class BatteryWatch:
-    """Remembers whether the battery is low."""
+    """Decides whether the battery is low."""
 
     def __init__(self, params: BatteryParams) -> None:
         self._params = params
@@ -74,11 +74,11 @@ class BatteryWatch:
         self.text = ""
 
     def step(self, now: float, battery: Battery | None) -> bool:
-        """Look at the battery; whether `is_low` has changed.
+        """Evaluate the battery; returns whether `is_low` has changed.
 
         Args:
             now: steady time [s], as `battery.at`.
-            battery: what it last said.
+            battery: its last state.
         """
         was_low = self.is_low
         if battery is None or now - battery.at > self._params.battery_timeout:

@@ -1,11 +1,12 @@
-"""The emergency stop: held by each that pressed it, until released, over restarts.
+"""Emergency stop: held by everybody who pressed it until they release it, also over restarts.
 
-Two can hold it: the service (a person or a program that means this robot) and the topic (a button on the robot, or
-whatever else feeds the base's lock). A button that says "not pressed" ten times a second releases only what it held
-itself; the service releases both, as whoever calls it means just that: a button that is still pressed says so again.
+It has two holders: the service (a person or a program that means this robot) and the topic (a button on the robot, or
+whatever else feeds the base's lock). A button that says "not pressed" ten times a second releases only its own hold.
+The service releases both, because its caller means that; a button that is still pressed says so again.
 
-What is kept on the disk holds unless it says plainly that nobody pressed: the file is absent, or it is
-`{"held_by": []}` and nothing else. No small damage makes that of a held one, which has at least seven bytes more.
+The state on the disk counts as held unless it says plainly that nobody pressed: the file is absent, or it is
+`{"held_by": []}` and nothing else. No small damage turns a held state into that, because a held one has at least seven
+bytes more.
 """
 
 from __future__ import annotations
@@ -29,15 +30,15 @@ _WORDS = {
 
 
 class EmergencyStop:
-    """Whether the robot has to stand still; any thread may ask while another presses or releases.
+    """Whether the robot must stand still; any thread may ask while another presses or releases.
 
     Args:
-        path: where that is kept; a file that cannot be read holds the robot.
+        path: of its file; an unreadable file holds the robot.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._held = self._read()  # replaced as a whole: who asks sees what was held before or after a press
+        self._held = self._read()  # replaced as a whole: a reader sees the state before or after a press
         self._unsaved = False
         if self._held:
             log.warning("%s, before the program ended", self.why)
@@ -49,12 +50,12 @@ class EmergencyStop:
 
     @property
     def why(self) -> str:
-        """Who holds it, "" where nobody does."""
+        """Holders, "" if there are none."""
         held = self._held
         return _WORDS[min(held, key=list(_WORDS).index)] if held else ""
 
     def press(self, pressed: bool, source: str) -> bool:
-        """Press (or release); whether `is_held` has changed. It holds at once, `save` makes it last."""
+        """Press (or release); returns whether `is_held` has changed. It acts at once; `save` stores it."""
         before = self._held
         if pressed:
             self._held = before | {source}
@@ -64,7 +65,7 @@ class EmergencyStop:
         return bool(self._held) != bool(before)
 
     def save(self) -> None:
-        """Bring it to the disk where it changed. Raises OSError."""
+        """Write it to the disk if it has changed. Raises OSError."""
         if self._unsaved:
             write_atomic(self._path, json.dumps({"held_by": sorted(self._held)}).encode())
             self._unsaved = False

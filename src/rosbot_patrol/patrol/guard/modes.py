@@ -1,6 +1,6 @@
-"""The names of the modes of arming, and what people type for them.
+"""Names of the arming modes, and what people type for them.
 
-A hint never turns arming into disarming or the other way: a name that is as close to both gets all names instead.
+A hint never turns arming into disarming or the other way: if a name is as close to both, all names are listed instead.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ _MEANT = {
     "unarmed": DISARMED,
     "unarm": DISARMED,
 }
-_LONGEST = 40  # of a name that is repeated
-_NEAR = 0.6  # likeness from which on a name is taken for a slip of the other
-_APART = 0.15  # by so much more it has to be like it than like any name of the opposite
+_LONGEST = 40  # length of a name shown in a message
+_NEAR = 0.6  # similarity above which a name is taken for a typing error
+_APART = 0.15  # minimum lead over the similarity to any opposite name
 
 
 def parse_mode(name: str) -> str | None:
-    """One of MODES for a name in any case, with blanks or hyphens; None where it is none."""
+    """One of MODES for a name in any case, with blanks or hyphens; None for any other name."""
     plain = _plain(name)
     plain = _ALIASES.get(plain, plain)
     return plain if plain in MODES else None
 
 
 def unknown_mode(name: str) -> str:
-    """What to say of a name that is no mode."""
+    """Message for a name that is no mode."""
     meant = _meant(_plain(name))
     hint = f"did you mean '{meant}'?" if meant else f"expected one of {', '.join(MODES)}"
     return f"'{one_line(name)[:_LONGEST]}' is not known here, {hint}"
@@ -50,7 +50,7 @@ def _plain(name: str) -> str:
 
 
 def _meant(plain: str) -> str:
-    """The mode that was meant, "" where that is not sure."""
+    """The mode that was meant, "" if that is uncertain."""
     if plain in _MEANT:
         return _MEANT[plain]
     words = {name: name for name in MODES} | _ALIASES

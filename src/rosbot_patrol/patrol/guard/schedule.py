@@ -1,15 +1,15 @@
-"""Rounds by the clock and by intervals: config/patrol_schedule.yaml.
+"""Scheduled rounds, at times of day or intervals: config/patrol_schedule.yaml.
 
     rounds:
       - {name: evening, at: ["22:30", "02:00"], days: [mon, tue, wed, thu, fri], rooms: all}
       - {name: hourly, every: 3600, rooms: [1, kitchen], modes: [armed_away]}
 
-- Times of day (`at`) are those of the wall's clock in `time_zone`, whatever ROS time says. Each is due once: an hour
-  that a clock leaves out or shows twice, or a clock that is set, neither doubles nor repeats a round (`wall_times`).
+- Times of day (`at`) are wall times in `time_zone`, whatever ROS time says. Each is due once: an hour that is skipped
+  or repeated by a change of the clock neither drops nor doubles a round (`wall_times`).
 - Intervals (`every`) are counted in ROS time, from the start of the last round of that name, over restarts.
-- A round that was missed (the program was down, the clock was set past it) is run once when that is noticed, however
-  many were missed; `missed: skip` leaves it out. One whose mode does not hold is left out.
-- A clock that goes back by more than LONGEST_BACK was wrong before: the schedule begins anew from there.
+- A missed round (the program was down, the clock was set past it) is run once when that is noticed, however many were
+  missed; `missed: skip` leaves it out. A round in a mode that it does not list is left out.
+- A clock that goes back by more than LONGEST_BACK was wrong before: the schedule starts again from there.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)
 
-MISSED = 60.0  # [s]; a round noticed later than this after its time was missed
+MISSED = 60.0  # [s]; a round noticed later than this counts as missed
 LONGEST_BACK = 3 * 3600.0  # [s]
 GUARDING = frozenset(MODES) - {DISARMED}
 
@@ -61,14 +61,14 @@ class ScheduleFile:
 
 @dataclass(frozen=True, kw_only=True)
 class Round:
-    """A round as it holds in a house.
+    """A round in a particular house.
 
     Attributes:
-        name: for people; rooms: in this order.
+        name: in messages; rooms: in order.
         minutes: times of day since midnight; days: Monday 0.
-        every: [s] of ROS time, 0 for none.
-        modes: in which it holds.
-        skips_missed: one whose time was missed is left out.
+        every: interval in ROS time [s], 0: none.
+        modes: in which it runs.
+        skips_missed: a missed round is left out.
     """
 
     name: str
@@ -125,32 +125,32 @@ def _round(item: Any, prefix: str, rooms: Rooms) -> Round:
 
 
 def all_rooms(rooms: Rooms) -> list[int]:
-    """Every room in the file's order, the base last, as the round ends there."""
+    """Every room in the file's order, with the base last, because the round ends there."""
     return sorted((room.id for room in rooms), key=lambda number: (number == rooms.base.id, number))
 
 
 class Schedule:
-    """Says when a round is due.
+    """Decides when a round is due.
 
     Args:
         rounds: of the file.
-        zone: of the times of day, None for this machine's.
-        memory: what `snapshot` gave before the program ended.
+        zone: of the times of day, None: this machine's.
+        memory: the last `snapshot` before the program ended.
     """
 
     def __init__(
         self, rounds: tuple[Round, ...], zone: tzinfo | None = None, memory: Mapping[str, Any] | None = None
     ) -> None:
         self._rounds, self._zone = rounds, zone
-        self._handled = {r.name: _number(memory, r.name) for r in rounds}  # up to here its times are dealt with
+        self._handled = {r.name: _number(memory, r.name) for r in rounds}  # time up to which each round is handled
         self.changed = False
 
     def snapshot(self) -> dict[str, float]:
-        """What has to outlive the program, for JSON: seconds since 1970, or of ROS time, by name."""
+        """State that must survive a restart, for JSON: seconds since 1970, or of ROS time, by name."""
         return {name: at for name, at in self._handled.items() if at is not None}
 
     def step(self, now: float, wall: float, mode: str) -> list[Round]:
-        """Rounds that are due; sets `changed` where the snapshot is another.
+        """Rounds that are due; sets `changed` if the snapshot has changed.
 
         Args:
             now: ROS time [s].
@@ -179,7 +179,7 @@ class Schedule:
         return self._take(entry, wall - last)
 
     def _last_time(self, entry: Round, wall: float) -> float | None:
-        """The last of the round's times that is not later than `wall`."""
+        """Last of the round's times not later than `wall`."""
         today = local(wall, self._zone)
         days = [today - timedelta(days=n) for n in range(8)]
         times = [moment(d, m, self._zone) for d in days if d.weekday() in entry.days for m in entry.minutes]
@@ -187,7 +187,7 @@ class Schedule:
 
     def _is_over(self, entry: Round, now: float) -> bool:
         last = self._handled[entry.name]
-        if last is None or last > now:  # it begins now, or simulated time does
+        if last is None or last > now:  # the round, or simulated time, starts now
             self._handled[entry.name] = now
             return False
         if now - last < entry.every:

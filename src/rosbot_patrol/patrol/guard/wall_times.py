@@ -1,8 +1,7 @@
-"""Times of day, days of the week and windows between two times, in a time zone.
+"""Wall times: times of day, days of the week and windows between two times, in a time zone.
 
-Days and times are those of the clock on the wall there. Where it is put forward, a time that it leaves out is the same
-moment by the clock as it was before (02:30 becomes 03:30); where it is put back, a time that comes twice counts the
-first time.
+Days and times are those of a wall clock in that zone. When it is put forward, a skipped time is the same moment by the
+old clock (02:30 becomes 03:30). When it is put back, a time that occurs twice counts the first time.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ _TIME = re.compile(r"(\d{1,2}):(\d{2})")
 def parse_time(value: Any, name: str) -> int:
     """Minutes since midnight of "22:30".
 
-    yaml reads an unquoted 22:30 as a number to the base of 60, which is just that.
+    yaml reads an unquoted 22:30 as a number to the base of 60, which is just that value.
 
     Raises:
         ParamError: it is no time of day.
@@ -38,7 +37,7 @@ def parse_time(value: Any, name: str) -> int:
 
 
 def parse_days(values: Iterable[Any], name: str) -> frozenset[int]:
-    """Days of the week, Monday 0; all where none is named.
+    """Days of the week, Monday 0; all if none is named.
 
     Raises:
         ParamError: one is no day.
@@ -53,7 +52,7 @@ def parse_days(values: Iterable[Any], name: str) -> frozenset[int]:
 
 
 def parse_zone(value: str, name: str) -> tzinfo | None:
-    """A time zone such as Europe/Warsaw; None for this machine's own.
+    """Time zone such as Europe/Warsaw; None: this machine's own.
 
     Raises:
         ParamError: there is none of that name.
@@ -67,26 +66,26 @@ def parse_zone(value: str, name: str) -> tzinfo | None:
 
 
 def moment(day: datetime, minutes: int, zone: tzinfo | None) -> float:
-    """Seconds since 1970 of a time of a day."""
+    """Seconds since 1970 of a time on a day."""
     naive = datetime(day.year, day.month, day.day, minutes // 60, minutes % 60)
     return naive.replace(tzinfo=zone).timestamp()
 
 
 def local(wall: float, zone: tzinfo | None) -> datetime:
-    """Date and time on the wall."""
+    """Date and wall time."""
     return datetime.fromtimestamp(wall, zone)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Window:
-    """From one time of day to another, over midnight where the second is not later; on the days on which it begins."""
+    """Time from one time of day to another, over midnight if the second is not later; on the days of its start."""
 
     start: int
     end: int
     days: frozenset[int] = frozenset(range(7))
 
     def contains(self, wall: float, zone: tzinfo | None) -> bool:
-        """Whether it is open."""
+        """Whether a time lies in it."""
         now = local(wall, zone)
         minutes = now.hour * 60 + now.minute
         if self.start < self.end:

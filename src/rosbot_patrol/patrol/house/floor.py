@@ -1,7 +1,7 @@
-"""The floor that a map shows, on a grid coarse enough to reckon with in plain numpy, with the clearance to what stands.
+"""Floor of a map on a grid coarse enough for plain numpy, with the clearance to obstacles.
 
-The patrol asks it where somebody could be, where the robot can stand and how far one can look. Cells that the map does
-not know are no floor: the inside of a cupboard, what lies beyond a window.
+The patrol uses it to decide where a person could be, where the robot can stand and how far one can see. Unknown cells
+of the map are no floor: the inside of a cupboard, or space beyond a window.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ Array = NDArray[np.float64]
 
 EDGE = 0.1  # of a cell of the floor [m]
 CLEARANCE_MOST = 1.0  # clearances are exact up to here [m]
-_SKIPPED = 0.2  # of a line of sight, at the eye: the robot itself stands there [m]
+_SKIPPED = 0.2  # skipped start of a line of sight: the robot itself stands there [m]
 _MARGIN = 0.3  # around the known part of the map [m]
 
 
 @dataclass(frozen=True)
 class Floor:
-    """Where there is floor.
+    """Free floor of a map.
 
     Attributes:
         info: place and size of the grid, in the map's frame.
         free: floor, shape (height, width).
-        clearance: from a floor cell to the nearest thing or unknown place [m], at most CLEARANCE_MOST; 0 elsewhere.
+        clearance: distance of a floor cell from obstacles and unknown cells [m], at most CLEARANCE_MOST; 0 elsewhere.
     """
 
     info: GridInfo
@@ -49,7 +49,7 @@ class Floor:
         return self.info.contains_cell(ix, iy) and bool(self.free[iy, ix])
 
     def nearest(self, mask: Mask, x: float, y: float, within: float = math.inf) -> tuple[int, int] | None:
-        """(ix, iy) of the cell of a mask that is nearest to a point, None where none lies within a distance [m]."""
+        """(ix, iy) of the mask's cell nearest to a point, None if there is none within a distance [m]."""
         iy, ix = np.nonzero(mask)
         if not len(ix):
             return None
@@ -59,7 +59,7 @@ class Floor:
         return (int(ix[k]), int(iy[k])) if gaps[k] <= within else None
 
     def centres(self, ix: NDArray[np.int64], iy: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Place in x and y of cells' centres [m]."""
+        """Positions x and y of cells' centres [m]."""
         i = self.info
         return i.origin_x + (ix + 0.5) * i.resolution, i.origin_y + (iy + 0.5) * i.resolution
 
@@ -72,13 +72,13 @@ class Floor:
         return ix.clip(0, i.width - 1), iy.clip(0, i.height - 1), inside
 
     def before(self, eye: tuple[float, float], x: float, y: float, most: float) -> tuple[float, float]:
-        """The last free place on the line from an eye to a place, where that is at most so much before it; else it.
+        """Last free place on the line from an eye to a place, if that is at most `most` before it; else the place.
 
         Args:
-            eye: from where it was seen [m].
+            eye: position of the viewer [m].
             x: of the place [m].
             y: of the place [m].
-            most: by how much the place may have been measured too far off [m].
+            most: largest excess of the measured distance [m].
         """
         away = math.hypot(x - eye[0], y - eye[1])
         along = np.arange(_SKIPPED, away, EDGE / 2.0)
@@ -94,7 +94,9 @@ class Floor:
     def are_free(self, xs: Array, ys: Array) -> Mask:
         """Whether points lie on the floor."""
         i = self.info
-        ix = ((xs - i.origin_x) * (1.0 / i.resolution)).astype(np.int32)  # rounds towards 0, where there is no floor
+        ix = ((xs - i.origin_x) * (1.0 / i.resolution)).astype(
+            np.int32
+        )  # rounds towards 0; the cells there are no floor
         iy = ((ys - i.origin_y) * (1.0 / i.resolution)).astype(np.int32)
         found: Mask = self.free.take(iy * i.width + ix, mode="clip")
         found &= (ix >= 0) & (iy >= 0) & (ix < i.width) & (iy < i.height)
@@ -108,17 +110,17 @@ class Floor:
         return _grown(hit, math.ceil(radius / self.info.resolution - 0.5))
 
     def open_to(self, mask: Mask, radius: float) -> Mask:
-        """The part of a mask that discs of a radius [m] fit into: specks and slits are left out."""
+        """Part of a mask that discs of a radius [m] fit into, without specks and slits."""
         cells = max(round(radius / self.info.resolution), 0)
         return mask & _grown(~_grown(~mask, cells), cells)
 
 
 def floor_of(grid: Grid, *, free_below: int = 25) -> Floor:
-    """The floor of a map.
+    """Make the floor of a map.
 
     Args:
         grid: occupancy, -1 unknown, 0 free to 100 occupied.
-        free_below: up to this a cell is floor.
+        free_below: largest occupancy of a floor cell.
 
     Raises:
         MapError: the map is turned, or shows no floor.
@@ -137,7 +139,7 @@ def floor_of(grid: Grid, *, free_below: int = 25) -> Floor:
 
 
 def _cropped(info: GridInfo, is_floor: Mask, fold: int) -> tuple[GridInfo, Mask]:
-    """The coarse grid about the floor, and the fine cells under it."""
+    """Coarse grid around the floor, and the fine cells under it."""
     margin = math.ceil(_MARGIN / info.resolution)
     rows, columns = np.flatnonzero(is_floor.any(axis=1)), np.flatnonzero(is_floor.any(axis=0))
     y0, x0 = int(rows[0]) - margin, int(columns[0]) - margin
@@ -158,7 +160,7 @@ def _cropped(info: GridInfo, is_floor: Mask, fold: int) -> tuple[GridInfo, Mask]
 
 
 def _clearance(free: Mask, most: float) -> Array:
-    """Distance from each free cell to the nearest that is not [cells], exact up to `most`.
+    """Distance from each free cell to the nearest other one [cells], exact up to `most`.
 
     Columns first, then rows: the two passes of Felzenszwalb and Huttenlocher's distance transform, the second one over
     the shifts that the bound allows.
@@ -176,7 +178,7 @@ def _clearance(free: Mask, most: float) -> Array:
 
 
 def _run_lengths(free: Mask) -> NDArray[np.int64]:
-    """How many free cells in a row end at each cell, from row 0 on."""
+    """Number of consecutive free cells ending at each cell, from row 0 on."""
     out = np.zeros(free.shape, np.int64)
     count = np.zeros(free.shape[1], np.int64)
     for row, is_free in enumerate(free):
@@ -186,7 +188,7 @@ def _run_lengths(free: Mask) -> NDArray[np.int64]:
 
 
 def _grown(mask: Mask, cells: int) -> Mask:
-    """A mask with all within so many cells of it."""
+    """A mask grown by this many cells."""
     out = mask.copy()
     for dy in range(-cells, cells + 1):
         for dx in range(-cells, cells + 1):

@@ -1,9 +1,9 @@
-"""Which floor belongs to which room: the map's floor, parted at doors and narrow places.
+"""Regions of the rooms: the map's floor, separated at doors and narrow places.
 
-Each room grows from its point over the widest floor first and through narrow places last (the watershed of Meyer 1992
+Each room grows from its point, over the widest floor first and through narrow places last (the watershed of Meyer 1992
 on the clearance), so that two rooms meet at the door between them. Rooms of one hall meet half-way. A part of the house
-without a room point falls to the room whose floor leads there by the widest way. A room whose point is not on the floor
-(off the map, in a wall, in what is unknown) has none: the nearest floor may be another room's, or that beyond a wall.
+without a room point belongs to the room with the widest passage to it. A room with a point off the floor (off the map,
+in a wall, in unknown space) has no region: the nearest floor may belong to another room, or lie beyond a wall.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from rosbot_patrol.patrol.house.floor import Floor, Mask
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
 
 NOBODYS = -1
-_LEVEL = 0.05  # between two levels of the flood [m]
+_LEVEL = 0.05  # step between two levels of the flood [m]
 _STEPS = [(dx, dy, math.hypot(dx, dy)) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
 
 class RoomRegions:
-    """Each room's floor.
+    """Floor of each room.
 
     Attributes:
         floor: of the map.
-        labels: id of the room that a cell belongs to, NOBODYS where there is no floor or no way to it.
-        lost: ids of the rooms with a point off the map's floor.
+        labels: id of the room of each cell, NOBODYS without floor or a path to it.
+        lost: ids of rooms with a point off the floor.
     """
 
     def __init__(self, floor: Floor, labels: NDArray[np.int16], lost: tuple[int, ...]) -> None:
         self.floor, self.labels, self.lost = floor, labels, lost
 
     def refusal(self, room: Room) -> str:
-        """Why a room cannot be looked at, "" where it can."""
+        """Reason why a room cannot be searched, "" if it can."""
         if room.id not in self.lost:
             return ""
         return (
@@ -44,22 +44,22 @@ class RoomRegions:
         )
 
     def mask(self, room_id: int) -> Mask:
-        """The room's floor."""
+        """Mask of a room's floor."""
         found: Mask = self.labels == room_id
         return found
 
     def area(self, room_id: int) -> float:
-        """Of the room's floor [m^2]."""
+        """Area of a room's floor [m^2]."""
         return float(self.mask(room_id).sum()) * self.floor.cell_area
 
     def room_at(self, x: float, y: float, within: float = 0.5) -> int:
-        """The room whose floor is at a point or within a distance of it [m], NOBODYS where there is none."""
+        """Room at a point or within a distance of it [m], NOBODYS if there is none."""
         cell = self.floor.nearest(self.labels != NOBODYS, x, y, within)
         return NOBODYS if cell is None else int(self.labels[cell[1], cell[0]])
 
 
 def part_rooms(floor: Floor, rooms: Rooms) -> RoomRegions:
-    """Part a floor among rooms."""
+    """Divide a floor among rooms."""
     labels = np.full(floor.info.shape, NOBODYS, np.int16)
     levels = np.ceil(floor.clearance / _LEVEL - 1e-9).astype(int)
     seeds, lost = [], []
@@ -77,7 +77,7 @@ def part_rooms(floor: Floor, rooms: Rooms) -> RoomRegions:
 
 
 def _climb(levels: NDArray[np.int64], ix: int, iy: int) -> list[tuple[int, int]]:
-    """Cells from one to the widest place about it, each wider than the one before."""
+    """Cells from one to the widest place around it, each wider than the previous one."""
     path = [(ix, iy)]
     while True:
         around = [(ix + dx, iy + dy) for dx, dy, _ in _STEPS if levels[iy + dy, ix + dx] > levels[iy, ix]]
@@ -88,7 +88,7 @@ def _climb(levels: NDArray[np.int64], ix: int, iy: int) -> list[tuple[int, int]]
 
 
 def _flood(levels: NDArray[np.int64], labels: NDArray[np.int16], seeds: list[tuple[int, int, int]]) -> None:
-    """Give each cell to the room that comes first: by the widest way, then the shortest on its level."""
+    """Assign each cell to the room that reaches it first: by the widest path, then the shortest on its level."""
     taken = bytearray(levels.size)
     width = levels.shape[1]
     level_of, label_of = levels.ravel().tolist(), labels.ravel()
@@ -107,5 +107,5 @@ def _flood(levels: NDArray[np.int64], labels: NDArray[np.int16], seeds: list[tup
             beside = cell + step
             level = level_of[beside]
             if level and not taken[beside]:
-                # a step down to a narrower level begins to count anew: the floor beside a wall goes with what it lines
+                # counting restarts at a narrower level: the floor along a wall belongs to the space that it borders
                 heapq.heappush(queue, (max(height, -level), gone * (-level <= height) + length, room, beside))

@@ -1,15 +1,15 @@
-"""The points file: where each room is looked at from.
+"""The points file: rooms, and the point from which each is searched.
 
 Matches the tutorial's room_points.yaml (`rooms_num`, `rooms: room0: {name, x, y, angle}`).
 
 Differs:
-- `angle_unit: deg|rad` names the unit of `angle`; without it the file is read in radians as the original reads it,
-  with a warning for each angle beyond a full turn.
-- `rooms_num` has to agree with the rooms listed; each fault is one sentence that names file and key.
-- Two rooms of one name are warned of.
-- A key that stands twice is a fault, where yaml itself keeps the last.
+- `angle_unit: deg|rad` is the unit of `angle`; without it the file is read in radians as in the original, with a
+  warning for each angle beyond a full turn.
+- `rooms_num` must agree with the rooms listed; each fault is one sentence with file and key.
+- Two rooms with the same name cause a warning.
+- A duplicate key is a fault, while yaml itself keeps the last.
 
-Rooms as files and people name them: by number or by name.
+Files and people name rooms by number or by name.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ MAX_ROOMS = 256  # EspTrigger.id is a byte
 
 @dataclass(frozen=True, kw_only=True)
 class Room:
-    """A point to look from; room 0 is the base.
+    """A point to search from; room 0 is the base.
 
     Attributes:
-        id: what a motion sensor sends.
-        name: for people.
+        id: number of the room.
+        name: in messages.
         pose: place and heading in the frame `map`.
     """
 
@@ -69,15 +69,15 @@ class Rooms:
         return self._rooms[0]
 
     def find(self, room_id: int) -> Room | None:
-        """The room of a sensor's id, None where the file has none."""
+        """Room of an id, None if the file has none."""
         return self._rooms.get(room_id)
 
     def get(self, room_id: int) -> Room:
-        """The room of an id that the file has. Raises KeyError."""
+        """Room of an id in the file. Raises KeyError."""
         return self._rooms[room_id]
 
     def refusal(self, room_id: int) -> str:
-        """Why an id is not taken, in one sentence."""
+        """Reason in one sentence why an id is refused."""
         return f"there is no room {room_id}: {self.source} has the rooms 0 to {max(self._rooms)}"
 
     def __iter__(self) -> Iterator[Room]:
@@ -92,7 +92,7 @@ def _not_finite(value: float) -> str | None:
 
 
 def bad_name(value: str) -> str | None:
-    """What is wrong with a room's name, None where nothing is."""
+    """Problem of a room's name, None if it is valid."""
     if not value.strip():
         return "is empty, expected a name"
     if not value.isprintable():
@@ -175,7 +175,7 @@ def _room(file: _File, index: int, key: str, prefix: str) -> Room:
 
 
 def save_rooms(path: str | Path, rooms: Iterable[Room]) -> None:
-    """Write a points file, whole or not at all; angles in degrees. Raises OSError."""
+    """Write a points file atomically; angles in degrees. Raises OSError."""
     listed = list(rooms)
     head = (
         "# Where the robot looks from in each room, and the base (room 0) that it comes home to. Frame: map, metres.\n"
@@ -198,7 +198,7 @@ def save_rooms(path: str | Path, rooms: Iterable[Room]) -> None:
 
 
 def choose_rooms(value: Any, rooms: Rooms, name: str) -> tuple[int, ...] | None:
-    """Numbers of the rooms of `all`, or of a list of numbers and names; None for all.
+    """Numbers of the rooms for `all`, or a list of numbers and names; None: all.
 
     Raises:
         ParamError: no list, no such room, or a name that two rooms have.

@@ -1,4 +1,4 @@
-"""Whether the patrol can begin, and what it waits for."""
+"""Readiness of the patrol, and what it waits for."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from rosbot_patrol.patrol.search.look import LookParams
 
 
 class Readiness:
-    """Ready once, ready for ever: later a call is taken at once, and its drive waits for what is missing.
+    """Stays ready once it is: a later call is taken at once, and its drive waits for what is missing.
 
     Attributes:
-        is_ready: it can begin.
-        at_rest: what to say while nothing happens.
+        is_ready: the patrol can start.
+        at_rest: text while nothing happens.
     """
 
     def __init__(self, look: LookParams) -> None:
@@ -23,7 +23,7 @@ class Readiness:
         self.at_rest = ON_GUARD
 
     def step(self, now: float, inputs: Inputs) -> bool:
-        """Look at what is there; `now` and the stamps of `inputs` in steady time [s]."""
+        """Check the inputs; `now` and the stamps of `inputs` in steady time [s]."""
         self._woke = now if self._woke is None else self._woke
         self._is_silent = now - inputs.detector_at > self._look.detector_timeout
         if not self.is_ready:
@@ -37,5 +37,5 @@ class Readiness:
 
     @property
     def text(self) -> str:
-        """What to say while nothing happens."""
+        """Text while nothing happens."""
         return f"{self.at_rest}; the detector is silent" if self.is_ready and self._is_silent else self.at_rest

@@ -1,7 +1,7 @@
-"""A clock that only goes forward, made from one that may be set, and the stamps of that one in its time.
+"""Steady time: a clock that never goes back, made from one that may be set, and stamps converted to it.
 
-All evidence of a mission lives in steady time: `SteadyInputs` converts every stamp once, as it comes in, and no other
-part of the patrol knows that a clock can be set. Until the clock is set for the first time both times are the same.
+All evidence of a mission uses steady time: `SteadyInputs` converts every stamp once, on arrival, and no other part of
+the patrol needs to know that a clock can be set. Until the clock is first set, both times are equal.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from rosbot_patrol.patrol.records.inputs import Battery, Frame, Inputs, ScanView
 
 log = logging.getLogger(__name__)
 
-LONGEST_STEP = 5.0  # [s] between two steps; more is a clock that was set, or a program that was held
-BACKWARDS = 1.0  # [s]; less is two machines' disagreement
-_PAUSE = 1.0  # [s] a longer step is this program's own pause: what it heard just before does not age by it
-_LATE = 1.0  # [s] what came since the last step is not older than this, whatever its stamp says
-_PERIODS = 20  # settings of the clock that are remembered
-_AGE_COUNTS = 0.1  # a slow detector is likelier than a picture from the future
+LONGEST_STEP = 5.0  # [s] between two steps; more means that the clock was set, or the program stopped
+BACKWARDS = 1.0  # [s]; less is a difference between two machines
+_PAUSE = 1.0  # [s] a longer step is this program's own pause: earlier inputs do not age by it
+_LATE = 1.0  # [s] largest age of inputs since the last step, whatever their stamps say
+_PERIODS = 20  # number of clock settings remembered
+_AGE_COUNTS = 0.1  # weight of age: a slow detector is likelier than a picture from the future
 
 
 @dataclass(frozen=True)
 class _Period:
-    """A time without a setting of the clock: steady time is clock time less `ahead`, from `since` on [s]."""
+    """A period without a setting of the clock: steady time is clock time less `ahead`, from `since` on [s]."""
 
     ahead: float
     since: float
 
 
 class SteadyClock:
-    """Time without what the clock was set by.
+    """Time without the jumps of the clock.
 
     Attributes:
         time: steady time [s]: the clock's at the first step, and what has passed since.
         passed: in the last step [s].
-        jump: by how much the clock was set in the last step [s], 0 where it was not.
+        jump: change of the clock's setting in the last step [s], 0: none.
     """
 
     def __init__(self) -> None:
@@ -50,24 +50,24 @@ class SteadyClock:
         self._periods: deque[_Period] = deque([_Period(ahead=0.0, since=-math.inf)], maxlen=_PERIODS)
 
     def step(self, now: float) -> float:
-        """Go on to `now` [s]; returns how much time has passed."""
+        """Advance to `now` [s]; returns how much time has passed."""
         if not self._has_begun:
             self._has_begun, self.now, self.time = True, now, now
         gap, self.now = now - self.now, now
         self.jump = 0.0 if -BACKWARDS <= gap <= LONGEST_STEP else gap
         if 0.0 <= gap <= LONGEST_STEP:
             self.passed = gap
-        else:  # the clock was set: take it that this step was as long as the one before
+        else:  # the clock was set: assume that this step was as long as the previous one
             ahead = self._periods[-1].ahead + gap - self.passed
             self._periods.append(_Period(ahead=ahead, since=self.time))
         self.time = max(self.time, now - self._periods[-1].ahead)
         return self.passed
 
     def steady(self, stamp: float) -> float:
-        """A stamp of the clock, of about now, in steady time [s].
+        """Convert a stamp of the clock, of about now, to steady time [s].
 
-        After the clock was set, a stamp may be of the clock as it is, or as it was before: what was on its way then.
-        The reading that disagrees least with the period that it supposes is taken.
+        After the clock was set, a stamp may be of the new clock, or of the old one for messages under way. The
+        interpretation with the smaller deviation from its period is used.
         """
         if len(self._periods) == 1 or not math.isfinite(stamp):
             return stamp
@@ -83,7 +83,7 @@ class SteadyClock:
 
 
 class Heard:
-    """When something was heard last, in steady time.
+    """Time of the newest message, in steady time.
 
     Args:
         clock: stepped before each `steady`.
@@ -95,7 +95,7 @@ class Heard:
         self._at = -math.inf
 
     def steady(self, raw: float) -> float:
-        """The stamp of the newest in steady time [s]; to be asked once a step. Infinite stamps are handed back."""
+        """Stamp of the newest message in steady time [s]; call it once per step. Infinite stamps stay as they are."""
         if not math.isfinite(raw):
             return raw
         if raw == self._raw:
@@ -109,7 +109,7 @@ class Heard:
 
 
 class SteadyInputs:
-    """Turns a step's inputs into steady time.
+    """Converts a step's inputs to steady time.
 
     Attributes:
         clock: stepped by `step`.
@@ -119,10 +119,10 @@ class SteadyInputs:
         self.clock = SteadyClock()
         self._detector, self._camera, self._camera_changed = (Heard(self.clock) for _ in range(3))
         self._battery = Heard(self.clock)
-        self._scan: tuple[ScanView, ScanView] | None = None  # as it came, and in steady time
+        self._scan: tuple[ScanView, ScanView] | None = None  # original, and in steady time
 
     def step(self, now: float, inputs: Inputs) -> Inputs:
-        """Go on to `now` [s]; returns the inputs with every stamp in steady time."""
+        """Advance to `now` [s]; returns the inputs with every stamp in steady time."""
         self.clock.step(now)
         if self.clock.jump:
             direction = "back" if self.clock.jump < 0.0 else "forward"

@@ -1,7 +1,7 @@
-"""The look around in a room: one full turn before a live detector, and whether it may be relied on.
+"""Look around: one full turn in front of a live detector, and whether it can be relied on.
 
-The turn is measured in odom. Wheels slip, so that a full turn there may be several degrees off; where the pose in the
-map (amcl) says so, within reason, the rest is turned on top.
+The turn is measured in odom. Wheels slip, so a full turn may be several degrees off. If the pose in the map (amcl) says
+so, within reason, the rest is turned in addition.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ class LookParams:
 
 @dataclass(frozen=True, kw_only=True)
 class LookStep:
-    """What to do now.
+    """Output of one step.
 
     Attributes:
-        speed: turning speed [rad/s], None where the wheels are another's.
+        speed: turning speed [rad/s], None if somebody else controls the wheels.
         goal: to be driven to; cancel: give it up.
-        progress: a viewpoint is done, which has to outlive the program.
+        progress: a viewpoint is done, and must be stored.
         done: the look is over.
-        problem: why it does not count as a look at the whole room, "" where it does.
-        is_stuck: that is because the robot could not turn so far; what it saw, it saw.
-        why: what it does, for people.
+        problem: reason why it does not count as a look at the whole room, "" if it does.
+        is_stuck: the reason is that the robot could not turn far enough; what it saw counts.
+        why: its activity, for people.
     """
 
     speed: float | None = 0.0
@@ -68,7 +68,7 @@ class Look:
     """One look around.
 
     Args:
-        needs_camera: whether pictures come to this program, too, so that a silent camera can be told.
+        needs_camera: whether this program receives pictures, so that it can detect a silent camera.
         turn: to the left [rad]; 0 is a look ahead.
     """
 
@@ -91,13 +91,13 @@ class Look:
         self._held_out_until = -math.inf
 
     def step(self, now: float, inputs: Inputs, *, candidate: bool, held: bool = False) -> LookStep:
-        """Wait for the eyes, turn, linger.
+        """Wait for detector and camera, turn, linger.
 
         Args:
             now: time [s].
             inputs: of this step.
             candidate: something is in view that may become an intruder.
-            held: another has the wheels for now: measure what it turns, and wait.
+            held: somebody else controls the wheels: measure the turn, and wait.
         """
         if self._began is None:
             self._began = now
@@ -116,14 +116,14 @@ class Look:
         if step.done and spin is self.spin and not step.problem and self._is_off():
             self._correction = Spin(abs(self._left()), clockwise=self._left() < 0.0, params=self._spin_params)
         elif step.done:
-            if spin is self.spin:  # a correction that fails takes nothing from the turn
+            if spin is self.spin:  # a failed correction does not spoil the turn
                 self._stuck = step.problem
             self._turned_at = now
         return LookStep(speed=step.speed, why=turning(self.spin.turned_deg, math.degrees(self.spin.target)))
 
     @property
     def turned_deg(self) -> float:
-        """How far it has turned [deg]: by the map where that is believed, else by odom."""
+        """Angle turned [deg]: by the map if it is plausible, else by odom."""
         by_map = abs(self._left()) <= self.params.correction_max
         return math.degrees(self._map_turned) if by_map else self.spin.turned_deg
 
@@ -172,7 +172,7 @@ class Look:
         if self._held_since is None:
             self._held_since = now
         if now - self._held_since > self.params.hold:
-            self._held_out_until = now + 1.5  # it had its chance: turn on past it
+            self._held_out_until = now + 1.5  # enough time was spent on it: turn on
             self._held_since = None
             return False
         return True

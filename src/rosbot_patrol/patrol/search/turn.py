@@ -1,10 +1,10 @@
-"""Turn on the spot by an angle that is measured, not timed.
+"""Turn on the spot by a measured angle, independent of time.
 
 Differs from the original's makeSpin (CONTRACTS A0, quirks 3 to 5):
-- the turned angle is the sum of wrapped yaw increments of odom -> base_link, so a full turn can be asked for and a
-  wobble the wrong way counts as what it is;
-- it slows down towards the end and ends with a zero twist; it ends at a time-out, too, and says why;
-- it waits while something is too near to turn, and gives up when that stays.
+- The turned angle is the sum of wrapped yaw increments of odom -> base_link. So full turns are possible, and a wobble
+  in the wrong direction is subtracted.
+- It slows down towards the end and ends with a zero twist; it also ends at a time-out, and says why.
+- It waits while something is too close to turn, and gives up if that stays.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class SpinParams:
 
 @dataclass(frozen=True, kw_only=True)
 class SpinStep:
-    """What to do now.
+    """Output of one step.
 
     Attributes:
         speed: turning speed to command [rad/s].
         done: the turn is over, well or not.
-        problem: why it ended early, "" where it did not.
+        problem: reason for an early end, "" for none.
     """
 
     speed: float
@@ -52,7 +52,7 @@ class SpinStep:
 
 
 def wrap_turn(radians: float) -> float:
-    """The angle to turn as the original wraps it: into [0, 2 pi]."""
+    """Angle to turn, wrapped into [0, 2 pi] as in the original."""
     if not math.isfinite(radians):
         raise ValueError(f"{radians} is no angle to turn")
     if 0.0 <= radians <= math.tau:
@@ -65,7 +65,7 @@ def wrap_turn(radians: float) -> float:
 
 
 class Spin:
-    """One turn, by default clockwise as the original's; feed it `step` at 20 Hz or more."""
+    """One turn, by default clockwise as in the original; call `step` at 20 Hz or more."""
 
     def __init__(self, radians: float, clockwise: bool = True, *, params: SpinParams | None = None) -> None:
         self.params = params or SpinParams()
@@ -81,12 +81,12 @@ class Spin:
         self._limit = self.params.spin_timeout or 3.0 * self.target / speed + 5.0
 
     def step(self, now: float, yaw: float | None, clearance: float | None = None, *, hold: bool = False) -> SpinStep:
-        """Measure, and say how fast to turn.
+        """Measure the turn, and compute the speed.
 
         Args:
             now: time [s].
-            yaw: heading in odom [rad], None where it is not known.
-            clearance: nearest obstacle [m], None where nothing tells.
+            yaw: heading in odom [rad], None if unknown.
+            clearance: distance of the nearest obstacle [m], None if unknown.
             hold: stand still for now, without counting the time.
         """
         passed = 0.0 if self._last is None else now - self._last
@@ -110,7 +110,7 @@ class Spin:
 
     @property
     def turned_deg(self) -> float:
-        """How far it has turned in the direction asked for [deg]."""
+        """Angle turned in the requested direction [deg]."""
         return math.degrees(self.turned)
 
     def _measure(self, yaw: float | None) -> None:

@@ -1,1 +1,1 @@
-"""What a camera can see of a floor: coverage, viewpoints, room points that are fit."""
+"""Visibility of floor from places: coverage, viewpoints, suitable room points."""

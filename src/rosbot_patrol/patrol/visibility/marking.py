@@ -1,4 +1,4 @@
-"""Room points marked on a map: each checked for being a place where the robot can stand, turn and get to."""
+"""Room points marked on a map: can the robot stand, turn and get there?"""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from rosbot_patrol.patrol.house.rooms import MAX_ROOMS, Room, Rooms, bad_name
 from rosbot_patrol.patrol.visibility.coverage import CoverageParams
 from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams, ViewpointPlanner
 
-TURN_CLEARANCE = 0.2  # the robot needs to turn on the spot [m]
-PASSAGE = 0.15  # half the narrowest gap that it drives through [m]
-APART = 0.5  # two points nearer than that were hardly both meant [m]
+TURN_CLEARANCE = 0.2  # clearance that the robot needs to turn on the spot [m]
+PASSAGE = 0.15  # half the width of the narrowest passage [m]
+APART = 0.5  # two points closer than this are probably a mistake [m]
 
 
 class Marks:
     """The points marked so far; the first is the base.
 
     Args:
-        rooms: to begin with.
+        rooms: initial rooms.
     """
 
     def __init__(self, rooms: Rooms | None = None) -> None:
@@ -25,11 +25,11 @@ class Marks:
 
     @property
     def is_full(self) -> bool:
-        """Whether no further room has a number."""
+        """Whether there is no number for another room."""
         return len(self.rooms) >= MAX_ROOMS
 
     def problem(self, floor: Floor, x: float, y: float) -> str:
-        """Why a place cannot be a room's point, in a sentence with where else; "" where it can.
+        """Reason why a place cannot be a room's point, with an alternative; "" if it can.
 
         Args:
             floor: of the map.
@@ -49,7 +49,7 @@ class Marks:
         return f"{near[0].title} is there already" if near else ""
 
     def name_problem(self, name: str) -> str:
-        """Why a name cannot be taken, "" where it can."""
+        """Reason why a name cannot be used, "" if it can."""
         bad = bad_name(name)
         if bad is not None:
             return f"the name {bad}"
@@ -57,7 +57,7 @@ class Marks:
         return f"{same.title} has that name" if same else ""
 
     def add(self, name: str, x: float, y: float) -> Room:
-        """Take a point, with the next number; heading 0."""
+        """Add a point with the next number and heading 0."""
         room = Room(id=len(self.rooms), name=name.strip(), pose=Pose2D(x, y, 0.0))
         self.rooms.append(room)
         return room
