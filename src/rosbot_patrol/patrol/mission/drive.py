@@ -1,4 +1,4 @@
-"""Bring the robot to a pose by an action server that may be down, die, refuse or never end."""
+"""Drive to a pose by an action server that may be down, die, refuse or never end."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class DriveParams:
 
 @dataclass(frozen=True, kw_only=True)
 class DriveStep:
-    """What to do now.
+    """Output of one step.
 
     Attributes:
-        goal: to be sent.
-        cancel: the goal that runs is to be given up.
+        goal: to send.
+        cancel: give up the active goal.
         waiting: for the action server.
         reached: the pose is reached.
-        problem: why it will not be, "" while it may; is_down: as there is no action server.
+        problem: reason why it cannot be reached, "" while it may; is_down: because there is no action server.
     """
 
     goal: Goal | None = None
@@ -56,9 +56,9 @@ class Drive:
     """One drive to one pose.
 
     Args:
-        name: of the drive, unlike any other's: the stem of its goals' tags.
+        name: unique name of the drive: the stem of its goals' tags.
         pose: in map.
-        params: bounds.
+        params: limits.
     """
 
     def __init__(self, name: str, pose: Pose2D, params: DriveParams) -> None:
@@ -75,7 +75,7 @@ class Drive:
         self._timeout: float | None = params.goal_timeout or None
 
     def step(self, now: float, link: GoalLink, pose: Pose2D | None) -> DriveStep:
-        """Look at the goal's state, and decide."""
+        """Check the goal's state, and decide."""
         passed = 0.0 if self._last is None else now - self._last
         self._last = now
         if not link.is_up:
@@ -96,7 +96,7 @@ class Drive:
         return DriveStep()
 
     def pause(self) -> None:
-        """The goal is given up by whoever calls this; the next step sends it again, and the pause does not count."""
+        """The caller gives up the goal; the next step sends it again, and the pause does not count."""
         self._tag = ""
         self._retry_at = None
         self._last = None
@@ -127,13 +127,13 @@ class Drive:
 
 
 class Trip:
-    """A drive to one of several poses that serve as well; the next is tried when navigation gives one up.
+    """A drive to one of several equivalent poses; the next is tried when the navigation gives one up.
 
     Args:
-        name: of the trip, unlike any other's.
-        pose: the first to try, as often as `params` say.
-        params: bounds.
-        others: gives further poses, asked when the first has failed; each is tried once.
+        name: unique name of the trip.
+        pose: the first to try, as often as `params` allow.
+        params: limits.
+        others: function that returns further poses after the first has failed; each is tried once.
     """
 
     def __init__(self, name: str, pose: Pose2D, params: DriveParams, others: OtherPoses | None = None) -> None:
@@ -145,15 +145,15 @@ class Trip:
 
     @property
     def is_at_first(self) -> bool:
-        """Whether it still goes to the first pose."""
+        """Whether it still drives to the first pose."""
         return self._tried == 0
 
     def pause(self) -> None:
-        """Interrupt the drive; the next step takes it up again."""
+        """Interrupt the drive; the next step resumes it."""
         self._drive.pause()
 
     def step(self, now: float, inputs: Inputs) -> DriveStep:
-        """Drive on."""
+        """Continue the drive."""
         step = self._drive.step(now, inputs.link, inputs.pose)
         if not step.problem or step.is_down:
             return step
@@ -173,9 +173,9 @@ class WayHome:
     """The drive to the base; it fails at once if the map shows no floor at the base's point.
 
     Args:
-        name: of the drive, unlike any other's.
+        name: unique name of the drive.
         base: room 0.
-        params: bounds.
+        params: limits.
     """
 
     def __init__(self, name: str, base: Room, params: DriveParams) -> None:
@@ -183,11 +183,11 @@ class WayHome:
         self._drive = Drive(name, base.pose, params)
 
     def pause(self) -> None:
-        """Interrupt the drive; the next step takes it up again."""
+        """Interrupt the drive; the next step resumes it."""
         self._drive.pause()
 
     def step(self, now: float, inputs: Inputs) -> DriveStep:
-        """Drive on."""
+        """Continue the drive."""
         refusal = inputs.house.refusal(self._base) if inputs.house is not None else ""
         if refusal:
             return DriveStep(problem=f"{self._base.title}: {refusal}")
@@ -195,7 +195,7 @@ class WayHome:
 
 
 def end_of_way_home(step: DriveStep) -> Place | None:
-    """Where a step of the way home left the robot, None while it drives on."""
+    """Place of the robot after the way home, None while it is driving."""
     if step.problem:
         return Place(Whereabouts.AWAY, f" ({step.problem})")
     return Place(Whereabouts.HOME) if step.reached else None

@@ -1,8 +1,8 @@
-"""What of the patrol outlives the program: one JSON file.
+"""Memory of the patrol over restarts: one JSON file.
 
-After a kill, of the program or of the whole launch, the patrol goes on where it stopped: every call gets its verdict.
-After an orderly end nothing is left to go on with. Handled latched triggers are remembered within one run of the launch
-only: in another run they are new. A file of another house (another points file) is not used.
+After the program or the whole launch was killed, the patrol continues where it stopped: every call gets its verdict.
+After an orderly end there is nothing to continue. Handled latched triggers are remembered only within one run of the
+launch: in another run they are new. A file of another house (another points file) is not used.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class Memory:
-    """What of the missions outlives the program.
+    """State of the missions that survives a restart.
 
     Attributes:
         count: missions so far; waiting: requests, the next first; mission: that ran.
         last_verdict: of the mission that ended last, "" before the first.
-        held: by id of its mission, when a held notice goes out at the latest [s since 1970].
+        held: latest time of sending of each held notice [s since 1970], by the id of its mission.
     """
 
     count: int = 0
@@ -40,7 +40,7 @@ class Memory:
 
 
 def memory_to_plain(memory: Memory) -> dict[str, Any]:
-    """For JSON."""
+    """Contents for JSON."""
     return {
         "count": memory.count,
         "queue": [request_to_plain(request) for request in memory.waiting],
@@ -51,7 +51,7 @@ def memory_to_plain(memory: Memory) -> dict[str, Any]:
 
 
 def memory_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Memory:
-    """The memory of `memory_to_plain`; a warning and an empty one if it makes no sense."""
+    """Memory from the result of `memory_to_plain`; an empty one, with a warning, if it is invalid."""
     if not plain:
         return Memory()
     try:
@@ -83,16 +83,16 @@ VERSION = 2
 
 
 class PatrolStore:
-    """Keeps the manager's memory, the schedule's, and the latched triggers that were handled.
+    """Stores the memories of the manager and the schedule, and the handled latched triggers.
 
     Args:
         path: of the file.
         run_id: of the launch.
-        house: which house it is of, such as its points file.
+        house: identity of the house, such as its points file.
 
     Attributes:
-        memory: what the manager kept, empty if nothing; schedule: what the schedule did.
-        taken: number of the last line of the journal that the memory knows.
+        memory: the manager's, empty if there is none; schedule: the schedule's.
+        taken: number of the last line of the journal in the memory.
     """
 
     def __init__(self, path: Path, run_id: str, house: str = "") -> None:
@@ -105,11 +105,11 @@ class PatrolStore:
         self._read()
 
     def is_handled(self, sender: str, room_id: int) -> bool:
-        """Whether a latched trigger of this sender was taken before the program ended."""
+        """Whether a latched trigger of this sender was handled before the restart."""
         return self._latched.get(sender) == room_id
 
     def note_latched(self, sender: str, room_id: int) -> None:
-        """Remember a latched trigger, the last 100 senders; `save` writes it."""
+        """Remember a latched trigger, for the last 100 senders; `save` writes it."""
         self._latched.pop(sender, None)
         self._latched[sender] = room_id
         while len(self._latched) > 100:
@@ -141,7 +141,7 @@ class PatrolStore:
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as err:
             log.warning("%s cannot be used (%s), starting afresh", self.path, err)
             return
-        self.taken = taken  # the journal goes on counting in any case
+        self.taken = taken  # the journal continues counting in any case
         if not is_same:
             log.warning("%s is of the house of %s, starting afresh", self.path, tree["house"])
             return

@@ -1,1 +1,1 @@
-"""What the parts of a patrol hand each other: inputs, requests, missions, findings, commands."""
+"""Records exchanged between the parts of a patrol: inputs, requests, missions, findings, commands."""

@@ -1,4 +1,4 @@
-"""What a mission found: a confirmed intruder, and the persons that it met."""
+"""Findings of a mission: a confirmed intruder, and the persons met."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 @dataclass(frozen=True, kw_only=True)
 class Confirmation:
-    """An intruder, as far as the detector can tell.
+    """A confirmed intruder, as far as the detector can tell.
 
     Attributes:
         label: its class.
-        probability: median over the pictures that show it.
-        stamp: the camera's, of the picture that shows it best [s].
+        probability: median over the pictures with the intruder.
+        stamp: the camera's stamp of the best picture [s].
         boxes: alarm boxes in that picture, the best first.
-        pictures: how many showed it.
-        measured: its place and size as they were last measured well, None where nothing tells.
+        pictures: number of pictures with the intruder.
+        measured: its last good measurement of place and size, None if there is none.
     """
 
     label: str
@@ -30,12 +30,12 @@ class Confirmation:
 
 @dataclass(kw_only=True)
 class Person:
-    """One who was met.
+    """A person met on a mission.
 
     Attributes:
         number: from 1 on.
         x: last place in map [m]; y: likewise; error: of it [m]; at: when [s].
-        sightings: how often confirmed; label: class of object; room: where, for people.
+        sightings: number of confirmations; label: object class; room: its name, for people.
     """
 
     number: int

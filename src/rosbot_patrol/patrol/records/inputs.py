@@ -1,4 +1,4 @@
-"""What the patrol is told in each step, and what it answers: plain records."""
+"""Inputs of the patrol in each step: plain records."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from rosbot_patrol.patrol.house.regions import RoomRegions
 from rosbot_patrol.patrol.records.request import Request
 from rosbot_patrol.scan import LaserScan
 
-_SLACK = 3.0, 0.04  # of a detector's boxes: pixels, and share of the height
+_SLACK = 3.0, 0.04  # tolerance of a detector's boxes: pixels, and share of the height
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """What is known of a box's object in space.
+    """Measurement of a box's object in space.
 
     Attributes:
         x: place in map [m]; y: likewise.
-        error: of the place, about [m].
+        error: approximate error of the place [m].
         away: distance from the camera over the floor [m].
-        top: of the object over the floor [m]; height, width: of what shows of it [m].
+        top: height of the object's top over the floor [m]; height, width: of its visible part [m].
         is_cut: the box ends about the picture's upper edge, or at its lower one: there may be more of it.
         is_cut_above: there may be more of it above the picture.
-        is_cut_aside: the box ends at the picture's left or right edge: the place is of the part that shows.
-        is_flat: all of it lies in one plane, None where no depth tells.
+        is_cut_aside: the box touches the left or right image border: the place is that of the visible part.
+        is_flat: all of it lies in one plane, None without depth.
         has_legs: of what goes on above the picture: it stands as a person does, where the map shows nothing; None where
             that is not known.
-        source: what told the distance: "depth", "lidar", "floor" (the box's lower edge).
+        source: of the distance: "depth", "lidar" or "floor" (the box's lower edge).
     """
 
     x: float
@@ -49,11 +49,11 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True)
 class Box:
-    """One object in one picture: class, probability, corners [px], and its place where that is known.
+    """One object in one picture: class, probability, corners [px], and its place if known.
 
     Attributes:
         measured: place and size.
-        doubt: where it may be, x, y in map [m], where it is too far off to be measured, but could be from near.
+        doubt: its possible place x, y in map [m], if it is too far away now but measurable from close by.
     """
 
     label: str
@@ -77,17 +77,17 @@ class Box:
 
     @property
     def slack(self) -> float:
-        """By how much its upper and lower edges may be off [px]."""
+        """Tolerance of its upper and lower edges [px]."""
         return _SLACK[0] + _SLACK[1] * self.height
 
 
 @dataclass(frozen=True, kw_only=True)
 class Eye:
-    """A camera over the floor when it took a picture.
+    """Pose and view of a camera at the time of a picture.
 
     Attributes:
         pose: in map.
-        width: angle that the picture spans [rad].
+        width: horizontal field of view [rad].
         columns: width of the picture [px].
     """
 
@@ -96,22 +96,22 @@ class Eye:
     columns: int = 640
 
     def bearing(self, column: float) -> float:
-        """Of a column of the picture from its middle, positive to the left [rad]."""
+        """Bearing of a column from the image centre, positive to the left [rad]."""
         half = self.columns / 2.0
         return math.atan((half - column) / half * math.tan(self.width / 2.0))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """What the detector saw in one picture.
+    """Detections in one picture.
 
     Attributes:
-        stamp: when the picture was taken [s], None where that is not known (darknet_ros tells it only with boxes).
-        boxes: nothing seen if empty.
-        eye: the camera then, None where its place or its lens is not known.
-        counts: False where its boxes could not be measured yet, so that they prove nothing.
-        is_same: its picture is the one before, byte for byte: the camera hangs, or has no noise and the room is still.
-        picture: stamp by which the camera's picture is found again [s], None where that is `stamp`.
+        stamp: time of the picture [s], None if unknown (darknet_ros sends it only with boxes).
+        boxes: empty if nothing was detected.
+        eye: the camera then, None if its pose or lens is unknown.
+        counts: False if its boxes could not be measured yet and therefore prove nothing.
+        is_same: the picture equals the previous one byte for byte: the camera hangs, or has no noise in a still room.
+        picture: stamp of the camera's picture [s], None if it equals `stamp`.
     """
 
     stamp: float | None = None
@@ -124,7 +124,7 @@ class Frame:
 
 @dataclass(frozen=True, kw_only=True)
 class ScanView:
-    """One scan, and from where it was taken: the lidar's pose in map."""
+    """One scan, and the lidar's pose in map."""
 
     scan: LaserScan
     map_from_laser: Pose2D
@@ -132,12 +132,12 @@ class ScanView:
 
 @dataclass(frozen=True, kw_only=True)
 class Battery:
-    """What the battery last said.
+    """Last state of the battery.
 
     Attributes:
-        share: of its charge, 0 to 1, None where it is not told; voltage: [V], None likewise.
-        is_charging: it hangs at the charger.
-        at: when it was heard [s].
+        share: of its charge, 0 to 1, None if unknown; voltage: [V], None if unknown.
+        is_charging: it is being charged.
+        at: time of arrival [s].
     """
 
     share: float | None = None
@@ -152,10 +152,10 @@ class Guarded:
 
     Attributes:
         mode: armed_away, armed_home, night or disarmed.
-        rooms: whose sensors count, None for all of them.
-        why: one sentence about what is not guarded, "" where everything is.
+        rooms: with active sensors, None: all.
+        why: one sentence about what is not guarded, "" if everything is.
         is_quiet: quiet hours: nothing but triggers and people's orders moves the robot.
-        holds_until: an entry delay runs to this moment, in seconds since 1970: notices wait; None where none does.
+        holds_until: end of the running entry delay, in seconds since 1970: notices wait; None: no delay.
     """
 
     mode: str = "armed_away"
@@ -175,21 +175,21 @@ class Inputs:
 
     Attributes:
         wall: seconds since 1970, for ids and records only.
-        triggers: rooms whose sensor saw motion since the last step, in order of arrival.
-        requests: rooms that something else asks for; ids and priorities are given to them here.
-        frames: what the detector saw since the last step.
-        yaw: heading of base_link in odom [rad], None where it is not known now.
-        pose: of base_link in map, None where it is not known now.
-        clearance: from the robot's centre to the nearest thing that the lidar sees [m], None where it is silent.
+        triggers: rooms with motion since the last step, in order of arrival.
+        requests: rooms requested otherwise; their ids and priorities are assigned here.
+        frames: detections since the last step.
+        yaw: heading of base_link in odom [rad], None if unknown now.
+        pose: of base_link in map, None if unknown now.
+        clearance: distance from the robot's centre to the nearest obstacle of the lidar [m], None if it is silent.
         link: the navigation.
         detector_at: when the detector was last heard [s].
-        camera_at: when a picture came last that was not black [s].
-        camera_changed_at: when one came last that differs from the one before [s], inf where nobody compares.
-        scan: the newest scan, while a mission runs; None where it is silent or the robot's place is not known.
+        camera_at: arrival of the last picture that was not black [s].
+        camera_changed_at: arrival of the last picture that differs from its predecessor [s], inf if nobody compares.
+        scan: the newest scan, during a mission; None if there is none or the robot's pose is unknown.
         house: the map's floor and its rooms, None until the map was heard.
-        battery: None where nobody tells of one.
+        battery: None if there is no report.
         guarded: what is armed.
-        stop: why the emergency stop holds the robot, "" where it does not.
+        stop: reason of the emergency stop, "" if it is not pressed.
     """
 
     wall: float = 0.0

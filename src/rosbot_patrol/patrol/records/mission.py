@@ -1,4 +1,4 @@
-"""Missions: one room to be looked at, from what called for it to the verdict."""
+"""Missions: one room to be searched, from the call to the verdict."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ View = tuple[float, float, float]  # x [m], y [m], yaw [rad] in map
 
 
 class Phase(Enum):
-    """What the patrol does; the values are those of PatrolState."""
+    """Phase of the patrol; values are those of PatrolState."""
 
     STARTING = "starting"
     IDLE = "idle"
@@ -27,7 +27,7 @@ class Phase(Enum):
 
 
 class Verdict(Enum):
-    """How a mission ends."""
+    """Verdict of a mission."""
 
     CONFIRMED = "confirmed"
     CLEAR = "clear"
@@ -40,8 +40,8 @@ class Mission:
     """One call on its way to a verdict.
 
     Attributes:
-        id: unlike any other's, sorts by time.
-        room: to be looked at.
+        id: unique, sorts by time.
+        room: to be searched.
         origin: what called for it; priority: greater goes first; called: when, in seconds since 1970; note: by whom,
             for people.
         phase: DRIVING, LOOKING or RETURNING.
@@ -49,12 +49,12 @@ class Mission:
         wall: start in seconds since 1970.
         verdict: None until there is one; reason: of it, one sentence.
         notified: its one notice is on disk.
-        sightings: confirmations in all; best: the surest.
+        sightings: number of confirmations; best: the surest one.
         triggers: how often the room's sensor called, the first time with it.
         times: seconds spent waiting, driving, looking and returning, by name.
         began: when each of these began first, in seconds since 1970.
         views_done: poses from which the room was looked at in a full turn.
-        share_seen: of the room's floor, 0 to 1, None where nobody measures.
+        share_seen: of the room's floor, 0 to 1, None if unknown.
         place: x, y in map [m] of the person who was confirmed first, then; None where it is not known.
         place_room: the room that lies in, None where it lies in none or nobody knows.
         is_outside: that place lies in no room of the map.
@@ -96,12 +96,12 @@ class Mission:
 
 
 def mission_id(wall: float, count: int) -> str:
-    """An id from the time of day [s since 1970] and a running number."""
+    """Id from the time of day [s since 1970] and a running number."""
     return f"{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime(wall))}-{count}"
 
 
 def mission_to_plain(mission: Mission) -> dict[str, Any]:
-    """What has to outlive the program, for JSON."""
+    """State that must survive a restart, for JSON."""
     return {
         "id": mission.id,
         "room": mission.room.id,
@@ -129,7 +129,7 @@ def mission_to_plain(mission: Mission) -> dict[str, Any]:
 
 
 def mission_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Mission | None:
-    """The mission of `mission_to_plain`; None where its room is gone from the points file.
+    """Mission from the result of `mission_to_plain`; None if its room is no longer in the points file.
 
     Raises:
         KeyError, TypeError, ValueError: this is no mission.
@@ -139,7 +139,7 @@ def mission_from_plain(plain: Mapping[str, Any], rooms: Rooms) -> Mission | None
         return None
     place = plain["place"]
     share = plain["share_seen"]
-    place_room = plain.get("place_room")  # as the next, not in files of earlier versions
+    place_room = plain.get("place_room")  # like the next one, missing in files of earlier versions
     return Mission(
         id=str(plain["id"]),
         room=room,

@@ -1,4 +1,4 @@
-"""A request for a mission: which room, for whom, since when."""
+"""Request for a mission: room, origin, time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 class Origin(Enum):
-    """What called for a mission."""
+    """Origin of a mission."""
 
     TRIGGER = "trigger"
     ACTION = "action"
@@ -21,16 +21,16 @@ class Origin(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """A room that something asks to be looked at.
+    """A request to search a room.
 
     Attributes:
-        room_id: which.
-        origin: what asks; note: more about it, for people.
-        wall: when, in seconds since 1970.
-        priority: greater goes first.
-        id: of the mission that it will be.
-        triggers: how often its sensor called.
-        times: what the mission has spent already, where it was put back (see Mission.times).
+        room_id: id of the room.
+        origin: of the request; note: details, for people.
+        wall: time in seconds since 1970.
+        priority: the greatest goes first.
+        id: of its future mission.
+        triggers: number of calls of its sensor.
+        times: time spent before the mission was put back (see Mission.times).
     """
 
     room_id: int
@@ -44,12 +44,12 @@ class Request:
 
 
 def request_to_plain(request: Request) -> dict[str, Any]:
-    """For JSON."""
+    """Contents for JSON."""
     return {**dataclasses.asdict(request), "origin": request.origin.value, "times": dict(request.times)}
 
 
 def request_from_plain(plain: Mapping[str, Any]) -> Request:
-    """The request of `request_to_plain`.
+    """Request from the result of `request_to_plain`.
 
     Raises:
         KeyError, TypeError, ValueError: this is no request.

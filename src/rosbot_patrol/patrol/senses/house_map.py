@@ -1,4 +1,4 @@
-"""The map's floor, parted among the rooms."""
+"""House map: the floor of the map, divided among the rooms."""
 
 from __future__ import annotations
 

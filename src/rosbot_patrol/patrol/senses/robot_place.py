@@ -1,7 +1,7 @@
-"""Where the robot is now, from the newest transforms, none of which may be too old.
+"""Present pose of the robot, from the newest transforms, with a maximum age of each.
 
-Odometry comes often; the map's part (amcl's map -> odom) comes with each scan, and a slow amcl may take its time. The
-newest of both are put together, each with an age limit of its own: a localisation that has died gives no pose.
+Odometry comes often; the map's part (amcl's map -> odom) comes with each scan, and a slow amcl may be late. The newest
+of both are combined, each with its own maximum age: a localisation that has died gives no pose.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class RobotPlace:
         params: names of the frames, and how old their transforms may be.
 
     Attributes:
-        problem: why `pose` gave none last, "" where it gave one.
+        problem: reason why `pose` last gave None, "" if it gave a pose.
     """
 
     def __init__(self, frames: Frames, params: InputParams) -> None:
@@ -28,14 +28,14 @@ class RobotPlace:
         self.problem = ""
 
     def yaw(self, now: float) -> float | None:
-        """Heading of the robot in odom [rad], None where it is not known now [s]."""
+        """Heading of the robot in odom [rad], None if unknown now [s]."""
         try:
             return self._in_odom(now).yaw
         except TransformError:
             return None
 
     def pose(self, now: float) -> Pose2D | None:
-        """The robot in the map, None where it is not known now [s]."""
+        """Pose of the robot in map, None if unknown now [s]."""
         try:
             found = compose(self.map_from_odom(now), self._in_odom(now))
         except TransformError as err:
@@ -45,10 +45,10 @@ class RobotPlace:
         return found
 
     def map_from_odom(self, now: float) -> Pose2D:
-        """The map's part of a pose of a time [s]; raises TransformError where it is too old for that."""
+        """Correction map_from_odom for a pose at a time [s]; raises TransformError if it is too old for that."""
         p = self._params
         pose, stamp = self._frames.lookup_stamped(p.map_frame, p.odom_frame)
-        age = now - stamp  # amcl's stamps lie ahead by its transform_tolerance; a transform that never moves has 0
+        age = now - stamp  # amcl post-dates its stamps by transform_tolerance; a static transform has 0
         if stamp and age > p.map_timeout:
             raise TransformError(
                 p.map_frame, p.odom_frame, f"the newest is {age:.1f} s old: does the localisation (amcl) still run?"

@@ -1,4 +1,4 @@
-"""Which room a motion sensor calls to."""
+"""Rooms of the motion sensors, by their ids."""
 
 from __future__ import annotations
 

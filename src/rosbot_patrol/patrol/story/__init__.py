@@ -1,1 +1,1 @@
-"""What the patrol says about itself: status, narration, the log of a mission."""
+"""Texts of the patrol about itself: status, narration, mission log."""

@@ -1,4 +1,4 @@
-"""One plain sentence for each step of a patrol, for whoever watches `scripts/patrol`."""
+"""Narration of a patrol: one plain sentence for each step, for people who watch `scripts/patrol`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The action `patrol`: rooms to look at, for programs. Callbacks store, the patrol's step answers."""
+"""Action `patrol`: search rooms, requested by programs. Callbacks store goals; the patrol's step answers."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ class PatrolActions:
         )
 
     def start(self) -> None:
-        """Take goals from now on."""
+        """Start accepting goals."""
         self._server.start()
 
     def begin(self) -> None:
-        """Take what was asked for, before a step."""
+        """Accept waiting goals, before a step."""
         while self._goals:
             self._take(self._goals.popleft())
         while self._cancels:
             self._cancel(self._cancels.popleft())
 
     def follow(self, ended: tuple[Mission, ...], report: Report | None) -> None:
-        """Tell how it goes, after a step."""
+        """Report progress, after a step."""
         self._report = report or self._report
         for goal in list(self._open):
             rooms = {mission_id: room for room, mission_id in goal.missions.items()}

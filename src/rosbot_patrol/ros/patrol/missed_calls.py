@@ -1,4 +1,4 @@
-"""Calls that the bridge took while the patrol was down: the sensors' watch tells when each sensor last called."""
+"""Calls that the bridge received while the patrol was down, from sensor_watch's last call of each sensor."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from rosbot_patrol.ros.runtime.node import now
 
 log = logging.getLogger(__name__)
 
-_LISTEN = 15.0  # the watch tells of all sensors every five seconds [s]
+_LISTEN = 15.0  # longest wait: sensor_watch reports all sensors every five seconds [s]
 
 
 class MissedCalls:
-    """Asks once, after the start, for what was called in the gap.
+    """Asks once, after the start, for the calls in the gap.
 
     Args:
         path: of the patrol's signs of life.
-        ask: takes what was missed.
-        room_of: the room that a sensor's id calls to, None where it calls to none.
+        ask: takes the missed calls.
+        room_of: room of a sensor's id, None if it has none.
     """
 
     def __init__(self, path: Path, ask: Callable[[Request], None], room_of: Callable[[int], int | None]) -> None:
@@ -42,7 +42,7 @@ class MissedCalls:
         self._subscriber: rospy.Subscriber | None = None
 
     def start(self) -> None:
-        """Begin to listen, where there was a gap."""
+        """Start listening, if there was a gap."""
         if self._vigil.has_gap:
             self._subscriber = rospy.Subscriber("sensors/states", SensorStates, self._on_states, queue_size=5)
 
@@ -58,7 +58,7 @@ class MissedCalls:
             self._subscriber = None
 
     def end(self) -> None:
-        """The patrol was ended in order, and is not waited for."""
+        """Record an orderly end of the patrol."""
         try:
             self._vigil.end()
         except OSError as err:
@@ -66,7 +66,7 @@ class MissedCalls:
 
     def _on_states(self, message: SensorStates) -> None:
         self._heard += 1
-        if self._heard != 2:  # the first is latched, nobody knows how old; those after the second tell nothing new
+        if self._heard != 2:  # the first is latched, of unknown age; those after the second add nothing
             return
         for sensor in message.sensors:
             wall = time.time() - sensor.motion

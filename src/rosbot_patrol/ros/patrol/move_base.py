@@ -1,4 +1,4 @@
-"""move_base's action as the patrol sees it: one client for ever, and whether the server lives."""
+"""Client of move_base's action, which also detects whether the server is alive."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rosbot_patrol.ros.messages import convert
 
 
 class MoveBase:
-    """Sends goals to the action server `move_base` and tells how they stand.
+    """Sends goals to the action server `move_base` and reports their state.
 
     Args:
         frame: of the goals.
-        silence: the server counts as down when its status was not heard for so long [s], wall time.
+        silence: silence of its status after which the server counts as down [s], wall time.
     """
 
     def __init__(self, frame: str = "map", silence: float = SILENCE) -> None:
@@ -36,7 +36,7 @@ class MoveBase:
 
     @property
     def is_up(self) -> bool:
-        """The server speaks, and hears us."""
+        """Whether the server is alive and receives our messages."""
         client = self._client.action_client
         connected = all(
             end.get_num_connections() > 0
@@ -45,7 +45,7 @@ class MoveBase:
         return connected and time.monotonic() - self._heard < self._silence
 
     def link(self) -> GoalLink:
-        """How server and goal stand."""
+        """State of server and goal."""
         with self._lock:
             if not self._tag:
                 return GoalLink(is_up=self.is_up)
@@ -54,7 +54,7 @@ class MoveBase:
             return GoalLink(is_up=self.is_up, tag=self._tag, state=goal_state(state), text=text)
 
     def send(self, goal: Goal) -> None:
-        """Send a goal; the one before is no longer followed."""
+        """Send a goal; the previous one is no longer followed."""
         message = MoveBaseGoal()
         message.target_pose = convert.pose_to_msg(goal.pose, self._frame, rospy.get_time())
         with self._lock:
@@ -68,5 +68,5 @@ class MoveBase:
                 self._client.cancel_goal()
 
     def cancel_all(self) -> None:
-        """Give up every goal that the server has, whoever sent it."""
+        """Cancel every goal of the server, whoever sent it."""
         self._client.cancel_all_goals()

@@ -1,6 +1,6 @@
-"""What the patrol says and commands on topics: that it lives, its state, and the wheels while it turns.
+"""Outputs of the patrol: sign of life, state, and wheel commands during turns.
 
-Those whom a mission met, for rviz on /patrol/people (latched): a figure, and above it who and where.
+And persons met on a mission, for rviz on /patrol/people (latched): a figure with a label.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ log = logging.getLogger(__name__)
 
 
 class Wheels:
-    """/cmd_vel while the patrol turns; another's, else."""
+    """/cmd_vel during the patrol's turns; otherwise it publishes nothing."""
 
     def __init__(self) -> None:
         self.publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         self._turning = False
 
     def turn(self, speed: float | None) -> None:
-        """Turn [rad/s]; None: no longer, and stand still at the end of a turn."""
+        """Turn [rad/s]; None: no longer, with a stop at the end of a turn."""
         if speed is None:
             self.stop()
             return
@@ -42,14 +42,14 @@ class Wheels:
         self.publisher.publish(convert.twist_to_msg(Twist2D(wz=speed)))
 
     def stop(self) -> None:
-        """Stand still, where it turns."""
+        """Stop, if it is turning."""
         if self._turning:
             self.publisher.publish(convert.twist_to_msg(STOP))
         self._turning = False
 
 
 class Pulse:
-    """/patrol/alive: the patrol's own step runs; about once a second of the wall, whatever simulated time does."""
+    """/patrol/alive: the patrol's own step runs; about once a second of wall time."""
 
     def __init__(self) -> None:
         self._at = -math.inf
@@ -76,12 +76,12 @@ class StatePublisher:
         self._publisher = rospy.Publisher("patrol/state", PatrolState, queue_size=10, latch=True)
 
     def publish(self, time_now: float, report: Report, mission: Mission | None) -> None:
-        """Tell a state that is new.
+        """Publish a state if it is new.
 
         Args:
             time_now: ROS time [s].
             report: the state.
-            mission: that runs.
+            mission: the active one.
         """
         if self._report is None or (report.phase, report.why) != (self._report.phase, self._report.why):
             log.info("%s: %s", report.phase.value, report.why)
@@ -113,7 +113,7 @@ _RED, _DARK = ColorRGBA(0.9, 0.1, 0.1, 0.9), ColorRGBA(0.4, 0.0, 0.0, 1.0)
 
 
 class PeopleMarkers:
-    """Publishes them.
+    """Publishes markers of the persons met.
 
     Args:
         frame: of their places.
@@ -124,16 +124,16 @@ class PeopleMarkers:
         self._publisher = rospy.Publisher(PEOPLE_TOPIC, MarkerArray, queue_size=2, latch=True)
 
     def clear(self) -> None:
-        """A new mission has met nobody."""
+        """Clear the markers for a new mission."""
         self._publisher.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
 
     def show(self, people: Iterable[Person], stamp: float, room: str) -> None:
-        """Those met so far, as far as their places are known.
+        """Show the persons with a known place.
 
         Args:
             people: each with its place.
             stamp: of now [s].
-            room: where the mission leads, for people to read.
+            room: of the mission, for people.
         """
         markers = [marker for person in people for marker in self._markers(person, stamp, room)]
         self._publisher.publish(MarkerArray(markers=markers))

@@ -1,7 +1,7 @@
-"""The camera's last pictures, kept only while they are wanted, and whether they show anything.
+"""Ring of the camera's last pictures, filled only when needed; detects black and repeated pictures.
 
-A camera that is covered or hung still sends: a picture that is black counts as none, and one that is the one before,
-byte for byte, is no new one (a real camera's noise is never twice the same).
+A covered or hung camera still sends. A black picture counts as none; a picture that equals its predecessor byte for
+byte is not new (a real camera's noise never repeats).
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from rosbot_patrol.alerts.pictures.jpeg import Picture, RawPicture
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams, EvidenceRing
 from rosbot_patrol.ros.runtime.node import now
 
-_SAMPLED = 211  # one byte of so many is looked at: 4,367 of a picture of 640 x 480
+_SAMPLED = 211  # one byte of this many is checked: 4,367 of a picture of 640 x 480
 _BLACK = 12  # of 255: a covered camera's noise stays below
 _MB = 1_000_000
 
 
 class PictureRing:
-    """Subscribes on `start`, forgets on `stop`; finds the picture that a detection speaks of.
+    """Subscribes on `start`, clears on `stop`; finds the picture of a detection.
 
     Args:
-        topic: of the camera; "" for none.
-        params: how many pictures to keep.
+        topic: of the camera; "": none.
+        params: number of pictures to keep.
     """
 
     def __init__(self, topic: str, params: EvidenceParams | None = None) -> None:
@@ -38,40 +38,40 @@ class PictureRing:
         self._ring = EvidenceRing(seconds=seconds, rate=given.evidence_rate, max_bytes=given.evidence_mb * _MB)
         self._subscriber: rospy.Subscriber | None = None
         self._seen_at = self._changed_at = float("-inf")
-        self._same: deque[float] = deque(maxlen=200)  # stamps of pictures that are the one before
-        self._same_since: float | None = None  # and of the first of those that go on until now
+        self._same: deque[float] = deque(maxlen=200)  # stamps of pictures equal to their predecessors
+        self._same_since: float | None = None  # stamp of the first of the present series
 
     @property
     def is_wanted(self) -> bool:
-        """There is a topic to look at."""
+        """Whether there is a topic."""
         return bool(self._topic)
 
     @property
     def seen_at(self) -> float:
-        """When the last picture came since `start` that is not black [s], -inf before."""
+        """Arrival of the last picture since `start` that is not black [s], -inf before."""
         return self._seen_at
 
     @property
     def changed_at(self) -> float:
-        """When the last picture came since `start` that differs from the one before [s], -inf before."""
+        """Arrival of the last picture since `start` that differs from its predecessor [s], -inf before."""
         return self._changed_at
 
     def is_same(self, stamp: float | None) -> bool:
-        """Whether the picture of a time [s], None for the newest, is known to be the one before, byte for byte."""
+        """Whether the picture at a time [s], None: the newest, is known to equal its predecessor byte for byte."""
         with self._lock:
             if self._same_since is not None and (stamp is None or stamp >= self._same_since):
                 return True
             return stamp is not None and any(abs(stamp - same) <= 0.002 for same in self._same)
 
     def start(self) -> None:
-        """Begin to collect, where it does not yet."""
+        """Start collecting, if it has not started."""
         if self._topic and self._subscriber is None:
             self._subscriber = rospy.Subscriber(
                 self._topic, Image, self._store, queue_size=2, buff_size=1 << 23, tcp_nodelay=True
             )
 
     def stop(self) -> None:
-        """Stop collecting and forget."""
+        """Stop collecting and clear."""
         if self._subscriber is not None:
             self._subscriber.unregister()
             self._subscriber = None
@@ -82,17 +82,17 @@ class PictureRing:
             self._seen_at = self._changed_at = float("-inf")
 
     def snapshot(self) -> EvidenceRing:
-        """What is there now, for threads that take their time."""
+        """The present pictures, for slow threads."""
         with self._lock:
             return self._ring.snapshot()
 
     def find(self, stamp: float, tolerance: float = 0.002) -> Picture | None:
-        """The picture nearest to a time [s], None where none lies within the tolerance."""
+        """Picture nearest to a time [s], None if there is none within the tolerance."""
         with self._lock:
             return self._ring.find(stamp, tolerance)
 
     def wait_for(self, stamp: float, seconds: float) -> Picture | None:
-        """`find`, again and again for some seconds of wall time; for threads that may wait."""
+        """Call `find` repeatedly for some seconds of wall time; for threads that may wait."""
         deadline = time.monotonic() + seconds
         while True:
             found = self.find(stamp)
@@ -125,5 +125,5 @@ class PictureRing:
 
 
 def is_black(data: bytes) -> bool:
-    """Whether no sample of a picture's bytes is bright enough to show anything."""
+    """Whether all samples of a picture's bytes are too dark to show anything."""
     return max(data[::_SAMPLED], default=0) < _BLACK

@@ -1,4 +1,4 @@
-"""Where the patrol listens to its camera's lens, to depth and to the map."""
+"""Topics of the camera's calibration, of depth images and of the map."""
 
 from __future__ import annotations
 
