@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What seeing costs the patrol: coverage, witness, boxes with depth, viewpoints, and the floor of our largest house.
+"""What seeing costs the patrol: coverage, lidar motion, boxes with depth, viewpoints, the floor of our largest house.
 
     python3 benchmarks/patrol_eyes.py [--json FILE]
 
@@ -29,7 +29,7 @@ from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.patrol.house.floor import Floor, floor_of
 from rosbot_patrol.patrol.house.regions import part_rooms
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.patrol.intruder.lidar_motion import Witness
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
 from rosbot_patrol.patrol.records.inputs import Box, Eye
 from rosbot_patrol.patrol.visibility.coverage import Coverage, sight_of_scan, sight_on_map
@@ -121,7 +121,7 @@ def coverage_ms(floor: Floor, mask: np.ndarray, pose: Pose2D, scan: LaserScan) -
 def witness_ms(floor: Floor, scans: list[LaserScan]) -> float:
     """A scan, those that are left out with them."""
     room = Pose2D(4.2, 2.3, 0.0)
-    witness = Witness()
+    witness = LidarMotion()
     began = time.perf_counter()
     for scan in scans:
         witness.see(scan, room, floor)

@@ -28,7 +28,7 @@ from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.patrol.house.floor import floor_of
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
 from rosbot_patrol.patrol.records.inputs import Box, Measured
@@ -106,20 +106,20 @@ def main() -> None:
     told: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     for house in HOUSES:
         stage = Stage(house)
-        judge = Judge(floor=stage.floor)
+        exclusions = Exclusions(floor=stage.floor)
         for kind in KINDS:
             for place in draw_places(stage.engine, rng, arguments.number):
                 there = put(stage, kind, place, rng)
                 if there is None:
                     continue
-                tell(stage, judge, kind, there, errors, told[kind])
+                tell(stage, exclusions, kind, there, errors, told[kind])
                 stage.engine.population.remove("it")
         stage.engine.close()
     report(errors, told, arguments.json)
 
 
 def tell(
-    stage: Stage, judge: Judge, kind: str, there: Pose2D, errors: dict[str, list[float]], told: Counter[str]
+    stage: Stage, exclusions: Exclusions, kind: str, there: Pose2D, errors: dict[str, list[float]], told: Counter[str]
 ) -> None:
     """Look, measure, and write down."""
     boxes, depth, off = stage.look()
@@ -131,7 +131,7 @@ def tell(
         return
     best = max(people, key=lambda box: box.probability)
     with_depth, without = measure(best, view, depth, off), measure(best, view, None, off)
-    refusal = judge.refusal(with_depth)
+    refusal = exclusions.refusal(with_depth)
     told[refusal or "taken for an intruder"] += 1
     if kind == "person":
         for m in (with_depth.measured, without.measured):

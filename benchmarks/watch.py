@@ -32,7 +32,7 @@ from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.params import load
-from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
+from rosbot_patrol.patrol.intruder.sightings import Sightings, SightingsParams
 from rosbot_patrol.patrol.records.inputs import Box, Frame
 from rosbot_patrol.simulation.engine import Engine, EngineParams
 from rosbot_patrol.simulation.render.egl import make_renderer
@@ -117,9 +117,9 @@ def turn(engine: Engine, detector: DarknetDetector, place: Pose2D) -> list[Frame
     return frames
 
 
-def judge(params: WatchParams, frames: list[Frame]) -> str:
+def judge(params: SightingsParams, frames: list[Frame]) -> str:
     """Class that the watch confirms on those pictures, "" for none."""
-    watch = Watch(CLASSES, params)
+    watch = Sightings(CLASSES, params)
     watch.start(0.0)
     for frame in frames:
         assert frame.stamp is not None
@@ -129,7 +129,7 @@ def judge(params: WatchParams, frames: list[Frame]) -> str:
     return ""
 
 
-def settings(weights_free: WatchParams) -> dict[str, WatchParams]:
+def settings(weights_free: SightingsParams) -> dict[str, SightingsParams]:
     """The shipped setting, and others beside it."""
     others = [(3, 5, 0.5), (3, 5, 0.65), (4, 6, 0.7), (5, 6, 0.7), (5, 6, 0.8)]
     named = {f"shipped: {weights_free.frames} of {weights_free.window} at {weights_free.min_score}": weights_free}
@@ -153,7 +153,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rng = np.random.default_rng(arguments.seed)
     tuned = yaml.safe_load((ROOT / "config" / "tuned" / "watch.yaml").read_text(encoding="utf-8"))["watch"]
-    chosen = settings(load(WatchParams, tuned))
+    chosen = settings(load(SightingsParams, tuned))
     detector = load_detector(arguments.cfg, arguments.weights, list(CLASSES), threshold=arguments.threshold)
     engine = make_engine(load_world(arguments.world))
     looks = arguments.looks.split(",")

@@ -19,7 +19,7 @@ from rosbot_patrol.costmap.params import SourceParams, read_costmap
 from rosbot_patrol.geometry import Pose2D, Transform, Twist2D
 from rosbot_patrol.grid import Grid, GridInfo
 from rosbot_patrol.patrol.house.floor import floor_of
-from rosbot_patrol.patrol.intruder.lidar_motion import Witness
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
 from rosbot_patrol.patrol.senses.health import NoHealth
 from rosbot_patrol.patrol.senses.lidar import Lidar
 from rosbot_patrol.patrol.senses.params import InputParams
@@ -183,7 +183,7 @@ def room_floor():
 @every_mount
 @every_limit
 def test_the_second_witness_sees_who_moved_on_the_right_side(mount: Transform, limit: float) -> None:
-    witness, floor = Witness(), room_floor()
+    witness, floor = LidarMotion(), room_floor()
     witness.start()
     for i in range(12):
         level = seen(mount, stamp=10.0 + 0.25 * i, posts=[(0.4 + 0.1 * i, 0.5)], range_max=limit)

@@ -22,7 +22,7 @@ from rosbot_patrol.params import load
 from rosbot_patrol.patrol.guard.arming import load_rules
 from rosbot_patrol.patrol.guard.schedule import load_schedule
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.patrol.intruder.sightings import WatchParams
+from rosbot_patrol.patrol.intruder.sightings import SightingsParams
 from rosbot_patrol.planning.local_planners.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
@@ -118,7 +118,7 @@ def test_networks_of_darknet_ros(name: str) -> None:
 
 def test_patrol() -> None:
     tree = given("rosbot_patrol.launch", "patrolling_node")
-    assert load(WatchParams, tree["watch"], name="/patrolling_node/watch/").frames == 5
+    assert load(SightingsParams, tree["watch"], name="/patrolling_node/watch/").frames == 5
     load_flat(NodeParams, tree)
 
 

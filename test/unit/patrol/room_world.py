@@ -12,7 +12,7 @@ from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalLink, GoalState
 from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.mission.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
 from rosbot_patrol.patrol.records.mission import Phase
@@ -58,7 +58,7 @@ class World:
         *,
         params: ManagerParams | None = None,
         eyes: SightParams | None = None,
-        judge: Judge | None = None,
+        exclusions: Exclusions | None = None,
         memory: dict | None = None,
         camera: bool = True,
         refused: Callable[[Pose2D], bool] = lambda pose: False,
@@ -67,7 +67,7 @@ class World:
         self.views = Eyes(eyes)
         self.house: RoomRegions | None = REGIONS if rooms is ROOMS else part_rooms(FLOOR, rooms)
         self.manager = PatrolManager(
-            rooms, params, views=self.views, viewpoints=self.views.instead, judge=judge, memory=memory
+            rooms, params, views=self.views, viewpoints=self.views.instead, exclusions=exclusions, memory=memory
         )
         self.people, self.camera, self.refused = people, camera, refused
         self.now, self.pose = 100.0, ROOMS.base.pose

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rosbot_patrol.patrol.intruder.exclusions import Judge, Reason, goes_on
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions, Reason, goes_on
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 
 _SAME = 1.0  # so near to each other two sightings are of one [m]
@@ -58,11 +58,11 @@ class CloseUps:
     """Those of one mission.
 
     Args:
-        judge: who tells pets, and what is too near to be told.
+        exclusions: what is a pet, and what is too near to tell.
     """
 
-    def __init__(self, judge: Judge) -> None:
-        self._judge = judge
+    def __init__(self, exclusions: Exclusions) -> None:
+        self._exclusions = exclusions
         self._pets: deque[Sighting] = deque(maxlen=20)
         self._people: deque[Sighting] = deque(maxlen=20)
         self._open: list[Sighting] = []
@@ -100,11 +100,11 @@ class CloseUps:
                 kept.append(box)
                 continue
             place = Sighting(*self._before_walls(m, eye), stamp, m.is_cut_aside, box.probability)
-            if self._judge.is_too_near(box) and not m.has_legs:
+            if self._exclusions.is_too_near(box) and not m.has_legs:
                 near.append((box, place))
                 continue
             kept.append(box)
-            exclusion = self._judge.exclusion(box)
+            exclusion = self._exclusions.exclusion(box)
             if exclusion is not None:
                 if exclusion.reason is Reason.PET:
                     self._pets.append(place)
@@ -115,14 +115,14 @@ class CloseUps:
         for box, place in near:
             if self._is_person(place):
                 kept.append(box)
-            elif self._judge.exclusion(box) is None and not any(place.may_be(pet) for pet in self._pets):
+            elif self._exclusions.exclusion(box) is None and not any(place.may_be(pet) for pet in self._pets):
                 is_left = True
                 self._note(place)
         return tuple(kept), is_left
 
     def _is_tall(self, box: Box, m: Measured) -> bool:
         """Taller than any pet, by a margin where the picture shows all of it."""
-        return m.top >= (self._judge.params.person_top_min if goes_on(box, m) else _TALL)
+        return m.top >= (self._exclusions.params.person_top_min if goes_on(box, m) else _TALL)
 
     def _note(self, place: Sighting) -> None:
         """The newest place of one counts, unless one shortly before tells more."""
@@ -132,9 +132,9 @@ class CloseUps:
 
     def _before_walls(self, m: Measured, eye: Eye | None) -> tuple[float, float]:
         """The place of something, on the near side of the wall that it stands before."""
-        if eye is None or self._judge.floor is None:
+        if eye is None or self._exclusions.floor is None:
             return m.x, m.y
-        return self._judge.floor.before((eye.pose.x, eye.pose.y), m.x, m.y, BEYOND)
+        return self._exclusions.floor.before((eye.pose.x, eye.pose.y), m.x, m.y, BEYOND)
 
     def _is_person(self, place: Sighting) -> bool:
         return sum(place.may_be(person) for person in self._people) >= _OFTEN

@@ -11,9 +11,9 @@ from rosbot_patrol.patrol.house.regions import NOBODYS, RoomRegions
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.intruder.camera_tracking import Track, TrackParams
 from rosbot_patrol.patrol.intruder.close_ups import CloseUps, Sighting
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.persons import People, PeopleParams
-from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
+from rosbot_patrol.patrol.intruder.sightings import Sightings, SightingsParams
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect, SuspectParams, Suspects
 from rosbot_patrol.patrol.records.findings import Confirmation, Person
 from rosbot_patrol.patrol.records.inputs import Frame, Inputs
@@ -28,7 +28,7 @@ class IntruderParams:
     """The groups of parameters that the decision is made with."""
 
     alarm_classes: Sequence[str]
-    watch: WatchParams
+    watch: SightingsParams
     suspects: SuspectParams
     people: PeopleParams
     track: TrackParams
@@ -59,14 +59,14 @@ class IntruderDecision:
     Args:
         rooms: of the points file.
         params: how sure to be.
-        judge: tells what cannot be an intruder.
+        exclusions: what cannot be an intruder.
     """
 
-    def __init__(self, rooms: Rooms, params: IntruderParams, judge: Judge) -> None:
-        self._rooms, self._params, self._judge = rooms, params, judge
-        self._watch = Watch(tuple(params.alarm_classes), params.watch, judge)
+    def __init__(self, rooms: Rooms, params: IntruderParams, exclusions: Exclusions) -> None:
+        self._rooms, self._params, self._exclusions = rooms, params, exclusions
+        self._sightings = Sightings(tuple(params.alarm_classes), params.watch, exclusions)
         self._suspects = Suspects(params.suspects)
-        self._close_ups = CloseUps(judge)
+        self._close_ups = CloseUps(exclusions)
         self._people = People(params.people)
         self._track = Track(params.track)
 
@@ -77,7 +77,7 @@ class IntruderDecision:
             now: steady time [s]; pictures taken before it do not count.
             met: places in map [m] of persons who were met before a restart, None where unknown.
         """
-        self._watch.start(now)
+        self._sightings.start(now)
         self._suspects.start(now)
         self._close_ups.start()
         self._track.reset()
@@ -95,12 +95,12 @@ class IntruderDecision:
             harmless: things that move and are no persons.
         """
         if inputs.house is not None:
-            self._judge.floor = inputs.house.floor
+            self._exclusions.floor = inputs.house.floor
         self._close_ups.add_pets(harmless)
         findings = []
         for given in inputs.frames:
             frame = self._leave_out_close_ups(now, given)
-            for seen in self._watch.add(now, frame):
+            for seen in self._sightings.add(now, frame):
                 self._suspects.told(seen.measured)
                 findings.append(self._find(now, seen, inputs.house))
             findings += [self._find(now, seen, inputs.house) for seen in self._weigh(frame)]
@@ -109,7 +109,7 @@ class IntruderDecision:
 
     def has_candidate(self, now: float) -> bool:
         """Whether a picture of the last moment shows something that may become an intruder."""
-        return self._watch.candidate(now)
+        return self._sightings.candidate(now)
 
     @property
     def doubtful(self) -> Sequence[Suspect]:
@@ -129,7 +129,7 @@ class IntruderDecision:
     @property
     def refusals(self) -> Mapping[str, int]:
         """Reasons why boxes were refused, and how often."""
-        return self._watch.refusals
+        return self._sightings.refusals
 
     @property
     def met(self) -> Sequence[Person]:
@@ -142,14 +142,14 @@ class IntruderDecision:
             return frame
         boxes, is_left = self._close_ups.sort(frame.stamp, frame.boxes, frame.eye)
         if is_left:
-            self._watch.glimpse(now)
+            self._sightings.glimpse(now)
         return dataclasses.replace(frame, boxes=boxes)
 
     def _weigh(self, frame: Frame) -> tuple[Confirmation, ...]:
         """Gather weak sightings by place."""
         if not frame.counts or frame.stamp is None or frame.eye is None:
             return ()
-        return self._suspects.add(frame.stamp, frame.eye.pose, self._watch.plausible(frame), frame.picture)
+        return self._suspects.add(frame.stamp, frame.eye.pose, self._sightings.plausible(frame), frame.picture)
 
     def _find(self, now: float, seen: Confirmation, house: RoomRegions | None) -> Finding:
         person, is_new = self._people.note(now, seen.measured)
@@ -182,8 +182,8 @@ class IntruderDecision:
         return self._track.step(now, inputs.yaw)
 
     def _point_camera(self, now: float, frame: Frame, inputs: Inputs) -> None:
-        boxes = self._watch.plausible(frame)
-        if not boxes or (self._watch.lately(now) < _LEAST_SEEN and not self._track.is_on):
+        boxes = self._sightings.plausible(frame)
+        if not boxes or (self._sightings.lately(now) < _LEAST_SEEN and not self._track.is_on):
             return
         if frame.eye is None or inputs.pose is None or inputs.yaw is None:
             return

@@ -15,7 +15,7 @@ from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 
 @dataclass(frozen=True, kw_only=True)
-class JudgeParams:
+class ExclusionParams:
     """Sizes and places that a person can have."""
 
     person_top_min: float = param(
@@ -36,7 +36,7 @@ class JudgeParams:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Known:
+class KnownObject:
     """Something that stands in the house and looks like somebody: place in map [m], reach [m], what it is."""
 
     x: float
@@ -79,7 +79,7 @@ class Exclusion:
 _NEAR_ERROR = 0.35  # of a place by the floor that is good enough to tell the size: right before the camera [m]
 
 
-class Judge:
+class Exclusions:
     """Refuses what cannot be an intruder.
 
     Args:
@@ -89,9 +89,9 @@ class Judge:
     """
 
     def __init__(
-        self, params: JudgeParams | None = None, known: tuple[Known, ...] = (), floor: Floor | None = None
+        self, params: ExclusionParams | None = None, known: tuple[KnownObject, ...] = (), floor: Floor | None = None
     ) -> None:
-        self.params, self.known, self.floor = params or JudgeParams(), known, floor
+        self.params, self.known, self.floor = params or ExclusionParams(), known, floor
 
     def exclusion(self, box: Box) -> Exclusion | None:
         """Why a box is no intruder, None if it may be one."""

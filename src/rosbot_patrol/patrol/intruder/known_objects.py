@@ -15,7 +15,7 @@ from typing import Any
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.patrol.intruder.exclusions import Known
+from rosbot_patrol.patrol.intruder.exclusions import KnownObject
 from rosbot_patrol.yaml_files import read_mapping
 
 
@@ -41,7 +41,7 @@ class _File:
     objects: list[Any] = params.param(doc="list of the known objects")
 
 
-def load_known(path: str | Path) -> tuple[Known, ...]:
+def load_known(path: str | Path) -> tuple[KnownObject, ...]:
     """Read the file; nothing where the path is empty.
 
     Raises:
@@ -54,8 +54,8 @@ def load_known(path: str | Path) -> tuple[Known, ...]:
     return tuple(_known(entry, f"{path}: objects/{i}/") for i, entry in enumerate(file.objects))
 
 
-def _known(tree: Any, name: str) -> Known:
+def _known(tree: Any, name: str) -> KnownObject:
     if not isinstance(tree, dict):
         raise ParamError(name, f"is {tree!r}, expected name, x, y, and maybe radius and label")
     entry = params.load(_Entry, tree, name=name)
-    return Known(x=entry.x, y=entry.y, radius=entry.radius, name=entry.name.strip(), label=entry.label)
+    return KnownObject(x=entry.x, y=entry.y, radius=entry.radius, name=entry.name.strip(), label=entry.label)

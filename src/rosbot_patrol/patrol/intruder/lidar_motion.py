@@ -1,9 +1,9 @@
-"""The second witness: what the lidar sees that the map does not show, and that moves.
+"""Motion that the lidar sees and the map does not explain.
 
-It needs no light and no camera, so that a patrol whose eyes failed still tells that something moved. Points on open
-floor that the map leaves free are put together to things, a thing is followed from scan to scan, and it has moved if it
-is some way from where it was first seen and the lidar now looks through that place. A chair that was pushed aside
-stands off the map, too, but stays; where much is off the map the robot does not know where it is, and nothing is told.
+It needs no light and no camera, so a patrol whose camera failed can still tell that something moved. Points on floor
+that the map leaves free are grouped, and each group is followed from scan to scan as a track. A track has moved if it
+is some way from its first place and the lidar now looks through that place. A chair that was pushed aside is off the
+map, too, but stays. If many points are off the map the robot does not know where it is, and nothing is told.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rosbot_patrol.scan import LaserScan, scan_points
 
 
 @dataclass(frozen=True, kw_only=True)
-class WitnessParams:
+class LidarMotionParams:
     """Conditions under which a lidar track counts as moving."""
 
     witness_reach: float = param(6.0, unit="m", lo=0.5, doc="maximum range of lidar points that are tracked")
@@ -57,7 +57,7 @@ class Moved:
 
 
 @dataclass
-class Thing:
+class LidarTrack:
     """Something that is followed.
 
     Attributes:
@@ -78,7 +78,7 @@ class Thing:
     shown: int = 0
 
 
-class Witness:
+class LidarMotion:
     """Follows what is not on the map.
 
     Args:
@@ -88,9 +88,9 @@ class Witness:
         things: that it follows; moved: what moved farthest.
     """
 
-    def __init__(self, params: WitnessParams | None = None) -> None:
-        self.params = params or WitnessParams()
-        self.things: list[Thing] = []
+    def __init__(self, params: LidarMotionParams | None = None) -> None:
+        self.params = params or LidarMotionParams()
+        self.things: list[LidarTrack] = []
         self._last = -math.inf
         self.moved: Moved | None = None
 
@@ -136,10 +136,10 @@ class Witness:
         for k in small:
             if k not in taken:
                 x, y = float(places[k][0]), float(places[k][1])
-                self.things.append(Thing(first=found[k], start=(x, y), since=now, x=x, y=y, at=now))
+                self.things.append(LidarTrack(first=found[k], start=(x, y), since=now, x=x, y=y, at=now))
         self.things = [thing for thing in self.things if now - thing.at <= p.thing_memory]
 
-    def _see_again(self, thing: Thing, now: float, place: Array, scan: LaserScan, map_from_laser: Pose2D) -> None:
+    def _see_again(self, thing: LidarTrack, now: float, place: Array, scan: LaserScan, map_from_laser: Pose2D) -> None:
         thing.x, thing.y, thing.at = float(place[0]), float(place[1]), now
         thing.looks += 1
         far = math.dist(thing.start, (thing.x, thing.y))

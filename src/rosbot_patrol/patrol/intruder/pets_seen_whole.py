@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 
 from rosbot_patrol.geometry import angle_difference
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
-from rosbot_patrol.patrol.intruder.lidar_motion import Thing
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
 from rosbot_patrol.patrol.intruder.second_looks import shows_whole
 from rosbot_patrol.patrol.records.inputs import Box, Eye
 from rosbot_patrol.patrol.visibility.coverage import Sight
@@ -35,7 +35,7 @@ class Harmless:
         """Where something was that is no person."""
         return tuple(self._sightings)
 
-    def look(self, now: float, eye: Eye, sight: Sight, boxes: Iterable[Box], things: Iterable[Thing]) -> None:
+    def look(self, now: float, eye: Eye, sight: Sight, boxes: Iterable[Box], things: Iterable[LidarTrack]) -> None:
         """Take in a picture.
 
         Args:
@@ -54,7 +54,7 @@ class Harmless:
                 self._sightings.append(Sighting(thing.x, thing.y, now))
 
 
-def _is_of(box: Box, eye: Eye, thing: Thing) -> bool:
+def _is_of(box: Box, eye: Eye, thing: LidarTrack) -> bool:
     bearing = math.atan2(thing.y - eye.pose.y, thing.x - eye.pose.x)
     ahead = angle_difference(bearing, eye.pose.yaw)
     return eye.bearing(box.xmax) - _BESIDE <= ahead <= eye.bearing(box.xmin) + _BESIDE

@@ -1,11 +1,10 @@
-"""When detections make an intruder: one class of alarm, in several pictures, over some time, sure enough.
+"""When detections make an intruder: one class of alarm, in several pictures, over some time, with enough probability.
 
-A detector that is shown the same picture again and again (a dead camera behind darknet_ros) adds nothing: pictures
-count by their stamp. Pictures in which nothing was seen count against. Sure is what the median of the pictures'
-probabilities is, so that one lucky picture does not make up for doubtful ones. Half of a thing looks like half of a
-person: what shows only in boxes that the picture's side cuts has to be surer; and so has what is no person. What the
-judge refuses (a pet, a poster, one outside) counts as nothing seen. Where places are known, only boxes near each other
-make one person: two who are in view at once are confirmed each.
+Pictures count by their stamp: the same picture again and again (a dead camera behind darknet_ros) adds nothing.
+Pictures without a detection count against. The median of the probabilities decides, so one lucky picture does not make
+up for doubtful ones. Boxes cut by the picture's side need a higher median, and so do classes other than person: half of
+a thing looks like half of a person. A box that the exclusions refuse (a pet, a poster, somebody outside) counts as
+nothing seen. If places are known, only boxes near each other make one person: two persons in view are confirmed each.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from collections import Counter, deque
 from dataclasses import dataclass
 
 from rosbot_patrol.params import param
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.records.findings import Confirmation
 from rosbot_patrol.patrol.records.inputs import Box, Frame, Measured
 
@@ -24,7 +23,7 @@ _AS_GOOD = 1.3  # so much larger may an error be in a newer picture
 
 
 @dataclass(frozen=True, kw_only=True)
-class WatchParams:
+class SightingsParams:
     """Sightings that make an intruder."""
 
     frames: int = param(3, lo=1, hi=100, doc="minimum number of images that show the intruder")
@@ -46,23 +45,26 @@ class WatchParams:
     )
 
 
-class Watch:
+class Sightings:
     """Collects pictures' boxes until they make an intruder.
 
     Args:
         alarm_classes: classes that alarm.
         params: how sure to be.
-        judge: who refuses what cannot be an intruder.
+        exclusions: boxes that cannot be an intruder.
 
     Attributes:
         refusals: why boxes were refused since `start`, and how often.
     """
 
     def __init__(
-        self, alarm_classes: tuple[str, ...], params: WatchParams | None = None, judge: Judge | None = None
+        self,
+        alarm_classes: tuple[str, ...],
+        params: SightingsParams | None = None,
+        exclusions: Exclusions | None = None,
     ) -> None:
-        self.params = params or WatchParams()
-        self.judge = judge or Judge()
+        self.params = params or SightingsParams()
+        self.exclusions = exclusions or Exclusions()
         self.refusals: Counter[str] = Counter()
         self._classes = frozenset(alarm_classes)
         self._views: deque[_View] = deque(maxlen=self.params.window)
@@ -88,7 +90,7 @@ class Watch:
                 return ()
             self._newest = stamp
         boxes = [box for box in frame.boxes if self._is_likely(box)]
-        refusals = {box: self.judge.refusal(box) for box in boxes}
+        refusals = {box: self.exclusions.refusal(box) for box in boxes}
         self.refusals.update(why for why in refusals.values() if why)
         picture = stamp if frame.picture is None else frame.picture
         view = _View(arrived=now, stamp=stamp, picture=picture, boxes=tuple(box for box in boxes if not refusals[box]))
@@ -112,7 +114,7 @@ class Watch:
 
     def plausible(self, frame: Frame) -> list[Box]:
         """Boxes of a picture that may show an intruder, the surest first."""
-        likely = (box for box in frame.boxes if self._is_likely(box) and not self.judge.refusal(box))
+        likely = (box for box in frame.boxes if self._is_likely(box) and not self.exclusions.refusal(box))
         return sorted(likely, key=_score, reverse=True)
 
     def lately(self, now: float, recent: float = 3.0) -> int:

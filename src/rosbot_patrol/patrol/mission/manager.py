@@ -31,7 +31,7 @@ from rosbot_patrol.geometry import distance
 from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.decision import IntruderDecision
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.frozen_camera import SamePictures
 from rosbot_patrol.patrol.mission.agenda import Agenda
 from rosbot_patrol.patrol.mission.interruptions import (
@@ -71,7 +71,7 @@ class PatrolManager:
         needs_camera: pictures come in, so that a silent camera can be told.
         views: what was seen of a room, and from where to see the rest.
         viewpoints: further poses that show a room whose own point cannot be reached.
-        judge: tells what cannot be an intruder.
+        exclusions: what cannot be an intruder.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class PatrolManager:
         needs_camera: bool = True,
         views: Views | None = None,
         viewpoints: Viewpoints | None = None,
-        judge: Judge | None = None,
+        exclusions: Exclusions | None = None,
     ) -> None:
         self.params = params = params or ManagerParams()
         kept = memory_from_plain(memory or {}, rooms)
@@ -94,7 +94,7 @@ class PatrolManager:
             needs_camera=needs_camera,
             views=views or OneTurn(),
             viewpoints=viewpoints,
-            decision=IntruderDecision(rooms, params.intruder, judge or Judge()),
+            decision=IntruderDecision(rooms, params.intruder, exclusions or Exclusions()),
             notices=NoticeGate(kept.held),
             status=StatusReports(agenda.queue, kept.last_verdict),
         )

@@ -14,9 +14,9 @@ from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams, check_battery
 from rosbot_patrol.patrol.intruder.camera_tracking import TrackParams
 from rosbot_patrol.patrol.intruder.decision import IntruderParams
-from rosbot_patrol.patrol.intruder.exclusions import JudgeParams
+from rosbot_patrol.patrol.intruder.exclusions import ExclusionParams
 from rosbot_patrol.patrol.intruder.persons import PeopleParams
-from rosbot_patrol.patrol.intruder.sightings import WatchParams
+from rosbot_patrol.patrol.intruder.sightings import SightingsParams
 from rosbot_patrol.patrol.intruder.weak_sightings import SuspectParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.search.look import LookParams
@@ -57,7 +57,7 @@ class ManagerParams(BehaviourParams):
     drive: DriveParams = DriveParams()
     look: LookParams = LookParams()
     spin: SpinParams = SpinParams()
-    watch: WatchParams = WatchParams()
+    watch: SightingsParams = SightingsParams()
     suspects: SuspectParams = SuspectParams()
     people: PeopleParams = PeopleParams()
     track: TrackParams = TrackParams()
@@ -96,9 +96,9 @@ class NodeParams(BehaviourParams, SightParams):
     schedule: str = param("", doc="file of the scheduled rounds; empty: none")
     arming: str = param("", doc="file of the arming modes; empty: every mode guards all rooms, without delays")
     known_objects: str = param("", doc="file of objects that look like a person (patrol/known_objects); empty: none")
-    watch: WatchParams = WatchParams()
+    watch: SightingsParams = SightingsParams()
     suspects: SuspectParams = SuspectParams()
-    judge: JudgeParams = JudgeParams()
+    judge: ExclusionParams = ExclusionParams()
     track: TrackParams = TrackParams()
     people: PeopleParams = PeopleParams()
     eyes: EyesTopics = EyesTopics()

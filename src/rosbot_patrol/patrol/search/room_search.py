@@ -11,7 +11,7 @@ from rosbot_patrol.geometry import Pose2D, angle_difference, wrap_angle
 from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
-from rosbot_patrol.patrol.intruder.lidar_motion import Witness
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
 from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
 from rosbot_patrol.patrol.intruder.second_looks import Doubt, Doubts
 from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
@@ -69,14 +69,14 @@ class Eyes:
         self.params = params or SightParams()
         self._ground: Ground | None = None  # until the map comes
         self._width = VIEW_WIDTH
-        self._witness = Witness(self.params.witness)
+        self._lidar_motion = LidarMotion(self.params.witness)
         self._started: _Search | None = None
 
     # -- Views
 
     def start(self, mission: Mission) -> None:
         """Begin with a room; viewpoints done before a restart count as seen, by the map."""
-        self._witness.start()
+        self._lidar_motion.start()
         self._started = _Search(mission=mission, doubts=Doubts(self.params.coverage.seen_in), calls=mission.triggers)
 
     @property
@@ -95,8 +95,8 @@ class Eyes:
         if self._ground is None or search.survey is None:
             return
         if view is not None:
-            self._witness.see(view.scan, view.map_from_laser, self._ground.house.floor)
-            if search.survey.has_motion(self._witness.things, view.scan.stamp):  # as good as the sensor's call
+            self._lidar_motion.see(view.scan, view.map_from_laser, self._ground.house.floor)
+            if search.survey.has_motion(self._lidar_motion.things, view.scan.stamp):  # as good as the sensor's call
                 search.called_at = now
         self._see_frames(search, search.survey, inputs)
 
@@ -114,7 +114,7 @@ class Eyes:
             search.doubts.look(frame.stamp, frame.eye, sight)
             if inputs.scan is not None:
                 stamp = inputs.scan.scan.stamp
-                search.harmless.look(stamp, frame.eye, sight, frame.boxes, self._witness.things)
+                search.harmless.look(stamp, frame.eye, sight, frame.boxes, self._lidar_motion.things)
 
     def suspect(self, doubtful: Sequence[Suspect]) -> None:
         """Look at what seems to be a person from another side."""
@@ -143,7 +143,7 @@ class Eyes:
         doubts = search.survey.doubts_here(search.doubts.grave()) if search.survey is not None else []
         if doubts:
             return doubts[0].text
-        unsure = search.doubts.unsure(bool(self._witness.text()))
+        unsure = search.doubts.unsure(bool(self._lidar_motion.text()))
         if unsure:
             return unsure
         is_enough = share is None or share >= self.params.clear_share
@@ -156,7 +156,7 @@ class Eyes:
 
     def moved(self) -> str:
         """What the lidar saw move, "" if nothing did."""
-        return self._witness.text()
+        return self._lidar_motion.text()
 
     def turn_from(self, pose: Pose2D | None, view: Viewpoint) -> float:
         """Angle to turn from where the robot stands [rad], the turn to the view's beginning with it."""
@@ -243,7 +243,7 @@ class Eyes:
 
     def _second_look(self, search: _Search, survey: Survey, pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the first doubt that has one."""
-        search.doubts.follow((thing.x, thing.y) for thing in self._witness.things if thing.has_moved)
+        search.doubts.follow((thing.x, thing.y) for thing in self._lidar_motion.things if thing.has_moved)
         doubts = survey.doubts_here(search.doubts.open())
         if not doubts:
             return None

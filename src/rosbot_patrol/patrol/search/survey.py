@@ -13,7 +13,7 @@ from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.house.regions import RoomRegions
 from rosbot_patrol.patrol.intruder.close_ups import BEYOND
-from rosbot_patrol.patrol.intruder.lidar_motion import Thing, WitnessParams, off_the_map
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotionParams, LidarTrack, off_the_map
 from rosbot_patrol.patrol.intruder.second_looks import Doubt
 from rosbot_patrol.patrol.records.inputs import Eye, Inputs
 from rosbot_patrol.patrol.records.mission import Mission
@@ -45,7 +45,7 @@ class SightParams:
     )
     coverage: CoverageParams = CoverageParams()
     viewpoints: ViewpointParams = ViewpointParams()
-    witness: WitnessParams = WitnessParams()
+    witness: LidarMotionParams = LidarMotionParams()
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Survey:
             return sight_on_map(floor, eye.pose.x, eye.pose.y, reach)
         return sight_of_scan(inputs.scan.scan, inputs.scan.map_from_laser, floor, reach)
 
-    def has_motion(self, things: Iterable[Thing], stamp: float) -> bool:
+    def has_motion(self, things: Iterable[LidarTrack], stamp: float) -> bool:
         """Whether something that moved is in the room at a time [s]."""
         moving = (thing for thing in things if thing.has_moved and thing.at >= stamp)
         return any(self._house.room_at(thing.x, thing.y) == self.mission.room.id for thing in moving)

@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable
 from typing import Any
 
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import ManagerParams, NodeParams
 from rosbot_patrol.patrol.records.inputs import Battery, Guarded, Inputs
@@ -83,7 +83,7 @@ class PatrolReplay:
         node: the node's own parameters; params: the manager's; frames: of tf.
         rooms: of the points file.
         sensors: whose id calls to which room.
-        judge: who refuses what cannot be an intruder.
+        exclusions: what cannot be an intruder.
         static: transforms that the bag lacks.
     """
 
@@ -98,11 +98,11 @@ class PatrolReplay:
         *,
         rooms: Rooms,
         sensors: SensorList,
-        judge: Judge,
+        exclusions: Exclusions,
         static: Iterable[Edge] = (),
     ) -> None:
         self._node, self._params, self._frames = node, params, frames
-        self._rooms, self._judge = rooms, judge
+        self._rooms, self._exclusions = rooms, exclusions
         self._sensor_rooms = SensorRooms(sensors)
         self._tree = TransformTree()
         for edge in static:
@@ -133,7 +133,7 @@ class PatrolReplay:
             needs_camera=CAMERA in names,
             views=views,
             viewpoints=views.instead,
-            judge=self._judge,
+            exclusions=self._exclusions,
         )
 
     def hear(self, name: str, now: float, content: Any) -> None:

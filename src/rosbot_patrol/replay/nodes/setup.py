@@ -17,7 +17,7 @@ from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.package_files import package_file, read_move_base
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.patrol.mission.params import NodeParams, manager_params
 from rosbot_patrol.patrol.senses.params import InputParams
@@ -173,7 +173,7 @@ def _patrol(setup: Setup) -> Replay:
         frames,
         rooms=rooms,
         sensors=load_sensors(node.sensors, names, rooms_source=str(rooms.source)),
-        judge=Judge(node.judge, load_known(node.known_objects)),
+        exclusions=Exclusions(node.judge, load_known(node.known_objects)),
         static=setup.static,
     )
 

@@ -38,7 +38,7 @@ from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules, load_rules, r
 from rosbot_patrol.patrol.guard.emergency import EmergencyStop
 from rosbot_patrol.patrol.guard.schedule import Schedule, load_schedule
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.resume import PatrolStore
@@ -123,7 +123,7 @@ class PatrolNode:
             needs_camera=self.pictures.is_wanted,
             views=views,
             viewpoints=views.instead,
-            judge=Judge(self.params.judge, load_known(self.params.known_objects)),
+            exclusions=Exclusions(self.params.judge, load_known(self.params.known_objects)),
         )
         how_many, how_often = count_of(len(rooms), "room"), count_of(len(rounds), "round")
         log.info("%s in %s, %s in the schedule", how_many, rooms.source, how_often)

@@ -9,7 +9,7 @@ from floors import drawn_floor
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.close_ups import CloseUps
-from rosbot_patrol.patrol.intruder.exclusions import Judge
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 
 
@@ -26,7 +26,7 @@ PERSON, PET = {"top": 1.6, "cut": False}, {"top": 0.6, "cut": False}
 
 @pytest.fixture
 def close_ups() -> CloseUps:
-    return CloseUps(Judge())
+    return CloseUps(Exclusions())
 
 
 def test_legs_alone_are_a_doubt(close_ups: CloseUps) -> None:
@@ -75,7 +75,7 @@ def test_an_unsure_sighting_tells_no_better_place_than_a_sure_one_shortly_before
 
 def test_what_is_measured_beyond_a_wall_stands_before_it() -> None:
     floor = drawn_floor("#######", "#.....#", "#.....#", "#######", "#.....#", "#######")  # 0.5 m a cell
-    close_ups, eye = CloseUps(Judge(floor=floor)), Eye(pose=Pose2D(1.0, 1.7, 1.57), width=1.0)
+    close_ups, eye = CloseUps(Exclusions(floor=floor)), Eye(pose=Pose2D(1.0, 1.7, 1.57), width=1.0)
     for y, seen in ((1.9, 1.9), (2.7, 2.45), (3.35, 3.35)):  # the last is too far beyond to be a poor measurement
         close_ups.start()
         close_ups.sort(1.0, (box(1.0, y=y),), eye)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 from floors import TWO_ROOMS, drawn_floor
 
-from rosbot_patrol.patrol.intruder.exclusions import Judge, Known
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions, KnownObject
 from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 FLOOR = drawn_floor(*TWO_ROOMS)
@@ -18,11 +18,11 @@ def box(*, label: str = "person", ymin: int = 60, ymax: int = 400, measured: boo
 
 
 def test_one_who_stands_in_the_room_is_not_refused() -> None:
-    assert Judge(floor=FLOOR).refusal(box()) == ""
+    assert Exclusions(floor=FLOOR).refusal(box()) == ""
 
 
 def test_what_was_not_measured_is_not_refused() -> None:
-    assert Judge(floor=FLOOR).refusal(box(measured=False)) == ""
+    assert Exclusions(floor=FLOOR).refusal(box(measured=False)) == ""
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_what_was_not_measured_is_not_refused() -> None:
     ],
 )
 def test_what_cannot_be_an_intruder_is_refused(fields: dict[str, float], why: str) -> None:
-    assert why in Judge(floor=FLOOR).refusal(box(**fields))
+    assert why in Exclusions(floor=FLOOR).refusal(box(**fields))
 
 
 @pytest.mark.parametrize(
@@ -57,26 +57,26 @@ def test_what_cannot_be_an_intruder_is_refused(fields: dict[str, float], why: st
     ],
 )
 def test_who_may_be_one_is_not_refused(fields: dict[str, float]) -> None:
-    assert Judge(floor=FLOOR).refusal(box(**fields)) == ""
+    assert Exclusions(floor=FLOOR).refusal(box(**fields)) == ""
 
 
 def test_the_size_of_other_classes_is_not_a_persons() -> None:
-    assert Judge().refusal(box(label="fire hydrant", top=0.6, height=0.6)) == ""
-    assert Judge().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_flat=True)) != ""
+    assert Exclusions().refusal(box(label="fire hydrant", top=0.6, height=0.6)) == ""
+    assert Exclusions().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_flat=True)) != ""
 
 
 def test_a_thing_has_to_be_whole_in_the_picture_from_left_to_right() -> None:
-    refusal = Judge().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_cut_aside=True))
+    refusal = Exclusions().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_cut_aside=True))
     assert refusal == "only a part of it is in the picture"
-    assert Judge().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_cut=True)) == ""
+    assert Exclusions().refusal(box(label="fire hydrant", top=0.6, height=0.6, is_cut=True)) == ""
 
 
 def test_a_known_object_is_refused_where_it_stands_only() -> None:
-    judge = Judge(known=(Known(x=2.0, y=2.0, radius=0.4, name="the statue", label="person"),))
-    assert judge.refusal(box()) == "it is the statue at (2.0, 2.0)"
-    assert judge.refusal(box(x=3.0)) == ""
-    assert judge.refusal(box(label="fire hydrant")) == ""
+    exclusions = Exclusions(known=(KnownObject(x=2.0, y=2.0, radius=0.4, name="the statue", label="person"),))
+    assert exclusions.refusal(box()) == "it is the statue at (2.0, 2.0)"
+    assert exclusions.refusal(box(x=3.0)) == ""
+    assert exclusions.refusal(box(label="fire hydrant")) == ""
 
 
 def test_without_a_map_nobody_is_outside() -> None:
-    assert Judge().refusal(box(x=40.0)) == ""
+    assert Exclusions().refusal(box(x=40.0)) == ""

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.patrol.intruder.exclusions import Known
+from rosbot_patrol.patrol.intruder.exclusions import KnownObject
 from rosbot_patrol.patrol.intruder.known_objects import load_known
 
 
@@ -25,8 +25,8 @@ def test_things_by_place_reach_and_class(tmp_path: Path) -> None:
         "  - {name: coat stand, x: 1, y: 2}\n",
     )
     assert load_known(path) == (
-        Known(x=2.1, y=-0.4, radius=0.8, name="Gipsbüste im Flur", label="person"),
-        Known(x=1.0, y=2.0, radius=0.5, name="coat stand", label=""),
+        KnownObject(x=2.1, y=-0.4, radius=0.8, name="Gipsbüste im Flur", label="person"),
+        KnownObject(x=1.0, y=2.0, radius=0.5, name="coat stand", label=""),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.intruder.lidar_motion import Thing
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
 from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
 from rosbot_patrol.patrol.records.inputs import Box, Eye
 from rosbot_patrol.patrol.visibility.coverage import Sight
@@ -17,15 +17,15 @@ EYE = Eye(pose=Pose2D(0.0, 0.0, 0.0), width=1.0)
 OPEN = Sight(x=0.0, y=0.0, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 6.0))
 
 
-def thing(x: float = 3.0, y: float = 0.0, *, moved: bool = True, at: float = 10.0) -> Thing:
-    return Thing(first=np.zeros((3, 2)), start=(0.0, 0.0), since=0.0, x=x, y=y, at=at, has_moved=moved)
+def thing(x: float = 3.0, y: float = 0.0, *, moved: bool = True, at: float = 10.0) -> LidarTrack:
+    return LidarTrack(first=np.zeros((3, 2)), start=(0.0, 0.0), since=0.0, x=x, y=y, at=at, has_moved=moved)
 
 
 def person(left: int, right: int, label: str = "person") -> Box:
     return Box(label=label, probability=0.4, xmin=left, ymin=10, xmax=right, ymax=300)
 
 
-def shown(given: Thing, boxes: tuple[Box, ...] = (), sight: Sight = OPEN, pictures: int = 20) -> int:
+def shown(given: LidarTrack, boxes: tuple[Box, ...] = (), sight: Sight = OPEN, pictures: int = 20) -> int:
     harmless = Harmless()
     for _ in range(pictures):
         harmless.look(10.0, EYE, sight, boxes, [given])
@@ -50,7 +50,7 @@ def test_a_thing_that_many_pictures_show_is_harmless_where_it_is():
         thing(at=9.0),  # it may be gone
     ],
 )
-def test_other_things_say_nothing(given: Thing):
+def test_other_things_say_nothing(given: LidarTrack):
     assert shown(given) == 0
 
 

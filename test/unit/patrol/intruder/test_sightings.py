@@ -1,7 +1,7 @@
 import pytest
 
-from rosbot_patrol.patrol.intruder.exclusions import Judge, Known
-from rosbot_patrol.patrol.intruder.sightings import Watch, WatchParams
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions, KnownObject
+from rosbot_patrol.patrol.intruder.sightings import Sightings, SightingsParams
 from rosbot_patrol.patrol.records.inputs import Box, Frame, Measured
 
 
@@ -22,7 +22,7 @@ def frames(*boxes, start=1.0, period=0.1):
 
 @pytest.fixture
 def watch():
-    watch = Watch(("person", "fire hydrant"))
+    watch = Sightings(("person", "fire hydrant"))
     watch.start(0.0)
     return watch
 
@@ -67,7 +67,7 @@ def test_the_same_picture_again_and_again_proves_nothing(watch):
 
 def test_pictures_from_before_the_mission_do_not_count():
     # the original mails when it is home again, from messages that waited (CONTRACTS A0, quirk 1)
-    watch = Watch(("person",))
+    watch = Sightings(("person",))
     watch.start(5.0)
     assert feed(watch, frames([box()], [box()], [box()], start=4.0), now=5.5) == []
 
@@ -112,7 +112,7 @@ def test_a_candidate_is_something_seen_lately(watch):
 
 
 def test_one_picture_is_enough_where_asked_for():
-    watch = Watch(("person",), WatchParams(frames=1, window=1, span=0.0))
+    watch = Sightings(("person",), SightingsParams(frames=1, window=1, span=0.0))
     assert len(feed(watch, frames([box()], start=1.0))) == 1
 
 
@@ -184,7 +184,7 @@ def test_one_box_that_is_whole_lets_the_usual_score_do(watch):
 
 
 def test_a_score_for_what_is_cut_below_the_usual_one_changes_nothing():
-    watch = Watch(("person",), WatchParams(min_score=0.7, cut_score=0.5))
+    watch = Sightings(("person",), SightingsParams(min_score=0.7, cut_score=0.5))
     assert feed(watch, frames(*[[placed(1.0, 1.0, 0.65, is_cut_aside=True)]] * 5)) == []
 
 
@@ -195,7 +195,7 @@ def test_what_is_no_person_has_to_be_surer(watch, probability, is_one):
 
 
 def test_what_the_judge_refuses_counts_as_nothing_seen_and_is_told():
-    watch = Watch(("person",), judge=Judge(known=(Known(x=1.0, y=1.0, name="the coat stand"),)))
+    watch = Sightings(("person",), exclusions=Exclusions(known=(KnownObject(x=1.0, y=1.0, name="the coat stand"),)))
     watch.start(0.0)
     assert feed(watch, frames(*[[placed(1.1, 1.0)]] * 4)) == []
     assert not watch.candidate(1.3)

@@ -11,7 +11,7 @@ from room_world import POINT, ROOMS, WIDTH, Place, World
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalState
 from rosbot_patrol.patrol.intruder.camera_tracking import TrackParams
-from rosbot_patrol.patrol.intruder.exclusions import Judge, Known
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions, KnownObject
 from rosbot_patrol.patrol.mission.manager import ManagerParams
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Phase
@@ -256,8 +256,8 @@ def test_a_poster_and_a_known_object_are_told_and_do_not_alarm() -> None:
     mission = world.mission()
     assert mission.verdict.value == "clear"
     assert "it is flat" in mission.reason
-    judge = Judge(known=(Known(x=7.0, y=1.0, name="the coat stand"),))
-    assert "the coat stand" in World(lambda now: [(7.0, 1.0)], judge=judge).mission().reason
+    exclusions = Exclusions(known=(KnownObject(x=7.0, y=1.0, name="the coat stand"),))
+    assert "the coat stand" in World(lambda now: [(7.0, 1.0)], exclusions=exclusions).mission().reason
 
 
 def test_without_a_map_a_turn_is_all_and_no_share_is_told() -> None:
