@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rosbot_patrol.patrol.records.commands import Word
+from rosbot_patrol.patrol.records.commands import OwnerMessage
 
 KIND = "the sensors' watch"
 
@@ -37,7 +37,7 @@ class Absence:
         quiet = now - self._heard
         return quiet if self.was_heard and quiet > self._silent_after else 0.0
 
-    def step(self, now: float) -> tuple[Word, ...]:
+    def step(self, now: float) -> tuple[OwnerMessage, ...]:
         """What the owner is told now; call it often: what this program slept through is not held against it."""
         is_gone = self.silence(now) > 0.0
         if is_gone == self._is_told:
@@ -50,4 +50,4 @@ class Absence:
         text = "the program sensor_watch has gone, or hangs: nobody tells of motion sensors that fail. See its log"
         if not is_gone:
             text = "the program sensor_watch is heard again: it tells of motion sensors that fail"
-        return (Word(kind=KIND, text=text, is_over=not is_gone),)
+        return (OwnerMessage(kind=KIND, text=text, is_over=not is_gone),)

@@ -9,7 +9,7 @@ from rosbot_patrol.patrol.guard.modes import DISARMED
 from rosbot_patrol.patrol.mission.mission_run import MissionRun
 from rosbot_patrol.patrol.mission.missions import Missions
 from rosbot_patrol.patrol.records.activity import ON_GUARD, Activity, Place, Whereabouts
-from rosbot_patrol.patrol.records.commands import Commands, Word
+from rosbot_patrol.patrol.records.commands import Commands, OwnerMessage
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Phase, Verdict
 from rosbot_patrol.patrol.records.request import Origin
@@ -50,7 +50,7 @@ class LowBattery:
             text = f"the battery is low ({level}): the robot goes home and waits there"
             text = text if is_low else f"the battery is no longer low ({level})"
             (log.warning if is_low else log.info)("%s", text)
-            out.words += (Word(kind="battery", text=text, is_over=not is_low),)
+            out.words += (OwnerMessage(kind="battery", text=text, is_over=not is_low),)
             self._went_home = False
         run = self._missions.run
         if is_low and run is not None and run.mission.phase is not Phase.RETURNING:
@@ -84,7 +84,7 @@ class EmergencyHold:
             self._hold(inputs.stop, out)
         elif self.is_on:
             self.is_on = False
-            out.words += (Word(kind=_STOP, text="the emergency stop is released", is_over=True),)
+            out.words += (OwnerMessage(kind=_STOP, text="the emergency stop is released", is_over=True),)
         return self.is_on
 
     def _hold(self, why: str, out: Commands) -> None:
@@ -92,7 +92,7 @@ class EmergencyHold:
         if not self.is_on:
             self.is_on = True
             out.cancel = out.cancel_all = True
-            out.words += (Word(kind=_STOP, text=f"{why}: nobody looks until it is released"),)
+            out.words += (OwnerMessage(kind=_STOP, text=f"{why}: nobody looks until it is released"),)
         missions.way_home = None
         out.goal, out.speed = None, 0.0
         if missions.run is not None:
@@ -144,6 +144,6 @@ def leave_out_off_the_map(run: MissionRun, inputs: Inputs, out: Commands) -> Non
     run.decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at: {problem}")
     if mission.origin is Origin.TRIGGER:
         text = f"motion in {mission.room.title}, which cannot be looked at: {problem}"
-        out.words += (Word(kind=f"room {mission.room.id}", text=text),)
+        out.words += (OwnerMessage(kind=f"room {mission.room.id}", text=text),)
     out.cancel = True
     run.turn_home(out)

@@ -72,7 +72,7 @@ class Ignored:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Word:
+class OwnerMessage:
     """Something that the owner has to know besides an intruder: the robot stays at home, or cannot go on.
 
     Attributes:
@@ -112,6 +112,6 @@ class Commands:
     ended: tuple[Mission, ...] = ()
     ignored: tuple[Ignored, ...] = ()
     suspects: tuple[str, ...] = ()
-    words: tuple[Word, ...] = ()
+    words: tuple[OwnerMessage, ...] = ()
     people: tuple[Person, ...] = ()
     changed: bool = False

@@ -26,7 +26,7 @@ from rosbot_patrol.alerts.safe_text import one_line, token
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.calls.ignored_log import IgnoredLog
-from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, Release, Word
+from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, OwnerMessage, Release
 from rosbot_patrol.patrol.story.mission_log import Entry, person_room
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.patrol.pictures import PictureRing
@@ -263,7 +263,7 @@ class AlertDesk:
         event = Event(wall=time.time(), kind="notice", text=text)
         self._keeper.put([Entry(incident=release.mission, events=(event,))])
 
-    def _tell(self, word: Word, wall: float) -> None:
+    def _tell(self, word: OwnerMessage, wall: float) -> None:
         """Tell the owner of something else than an intruder."""
         self._post.put(
             PostNotice(

@@ -42,7 +42,7 @@ from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.resume import PatrolStore
-from rosbot_patrol.patrol.records.commands import Commands, Word
+from rosbot_patrol.patrol.records.commands import Commands, OwnerMessage
 from rosbot_patrol.patrol.records.inputs import Box, Inputs
 from rosbot_patrol.patrol.records.mission import Phase
 from rosbot_patrol.patrol.records.request import Origin, Request
@@ -181,7 +181,7 @@ class PatrolNode:
         self.desk.start()
         if self._lost_calls:
             log.error("%s", self._lost_calls)
-            self.desk.follow(Commands(words=(Word(kind="calls lost", text=self._lost_calls),)))
+            self.desk.follow(Commands(words=(OwnerMessage(kind="calls lost", text=self._lost_calls),)))
         self.inputs.start()
         self.missed.start()
         self.neighbour.start()
@@ -239,7 +239,7 @@ class PatrolNode:
             for room in entry.rooms
         )
 
-    def _tell_owner(self, word: Word) -> None:
+    def _tell_owner(self, word: OwnerMessage) -> None:
         self.desk.follow(Commands(words=(word,)))
 
     def _note_sighting(self, stamp: float, boxes: Sequence[Box]) -> None:

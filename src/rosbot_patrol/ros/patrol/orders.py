@@ -22,7 +22,7 @@ from rosbot_patrol.patrol.guard.modes import DISARMED
 from rosbot_patrol.patrol.guard.schedule import all_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.mission.manager import PatrolManager
-from rosbot_patrol.patrol.records.commands import Word
+from rosbot_patrol.patrol.records.commands import OwnerMessage
 from rosbot_patrol.patrol.records.inputs import Guarded
 from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.ros.messages import convert
@@ -131,7 +131,7 @@ class ArmingDesk:
         self,
         arming: Arming,
         path: Path,
-        tell: Callable[[Word], None],
+        tell: Callable[[OwnerMessage], None],
         write_later: Callable[[Callable[[], None]], None],
     ) -> None:
         self._arming, self._path, self._tell, self._write_later = arming, path, tell, write_later
@@ -193,11 +193,11 @@ class ArmingDesk:
         self._publisher.publish(message)
 
 
-def changed_word(mode: str, text: str, caller: str, wall: float) -> Word:
+def changed_word(mode: str, text: str, caller: str, wall: float) -> OwnerMessage:
     """What the owner is told of another mode: what, who, from where, when."""
     when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(wall))
     kind = "disarmed" if mode == DISARMED else f"armed ({mode})"
-    return Word(kind=kind, text=f"{text}. Ordered by {caller}, by the service /patrol/arm, {when}")
+    return OwnerMessage(kind=kind, text=f"{text}. Ordered by {caller}, by the service /patrol/arm, {when}")
 
 
 class Orders:

@@ -9,7 +9,7 @@ import rospy
 
 from rosbot_patrol.msg import SensorStates
 from rosbot_patrol.patrol.guard.absence import Absence
-from rosbot_patrol.patrol.records.commands import Word
+from rosbot_patrol.patrol.records.commands import OwnerMessage
 from rosbot_patrol.ros.runtime.diagnostics import OK, WARN, Health
 
 log = logging.getLogger(__name__)
@@ -38,7 +38,7 @@ class Neighbour:
     def _on_states(self, _: SensorStates) -> None:
         self._absence.heard(time.monotonic())
 
-    def step(self) -> tuple[Word, ...]:
+    def step(self) -> tuple[OwnerMessage, ...]:
         """Say on /diagnostics how it is; what the owner is told."""
         now = time.monotonic()
         silence = self._absence.silence(now)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from rosbot_patrol.patrol.guard.absence import Absence
-from rosbot_patrol.patrol.records.commands import Word
+from rosbot_patrol.patrol.records.commands import OwnerMessage
 
 
-def steps(absence: Absence, begin: float, end: float, *, heard: bool = False) -> list[tuple[float, Word]]:
+def steps(absence: Absence, begin: float, end: float, *, heard: bool = False) -> list[tuple[float, OwnerMessage]]:
     """Ten steps a second; what was said, and when."""
     said = []
     for k in range(round((end - begin) * 10)):
