@@ -14,7 +14,7 @@ from rosbot_patrol.patrol.intruder.close_ups import CloseUps, Sighting
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.persons import People, PeopleParams
 from rosbot_patrol.patrol.intruder.sightings import Sightings, SightingsParams
-from rosbot_patrol.patrol.intruder.weak_sightings import Suspect, SuspectParams, Suspects
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting, WeakSightingParams, WeakSightings
 from rosbot_patrol.patrol.records.findings import Confirmation, Person
 from rosbot_patrol.patrol.records.inputs import Frame, Inputs
 
@@ -29,7 +29,7 @@ class IntruderParams:
 
     alarm_classes: Sequence[str]
     watch: SightingsParams
-    suspects: SuspectParams
+    suspects: WeakSightingParams
     people: PeopleParams
     track: TrackParams
 
@@ -65,7 +65,7 @@ class IntruderDecision:
     def __init__(self, rooms: Rooms, params: IntruderParams, exclusions: Exclusions) -> None:
         self._rooms, self._params, self._exclusions = rooms, params, exclusions
         self._sightings = Sightings(tuple(params.alarm_classes), params.watch, exclusions)
-        self._suspects = Suspects(params.suspects)
+        self._weak_sightings = WeakSightings(params.suspects)
         self._close_ups = CloseUps(exclusions)
         self._people = People(params.people)
         self._track = Track(params.track)
@@ -78,7 +78,7 @@ class IntruderDecision:
             met: places in map [m] of persons who were met before a restart, None where unknown.
         """
         self._sightings.start(now)
-        self._suspects.start(now)
+        self._weak_sightings.start(now)
         self._close_ups.start()
         self._track.reset()
         self._people = People(self._params.people)
@@ -101,7 +101,7 @@ class IntruderDecision:
         for given in inputs.frames:
             frame = self._leave_out_close_ups(now, given)
             for seen in self._sightings.add(now, frame):
-                self._suspects.told(seen.measured)
+                self._weak_sightings.told(seen.measured)
                 findings.append(self._find(now, seen, inputs.house))
             findings += [self._find(now, seen, inputs.house) for seen in self._weigh(frame)]
             self._point_camera(now, frame, inputs)
@@ -112,9 +112,9 @@ class IntruderDecision:
         return self._sightings.candidate(now)
 
     @property
-    def doubtful(self) -> Sequence[Suspect]:
+    def doubtful(self) -> Sequence[WeakSighting]:
         """Things that look like a person, from too few sides to tell."""
-        return self._suspects.doubtful()
+        return self._weak_sightings.doubtful()
 
     @property
     def too_near(self) -> Sequence[Sighting]:
@@ -122,9 +122,9 @@ class IntruderDecision:
         return self._close_ups.doubtful
 
     @property
-    def suspects(self) -> Sequence[Suspect]:
+    def suspects(self) -> Sequence[WeakSighting]:
         """Everything that looked a little like somebody."""
-        return self._suspects.all
+        return self._weak_sightings.all
 
     @property
     def refusals(self) -> Mapping[str, int]:
@@ -149,7 +149,7 @@ class IntruderDecision:
         """Gather weak sightings by place."""
         if not frame.counts or frame.stamp is None or frame.eye is None:
             return ()
-        return self._suspects.add(frame.stamp, frame.eye.pose, self._sightings.plausible(frame), frame.picture)
+        return self._weak_sightings.add(frame.stamp, frame.eye.pose, self._sightings.plausible(frame), frame.picture)
 
     def _find(self, now: float, seen: Confirmation, house: RoomRegions | None) -> Finding:
         person, is_new = self._people.note(now, seen.measured)

@@ -16,7 +16,7 @@ import numpy as np
 
 from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
-from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.inputs import Eye
 from rosbot_patrol.patrol.visibility.coverage import Sight
 
@@ -127,7 +127,7 @@ class Doubts:
         self._seen_in = seen_in
         self._all: list[Doubt] = []
         self._too_near: Sequence[Sighting] = ()  # what nobody has told from a pet yet
-        self._suspects: Sequence[Suspect] = ()
+        self._weak_sightings: Sequence[WeakSighting] = ()
 
     def __iter__(self) -> Iterator[Doubt]:
         return iter(self._all)
@@ -140,7 +140,7 @@ class Doubts:
                 return
         self._all.append(Doubt(x, y, label))
 
-    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+    def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """Take in what seems to be a person from one side, all that is so by now."""
         for suspect in doubtful:
             known = next((d for d in self._all if d.seen_from and suspect.apart(d.x, d.y) < _SAME_SUSPECT), None)
@@ -152,7 +152,7 @@ class Doubts:
         for doubt in self._all:
             if doubt.seen_from and not any(s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in doubtful):
                 doubt.is_visited = doubt.is_over = True
-        self._suspects = tuple(doubtful)
+        self._weak_sightings = tuple(doubtful)
 
     def near(self, doubtful: Sequence[Sighting]) -> None:
         """Take in what is too near to be told from a pet, all that is so by now."""
@@ -204,9 +204,9 @@ class Doubts:
 
     def _was_seen(self, doubt: Doubt, stamp: float) -> bool:
         """Whether a picture, or one after it, shows something like a person at a place."""
-        return any(s.seen_at >= stamp and s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in self._suspects) or any(
-            thing.at >= stamp and _apart(doubt, thing) < _SAME_SUSPECT for thing in self._too_near
-        )
+        return any(
+            s.seen_at >= stamp and s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in self._weak_sightings
+        ) or any(thing.at >= stamp and _apart(doubt, thing) < _SAME_SUSPECT for thing in self._too_near)
 
     def open(self) -> list[Doubt]:
         """Those seen in some pictures and not looked at again, or in vain: the way was blocked, or the view."""

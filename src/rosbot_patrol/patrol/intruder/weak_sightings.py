@@ -26,7 +26,7 @@ _PART = 0.25  # what the place of a part of it is worth, at the picture's edge
 
 
 @dataclass(frozen=True, kw_only=True)
-class SuspectParams:
+class WeakSightingParams:
     """Conclusions from uncertain sightings at one place."""
 
     weak_score: float = param(0.5, lo=0.0, hi=1.0, doc="minimum median score from one side for a weak sighting")
@@ -75,7 +75,7 @@ class Side:
 
 
 @dataclass
-class Suspect:
+class WeakSighting:
     """Something that looks like a person.
 
     Attributes:
@@ -108,16 +108,16 @@ class Suspect:
         return math.hypot(self.x - x, self.y - y)
 
 
-class Suspects:
+class WeakSightings:
     """Those of one mission.
 
     Args:
         params: what makes one a person.
     """
 
-    def __init__(self, params: SuspectParams | None = None) -> None:
-        self.params = params or SuspectParams()
-        self.all: list[Suspect] = []
+    def __init__(self, params: WeakSightingParams | None = None) -> None:
+        self.params = params or WeakSightingParams()
+        self.all: list[WeakSighting] = []
         self._newest = -math.inf
 
     def start(self, now: float) -> None:
@@ -160,16 +160,16 @@ class Suspects:
             if measured is None or suspect.apart(measured.x, measured.y) <= self.params.weak_apart + measured.error:
                 suspect.is_told = True
 
-    def doubtful(self) -> list[Suspect]:
+    def doubtful(self) -> list[WeakSighting]:
         """Those that looked like a person in some pictures, and are not confirmed."""
         least = self.params.doubt_pictures
         return [s for s in self.all if not s.is_told and any(len(side.scores) >= least for side in s.sides)]
 
-    def _take(self, box: Box, m: Measured, picture: float, boxes: tuple[Box, ...]) -> Suspect:
+    def _take(self, box: Box, m: Measured, picture: float, boxes: tuple[Box, ...]) -> WeakSighting:
         near = [s for s in self.all if s.label == box.label and s.apart(m.x, m.y) <= self.params.weak_apart]
         weight = (_PART if m.is_cut_aside else 1.0) / max(m.error, 0.05) ** 2
         if not near:
-            self.all.append(Suspect(box.label, m.x, m.y, weight, box, picture, boxes))
+            self.all.append(WeakSighting(box.label, m.x, m.y, weight, box, picture, boxes))
             return self.all[-1]
         suspect = min(near, key=lambda s: s.apart(m.x, m.y))
         suspect.weight += weight
@@ -179,7 +179,7 @@ class Suspects:
             suspect.best, suspect.picture, suspect.boxes = box, picture, boxes
         return suspect
 
-    def _side(self, suspect: Suspect, eye: Pose2D) -> Side:
+    def _side(self, suspect: WeakSighting, eye: Pose2D) -> Side:
         bearing = math.atan2(eye.y - suspect.y, eye.x - suspect.x)
         nearest = min(suspect.sides, key=lambda s: abs(angle_difference(s.bearing, bearing)), default=None)
         if nearest is None or abs(angle_difference(nearest.bearing, bearing)) > self.params.side_angle:
@@ -188,7 +188,7 @@ class Suspects:
         nearest.eye = eye
         return nearest
 
-    def _witnesses(self, suspect: Suspect) -> list[Side]:
+    def _witnesses(self, suspect: WeakSighting) -> list[Side]:
         least = self.params.cut_score
         return [s for s in suspect.sides if self._is_weak(s) and (not s.is_cut or s.score >= least)]
 
@@ -198,7 +198,7 @@ class Suspects:
     def _lasts(self, side: Side) -> bool:
         return len(side.scores) >= self.params.grave_pictures and side.score >= self.params.grave_score
 
-    def _confirmation(self, suspect: Suspect) -> Confirmation:
+    def _confirmation(self, suspect: WeakSighting) -> Confirmation:
         others = tuple(box for box in suspect.boxes if box is not suspect.best)
         scores = [score for side in self._witnesses(suspect) for score in side.scores]
         return Confirmation(

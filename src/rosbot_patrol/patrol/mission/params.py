@@ -17,7 +17,7 @@ from rosbot_patrol.patrol.intruder.decision import IntruderParams
 from rosbot_patrol.patrol.intruder.exclusions import ExclusionParams
 from rosbot_patrol.patrol.intruder.persons import PeopleParams
 from rosbot_patrol.patrol.intruder.sightings import SightingsParams
-from rosbot_patrol.patrol.intruder.weak_sightings import SuspectParams
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSightingParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.search.look import LookParams
 from rosbot_patrol.patrol.search.survey import SightParams
@@ -58,7 +58,7 @@ class ManagerParams(BehaviourParams):
     look: LookParams = LookParams()
     spin: SpinParams = SpinParams()
     watch: SightingsParams = SightingsParams()
-    suspects: SuspectParams = SuspectParams()
+    suspects: WeakSightingParams = WeakSightingParams()
     people: PeopleParams = PeopleParams()
     track: TrackParams = TrackParams()
     priorities: PriorityParams = PriorityParams()
@@ -97,7 +97,7 @@ class NodeParams(BehaviourParams, SightParams):
     arming: str = param("", doc="file of the arming modes; empty: every mode guards all rooms, without delays")
     known_objects: str = param("", doc="file of objects that look like a person (patrol/known_objects); empty: none")
     watch: SightingsParams = SightingsParams()
-    suspects: SuspectParams = SuspectParams()
+    suspects: WeakSightingParams = WeakSightingParams()
     judge: ExclusionParams = ExclusionParams()
     track: TrackParams = TrackParams()
     people: PeopleParams = PeopleParams()

@@ -8,7 +8,7 @@ from typing import Protocol
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
-from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
@@ -26,7 +26,7 @@ class Views(Protocol):
     def see(self, now: float, inputs: Inputs) -> None:
         """Take in one step of the drive to the room or of the look."""
 
-    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+    def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """Take in everything that looks like a person from too few sides."""
 
     def step_back(self, doubtful: Sequence[Sighting]) -> None:
@@ -63,7 +63,7 @@ class OneTurn:
     def see(self, now: float, inputs: Inputs) -> None:
         """Nothing to see."""
 
-    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+    def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """There is no other side."""
 
     def step_back(self, doubtful: Sequence[Sighting]) -> None:

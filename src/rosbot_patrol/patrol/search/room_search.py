@@ -14,7 +14,7 @@ from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
 from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
 from rosbot_patrol.patrol.intruder.second_looks import Doubt, Doubts
-from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission
 from rosbot_patrol.patrol.search.survey import Ground, SightParams, Survey
@@ -116,7 +116,7 @@ class Eyes:
                 stamp = inputs.scan.scan.stamp
                 search.harmless.look(stamp, frame.eye, sight, frame.boxes, self._lidar_motion.things)
 
-    def suspect(self, doubtful: Sequence[Suspect]) -> None:
+    def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """Look at what seems to be a person from another side."""
         self._search.doubts.suspect(doubtful)
 

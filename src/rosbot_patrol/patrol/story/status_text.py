@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.weak_sightings import Suspect
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.commands import Commands, Report
 from rosbot_patrol.patrol.records.findings import Confirmation
 from rosbot_patrol.patrol.records.inputs import Guarded
@@ -60,7 +60,7 @@ def clear(mission: Mission, turned_deg: float, refusals: Mapping[str, int]) -> s
     return ", ".join(parts)
 
 
-def suspects(found: Iterable[Suspect]) -> tuple[str, ...]:
+def suspects(found: Iterable[WeakSighting]) -> tuple[str, ...]:
     """What looked like somebody, for the record: where, how surely, from which sides."""
     texts = []
     for suspect in found:

@@ -8,7 +8,7 @@ import pytest
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.second_looks import Doubts
-from rosbot_patrol.patrol.intruder.weak_sightings import Suspect, Suspects
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting, WeakSightings
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 from rosbot_patrol.patrol.visibility.coverage import Sight
 
@@ -57,11 +57,11 @@ def test_a_look_counts_for_the_place_it_showed_only():
     assert [(d.x, d.y) for d in doubts.open()] == [(0.0, 1.0)]
 
 
-def suspects(*eyes: Pose2D, score: float = 0.6) -> list[Suspect]:
+def suspects(*eyes: Pose2D, score: float = 0.6) -> list[WeakSighting]:
     """Something at (0, 0) that looks more or less like a person from some places for long."""
     measured = Measured(x=0.0, y=0.0, error=0.2, away=3.0, top=1.0, height=0.7, width=0.5)
     box = Box(label="person", probability=score, xmin=100, ymin=50, xmax=200, ymax=250, measured=measured)
-    seen, now = Suspects(), 1.0
+    seen, now = WeakSightings(), 1.0
     for eye in eyes:
         for _ in range(9):
             now += 0.1

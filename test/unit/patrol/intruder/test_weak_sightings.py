@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.intruder.weak_sightings import SuspectParams, Suspects
+from rosbot_patrol.patrol.intruder.weak_sightings import WeakSightingParams, WeakSightings
 from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 WEST, SOUTH, SOUTH_WEST = Pose2D(-3.0, 0.0, 0.0), Pose2D(0.0, -3.0, 1.57), Pose2D(-3.0, -1.0, 0.3)
@@ -20,7 +20,7 @@ class Seen:
     """Pictures at ten a second."""
 
     def __init__(self, **params: float) -> None:
-        self.suspects = Suspects(SuspectParams(**params))
+        self.suspects = WeakSightings(WeakSightingParams(**params))
         self.suspects.start(100.0)
         self.now = 100.0
 
