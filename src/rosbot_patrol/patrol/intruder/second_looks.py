@@ -39,7 +39,7 @@ _BODY = 0.4  # in front of a place its own body may end a beam [m]
 
 
 @dataclass
-class Doubt:
+class SecondLook:
     """A place [m] in map where something like a person, or what else alarms, was seen.
 
     Attributes:
@@ -116,7 +116,7 @@ class Doubt:
         return self.is_visited and bool(self.known_from) and shows_anew(eye, sight, self)
 
 
-class Doubts:
+class SecondLooks:
     """Those of one mission.
 
     Args:
@@ -125,11 +125,11 @@ class Doubts:
 
     def __init__(self, seen_in: int) -> None:
         self._seen_in = seen_in
-        self._all: list[Doubt] = []
+        self._all: list[SecondLook] = []
         self._too_near: Sequence[Sighting] = ()  # what nobody has told from a pet yet
         self._weak_sightings: Sequence[WeakSighting] = ()
 
-    def __iter__(self) -> Iterator[Doubt]:
+    def __iter__(self) -> Iterator[SecondLook]:
         return iter(self._all)
 
     def far(self, label: str, x: float, y: float) -> None:
@@ -138,14 +138,14 @@ class Doubts:
             if not doubt.seen_from and not doubt.is_near and math.hypot(doubt.x - x, doubt.y - y) < _SAME_FAR:
                 doubt.pictures += 1
                 return
-        self._all.append(Doubt(x, y, label))
+        self._all.append(SecondLook(x, y, label))
 
     def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """Take in what seems to be a person from one side, all that is so by now."""
         for suspect in doubtful:
             known = next((d for d in self._all if d.seen_from and suspect.apart(d.x, d.y) < _SAME_SUSPECT), None)
             if known is None:
-                known = Doubt(suspect.x, suspect.y, suspect.label, pictures=self._seen_in)
+                known = SecondLook(suspect.x, suspect.y, suspect.label, pictures=self._seen_in)
                 self._all.append(known)
             known.is_grave = suspect.is_grave
             known.seen_from = tuple(side.eye for side in suspect.sides)
@@ -159,7 +159,7 @@ class Doubts:
         for thing in doubtful:
             known = next((d for d in self._all if d.is_near and _apart(d, thing) < _SAME_FAR), None)
             if known is None:
-                self._all.append(Doubt(thing.x, thing.y, pictures=self._seen_in, is_near=True))
+                self._all.append(SecondLook(thing.x, thing.y, pictures=self._seen_in, is_near=True))
             elif known.was_at == (thing.x, thing.y):
                 continue
             elif not known.is_visited:
@@ -202,24 +202,24 @@ class Doubts:
             else:
                 doubt.looks += 1
 
-    def _was_seen(self, doubt: Doubt, stamp: float) -> bool:
+    def _was_seen(self, doubt: SecondLook, stamp: float) -> bool:
         """Whether a picture, or one after it, shows something like a person at a place."""
         return any(
             s.seen_at >= stamp and s.apart(doubt.x, doubt.y) < _SAME_SUSPECT for s in self._weak_sightings
         ) or any(thing.at >= stamp and _apart(doubt, thing) < _SAME_SUSPECT for thing in self._too_near)
 
-    def open(self) -> list[Doubt]:
+    def open(self) -> list[SecondLook]:
         """Those seen in some pictures and not looked at again, or in vain: the way was blocked, or the view."""
         known = [doubt for doubt in self._all if doubt.pictures >= self._seen_in]
         return [doubt for doubt in known if not doubt.is_visited or (self._is_in_vain(doubt) and doubt.goes_on)]
 
-    def grave(self) -> list[Doubt]:
+    def grave(self) -> list[SecondLook]:
         """Those without whose second look nobody can say that nobody is there."""
         return [doubt for doubt in self.open() if doubt.is_grave and not doubt.is_visited] + [
             doubt for doubt in self._all if doubt.seen_from and doubt.is_grave and self._is_in_vain(doubt)
         ]
 
-    def _is_in_vain(self, doubt: Doubt) -> bool:
+    def _is_in_vain(self, doubt: SecondLook) -> bool:
         """It was seen from one side, or too near, and pictures from elsewhere did not show its place, or it again."""
         wanted = self._seen_in if doubt.is_near else max(_LOOKS, doubt.again) if doubt.seen_from else 0
         return doubt.is_visited and not doubt.is_over and doubt.looks < wanted
@@ -234,18 +234,18 @@ class Doubts:
         """
         for thing in self._too_near:
             if is_moving or not any(self._was_looked_at(doubt, thing) for doubt in self._all):
-                return Doubt(thing.x, thing.y, is_near=True).text
+                return SecondLook(thing.x, thing.y, is_near=True).text
         return ""
 
-    def _was_looked_at(self, doubt: Doubt, thing: Sighting) -> bool:
+    def _was_looked_at(self, doubt: SecondLook, thing: Sighting) -> bool:
         return doubt.is_near and doubt.looks >= self._seen_in and _apart(doubt, thing) < _SAME_FAR
 
 
-def _apart(doubt: Doubt, thing: Sighting) -> float:
+def _apart(doubt: SecondLook, thing: Sighting) -> float:
     return math.dist(doubt.was_at or (doubt.x, doubt.y), (thing.x, thing.y))
 
 
-def shows_anew(eye: Eye, sight: Sight, doubt: Doubt) -> bool:
+def shows_anew(eye: Eye, sight: Sight, doubt: SecondLook) -> bool:
     """Whether a picture shows a place from another side than those known, or from nearer than any of them."""
     away, bearing = math.hypot(doubt.x - eye.pose.x, doubt.y - eye.pose.y), _bearing(eye.pose, doubt)
     aside = min(abs(angle_difference(_bearing(known, doubt), bearing)) for known in doubt.known_from)
@@ -261,7 +261,7 @@ def shows_whole(eye: Eye, sight: Sight, x: float, y: float) -> bool:
     return _WHOLE <= away <= _BACK[1] + 0.5 and _is_in_view(eye, sight, away, bearing)
 
 
-def _bearing(eye: Pose2D, doubt: Doubt) -> float:
+def _bearing(eye: Pose2D, doubt: SecondLook) -> float:
     return math.atan2(doubt.y - eye.y, doubt.x - eye.x)
 
 

@@ -13,7 +13,7 @@ from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
 from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
-from rosbot_patrol.patrol.intruder.second_looks import Doubt, Doubts
+from rosbot_patrol.patrol.intruder.second_looks import SecondLook, SecondLooks
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission
@@ -44,7 +44,7 @@ class _Search:
     """
 
     mission: Mission
-    doubts: Doubts
+    doubts: SecondLooks
     calls: int
     harmless: Harmless = field(default_factory=Harmless)
     survey: Survey | None = None
@@ -77,7 +77,9 @@ class Eyes:
     def start(self, mission: Mission) -> None:
         """Begin with a room; viewpoints done before a restart count as seen, by the map."""
         self._lidar_motion.start()
-        self._started = _Search(mission=mission, doubts=Doubts(self.params.coverage.seen_in), calls=mission.triggers)
+        self._started = _Search(
+            mission=mission, doubts=SecondLooks(self.params.coverage.seen_in), calls=mission.triggers
+        )
 
     @property
     def _search(self) -> _Search:
@@ -297,12 +299,12 @@ class Eyes:
 
 
 def _view_of(
-    doubt: Doubt, pose: Pose2D, planner: ViewpointPlanner, stands: Mask | None, span: Mapping[str, float]
+    doubt: SecondLook, pose: Pose2D, planner: ViewpointPlanner, stands: Mask | None, span: Mapping[str, float]
 ) -> Viewpoint | None:
     return planner.near(pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, tried=doubt.tried, **span)
 
 
-def _with_sweep(doubt: Doubt, view: Viewpoint) -> Viewpoint:
+def _with_sweep(doubt: SecondLook, view: Viewpoint) -> Viewpoint:
     """The viewpoint with its stay, and a sweep over what looks a little like a person: each picture differs."""
     if doubt.is_near:
         return replace(view, stay=_STAY_NEAR)

@@ -14,7 +14,7 @@ from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.house.regions import RoomRegions
 from rosbot_patrol.patrol.intruder.close_ups import BEYOND
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotionParams, LidarTrack, off_the_map
-from rosbot_patrol.patrol.intruder.second_looks import Doubt
+from rosbot_patrol.patrol.intruder.second_looks import SecondLook
 from rosbot_patrol.patrol.records.inputs import Eye, Inputs
 from rosbot_patrol.patrol.records.mission import Mission
 from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
@@ -91,7 +91,7 @@ class Survey:
         moving = (thing for thing in things if thing.has_moved and thing.at >= stamp)
         return any(self._house.room_at(thing.x, thing.y) == self.mission.room.id for thing in moving)
 
-    def doubts_here(self, doubts: Iterable[Doubt]) -> list[Doubt]:
+    def doubts_here(self, doubts: Iterable[SecondLook]) -> list[SecondLook]:
         """The doubts in the room, or right in front of the robot."""
         room = self.mission.room.id
         return [d for d in doubts if d.is_near or self._house.room_at(*self._before_walls(d)) == room]
@@ -124,7 +124,7 @@ class Survey:
         radius = self._params.viewpoints.hideout
         return self._house.floor.open_to(unseen, radius) if radius > 0.0 else np.zeros(unseen.shape, bool)
 
-    def _before_walls(self, doubt: Doubt) -> tuple[float, float]:
+    def _before_walls(self, doubt: SecondLook) -> tuple[float, float]:
         """The place of a doubt, moved before the wall if it was measured beyond one."""
         if not doubt.seen_from:
             return doubt.x, doubt.y

@@ -7,7 +7,7 @@ import pytest
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
-from rosbot_patrol.patrol.intruder.second_looks import Doubts
+from rosbot_patrol.patrol.intruder.second_looks import SecondLooks
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting, WeakSightings
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 from rosbot_patrol.patrol.visibility.coverage import Sight
@@ -21,7 +21,7 @@ def near(x: float, y: float, at: float = 0.0) -> Sighting:
 
 
 def test_what_was_too_near_wants_one_look():
-    doubts = Doubts(SEEN_IN)
+    doubts = SecondLooks(SEEN_IN)
     doubts.near([near(1.0, 0.0)])
     (doubt,) = doubts.open()
     assert doubt.spans == ({"nearest": 2.0, "most": 4.5},)
@@ -34,7 +34,7 @@ def test_what_was_too_near_wants_one_look():
 
 
 def test_what_was_too_near_and_came_along_is_looked_at_again_but_not_for_ever():
-    doubts = Doubts(SEEN_IN)
+    doubts = SecondLooks(SEEN_IN)
     doubts.near([near(0.0, 0.0)])
     visits = 0
     for k in range(10):
@@ -46,7 +46,7 @@ def test_what_was_too_near_and_came_along_is_looked_at_again_but_not_for_ever():
 
 
 def test_a_look_counts_for_the_place_it_showed_only():
-    doubts = Doubts(SEEN_IN)
+    doubts = SecondLooks(SEEN_IN)
     doubts.near([near(0.0, 0.0)])
     doubts.open()[0].visit(Pose2D(0.0, 0.0, 0.0))
     for _ in range(SEEN_IN):
@@ -81,7 +81,7 @@ def suspects(*eyes: Pose2D, score: float = 0.6) -> list[WeakSighting]:
     ],
 )
 def test_one_side_is_not_all_until_pictures_of_another_showed_the_place(eye: Pose2D, is_told: bool) -> None:
-    doubts, way = Doubts(SEEN_IN), Pose2D(0.0, 2.0, 0.0)
+    doubts, way = SecondLooks(SEEN_IN), Pose2D(0.0, 2.0, 0.0)
     sight = Sight(x=eye.x, y=eye.y, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 5.0))
     doubts.suspect(suspects(Pose2D(3.0, 0.0, math.pi)))
     for visit in range(4):
@@ -102,7 +102,7 @@ def test_one_side_is_not_all_until_pictures_of_another_showed_the_place(eye: Pos
 
 @pytest.mark.parametrize(("seen", "empty", "is_told"), [(9, 5, False), (9, 9, True), (3, 5, True), (0, 5, True)])
 def test_a_second_look_that_shows_somebody_again_tells_nothing(seen: int, empty: int, is_told: bool) -> None:
-    doubts, first, second = Doubts(SEEN_IN), Pose2D(3.0, 0.0, math.pi), Pose2D(1.5, 0.0, math.pi)
+    doubts, first, second = SecondLooks(SEEN_IN), Pose2D(3.0, 0.0, math.pi), Pose2D(1.5, 0.0, math.pi)
     doubts.suspect(suspects(first))
     (doubt,) = doubts.open()
     doubt.visit(second)
@@ -116,7 +116,7 @@ def test_a_second_look_that_shows_somebody_again_tells_nothing(seen: int, empty:
 
 
 def test_what_looks_little_like_a_person_gets_two_looks_at_most_and_is_not_grave() -> None:
-    doubts = Doubts(SEEN_IN)
+    doubts = SecondLooks(SEEN_IN)
     doubts.suspect(suspects(Pose2D(3.0, 0.0, math.pi), score=0.45))
     for _ in range(2):
         (doubt,) = doubts.open()
@@ -125,9 +125,9 @@ def test_what_looks_little_like_a_person_gets_two_looks_at_most_and_is_not_grave
     assert doubts.grave() == []
 
 
-def looked_at() -> Doubts:
+def looked_at() -> SecondLooks:
     """Something too near was at (0, 0), whose place was seen from farther off since."""
-    doubts = Doubts(SEEN_IN)
+    doubts = SecondLooks(SEEN_IN)
     doubts.near([near(0.0, 0.0)])
     doubts.open()[0].visit(Pose2D(3.0, 0.0, math.pi))
     for _ in range(SEEN_IN):
@@ -169,7 +169,7 @@ def test_what_moves_where_it_was_seen_or_far_away_is_not_followed(place: tuple[f
 
 
 def test_where_something_moves_what_was_too_near_may_have_gone():
-    doubts = Doubts(SEEN_IN)
+    doubts = SecondLooks(SEEN_IN)
     doubts.near([near(0.0, 0.0)])
     for _ in range(SEEN_IN):
         doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
@@ -180,7 +180,7 @@ def test_where_something_moves_what_was_too_near_may_have_gone():
 
 
 def test_what_was_seen_far_off_takes_some_pictures():
-    doubts = Doubts(SEEN_IN)
+    doubts = SecondLooks(SEEN_IN)
     for k in range(SEEN_IN):
         assert doubts.open() == []
         doubts.far("fire hydrant", 6.0 + 0.1 * k, 0.0)
