@@ -24,7 +24,7 @@ _BESIDE = 0.15  # a box that begins so far beside a thing is of another [rad]
 _KEPT = 20
 
 
-class Harmless:
+class PetsSeenWhole:
     """Those of one mission."""
 
     def __init__(self) -> None:

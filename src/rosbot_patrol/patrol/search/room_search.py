@@ -12,7 +12,7 @@ from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.intruder.close_ups import Sighting
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
-from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
+from rosbot_patrol.patrol.intruder.pets_seen_whole import PetsSeenWhole
 from rosbot_patrol.patrol.intruder.second_looks import SecondLook, SecondLooks
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.inputs import Inputs
@@ -46,7 +46,7 @@ class _Search:
     mission: Mission
     doubts: SecondLooks
     calls: int
-    harmless: Harmless = field(default_factory=Harmless)
+    harmless: PetsSeenWhole = field(default_factory=PetsSeenWhole)
     survey: Survey | None = None
     has_eye: bool = False
     now: float = 0.0

@@ -9,7 +9,7 @@ import pytest
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
-from rosbot_patrol.patrol.intruder.pets_seen_whole import Harmless
+from rosbot_patrol.patrol.intruder.pets_seen_whole import PetsSeenWhole
 from rosbot_patrol.patrol.records.inputs import Box, Eye
 from rosbot_patrol.patrol.visibility.coverage import Sight
 
@@ -26,14 +26,14 @@ def person(left: int, right: int, label: str = "person") -> Box:
 
 
 def shown(given: LidarTrack, boxes: tuple[Box, ...] = (), sight: Sight = OPEN, pictures: int = 20) -> int:
-    harmless = Harmless()
+    harmless = PetsSeenWhole()
     for _ in range(pictures):
         harmless.look(10.0, EYE, sight, boxes, [given])
     return len(harmless.sightings)
 
 
 def test_a_thing_that_many_pictures_show_is_harmless_where_it_is():
-    harmless, dog = Harmless(), thing()
+    harmless, dog = PetsSeenWhole(), thing()
     for _ in range(7):
         harmless.look(10.0, EYE, OPEN, (), [dog])
     assert not harmless.sightings
