@@ -15,7 +15,7 @@ from rosbot_patrol.params import param
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrackParams:
+class CameraTrackingParams:
     """Keeping a person in the camera's view."""
 
     track_time: float = param(
@@ -30,11 +30,11 @@ class TrackParams:
     track_band: float = param(0.08, unit="rad", lo=0.0, hi=1.0, doc="dead band around the image centre")
 
 
-class Track:
+class CameraTracking:
     """Holds the camera on one person at a time."""
 
-    def __init__(self, params: TrackParams | None = None) -> None:
-        self.params = params or TrackParams()
+    def __init__(self, params: CameraTrackingParams | None = None) -> None:
+        self.params = params or CameraTrackingParams()
         self._since: float | None = None
         self._seen_at = -math.inf
         self._yaw: float | None = None

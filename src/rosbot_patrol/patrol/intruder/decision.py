@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rosbot_patrol.patrol.house.regions import NOBODYS, RoomRegions
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
-from rosbot_patrol.patrol.intruder.camera_tracking import Track, TrackParams
+from rosbot_patrol.patrol.intruder.camera_tracking import CameraTracking, CameraTrackingParams
 from rosbot_patrol.patrol.intruder.close_ups import CloseUps, Sighting
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.persons import People, PeopleParams
@@ -31,7 +31,7 @@ class IntruderParams:
     watch: SightingsParams
     suspects: WeakSightingParams
     people: PeopleParams
-    track: TrackParams
+    track: CameraTrackingParams
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ class IntruderDecision:
         self._weak_sightings = WeakSightings(params.suspects)
         self._close_ups = CloseUps(exclusions)
         self._people = People(params.people)
-        self._track = Track(params.track)
+        self._camera_tracking = CameraTracking(params.track)
 
     def start(self, now: float, met: Iterable[tuple[float, float] | None]) -> None:
         """Forget everything, for a new mission.
@@ -80,7 +80,7 @@ class IntruderDecision:
         self._sightings.start(now)
         self._weak_sightings.start(now)
         self._close_ups.start()
-        self._track.reset()
+        self._camera_tracking.reset()
         self._people = People(self._params.people)
         self._people.recall(met, now)
 
@@ -176,17 +176,17 @@ class IntruderDecision:
     def camera_speed(self, now: float, inputs: Inputs) -> float | None:
         """Turning speed that keeps somebody in view [rad/s], None if nobody is followed."""
         lost = " and ".join(["its pose in the map"] * (inputs.pose is None) + ["its heading"] * (inputs.yaw is None))
-        if lost and self._track.is_on:
+        if lost and self._camera_tracking.is_on:
             log.warning("the camera no longer follows whom it sees: the robot does not know %s", lost)
-            self._track.release(now)
-        return self._track.step(now, inputs.yaw)
+            self._camera_tracking.release(now)
+        return self._camera_tracking.step(now, inputs.yaw)
 
     def _point_camera(self, now: float, frame: Frame, inputs: Inputs) -> None:
         boxes = self._sightings.plausible(frame)
-        if not boxes or (self._sightings.lately(now) < _LEAST_SEEN and not self._track.is_on):
+        if not boxes or (self._sightings.lately(now) < _LEAST_SEEN and not self._camera_tracking.is_on):
             return
         if frame.eye is None or inputs.pose is None or inputs.yaw is None:
             return
         column = (boxes[0].xmin + boxes[0].xmax) / 2.0
         in_odom = frame.eye.pose.yaw - inputs.pose.yaw + inputs.yaw  # a correction of the map's part does not turn odom
-        self._track.see(now, frame.eye.bearing(column), in_odom)
+        self._camera_tracking.see(now, frame.eye.bearing(column), in_odom)

@@ -12,7 +12,7 @@ from typing import Any
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams, check_battery
-from rosbot_patrol.patrol.intruder.camera_tracking import TrackParams
+from rosbot_patrol.patrol.intruder.camera_tracking import CameraTrackingParams
 from rosbot_patrol.patrol.intruder.decision import IntruderParams
 from rosbot_patrol.patrol.intruder.exclusions import ExclusionParams
 from rosbot_patrol.patrol.intruder.persons import PeopleParams
@@ -60,7 +60,7 @@ class ManagerParams(BehaviourParams):
     watch: SightingsParams = SightingsParams()
     suspects: WeakSightingParams = WeakSightingParams()
     people: PeopleParams = PeopleParams()
-    track: TrackParams = TrackParams()
+    track: CameraTrackingParams = CameraTrackingParams()
     priorities: PriorityParams = PriorityParams()
     battery: BatteryParams = BatteryParams()
 
@@ -99,7 +99,7 @@ class NodeParams(BehaviourParams, SightParams):
     watch: SightingsParams = SightingsParams()
     suspects: WeakSightingParams = WeakSightingParams()
     judge: ExclusionParams = ExclusionParams()
-    track: TrackParams = TrackParams()
+    track: CameraTrackingParams = CameraTrackingParams()
     people: PeopleParams = PeopleParams()
     eyes: EyesTopics = EyesTopics()
 

@@ -4,10 +4,12 @@ import math
 
 import pytest
 
-from rosbot_patrol.patrol.intruder.camera_tracking import Track, TrackParams
+from rosbot_patrol.patrol.intruder.camera_tracking import CameraTracking, CameraTrackingParams
 
 
-def play(track: Track, bearing_of, seconds: float, yaw: float = 0.0, seen=lambda now: True) -> tuple[float, float]:
+def play(
+    track: CameraTracking, bearing_of, seconds: float, yaw: float = 0.0, seen=lambda now: True
+) -> tuple[float, float]:
     """Turn a base as told at 20 Hz; the heading at the end and the time at which it let go (inf: not)."""
     now, let_go = 0.0, math.inf
     while now < seconds:
@@ -23,18 +25,18 @@ def play(track: Track, bearing_of, seconds: float, yaw: float = 0.0, seen=lambda
 
 @pytest.mark.parametrize("bearing", [0.4, -0.5, 3.0])
 def test_the_camera_turns_to_the_person(bearing: float) -> None:
-    yaw, let_go = play(Track(), lambda _: bearing, 6.0)
+    yaw, let_go = play(CameraTracking(), lambda _: bearing, 6.0)
     assert math.remainder(yaw - bearing, math.tau) == pytest.approx(0.0, abs=0.1)
     assert let_go == math.inf
 
 
 def test_one_who_walks_past_is_followed() -> None:
-    yaw, _ = play(Track(), lambda now: 0.3 * now, 5.0)
+    yaw, _ = play(CameraTracking(), lambda now: 0.3 * now, 5.0)
     assert yaw == pytest.approx(1.5, abs=0.35)
 
 
 def test_the_speed_is_bounded() -> None:
-    track = Track(TrackParams(track_speed=0.5))
+    track = CameraTracking(CameraTrackingParams(track_speed=0.5))
     track.see(0.0, 2.0, 0.0)
     assert track.step(0.05, 0.0) == 0.5
     track.see(0.1, -2.0, 0.0)
@@ -42,18 +44,18 @@ def test_the_speed_is_bounded() -> None:
 
 
 def test_one_in_the_middle_needs_no_turning() -> None:
-    track = Track()
+    track = CameraTracking()
     track.see(0.0, 0.02, 1.0)
     assert track.step(0.05, 1.0) == 0.0
 
 
 def test_whoever_is_lost_is_waited_for_a_moment() -> None:
-    _, let_go = play(Track(), lambda _: 0.0, 6.0, seen=lambda now: now < 2.0)
+    _, let_go = play(CameraTracking(), lambda _: 0.0, 6.0, seen=lambda now: now < 2.0)
     assert let_go == pytest.approx(3.5, abs=0.2)
 
 
 def test_whoever_stays_is_let_go_and_not_taken_again_for_a_while() -> None:
-    track = Track(TrackParams(track_time=4.0, track_pause=10.0))
+    track = CameraTracking(CameraTrackingParams(track_time=4.0, track_pause=10.0))
     _, let_go = play(track, lambda _: 0.0, 12.0)
     assert let_go == pytest.approx(4.0, abs=0.2)
     assert not track.is_on
@@ -62,7 +64,7 @@ def test_whoever_stays_is_let_go_and_not_taken_again_for_a_while() -> None:
 
 
 def test_one_who_walks_to_and_fro_is_watched_no_longer_in_all() -> None:
-    track = Track(TrackParams(track_time=6.0, track_lost=1.0, track_pause=10.0))
+    track = CameraTracking(CameraTrackingParams(track_time=6.0, track_lost=1.0, track_pause=10.0))
     held = []
     for k in range(1200):  # in view for 3 of 5 s, a minute long
         now = 0.05 * k
@@ -76,7 +78,7 @@ def test_one_who_walks_to_and_fro_is_watched_no_longer_in_all() -> None:
 
 
 def test_whoever_comes_much_later_is_watched_from_the_beginning() -> None:
-    track = Track(TrackParams(track_time=4.0, track_pause=10.0))
+    track = CameraTracking(CameraTrackingParams(track_time=4.0, track_pause=10.0))
     play(track, lambda _: 0.0, 6.0, seen=lambda now: now < 2.0)
     track.see(20.0, 0.0, 0.0)
     track.see(23.0, 0.0, 0.0)
@@ -84,13 +86,13 @@ def test_whoever_comes_much_later_is_watched_from_the_beginning() -> None:
 
 
 def test_it_can_be_switched_off() -> None:
-    track = Track(TrackParams(track_time=0.0))
+    track = CameraTracking(CameraTrackingParams(track_time=0.0))
     track.see(0.0, 1.0, 0.0)
     assert track.step(0.0, 0.0) is None
 
 
 def test_without_a_heading_it_stands() -> None:
-    track = Track()
+    track = CameraTracking()
     track.see(0.0, 1.0, None)
     assert not track.is_on
     track.see(0.0, 1.0, 0.0)

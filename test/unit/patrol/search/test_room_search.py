@@ -10,7 +10,7 @@ from room_world import POINT, ROOMS, WIDTH, Place, World
 
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalState
-from rosbot_patrol.patrol.intruder.camera_tracking import TrackParams
+from rosbot_patrol.patrol.intruder.camera_tracking import CameraTrackingParams
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions, KnownObject
 from rosbot_patrol.patrol.mission.manager import ManagerParams
 from rosbot_patrol.patrol.records.inputs import Inputs
@@ -219,7 +219,7 @@ def test_a_turn_towards_somebody_ends_where_the_pose_in_the_map_is_lost(caplog: 
 
 def test_whom_the_robot_turns_to_is_found_by_odometry_alone() -> None:
     """A correction of the map's heading by the localisation in mid turn does not lead the camera astray."""
-    world = World(walks, params=ManagerParams(track=TrackParams(track_time=30.0)))
+    world = World(walks, params=ManagerParams(track=CameraTrackingParams(track_time=30.0)))
     step, off = world.manager.step, [0.0]
 
     def turned(now, inputs):
