@@ -12,7 +12,7 @@ from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.intruder.camera_tracking import CameraTracking, CameraTrackingParams
 from rosbot_patrol.patrol.intruder.close_ups import CloseUps, Sighting
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions
-from rosbot_patrol.patrol.intruder.persons import People, PeopleParams
+from rosbot_patrol.patrol.intruder.persons import Persons, PersonsParams
 from rosbot_patrol.patrol.intruder.sightings import Sightings, SightingsParams
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting, WeakSightingParams, WeakSightings
 from rosbot_patrol.patrol.records.findings import Confirmation, Person
@@ -30,7 +30,7 @@ class IntruderParams:
     alarm_classes: Sequence[str]
     watch: SightingsParams
     suspects: WeakSightingParams
-    people: PeopleParams
+    people: PersonsParams
     track: CameraTrackingParams
 
 
@@ -67,7 +67,7 @@ class IntruderDecision:
         self._sightings = Sightings(tuple(params.alarm_classes), params.watch, exclusions)
         self._weak_sightings = WeakSightings(params.suspects)
         self._close_ups = CloseUps(exclusions)
-        self._people = People(params.people)
+        self._persons = Persons(params.people)
         self._camera_tracking = CameraTracking(params.track)
 
     def start(self, now: float, met: Iterable[tuple[float, float] | None]) -> None:
@@ -81,8 +81,8 @@ class IntruderDecision:
         self._weak_sightings.start(now)
         self._close_ups.start()
         self._camera_tracking.reset()
-        self._people = People(self._params.people)
-        self._people.recall(met, now)
+        self._persons = Persons(self._params.people)
+        self._persons.recall(met, now)
 
     # -- who is there
 
@@ -134,7 +134,7 @@ class IntruderDecision:
     @property
     def met(self) -> Sequence[Person]:
         """Persons who were confirmed."""
-        return self._people.met
+        return self._persons.met
 
     def _leave_out_close_ups(self, now: float, frame: Frame) -> Frame:
         """Boxes too near to tell a person from a pet prove nothing, but the robot stops for them."""
@@ -152,14 +152,14 @@ class IntruderDecision:
         return self._weak_sightings.add(frame.stamp, frame.eye.pose, self._sightings.plausible(frame), frame.picture)
 
     def _find(self, now: float, seen: Confirmation, house: RoomRegions | None) -> Finding:
-        person, is_new = self._people.note(now, seen.measured)
+        person, is_new = self._persons.note(now, seen.measured)
         room, is_outside = self._room_at(person, house)
         person.label, person.room = seen.label, room.title if room else ""
         return Finding(
             seen=seen,
             number=person.number,
             is_new=is_new,
-            places=tuple(self._people.places),
+            places=tuple(self._persons.places),
             room=room,
             is_outside=is_outside,
         )

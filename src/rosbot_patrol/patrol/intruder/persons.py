@@ -16,7 +16,7 @@ from rosbot_patrol.patrol.records.inputs import Measured
 
 
 @dataclass(frozen=True, kw_only=True)
-class PeopleParams:
+class PersonsParams:
     """Conditions under which two sightings are of the same person."""
 
     same_person: float = param(1.0, unit="m", lo=0.1, doc="sightings closer than this belong to the same person")
@@ -26,11 +26,11 @@ class PeopleParams:
     walked_most: float = param(5.0, unit="m", lo=0.0, doc="limit of that growth; beyond it stands another person")
 
 
-class People:
+class Persons:
     """Those met on one mission."""
 
-    def __init__(self, params: PeopleParams | None = None) -> None:
-        self.params = params or PeopleParams()
+    def __init__(self, params: PersonsParams | None = None) -> None:
+        self.params = params or PersonsParams()
         self.met: list[Person] = []
 
     def recall(self, places: Iterable[tuple[float, float] | None], now: float) -> None:

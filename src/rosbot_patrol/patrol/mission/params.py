@@ -15,7 +15,7 @@ from rosbot_patrol.patrol.guard.battery import BatteryParams, check_battery
 from rosbot_patrol.patrol.intruder.camera_tracking import CameraTrackingParams
 from rosbot_patrol.patrol.intruder.decision import IntruderParams
 from rosbot_patrol.patrol.intruder.exclusions import ExclusionParams
-from rosbot_patrol.patrol.intruder.persons import PeopleParams
+from rosbot_patrol.patrol.intruder.persons import PersonsParams
 from rosbot_patrol.patrol.intruder.sightings import SightingsParams
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSightingParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
@@ -59,7 +59,7 @@ class ManagerParams(BehaviourParams):
     spin: SpinParams = SpinParams()
     watch: SightingsParams = SightingsParams()
     suspects: WeakSightingParams = WeakSightingParams()
-    people: PeopleParams = PeopleParams()
+    people: PersonsParams = PersonsParams()
     track: CameraTrackingParams = CameraTrackingParams()
     priorities: PriorityParams = PriorityParams()
     battery: BatteryParams = BatteryParams()
@@ -100,7 +100,7 @@ class NodeParams(BehaviourParams, SightParams):
     suspects: WeakSightingParams = WeakSightingParams()
     judge: ExclusionParams = ExclusionParams()
     track: CameraTrackingParams = CameraTrackingParams()
-    people: PeopleParams = PeopleParams()
+    people: PersonsParams = PersonsParams()
     eyes: EyesTopics = EyesTopics()
 
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from rosbot_patrol.patrol.intruder.persons import People
+from rosbot_patrol.patrol.intruder.persons import Persons
 from rosbot_patrol.patrol.records.inputs import Measured
 
 
@@ -9,13 +9,13 @@ def at(x: float, y: float = 0.0, error: float = 0.1) -> Measured:
 
 
 def test_the_same_place_is_the_same_person() -> None:
-    people = People()
+    people = Persons()
     assert [people.note(t, at(1.0 + 0.1 * t))[1] for t in (0.0, 0.5, 20.0)] == [True, False, False]
     assert people.met[0].sightings == 3
 
 
 def test_somebody_elsewhere_at_once_is_another() -> None:
-    people = People()
+    people = Persons()
     people.note(0.0, at(0.0))
     person, is_new = people.note(0.1, at(3.0))
     assert (person.number, is_new) == (2, True)
@@ -24,26 +24,26 @@ def test_somebody_elsewhere_at_once_is_another() -> None:
 
 
 def test_one_who_walked_on_is_the_same() -> None:
-    people = People()
+    people = Persons()
     people.note(0.0, at(0.0))
     assert people.note(4.0, at(4.0)) == (people.met[0], False)
 
 
 def test_one_whom_nobody_can_have_walked_to_is_another() -> None:
-    people = People()
+    people = Persons()
     people.note(0.0, at(0.0))
     assert people.note(60.0, at(9.0))[1]
 
 
 def test_without_a_place_it_is_whom_was_seen_last() -> None:
-    people = People()
+    people = Persons()
     people.note(0.0, at(0.0))
     people.note(0.1, at(5.0))
     assert people.note(0.2, None)[0].number == 2
 
 
 def test_the_place_is_the_last_sure_one() -> None:
-    people = People()
+    people = Persons()
     people.note(0.0, at(1.0))
     people.note(0.2, at(1.8, error=0.9))
     assert people.met[0].x == 1.0
@@ -52,7 +52,7 @@ def test_the_place_is_the_last_sure_one() -> None:
 
 
 def test_of_two_who_may_be_it_the_nearer_is() -> None:
-    people = People()
+    people = Persons()
     people.note(0.0, at(0.0))
     people.note(0.1, at(4.0))
     for t in range(1, 30):
