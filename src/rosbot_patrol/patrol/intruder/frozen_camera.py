@@ -18,7 +18,7 @@ TURNED = 0.05  # likewise [rad]
 log = logging.getLogger(__name__)
 
 
-class SamePictures:
+class FrozenCamera:
     """Leaves out what a camera that hangs shows."""
 
     def __init__(self) -> None:

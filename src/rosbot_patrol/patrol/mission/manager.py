@@ -32,7 +32,7 @@ from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Rooms
 from rosbot_patrol.patrol.intruder.decision import IntruderDecision
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions
-from rosbot_patrol.patrol.intruder.frozen_camera import SamePictures
+from rosbot_patrol.patrol.intruder.frozen_camera import FrozenCamera
 from rosbot_patrol.patrol.mission.agenda import Agenda
 from rosbot_patrol.patrol.mission.interruptions import (
     EmergencyHold,
@@ -102,7 +102,7 @@ class PatrolManager:
         self._battery = LowBattery(params.battery, self._missions)
         self._hold = EmergencyHold(self._missions)
         self._steady = SteadyInputs()
-        self._same_pictures = SamePictures()
+        self._frozen_camera = FrozenCamera()
         self._is_first = True
         self._inputs = Inputs()  # of the last step
         self._pending = Commands()  # of orders since then
@@ -230,7 +230,7 @@ class PatrolManager:
             inputs: since the last step.
         """
         out, self._pending = self._pending, Commands()
-        inputs = dataclasses.replace(inputs, frames=self._same_pictures.left(inputs.frames))
+        inputs = dataclasses.replace(inputs, frames=self._frozen_camera.left(inputs.frames))
         inputs = self._inputs = self._steady.step(now, inputs)
         self._parts.status.mode = inputs.guarded.mode
         if self._is_first and self._missions.run is not None:
