@@ -16,7 +16,7 @@ from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.mission.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
 from rosbot_patrol.patrol.records.mission import Phase
-from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.room_search import RoomSearch
 from rosbot_patrol.patrol.search.survey import SightParams
 
 WIDTH = 1.047
@@ -64,7 +64,7 @@ class World:
         refused: Callable[[Pose2D], bool] = lambda pose: False,
         rooms: Rooms = ROOMS,
     ) -> None:
-        self.views = Eyes(eyes)
+        self.views = RoomSearch(eyes)
         self.house: RoomRegions | None = REGIONS if rooms is ROOMS else part_rooms(FLOOR, rooms)
         self.manager = PatrolManager(
             rooms, params, views=self.views, viewpoints=self.views.instead, exclusions=exclusions, memory=memory

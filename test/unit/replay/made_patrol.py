@@ -18,7 +18,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.goal import GoalState
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import NodeParams
-from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.room_search import RoomSearch
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -71,7 +71,7 @@ class RecordedWorld(World):
     """The world, and what rosbag would have written of it."""
 
     def __init__(self, **given: Any) -> None:
-        views = Eyes(NODE)
+        views = RoomSearch(NODE)
         super().__init__(PatrolManager(ROOMS, views=views, viewpoints=views.instead), **given)
         self._make = Maker()
         self.messages: list[tuple[float, str, Any]] = []

@@ -58,7 +58,7 @@ class _Search:
     seen_before: float = 0.0
 
 
-class Eyes:
+class RoomSearch:
     """Searches the room of one mission after the other.
 
     Args:

@@ -21,7 +21,7 @@ from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import ManagerParams, NodeParams
 from rosbot_patrol.patrol.records.inputs import Battery, Guarded, Inputs
-from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.room_search import RoomSearch
 from rosbot_patrol.patrol.senses.health import NoHealth
 from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.patrol.senses.records import (
@@ -126,7 +126,7 @@ class PatrolReplay:
             alarm_classes=self._node.alarm_classes,
             health=NoHealth(),
         )
-        views = Eyes(self._node)
+        views = RoomSearch(self._node)
         self._manager = PatrolManager(
             self._rooms,
             self._params,

@@ -46,7 +46,7 @@ from rosbot_patrol.patrol.records.commands import Commands, OwnerMessage
 from rosbot_patrol.patrol.records.inputs import Box, Inputs
 from rosbot_patrol.patrol.records.mission import Phase
 from rosbot_patrol.patrol.records.request import Origin, Request
-from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.room_search import RoomSearch
 from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.patrol.senses.senses import PatrolSenses
 from rosbot_patrol.patrol.senses.sensor_rooms import SensorRooms
@@ -115,7 +115,7 @@ class PatrolNode:
         rounds, zone = load_or_say(load_schedule, self.params.schedule, rooms, NO_ROUNDS, self.health)
         self.schedule = Schedule(rounds, zone, self.store.schedule)
         params = load_manager_params(self.params, tree, rospy.get_name() + "/")
-        views = Eyes(self.params)
+        views = RoomSearch(self.params)
         self.manager = PatrolManager(
             rooms,
             params,

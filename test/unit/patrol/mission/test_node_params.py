@@ -4,7 +4,7 @@ import dataclasses
 
 from rosbot_patrol.params import load
 from rosbot_patrol.patrol.mission.params import NodeParams
-from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.room_search import RoomSearch
 from rosbot_patrol.patrol.search.survey import SightParams
 
 SET = {
@@ -17,6 +17,6 @@ SET = {
 
 def test_the_node_knows_each_parameter_of_how_a_room_is_looked_at():
     node = load(NodeParams, SET, name="~")
-    params = Eyes(node).params
+    params = RoomSearch(node).params
     assert {field.name for field in dataclasses.fields(SightParams)} <= {f.name for f in dataclasses.fields(params)}
     assert (params.look_around, params.person_distance, params.clear_share) == ("spin", 0.7, 0.25)

@@ -15,7 +15,7 @@ from rosbot_patrol.patrol.intruder.exclusions import Exclusions, KnownObject
 from rosbot_patrol.patrol.mission.manager import ManagerParams
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Phase
-from rosbot_patrol.patrol.search.room_search import Eyes
+from rosbot_patrol.patrol.search.room_search import RoomSearch
 from rosbot_patrol.patrol.search.survey import SightParams
 from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams
 
@@ -261,7 +261,7 @@ def test_a_poster_and_a_known_object_are_told_and_do_not_alarm() -> None:
 
 
 def test_without_a_map_a_turn_is_all_and_no_share_is_told() -> None:
-    views = Eyes()
+    views = RoomSearch()
     assert views.share() is None
     assert views.blind() == ""
     assert views.instead(ROOMS.base, Inputs()) == []
