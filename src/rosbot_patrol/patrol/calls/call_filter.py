@@ -29,7 +29,7 @@ class Taken:
     ignored: tuple[Ignored, ...] = ()
 
 
-class Intake:
+class CallFilter:
     """Takes calls into the queue.
 
     Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Collection, Iterable, Sequence
 
-from rosbot_patrol.patrol.calls.call_filter import Intake, Taken
+from rosbot_patrol.patrol.calls.call_filter import CallFilter, Taken
 from rosbot_patrol.patrol.calls.own_motion import OwnMotion
 from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Rooms
@@ -34,7 +34,7 @@ class Agenda:
         self.queue = MissionQueue()
         self._rooms = rooms
         self._own_motion = OwnMotion(params.own_motion_radius, params.own_motion_memory)
-        self._calls = Intake(rooms, self.queue, params.priorities, self._own_motion)
+        self._calls = CallFilter(rooms, self.queue, params.priorities, self._own_motion)
         self._calls.count = count
         for request in waiting:
             self.queue.add(request)
@@ -55,7 +55,7 @@ class Agenda:
         self._own_motion.see(now, inputs.pose, awake=is_awake)
 
     def take(self, now: float, inputs: Inputs, mission: Mission | None, *, has_candidate: bool) -> Taken:
-        """Take a step's calls; arguments as of `Intake.take`."""
+        """Take a step's calls; arguments as of `CallFilter.take`."""
         return self._calls.take(now, inputs, mission, has_candidate=has_candidate)
 
     def ask(self, requests: Sequence[Request], wall: float, mission: Mission | None) -> dict[int, str]:
