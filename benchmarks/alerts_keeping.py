@@ -26,7 +26,7 @@ from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.records.commands import Commands, Notice, Report
 from rosbot_patrol.patrol.records.findings import Confirmation
 from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
-from rosbot_patrol.patrol.story.mission_log import Chronicle
+from rosbot_patrol.patrol.story.mission_log import MissionLog
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -67,7 +67,7 @@ def measure() -> dict[str, float]:
 
 def patrol(keeper: IncidentKeeper, number: int, frames: list[bytes], *, is_seen: bool) -> float:
     """The share of a core that a patrol costs."""
-    chronicle, start = Chronicle(), 1000.0 * (number + 1)
+    chronicle, start = MissionLog(), 1000.0 * (number + 1)
     mission = Mission(id=f"m{number}", room=Room(id=3, name="hall", pose=Pose2D(4.0, 0.0, 0.0)), wall=WALL + start)
     spent = 0.0
     for tick in range(SECONDS * STEPS):

@@ -45,7 +45,7 @@ class Entry:
     closed: float | None = None
 
 
-class Chronicle:
+class MissionLog:
     """Turns the patrol's steps into entries."""
 
     def __init__(self) -> None:

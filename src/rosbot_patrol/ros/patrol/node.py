@@ -50,7 +50,7 @@ from rosbot_patrol.patrol.search.room_search import RoomSearch
 from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.patrol.senses.senses import PatrolSenses
 from rosbot_patrol.patrol.senses.sensor_rooms import SensorRooms
-from rosbot_patrol.patrol.story.mission_log import Chronicle
+from rosbot_patrol.patrol.story.mission_log import MissionLog
 from rosbot_patrol.ros.patrol.action import PatrolActions
 from rosbot_patrol.ros.patrol.alert_desk import AlertDesk
 from rosbot_patrol.ros.patrol.calls import CallDesk
@@ -99,7 +99,7 @@ class PatrolNode:
         self.health = Health()
         evidence = load_flat(EvidenceParams, tree)
         self.pictures = PictureRing(self.params.image_topic, evidence)
-        self.chronicle = Chronicle()
+        self.mission_log = MissionLog()
         self.keeper = IncidentKeeper(
             folder,
             self.pictures,
@@ -280,7 +280,7 @@ class PatrolNode:
 
     def _record(self, time_now: float, commands: Commands, pose: Pose2D | None = None) -> None:
         mission = self.manager.mission
-        entries = self.chronicle.step(
+        entries = self.mission_log.step(
             now=time_now,
             wall=time.time(),
             mission=mission,

@@ -10,7 +10,7 @@ from rosbot_patrol.patrol.house.regions import NOBODYS
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.records.inputs import Measured
 from rosbot_patrol.patrol.records.mission import Phase, mission_from_plain, mission_to_plain
-from rosbot_patrol.patrol.story.mission_log import Chronicle
+from rosbot_patrol.patrol.story.mission_log import MissionLog
 
 
 class House:
@@ -87,7 +87,7 @@ def test_two_people_in_two_rooms_are_told_each_in_theirs():
 
 def records(world):
     """The records of a world's mission, as the keeper would have them."""
-    chronicle, kept = Chronicle(), {}
+    chronicle, kept = MissionLog(), {}
     for out in world.all:
         mission = world.manager.mission or (out.ended[0] if out.ended else None)
         for entry in chronicle.step(now=0.0, wall=1.0, mission=mission, commands=out, pose=None):

@@ -8,7 +8,7 @@ from rosbot_patrol.patrol.house.rooms import Room
 from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, Report
 from rosbot_patrol.patrol.records.findings import Confirmation
 from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
-from rosbot_patrol.patrol.story.mission_log import Chronicle
+from rosbot_patrol.patrol.story.mission_log import MissionLog
 
 WALL = 1_790_000_000.0
 
@@ -17,13 +17,15 @@ class Patrol:
     """Steps a chronicle once a second."""
 
     def __init__(self):
-        self.chronicle, self.now = Chronicle(), 100.0
+        self.mission_log, self.now = MissionLog(), 100.0
 
     def step(self, mission=None, report=None, heard=(), pose=None, **commands):
         self.now += 1.0
         commands = Commands(report=report, **commands)
         wall = WALL + self.now
-        return self.chronicle.step(now=self.now, wall=wall, mission=mission, commands=commands, pose=pose, heard=heard)
+        return self.mission_log.step(
+            now=self.now, wall=wall, mission=mission, commands=commands, pose=pose, heard=heard
+        )
 
 
 @pytest.fixture
