@@ -10,7 +10,7 @@ A depth camera that knows the depth of little of a box sees furniture before one
 lidar sees legs farther off; so it does where the upper part of the box is as far off as the lidar's legs.
 
 Nothing in a box is farther off than the floor beneath its lower edge. Depth that says so is of what shows between the
-legs or beside them, as of dark clothes or of one nearer than a depth camera can measure, and is not taken.
+legs or beside them, as of dark clothes or of one nearest_within than a depth camera can measure, and is not taken.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from rosbot_patrol.patrol.intruder.measure_depth import (
     UP,
     is_beyond,
     is_flat,
-    is_rather,
-    nearer,
-    upright,
-    whose,
+    nearest_within,
+    object_distance,
+    upper_part_is_at,
+    upright_distance,
 )
 from rosbot_patrol.patrol.records.inputs import Box, Measured
 
@@ -117,7 +117,7 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
     found = _by_lidar(box, view, unmapped) if unmapped is not None else None
     if depth is not None:
         samples = _samples(box, view.lens, depth)
-        along, is_before = whose(samples)
+        along, is_before = object_distance(samples)
         if found is not None and found <= _ABOUT * most and _are_legs_behind(found, along, samples):
             return replace(box, measured=_at(box, view, found, source="lidar", error=0.15 + 0.02 * found, flat=None))
         is_behind = along is not None and along > most
@@ -126,7 +126,7 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
         if leg is not None:
             along = leg
         elif is_behind:
-            along = nearer(samples, most)
+            along = nearest_within(samples, most)
         else:
             around = _samples(box, view.lens, depth, ASIDE, UP) if is_before.any() else None
             flat = is_flat(samples, is_before, around)
@@ -147,7 +147,7 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
 
 
 def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: bool | None) -> Measured:
-    """The record of an object whose front is so far along the optical axis [m]."""
+    """The record of an object object_distance front is so far along the optical axis [m]."""
     lens, middle = view.lens, (box.xmin + box.xmax) / 2.0
     place = view.eye + view.ray(middle, lens.cy) * (along + _THICK)
     top = view.eye + view.ray(middle, box.ymin) * along
@@ -201,7 +201,7 @@ def _are_legs_behind(found: float, along: float | None, samples: Array) -> bool:
     """Whether the lidar's legs are of the one in the box, and what depth tells is of something before [m]."""
     if is_beyond(samples):
         return found > (along or 0.0)
-    return along is not None and found > along + DEEP and is_rather(samples, along, found)
+    return along is not None and found > along + DEEP and upper_part_is_at(samples, along, found)
 
 
 def _has_legs(samples: Array, box: Box, view: View, along: float) -> bool | None:
@@ -264,7 +264,7 @@ def _about_floor(box: Box, view: View) -> tuple[float, float]:
 def _leg_before(along: float, samples: Array, box: Box, view: View) -> float | None:
     """How far a leg is where the floor ends the box, before what depth tells and what is beyond that floor [m]."""
     least, most = _about_floor(box, view)
-    leg = upright(samples, least, most) if along > most else None
+    leg = upright_distance(samples, least, most) if along > most else None
     return leg if leg is not None and leg < along - DEEP else None
 
 
