@@ -67,7 +67,12 @@ class World:
         self.views = RoomSearch(eyes)
         self.house: RoomRegions | None = REGIONS if rooms is ROOMS else part_rooms(FLOOR, rooms)
         self.manager = PatrolManager(
-            rooms, params, views=self.views, viewpoints=self.views.instead, exclusions=exclusions, memory=memory
+            rooms,
+            params,
+            views=self.views,
+            viewpoints=self.views.fallback_viewpoints,
+            exclusions=exclusions,
+            memory=memory,
         )
         self.people, self.camera, self.refused = people, camera, refused
         self.now, self.pose = 100.0, ROOMS.base.pose

@@ -72,7 +72,7 @@ class RecordedWorld(World):
 
     def __init__(self, **given: Any) -> None:
         views = RoomSearch(NODE)
-        super().__init__(PatrolManager(ROOMS, views=views, viewpoints=views.instead), **given)
+        super().__init__(PatrolManager(ROOMS, views=views, viewpoints=views.fallback_viewpoints), **given)
         self._make = Maker()
         self.messages: list[tuple[float, str, Any]] = []
         self._ended = 0

@@ -271,7 +271,7 @@ class RoomSearch:
 
     # -- for a room whose own point cannot be reached
 
-    def instead(self, room: Room, inputs: Inputs, most: int = 3) -> list[Pose2D]:
+    def fallback_viewpoints(self, room: Room, inputs: Inputs, most: int = 3) -> list[Pose2D]:
         """Other poses that show a room, the best first."""
         self._settle_in(inputs)
         ground, pose = self._ground, inputs.pose
@@ -280,7 +280,7 @@ class RoomSearch:
         mask, tried = ground.house.mask(room.id), [(room.pose.x, room.pose.y)]
         found: list[Pose2D] = []
         for _ in range(most):
-            view = ground.planner.instead(pose, mask, tried=tuple(tried), width=self._width)
+            view = ground.planner.fallback(pose, mask, tried=tuple(tried), width=self._width)
             if view is None:
                 break
             found.append(view.pose)
@@ -301,7 +301,7 @@ class RoomSearch:
 def _view_of(
     doubt: SecondLook, pose: Pose2D, planner: ViewpointPlanner, stands: Mask | None, span: Mapping[str, float]
 ) -> Viewpoint | None:
-    return planner.near(pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, tried=doubt.tried, **span)
+    return planner.view_of(pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, tried=doubt.tried, **span)
 
 
 def _with_sweep(doubt: SecondLook, view: Viewpoint) -> Viewpoint:

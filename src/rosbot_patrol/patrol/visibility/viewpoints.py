@@ -146,13 +146,13 @@ class ViewpointPlanner:
         first, turn = self.arc(x, y, unseen, width)
         return Viewpoint(pose=Pose2D(x, y, first), turn=turn, gain=most * self.floor.cell_area, way=way)
 
-    def instead(
+    def fallback(
         self, start: Pose2D, room: Mask, *, tried: tuple[tuple[float, float], ...], width: float
     ) -> Viewpoint | None:
         """Another place to look into a room from whose own point cannot be reached."""
         return self.next(start, room, room, width=width, tried=tried)
 
-    def near(
+    def view_of(
         self,
         start: Pose2D,
         x: float,

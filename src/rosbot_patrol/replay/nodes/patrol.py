@@ -132,7 +132,7 @@ class PatrolReplay:
             self._params,
             needs_camera=CAMERA in names,
             views=views,
-            viewpoints=views.instead,
+            viewpoints=views.fallback_viewpoints,
             exclusions=self._exclusions,
         )
 

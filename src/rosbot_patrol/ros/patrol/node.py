@@ -122,7 +122,7 @@ class PatrolNode:
             memory=self.store.memory,
             needs_camera=self.pictures.is_wanted,
             views=views,
-            viewpoints=views.instead,
+            viewpoints=views.fallback_viewpoints,
             exclusions=Exclusions(self.params.judge, load_known(self.params.known_objects)),
         )
         how_many, how_often = count_of(len(rooms), "room"), count_of(len(rounds), "round")

@@ -264,7 +264,7 @@ def test_without_a_map_a_turn_is_all_and_no_share_is_told() -> None:
     views = RoomSearch()
     assert views.share() is None
     assert views.blind() == ""
-    assert views.instead(ROOMS.base, Inputs()) == []
+    assert views.fallback_viewpoints(ROOMS.base, Inputs()) == []
 
 
 @pytest.mark.parametrize(("flat", "verdict"), [(True, "clear"), (False, "confirmed")])

@@ -126,7 +126,7 @@ def test_places_that_were_tried_and_what_stands_there_are_left_out() -> None:
 def test_a_room_whose_point_is_out_of_reach_is_looked_into_from_elsewhere() -> None:
     floor = drawn_floor(*TWO_ROOMS)
     rooms = part_rooms(floor, points((1.5, 3.0), (8.0, 3.0)))
-    view = ViewpointPlanner(floor).instead(Pose2D(1.5, 3.0, 0.0), rooms.mask(1), tried=((8.0, 3.0),), width=WIDTH)
+    view = ViewpointPlanner(floor).fallback(Pose2D(1.5, 3.0, 0.0), rooms.mask(1), tried=((8.0, 3.0),), width=WIDTH)
     assert view is not None
     assert view.gain > 8.0
 
@@ -144,7 +144,7 @@ def test_what_no_way_leads_to_is_not_reached() -> None:
     assert reached.any()
     assert xs.max() < 1.5
     assert np.isinf(planner.ways(start)[~reached]).all()
-    assert planner.near(start, 2.5, 1.5, nearest=0.1, most=1.0) is None  # floor there is, but no way to it
+    assert planner.view_of(start, 2.5, 1.5, nearest=0.1, most=1.0) is None  # floor there is, but no way to it
 
 
 def test_a_second_look_is_from_where_there_is_room_to_turn() -> None:
@@ -159,12 +159,12 @@ def test_a_second_look_is_from_where_there_is_room_to_turn() -> None:
     )
     planner = ViewpointPlanner(floor)
     for start in ((3.7, 3.2), (4.2, 2.6), (4.8, 3.3)):  # beside the post
-        view = planner.near(Pose2D(*start, 0.0), 6.5, 3.2)
+        view = planner.view_of(Pose2D(*start, 0.0), 6.5, 3.2)
         assert view is not None
         ix, iy = floor.info.cell_of(*view.pose[:2])
         assert floor.clearance[iy, ix] >= 0.6
     narrow = drawn_floor("#" * 12, "#..........#", "#..........#", "#" * 12)
-    assert ViewpointPlanner(narrow).near(Pose2D(0.9, 1.0, 0.0), 4.0, 1.0) is not None
+    assert ViewpointPlanner(narrow).view_of(Pose2D(0.9, 1.0, 0.0), 4.0, 1.0) is not None
 
 
 def test_a_second_look_that_no_other_side_allows_is_from_nearer_or_from_a_step_away() -> None:
@@ -180,7 +180,7 @@ def test_a_second_look_that_no_other_side_allows_is_from_nearer_or_from_a_step_a
     start, eye, place = Pose2D(1.0, 2.2, 0.0), Pose2D(1.2, 2.5, 0.0), (4.3, 2.5)
 
     def seen(nearest: float, **given: object) -> Pose2D:
-        found = ViewpointPlanner(floor).near(start, *place, seen_from=(eye,), nearest=nearest, **given)
+        found = ViewpointPlanner(floor).view_of(start, *place, seen_from=(eye,), nearest=nearest, **given)
         assert found is not None
         assert abs(found.pose.yaw) < 0.5
         return found.pose
@@ -198,7 +198,7 @@ def test_a_step_away_is_as_far_as_there_is_room() -> None:
     planner, eye, place = ViewpointPlanner(floor), Pose2D(1.0, 1.5, 0.0), (3.6, 1.5)
     for room, has_one in ((0.3, True), (0.1, False)):
         stands = ~floor.mark_near(np.array([eye[:2]]), room)
-        view = planner.near(eye, *place, seen_from=(eye,), nearest=2.0, stands=stands)
+        view = planner.view_of(eye, *place, seen_from=(eye,), nearest=2.0, stands=stands)
         assert (view is not None) == has_one
         if view is not None:
             assert 0.2 <= math.dist(view.pose[:2], eye[:2]) <= 0.45
