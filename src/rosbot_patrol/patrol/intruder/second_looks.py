@@ -54,7 +54,7 @@ class SecondLook:
         tried: those viewpoints.
         known_from: the sides that were known when the last of them was chosen.
         looks: pictures that showed its place from there: from farther off, or from another side, and nobody.
-        again: pictures that showed it, from there, too.
+        seen_again: pictures that showed it, from there, too.
         was_at: where it was too near, since what moves elsewhere is looked at for it.
     """
 
@@ -71,7 +71,7 @@ class SecondLook:
     tried: tuple[tuple[float, float], ...] = ()
     known_from: tuple[Pose2D, ...] = ()
     looks: int = 0
-    again: int = 0
+    seen_again: int = 0
     was_at: tuple[float, float] | None = None
 
     @property
@@ -104,7 +104,7 @@ class SecondLook:
         self.tried += ((at.x, at.y),)
         self.known_from = self.seen_from
 
-    def again_at(self, x: float, y: float, was_at: tuple[float, float] | None = None) -> None:
+    def move_to(self, x: float, y: float, was_at: tuple[float, float] | None = None) -> None:
         """Take it that it has moved to another place [m], and had no look there."""
         self.x, self.y, self.was_at = x, y, was_at
         self.is_visited, self.looks, self.tried = False, 0, ()
@@ -132,7 +132,7 @@ class SecondLooks:
     def __iter__(self) -> Iterator[SecondLook]:
         return iter(self._all)
 
-    def far(self, label: str, x: float, y: float) -> None:
+    def add_far(self, label: str, x: float, y: float) -> None:
         """Take in that something of a class was seen at about a place, too far off to be measured."""
         for doubt in self._all:
             if not doubt.seen_from and not doubt.is_near and math.hypot(doubt.x - x, doubt.y - y) < _SAME_FAR:
@@ -154,7 +154,7 @@ class SecondLooks:
                 doubt.is_visited = doubt.is_over = True
         self._weak_sightings = tuple(doubtful)
 
-    def near(self, doubtful: Sequence[Sighting]) -> None:
+    def set_too_near(self, doubtful: Sequence[Sighting]) -> None:
         """Take in what is too near to be told from a pet, all that is so by now."""
         for thing in doubtful:
             known = next((d for d in self._all if d.is_near and _apart(d, thing) < _SAME_FAR), None)
@@ -165,7 +165,7 @@ class SecondLooks:
             elif not known.is_visited:
                 known.x, known.y, known.was_at = thing.x, thing.y, None
             elif _apart(known, thing) > _MOVED and known.visits < _VISITS:
-                known.again_at(thing.x, thing.y)
+                known.move_to(thing.x, thing.y)
         for doubt in self._all:
             if doubt.is_near and not any(_apart(doubt, thing) < _SAME_FAR for thing in doubtful):
                 doubt.is_visited = doubt.is_over = True
@@ -184,7 +184,7 @@ class SecondLooks:
             here = doubt.x, doubt.y
             apart, place = min(((math.dist(here, place), place) for place in places), default=(0.0, here))
             if _MOVED < apart < _FOLLOWED and doubt.visits < _VISITS:
-                doubt.again_at(*place, was_at=doubt.was_at or here)
+                doubt.move_to(*place, was_at=doubt.was_at or here)
 
     def look(self, stamp: float | None, eye: Eye, sight: Sight) -> None:
         """Count a picture for the places that it gives a second look at.
@@ -198,7 +198,7 @@ class SecondLooks:
             if not doubt.shows(eye, sight):
                 continue
             if stamp is not None and not doubt.is_near and self._was_seen(doubt, stamp):
-                doubt.again += 1
+                doubt.seen_again += 1
             else:
                 doubt.looks += 1
 
@@ -221,7 +221,7 @@ class SecondLooks:
 
     def _is_in_vain(self, doubt: SecondLook) -> bool:
         """It was seen from one side, or too near, and pictures from elsewhere did not show its place, or it again."""
-        wanted = self._seen_in if doubt.is_near else max(_LOOKS, doubt.again) if doubt.seen_from else 0
+        wanted = self._seen_in if doubt.is_near else max(_LOOKS, doubt.seen_again) if doubt.seen_from else 0
         return doubt.is_visited and not doubt.is_over and doubt.looks < wanted
 
     def unsure(self, is_moving: bool) -> str:

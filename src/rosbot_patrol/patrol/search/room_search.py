@@ -112,7 +112,7 @@ class RoomSearch:
             survey.coverage.look(frame.eye, sight, search.now)
             for box in frame.boxes:
                 if box.doubt is not None:
-                    search.doubts.far(box.label, *box.doubt)
+                    search.doubts.add_far(box.label, *box.doubt)
             search.doubts.look(frame.stamp, frame.eye, sight)
             if inputs.scan is not None:
                 stamp = inputs.scan.scan.stamp
@@ -124,7 +124,7 @@ class RoomSearch:
 
     def step_back(self, doubtful: Sequence[Sighting]) -> None:
         """Look from farther off at what is too near to tell a person from a pet."""
-        self._search.doubts.near(doubtful)
+        self._search.doubts.set_too_near(doubtful)
 
     def harmless(self) -> Sequence[Sighting]:
         """Things that move, were shown whole and are no persons."""

@@ -22,11 +22,11 @@ def near(x: float, y: float, at: float = 0.0) -> Sighting:
 
 def test_what_was_too_near_wants_one_look():
     doubts = SecondLooks(SEEN_IN)
-    doubts.near([near(1.0, 0.0)])
+    doubts.set_too_near([near(1.0, 0.0)])
     (doubt,) = doubts.open()
     assert doubt.spans == ({"nearest": 2.0, "most": 4.5},)
     doubt.visit(Pose2D(0.0, 0.0, 0.0))
-    doubts.near([near(1.2, 0.1)])
+    doubts.set_too_near([near(1.2, 0.1)])
     assert doubts.open() == [doubt]  # which it has not had yet
     for _ in range(SEEN_IN):
         doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
@@ -35,24 +35,24 @@ def test_what_was_too_near_wants_one_look():
 
 def test_what_was_too_near_and_came_along_is_looked_at_again_but_not_for_ever():
     doubts = SecondLooks(SEEN_IN)
-    doubts.near([near(0.0, 0.0)])
+    doubts.set_too_near([near(0.0, 0.0)])
     visits = 0
     for k in range(10):
         for doubt in doubts.open():
             doubt.visit(Pose2D(0.0, 0.0, 0.0))
             visits += 1
-        doubts.near([near(0.9 * ((k + 1) % 2), 0.0, at=float(k))])
+        doubts.set_too_near([near(0.9 * ((k + 1) % 2), 0.0, at=float(k))])
     assert visits == 3
 
 
 def test_a_look_counts_for_the_place_it_showed_only():
     doubts = SecondLooks(SEEN_IN)
-    doubts.near([near(0.0, 0.0)])
+    doubts.set_too_near([near(0.0, 0.0)])
     doubts.open()[0].visit(Pose2D(0.0, 0.0, 0.0))
     for _ in range(SEEN_IN):
         doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
     assert doubts.unsure(is_moving=False) == ""
-    doubts.near([near(0.0, 1.0)])
+    doubts.set_too_near([near(0.0, 1.0)])
     assert "(0.0, 1.0) was too near to be told from a pet" in doubts.unsure(is_moving=False)
     assert [(d.x, d.y) for d in doubts.open()] == [(0.0, 1.0)]
 
@@ -128,7 +128,7 @@ def test_what_looks_little_like_a_person_gets_two_looks_at_most_and_is_not_grave
 def looked_at() -> SecondLooks:
     """Something too near was at (0, 0), whose place was seen from farther off since."""
     doubts = SecondLooks(SEEN_IN)
-    doubts.near([near(0.0, 0.0)])
+    doubts.set_too_near([near(0.0, 0.0)])
     doubts.open()[0].visit(Pose2D(3.0, 0.0, math.pi))
     for _ in range(SEEN_IN):
         doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
@@ -139,11 +139,11 @@ def looked_at() -> SecondLooks:
 def test_what_moves_is_looked_at_for_what_was_too_near_and_has_gone():
     doubts = looked_at()
     doubts.follow([(9.0, 0.0), (1.0, 2.0)])
-    doubts.near([near(0.0, 0.0)])
+    doubts.set_too_near([near(0.0, 0.0)])
     (doubt,) = doubts.open()
     assert (doubt.x, doubt.y) == (1.0, 2.0)
     assert "(0.0, 0.0) was too near to be told from a pet" in doubts.unsure(is_moving=True)
-    doubts.near([])  # it was told: a pet
+    doubts.set_too_near([])  # it was told: a pet
     assert doubts.open() == []
     assert doubts.unsure(is_moving=True) == ""
 
@@ -157,7 +157,7 @@ def test_what_moves_is_not_followed_for_ever():
             doubt.visit(Pose2D(3.0, 0.0, math.pi))
             visits += 1
             doubt.looks = SEEN_IN
-        doubts.near([near(0.0, 0.0)])
+        doubts.set_too_near([near(0.0, 0.0)])
     assert visits == 3
 
 
@@ -170,11 +170,11 @@ def test_what_moves_where_it_was_seen_or_far_away_is_not_followed(place: tuple[f
 
 def test_where_something_moves_what_was_too_near_may_have_gone():
     doubts = SecondLooks(SEEN_IN)
-    doubts.near([near(0.0, 0.0)])
+    doubts.set_too_near([near(0.0, 0.0)])
     for _ in range(SEEN_IN):
         doubts.look(None, Eye(pose=Pose2D(3.0, 0.0, math.pi), width=1.0), ALL_AROUND)
     assert doubts.unsure(is_moving=True)
-    doubts.near([])
+    doubts.set_too_near([])
     assert doubts.unsure(is_moving=True) == ""
     assert doubts.open() == []
 
@@ -183,6 +183,6 @@ def test_what_was_seen_far_off_takes_some_pictures():
     doubts = SecondLooks(SEEN_IN)
     for k in range(SEEN_IN):
         assert doubts.open() == []
-        doubts.far("fire hydrant", 6.0 + 0.1 * k, 0.0)
+        doubts.add_far("fire hydrant", 6.0 + 0.1 * k, 0.0)
     assert len(doubts.open()) == 1
     assert doubts.open()[0].text == "something like a fire hydrant at about (6.0, 0.0) was not seen from near"
