@@ -83,7 +83,7 @@ class CloseUps:
         new = [s for s in sightings if s not in self._pets]
         self._pets.extend(new)
         if new:
-            self._open = [s for s in self._open if not self._is_told(s)]
+            self._open = [s for s in self._open if not self._is_settled(s)]
 
     def sort(self, stamp: float, boxes: Iterable[Box], eye: Eye | None = None) -> tuple[tuple[Box, ...], bool]:
         """The boxes of a picture that can be judged, and whether one was left out that may be a person.
@@ -110,7 +110,7 @@ class CloseUps:
                     self._pets.append(place)
             elif box.probability >= _SURE and (m.has_legs or self._is_tall(box, m)):
                 self._people.append(place)
-        self._open = [s for s in self._open if not self._is_told(s)]
+        self._open = [s for s in self._open if not self._is_settled(s)]
         is_left = False
         for box, place in near:
             if self._is_person(place):
@@ -139,5 +139,5 @@ class CloseUps:
     def _is_person(self, place: Sighting) -> bool:
         return sum(place.may_be(person) for person in self._people) >= _OFTEN
 
-    def _is_told(self, place: Sighting) -> bool:
+    def _is_settled(self, place: Sighting) -> bool:
         return self._is_person(place) or any(place.may_be(pet) for pet in self._pets)

@@ -101,7 +101,7 @@ class IntruderDecision:
         for given in inputs.frames:
             frame = self._leave_out_close_ups(now, given)
             for seen in self._sightings.add(now, frame):
-                self._weak_sightings.told(seen.measured)
+                self._weak_sightings.note_confirmed(seen.measured)
                 findings.append(self._find(now, seen, inputs.house))
             findings += [self._find(now, seen, inputs.house) for seen in self._weigh(frame)]
             self._point_camera(now, frame, inputs)

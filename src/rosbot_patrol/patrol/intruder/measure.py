@@ -10,7 +10,7 @@ A depth camera that knows the depth of little of a box sees furniture before one
 lidar sees legs farther off; so it does where the upper part of the box is as far off as the lidar's legs.
 
 Nothing in a box is farther off than the floor beneath its lower edge. Depth that says so is of what shows between the
-legs or beside them, as of dark clothes or of one nearest_within than a depth camera can measure, and is not taken.
+legs or beside them, as of dark clothes or of one nearer than a depth camera can measure, and is not taken.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def measure(box: Box, view: View, depth: Depth | None = None, unmapped: Array | 
 
 
 def _at(box: Box, view: View, along: float, *, source: str, error: float, flat: bool | None) -> Measured:
-    """The record of an object object_distance front is so far along the optical axis [m]."""
+    """The record of an object with its front this far along the optical axis [m]."""
     lens, middle = view.lens, (box.xmin + box.xmax) / 2.0
     place = view.eye + view.ray(middle, lens.cy) * (along + _THICK)
     top = view.eye + view.ray(middle, box.ymin) * along

@@ -20,7 +20,7 @@ _FEW = 40  # depths, at least, to say anything
 _KNOWN = 0.2  # of the middle of a box has depth; with less, that is of something else
 _KNOWN_FLAT = 0.75  # of a box has depth, to tell a picture
 _FLAT_SHARE = 0.88  # of the samples lie in a picture's plane
-_BELIEVED = 0.05  # of a box's samples speak for the nearest_within thing
+_BELIEVED = 0.05  # of a box's samples speak for the nearer thing
 _UPRIGHT_ROWS = 0.5  # of the rows show one who stands
 _CHEST = 0.45  # of a box, from above, show head and chest
 _CHEST_SHARE = 0.1  # of that has to show, to tell a picture, and of what is around
@@ -28,7 +28,7 @@ _ASIDE, _ABOVE = 0.25, 0.2  # so much of a box is free beside or above its objec
 _ROWS = 0.4  # of the rows of a box show its object, at least
 _HEAD = GRID // 3  # rows that show the upper part of a person: not all of it is unknown
 _HEAD_SHARE, _HEAD_FARTHER = 0.04, 0.05  # with less of it there, and so much of what is farther, it is something before
-_HEAD_OTHER, _HEAD_TIMES = 0.15, 3.0  # so much of it at another distance, and so many times what is nearest_within
+_HEAD_OTHER, _HEAD_TIMES = 0.15, 3.0  # so much of it at another distance, and so many times what is nearer
 _ASIDE_UP = 0.4  # and beside its upper half
 _BEFORE_MOST = 0.7  # of a box may show what stands before its object
 _STRIP, _FREE = 0.1, 0.25  # of a row or column, to belong to it; so much of it has to lie beyond, to be free
@@ -116,7 +116,7 @@ def nearest_within(samples: Array, most: float) -> float | None:
 
 
 def upright_distance(samples: Array, least: float, most: float) -> float | None:
-    """How far the upright_distance thing is that lies between two distances [m], None where there is none.
+    """Distance of an upright thing between two distances [m], None if there is none.
 
     A leg at the edge of a box, before a wall that fills it: little of the box, but most of its rows, the upper ones
     with them, where furniture that hides the feet has none.

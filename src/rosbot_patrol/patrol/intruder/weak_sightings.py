@@ -83,7 +83,7 @@ class WeakSighting:
         sides: from where it was seen.
         best: the surest box; picture: the camera's stamp of its picture [s]; boxes: all of that picture.
         seen_at: when the last picture that showed it was taken [s].
-        is_told: it was confirmed; is_grave: from one side it looks like a person, or a little so for long.
+        is_confirmed: it was confirmed; is_grave: from one side it looks like a person, or a little so for long.
     """
 
     label: str
@@ -95,7 +95,7 @@ class WeakSighting:
     boxes: tuple[Box, ...]
     seen_at: float = -math.inf
     sides: list[Side] = field(default_factory=list)
-    is_told: bool = False
+    is_confirmed: bool = False
     is_grave: bool = False
 
     @property
@@ -149,21 +149,21 @@ class WeakSightings:
             side.scores.append(box.probability)
             side.is_cut &= m.is_cut_aside
             suspect.is_grave = any(self._is_weak(side) or self._lasts(side) for side in suspect.sides)
-            if not suspect.is_told and len(self._witnesses(suspect)) >= self.params.weak_sides:
-                suspect.is_told = True
+            if not suspect.is_confirmed and len(self._witnesses(suspect)) >= self.params.weak_sides:
+                suspect.is_confirmed = True
                 found.append(self._confirmation(suspect))
         return tuple(found)
 
-    def told(self, measured: Measured | None) -> None:
+    def note_confirmed(self, measured: Measured | None) -> None:
         """Somebody was confirmed otherwise: what was gathered there is of them."""
         for suspect in self.all:
             if measured is None or suspect.apart(measured.x, measured.y) <= self.params.weak_apart + measured.error:
-                suspect.is_told = True
+                suspect.is_confirmed = True
 
     def doubtful(self) -> list[WeakSighting]:
         """Those that looked like a person in some pictures, and are not confirmed."""
         least = self.params.doubt_pictures
-        return [s for s in self.all if not s.is_told and any(len(side.scores) >= least for side in s.sides)]
+        return [s for s in self.all if not s.is_confirmed and any(len(side.scores) >= least for side in s.sides)]
 
     def _take(self, box: Box, m: Measured, picture: float, boxes: tuple[Box, ...]) -> WeakSighting:
         near = [s for s in self.all if s.label == box.label and s.apart(m.x, m.y) <= self.params.weak_apart]

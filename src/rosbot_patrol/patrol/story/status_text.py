@@ -69,7 +69,7 @@ def suspects(found: Iterable[WeakSighting]) -> tuple[str, ...]:
             for side in suspect.sides
         ]
         about = f"{suspect.label} at ({suspect.x:.2f}, {suspect.y:.2f})"
-        texts.append(f"{about}{', told' * suspect.is_told}: {'; '.join(sides)}")
+        texts.append(f"{about}{', told' * suspect.is_confirmed}: {'; '.join(sides)}")
     return tuple(texts)
 
 

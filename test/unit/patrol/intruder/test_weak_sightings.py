@@ -61,7 +61,7 @@ def test_what_the_edge_of_the_picture_cuts_from_one_side_is_doubtful_until_it_is
     seen = Seen()
     assert seen.see(WEST, box()) == []
     assert seen.see(SOUTH, box(score=0.7, cut=True), pictures=50) == []
-    assert [(s.is_told, s.is_grave) for s in seen.suspects.doubtful()] == [(False, True)]
+    assert [(s.is_confirmed, s.is_grave) for s in seen.suspects.doubtful()] == [(False, True)]
     assert len(seen.see(SOUTH, box(score=0.7), pictures=1)) == 1
     sure = Seen()
     sure.see(WEST, box())
@@ -98,12 +98,12 @@ def test_the_same_picture_again_and_one_of_before_do_not_count() -> None:
 def test_one_who_was_confirmed_is_not_again() -> None:
     seen = Seen()
     seen.see(WEST, box(), box(3.0, 0.0))
-    seen.suspects.told(box(0.2, 0.0).measured)
+    seen.suspects.note_confirmed(box(0.2, 0.0).measured)
     (left,) = seen.suspects.doubtful()
     assert left.x == pytest.approx(3.0)
     (person,) = seen.see(SOUTH, box(), box(3.0, 0.0), pictures=30)
     assert person.measured.x == 3.0
-    seen.suspects.told(None)
+    seen.suspects.note_confirmed(None)
     assert seen.suspects.doubtful() == []
 
 
