@@ -28,7 +28,7 @@ _OFTEN = 3  # such sightings, at least
 
 
 @dataclass(frozen=True)
-class Sighting:
+class SeenAt:
     """Where something was, in map [m], and when [s].
 
     Attributes:
@@ -42,12 +42,12 @@ class Sighting:
     is_part: bool = False
     score: float = 1.0
 
-    def may_be(self, other: Sighting) -> bool:
+    def may_be(self, other: SeenAt) -> bool:
         """Whether both may be of one."""
         walked = min(_SPEED * abs(self.at - other.at), _WALKED)
         return math.hypot(self.x - other.x, self.y - other.y) <= _SAME + walked
 
-    def tells_more(self, other: Sighting) -> bool:
+    def tells_more(self, other: SeenAt) -> bool:
         """Whether its place is to be believed rather than that of another of the same, a little later."""
         if self.is_part != other.is_part:
             return other.is_part
@@ -63,9 +63,9 @@ class CloseUps:
 
     def __init__(self, exclusions: Exclusions) -> None:
         self._exclusions = exclusions
-        self._pets: deque[Sighting] = deque(maxlen=20)
-        self._people: deque[Sighting] = deque(maxlen=20)
-        self._open: list[Sighting] = []
+        self._pets: deque[SeenAt] = deque(maxlen=20)
+        self._people: deque[SeenAt] = deque(maxlen=20)
+        self._open: list[SeenAt] = []
 
     def start(self) -> None:
         """Forget all, for a new mission."""
@@ -74,11 +74,11 @@ class CloseUps:
         self._open = []
 
     @property
-    def doubtful(self) -> Sequence[Sighting]:
+    def doubtful(self) -> Sequence[SeenAt]:
         """What was too near to be told, and was not told otherwise."""
         return self._open
 
-    def add_pets(self, sightings: Iterable[Sighting]) -> None:
+    def add_pets(self, sightings: Iterable[SeenAt]) -> None:
         """Take in where something was that moves and is no person."""
         new = [s for s in sightings if s not in self._pets]
         self._pets.extend(new)
@@ -99,7 +99,7 @@ class CloseUps:
             if m is None or box.label != "person":
                 kept.append(box)
                 continue
-            place = Sighting(*self._before_walls(m, eye), stamp, m.is_cut_aside, box.probability)
+            place = SeenAt(*self._before_walls(m, eye), stamp, m.is_cut_aside, box.probability)
             if self._exclusions.is_too_near(box) and not m.has_legs:
                 near.append((box, place))
                 continue
@@ -124,7 +124,7 @@ class CloseUps:
         """Taller than any pet, by a margin where the picture shows all of it."""
         return m.top >= (self._exclusions.params.person_top_min if goes_on(box, m) else _TALL)
 
-    def _note(self, place: Sighting) -> None:
+    def _note(self, place: SeenAt) -> None:
         """The newest place of one counts, unless one shortly before tells more."""
         before = [s for s in self._open if s.may_be(place)]
         kept = [s for s in before if s.tells_more(place) and place.at - s.at <= _SHORTLY]
@@ -136,8 +136,8 @@ class CloseUps:
             return m.x, m.y
         return self._exclusions.floor.before((eye.pose.x, eye.pose.y), m.x, m.y, BEYOND)
 
-    def _is_person(self, place: Sighting) -> bool:
+    def _is_person(self, place: SeenAt) -> bool:
         return sum(place.may_be(person) for person in self._people) >= _OFTEN
 
-    def _is_settled(self, place: Sighting) -> bool:
+    def _is_settled(self, place: SeenAt) -> bool:
         return self._is_person(place) or any(place.may_be(pet) for pet in self._pets)

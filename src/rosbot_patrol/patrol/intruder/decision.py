@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from rosbot_patrol.patrol.house.regions import NOBODYS, RoomRegions
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
 from rosbot_patrol.patrol.intruder.camera_tracking import CameraTracking, CameraTrackingParams
-from rosbot_patrol.patrol.intruder.close_ups import CloseUps, Sighting
+from rosbot_patrol.patrol.intruder.close_ups import CloseUps, SeenAt
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.persons import Persons, PersonsParams
 from rosbot_patrol.patrol.intruder.sightings import Sightings, SightingsParams
@@ -86,7 +86,7 @@ class IntruderDecision:
 
     # -- who is there
 
-    def see(self, now: float, inputs: Inputs, harmless: Iterable[Sighting]) -> list[Finding]:
+    def see(self, now: float, inputs: Inputs, harmless: Iterable[SeenAt]) -> list[Finding]:
         """Take in a step's pictures.
 
         Args:
@@ -117,7 +117,7 @@ class IntruderDecision:
         return self._weak_sightings.doubtful()
 
     @property
-    def too_near(self) -> Sequence[Sighting]:
+    def too_near(self) -> Sequence[SeenAt]:
         """Things too near to tell a person from a pet."""
         return self._close_ups.doubtful
 

@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 
 from rosbot_patrol.geometry import angle_difference
-from rosbot_patrol.patrol.intruder.close_ups import Sighting
+from rosbot_patrol.patrol.intruder.close_ups import SeenAt
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
 from rosbot_patrol.patrol.intruder.second_looks import shows_whole
 from rosbot_patrol.patrol.records.inputs import Box, Eye
@@ -28,10 +28,10 @@ class PetsSeenWhole:
     """Those of one mission."""
 
     def __init__(self) -> None:
-        self._sightings: deque[Sighting] = deque(maxlen=_KEPT)
+        self._sightings: deque[SeenAt] = deque(maxlen=_KEPT)
 
     @property
-    def sightings(self) -> Sequence[Sighting]:
+    def sightings(self) -> Sequence[SeenAt]:
         """Where something was that is no person."""
         return tuple(self._sightings)
 
@@ -51,7 +51,7 @@ class PetsSeenWhole:
                 continue
             thing.shown = 0 if any(_is_of(box, eye, thing) for box in people) else thing.shown + 1
             if thing.shown >= _PICTURES:
-                self._sightings.append(Sighting(thing.x, thing.y, now))
+                self._sightings.append(SeenAt(thing.x, thing.y, now))
 
 
 def _is_of(box: Box, eye: Eye, thing: LidarTrack) -> bool:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rosbot_patrol.geometry import Pose2D, angle_difference
-from rosbot_patrol.patrol.intruder.close_ups import Sighting
+from rosbot_patrol.patrol.intruder.close_ups import SeenAt
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.inputs import Eye
 from rosbot_patrol.patrol.visibility.coverage import Sight
@@ -126,7 +126,7 @@ class SecondLooks:
     def __init__(self, seen_in: int) -> None:
         self._seen_in = seen_in
         self._all: list[SecondLook] = []
-        self._too_near: Sequence[Sighting] = ()  # what nobody has told from a pet yet
+        self._too_near: Sequence[SeenAt] = ()  # what nobody has told from a pet yet
         self._weak_sightings: Sequence[WeakSighting] = ()
 
     def __iter__(self) -> Iterator[SecondLook]:
@@ -154,7 +154,7 @@ class SecondLooks:
                 doubt.is_visited = doubt.is_over = True
         self._weak_sightings = tuple(doubtful)
 
-    def set_too_near(self, doubtful: Sequence[Sighting]) -> None:
+    def set_too_near(self, doubtful: Sequence[SeenAt]) -> None:
         """Take in what is too near to be told from a pet, all that is so by now."""
         for thing in doubtful:
             known = next((d for d in self._all if d.is_near and _apart(d, thing) < _SAME_FAR), None)
@@ -237,11 +237,11 @@ class SecondLooks:
                 return SecondLook(thing.x, thing.y, is_near=True).text
         return ""
 
-    def _was_looked_at(self, doubt: SecondLook, thing: Sighting) -> bool:
+    def _was_looked_at(self, doubt: SecondLook, thing: SeenAt) -> bool:
         return doubt.is_near and doubt.looks >= self._seen_in and _apart(doubt, thing) < _SAME_FAR
 
 
-def _apart(doubt: SecondLook, thing: Sighting) -> float:
+def _apart(doubt: SecondLook, thing: SeenAt) -> float:
     return math.dist(doubt.was_at or (doubt.x, doubt.y), (thing.x, thing.y))
 
 

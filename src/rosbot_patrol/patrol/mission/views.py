@@ -7,7 +7,7 @@ from typing import Protocol
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.close_ups import Sighting
+from rosbot_patrol.patrol.intruder.close_ups import SeenAt
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission
@@ -29,10 +29,10 @@ class Views(Protocol):
     def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """Take in everything that looks like a person from too few sides."""
 
-    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+    def step_back(self, doubtful: Sequence[SeenAt]) -> None:
         """Take in everything that is too near to tell a person from a pet."""
 
-    def harmless(self) -> Sequence[Sighting]:
+    def harmless(self) -> Sequence[SeenAt]:
         """Things that move in the room and are no persons."""
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
@@ -66,10 +66,10 @@ class OneTurn:
     def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """There is no other side."""
 
-    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+    def step_back(self, doubtful: Sequence[SeenAt]) -> None:
         """There is no other place."""
 
-    def harmless(self) -> Sequence[Sighting]:
+    def harmless(self) -> Sequence[SeenAt]:
         """Nobody knows."""
         return ()
 

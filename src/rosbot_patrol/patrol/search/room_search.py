@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from rosbot_patrol.geometry import Pose2D, angle_difference, wrap_angle
 from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.close_ups import Sighting
+from rosbot_patrol.patrol.intruder.close_ups import SeenAt
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
 from rosbot_patrol.patrol.intruder.pets_seen_whole import PetsSeenWhole
 from rosbot_patrol.patrol.intruder.second_looks import SecondLook, SecondLooks
@@ -122,11 +122,11 @@ class RoomSearch:
         """Look at what seems to be a person from another side."""
         self._search.doubts.suspect(doubtful)
 
-    def step_back(self, doubtful: Sequence[Sighting]) -> None:
+    def step_back(self, doubtful: Sequence[SeenAt]) -> None:
         """Look from farther off at what is too near to tell a person from a pet."""
         self._search.doubts.set_too_near(doubtful)
 
-    def harmless(self) -> Sequence[Sighting]:
+    def harmless(self) -> Sequence[SeenAt]:
         """Things that move, were shown whole and are no persons."""
         return self._search.harmless.sightings
 

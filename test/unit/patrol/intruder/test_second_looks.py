@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.intruder.close_ups import Sighting
+from rosbot_patrol.patrol.intruder.close_ups import SeenAt
 from rosbot_patrol.patrol.intruder.second_looks import SecondLooks
 from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting, WeakSightings
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
@@ -16,8 +16,8 @@ SEEN_IN = 3
 ALL_AROUND = Sight(x=3.0, y=0.0, first=-math.pi, step=math.tau / 360.0, lengths=np.full(360, 5.0))
 
 
-def near(x: float, y: float, at: float = 0.0) -> Sighting:
-    return Sighting(x, y, at)
+def near(x: float, y: float, at: float = 0.0) -> SeenAt:
+    return SeenAt(x, y, at)
 
 
 def test_what_was_too_near_wants_one_look():
