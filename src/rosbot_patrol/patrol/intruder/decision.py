@@ -122,7 +122,7 @@ class IntruderDecision:
         return self._close_ups.doubtful
 
     @property
-    def suspects(self) -> Sequence[WeakSighting]:
+    def weak_sightings(self) -> Sequence[WeakSighting]:
         """Everything that looked a little like somebody."""
         return self._weak_sightings.all
 

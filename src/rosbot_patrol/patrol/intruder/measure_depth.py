@@ -49,7 +49,7 @@ def is_beyond(samples: Array) -> bool:
 
 
 def upper_part_is_at(samples: Array, along: float, other: float) -> bool:
-    """Whether the upper part of a box shows what is at the other, farther distance [m] rather than at the first."""
+    """Whether the upper part of a box shows something at the other, farther distance [m] rather than the first one."""
     upper = samples[:_HEAD]
     first, second = (upper < along + DEEP).mean(), (np.abs(upper - other) < DEEP).mean()  # NaN is neither
     return bool(second >= _HEAD_OTHER and second > _HEAD_TIMES * first)
@@ -65,10 +65,10 @@ def _nearest(samples: Array) -> float | None:
 
 
 def object_distance(samples: Array) -> tuple[float | None, Mask]:
-    """How far that is which a box is drawn around [m], and which samples show what stands before it.
+    """Distance of the object that a box is drawn around [m], None if unknown, and the samples of what stands before it.
 
-    A detector's box ends where its object does: head, arms and feet touch its sides. What is nearest, but leaves a
-    strip of the box free beside or above it, as a chair before somebody, or before a picture on the wall, is not it.
+    A detector's box ends where its object does: head, arms and feet touch its sides. The nearest thing is not it
+    if it leaves a strip of the box free beside or above it: a chair before somebody, or a picture on the wall.
     """
     first, along = _nearest(_middle(samples)), _nearest(samples)
     nothing = np.zeros(samples.shape, np.bool_)
@@ -110,7 +110,7 @@ def _aside(columns: Mask) -> float:
 
 
 def nearest_within(samples: Array, most: float) -> float | None:
-    """How far the thing is that is no farther than `most` [m], None where next to nothing is."""
+    """Distance of the thing within `most` [m], None if too few samples lie there."""
     near = samples[samples <= most]  # NaN is not
     return float(np.median(near)) if near.size >= max(_BELIEVED * samples.size, _FEW) else None
 

@@ -60,7 +60,7 @@ def clear(mission: Mission, turned_deg: float, refusals: Mapping[str, int]) -> s
     return ", ".join(parts)
 
 
-def suspects(found: Iterable[WeakSighting]) -> tuple[str, ...]:
+def weak_sightings(found: Iterable[WeakSighting]) -> tuple[str, ...]:
     """What looked like somebody, for the record: where, how surely, from which sides."""
     texts = []
     for suspect in found:
