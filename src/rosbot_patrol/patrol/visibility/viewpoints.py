@@ -164,17 +164,17 @@ class ViewpointPlanner:
         nearest: float = 1.5,
         most: float = 3.5,
     ) -> Viewpoint | None:
-        """A place from which another one is looked at from near, on a free line; None where there is none.
+        """The nearest viewpoint with a free line to a place, None if there is none.
 
         Args:
             start: where the robot is, in map.
-            x: of what is to be looked at [m].
-            y: of what is to be looked at [m].
+            x: of the place [m].
+            y: of the place [m].
             stands: as for `next`.
-            seen_from: from there it was seen: the place is to show another side, or at least more, or from a step away.
-            tried: looking from there was in vain; after two of them a step aside has to do.
-            nearest: no place nearer than that [m].
-            most: none farther [m].
+            seen_from: poses that showed it: the viewpoint shows another side, or at least more, or a step aside.
+            tried: viewpoints that were in vain; after two of them a step aside is enough.
+            nearest: minimum distance from the place [m].
+            most: maximum distance [m].
         """
         floor, ways = self.floor, self.ways(start, stands)
         sight = sight_on_map(floor, *self._before(x, y), most)
@@ -189,12 +189,14 @@ class ViewpointPlanner:
             good = self._anew(good, untried, distances.reshape(good.shape), seen_from, x, y, tried)
         else:
             good = untried
-        roomy = good & (floor.clearance >= _ROOMY)
+        return self._nearest_view(good, ways, x, y) if good.any() else None
+
+    def _nearest_view(self, good: Mask, ways: Array, x: float, y: float) -> Viewpoint:
+        """The view of a place from the good cell with the shortest way, a roomy one if there is any."""
+        roomy = good & (self.floor.clearance >= _ROOMY)
         good = roomy if roomy.any() else good
-        if not good.any():
-            return None
         iy, ix = np.unravel_index(int(np.where(good, ways, _FAR).argmin()), good.shape)
-        at = floor.info.centre_of(int(ix), int(iy))
+        at = self.floor.info.centre_of(int(ix), int(iy))
         yaw = math.atan2(y - at[1], x - at[0])
         return Viewpoint(pose=Pose2D(*at, yaw), turn=0.0, gain=0.0, way=float(ways[iy, ix]))
 
