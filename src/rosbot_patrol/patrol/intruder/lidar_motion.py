@@ -85,18 +85,18 @@ class LidarMotion:
         params: what counts.
 
     Attributes:
-        things: that it follows; moved: what moved farthest.
+        tracks: that it follows; moved: what moved farthest.
     """
 
     def __init__(self, params: LidarMotionParams | None = None) -> None:
         self.params = params or LidarMotionParams()
-        self.things: list[LidarTrack] = []
+        self.tracks: list[LidarTrack] = []
         self._last = -math.inf
         self.moved: Moved | None = None
 
     def start(self) -> None:
         """Forget everything."""
-        self.things.clear()
+        self.tracks.clear()
         self._last, self.moved = -math.inf, None
 
     def see(self, scan: LaserScan, map_from_laser: Pose2D, floor: Floor) -> None:
@@ -109,7 +109,7 @@ class LidarMotion:
         points = points[np.hypot(*points.T) < p.witness_reach] if len(points) else points
         off = off_the_map(floor, transform_points(map_from_laser, points), p.off_map)
         if len(off) > p.lost_share * max(len(points), 1):
-            self.things.clear()
+            self.tracks.clear()
             return
         self._follow(now, groups(off, p.thing_gap, p.thing_points), scan, map_from_laser)
 
@@ -123,37 +123,37 @@ class LidarMotion:
         places = [(points.min(axis=0) + points.max(axis=0)) / 2.0 for points in found]
         small = [k for k, points in enumerate(found) if np.ptp(points, axis=0).max() <= p.thing_size]
         pairs = sorted(
-            (math.dist((thing.x, thing.y), places[k]), i, k) for i, thing in enumerate(self.things) for k in small
+            (math.dist((track.x, track.y), places[k]), i, k) for i, track in enumerate(self.tracks) for k in small
         )
-        things: set[int] = set()
+        matched: set[int] = set()
         taken: set[int] = set()
         for apart, i, k in pairs:
-            if apart > p.thing_jump or i in things or k in taken:
+            if apart > p.thing_jump or i in matched or k in taken:
                 continue
-            things.add(i)
+            matched.add(i)
             taken.add(k)
-            self._see_again(self.things[i], now, places[k], scan, map_from_laser)
+            self._see_again(self.tracks[i], now, places[k], scan, map_from_laser)
         for k in small:
             if k not in taken:
                 x, y = float(places[k][0]), float(places[k][1])
-                self.things.append(LidarTrack(first=found[k], start=(x, y), since=now, x=x, y=y, at=now))
-        self.things = [thing for thing in self.things if now - thing.at <= p.thing_memory]
+                self.tracks.append(LidarTrack(first=found[k], start=(x, y), since=now, x=x, y=y, at=now))
+        self.tracks = [track for track in self.tracks if now - track.at <= p.thing_memory]
 
-    def _see_again(self, thing: LidarTrack, now: float, place: Array, scan: LaserScan, map_from_laser: Pose2D) -> None:
-        thing.x, thing.y, thing.at = float(place[0]), float(place[1]), now
-        thing.looks += 1
-        far = math.dist(thing.start, (thing.x, thing.y))
-        away = math.dist(thing.start, (map_from_laser.x, map_from_laser.y))
-        if thing.looks < 3 or far < self.params.moved + self.params.moved_drift * away:
+    def _see_again(self, track: LidarTrack, now: float, place: Array, scan: LaserScan, map_from_laser: Pose2D) -> None:
+        track.x, track.y, track.at = float(place[0]), float(place[1]), now
+        track.looks += 1
+        far = math.dist(track.start, (track.x, track.y))
+        away = math.dist(track.start, (map_from_laser.x, map_from_laser.y))
+        if track.looks < 3 or far < self.params.moved + self.params.moved_drift * away:
             return
         is_farthest = self.moved is None or far > self.moved.far
-        if thing.has_moved and not is_farthest:
+        if track.has_moved and not is_farthest:
             return
-        if not _is_looked_through(thing.first, scan, map_from_laser):
+        if not _is_looked_through(track.first, scan, map_from_laser):
             return
-        thing.has_moved = True
+        track.has_moved = True
         if is_farthest:
-            self.moved = Moved(x=thing.x, y=thing.y, at=now, far=far)
+            self.moved = Moved(x=track.x, y=track.y, at=now, far=far)
 
 
 def off_the_map(floor: Floor, points: Array, tolerance: float) -> Array:

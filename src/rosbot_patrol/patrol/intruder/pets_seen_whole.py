@@ -35,7 +35,7 @@ class PetsSeenWhole:
         """Where something was that is no person."""
         return tuple(self._sightings)
 
-    def look(self, now: float, eye: Eye, sight: Sight, boxes: Iterable[Box], things: Iterable[LidarTrack]) -> None:
+    def look(self, now: float, eye: Eye, sight: Sight, boxes: Iterable[Box], tracks: Iterable[LidarTrack]) -> None:
         """Take in a picture.
 
         Args:
@@ -43,18 +43,18 @@ class PetsSeenWhole:
             eye: the camera when it was taken.
             sight: how far one could look from there.
             boxes: all that the detector found in it.
-            things: that the lidar follows.
+            tracks: of what the lidar follows.
         """
         people = [box for box in boxes if box.label == "person"]
-        for thing in things:
-            if not thing.has_moved or now - thing.at > _LATE or not shows_whole(eye, sight, thing.x, thing.y):
+        for track in tracks:
+            if not track.has_moved or now - track.at > _LATE or not shows_whole(eye, sight, track.x, track.y):
                 continue
-            thing.shown = 0 if any(_is_of(box, eye, thing) for box in people) else thing.shown + 1
-            if thing.shown >= _PICTURES:
-                self._sightings.append(SeenAt(thing.x, thing.y, now))
+            track.shown = 0 if any(_is_of(box, eye, track) for box in people) else track.shown + 1
+            if track.shown >= _PICTURES:
+                self._sightings.append(SeenAt(track.x, track.y, now))
 
 
-def _is_of(box: Box, eye: Eye, thing: LidarTrack) -> bool:
-    bearing = math.atan2(thing.y - eye.pose.y, thing.x - eye.pose.x)
+def _is_of(box: Box, eye: Eye, track: LidarTrack) -> bool:
+    bearing = math.atan2(track.y - eye.pose.y, track.x - eye.pose.x)
     ahead = angle_difference(bearing, eye.pose.yaw)
     return eye.bearing(box.xmax) - _BESIDE <= ahead <= eye.bearing(box.xmin) + _BESIDE

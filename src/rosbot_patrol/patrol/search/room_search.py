@@ -98,7 +98,7 @@ class RoomSearch:
             return
         if view is not None:
             self._lidar_motion.see(view.scan, view.map_from_laser, self._ground.house.floor)
-            if search.survey.has_motion(self._lidar_motion.things, view.scan.stamp):  # as good as the sensor's call
+            if search.survey.has_motion(self._lidar_motion.tracks, view.scan.stamp):  # as good as the sensor's call
                 search.called_at = now
         self._see_frames(search, search.survey, inputs)
 
@@ -116,7 +116,7 @@ class RoomSearch:
             search.doubts.look(frame.stamp, frame.eye, sight)
             if inputs.scan is not None:
                 stamp = inputs.scan.scan.stamp
-                search.harmless.look(stamp, frame.eye, sight, frame.boxes, self._lidar_motion.things)
+                search.harmless.look(stamp, frame.eye, sight, frame.boxes, self._lidar_motion.tracks)
 
     def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
         """Look at what seems to be a person from another side."""
@@ -245,7 +245,7 @@ class RoomSearch:
 
     def _second_look(self, search: _Search, survey: Survey, pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the first doubt that has one."""
-        search.doubts.follow((thing.x, thing.y) for thing in self._lidar_motion.things if thing.has_moved)
+        search.doubts.follow((track.x, track.y) for track in self._lidar_motion.tracks if track.has_moved)
         doubts = survey.doubts_here(search.doubts.open())
         if not doubts:
             return None

@@ -86,10 +86,10 @@ class Survey:
             return sight_on_map(floor, eye.pose.x, eye.pose.y, reach)
         return sight_of_scan(inputs.scan.scan, inputs.scan.map_from_laser, floor, reach)
 
-    def has_motion(self, things: Iterable[LidarTrack], stamp: float) -> bool:
+    def has_motion(self, tracks: Iterable[LidarTrack], stamp: float) -> bool:
         """Whether something that moved is in the room at a time [s]."""
-        moving = (thing for thing in things if thing.has_moved and thing.at >= stamp)
-        return any(self._house.room_at(thing.x, thing.y) == self.mission.room.id for thing in moving)
+        moving = (track for track in tracks if track.has_moved and track.at >= stamp)
+        return any(self._house.room_at(track.x, track.y) == self.mission.room.id for track in moving)
 
     def doubts_here(self, doubts: Iterable[SecondLook]) -> list[SecondLook]:
         """The doubts in the room, or right in front of the robot."""
