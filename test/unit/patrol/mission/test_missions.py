@@ -49,6 +49,28 @@ def test_the_most_urgent_goes_first_and_equals_in_order():
     assert len({m.id for m in world.ended}) == 4
 
 
+def test_calls_are_those_of_sensors_that_have_no_verdict_yet():
+    world = World()
+    world.requests = ask(1)
+    world.triggers = [2, 3]
+    world.run(driving_to(2))
+    manager = world.manager
+    assert sorted(manager.calls().values()) == [2, 3]
+    assert manager.calls()[manager.mission.id] == 2
+    assert manager.served() == {1, 2, 3}
+    world.run(lambda w: len(w.ended) == 3)
+    assert manager.calls() == {}
+
+
+def test_the_room_that_the_robot_comes_home_from_is_not_served_by_that():
+    world = World()
+    world.triggers = [2]
+    world.run(lambda w: phase(w) is Phase.LOOKING)
+    assert world.manager.served() == {2}
+    world.run(lambda w: phase(w) is not Phase.LOOKING)
+    assert world.manager.served() == frozenset()
+
+
 def test_a_sensors_call_puts_a_round_back_which_then_goes_on():
     world = World()
     world.requests = ask(1, 2)
