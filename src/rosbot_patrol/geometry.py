@@ -26,7 +26,7 @@ class Pose2D(NamedTuple):
     y: float = 0.0
     yaw: float = 0.0
 
-    def __matmul__(self, other: Pose2D) -> Pose2D:  # type: ignore[override]
+    def __matmul__(self, other: Pose2D) -> Pose2D:
         return compose(self, other)
 
 
@@ -119,7 +119,8 @@ def transform_points(a_from_b: Pose2D, points_b: Array) -> Array:
     """Points of frame b, shape (N, 2), in frame a."""
     c, s = math.cos(a_from_b.yaw), math.sin(a_from_b.yaw)
     rotation = np.array([[c, s], [-s, c]])
-    return points_b @ rotation + np.array([a_from_b.x, a_from_b.y])
+    points_a: Array = points_b @ rotation + np.array([a_from_b.x, a_from_b.y])
+    return points_a
 
 
 def compose_poses(a_from_b: Pose2D, poses_b: Array) -> Array:

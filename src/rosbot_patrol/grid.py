@@ -120,4 +120,5 @@ def occupancy_grid(info: GridInfo, data: Any, source: str) -> Grid:
 def cells_of_points(info: GridInfo, points: NDArray[np.float64]) -> NDArray[np.int64]:
     """(ix, iy) of points of shape (N, 2), shape (N, 2); may lie outside."""
     origin = np.array([info.origin_x, info.origin_y])
-    return np.floor((points - origin) / info.resolution).astype(np.int64)
+    cells: NDArray[np.int64] = np.floor((points - origin) / info.resolution).astype(np.int64)
+    return cells

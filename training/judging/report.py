@@ -10,9 +10,11 @@ import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet import decode
 from rosbot_patrol.detection.darknet.cfg import read_cfg
@@ -38,7 +40,7 @@ from training.learning.dataset import Pictures, asked, batch_of
 from training.pictures.labels import HEIGHT, WIDTH, column
 
 FLOOR = 0.02
-Forward = Callable[[np.ndarray], list[np.ndarray]]
+Forward = Callable[[NDArray[Any]], list[NDArray[Any]]]
 
 
 def load_forward(cfg: Path, weights: Path, *, threads: int = 2) -> Forward:
@@ -47,7 +49,7 @@ def load_forward(cfg: Path, weights: Path, *, threads: int = 2) -> Forward:
     network = load_network(spec, read_weights(str(weights), spec), threads=threads)
     place = Letterbox(WIDTH, HEIGHT, spec.width, spec.height)
 
-    def forward(images: np.ndarray) -> list[np.ndarray]:
+    def forward(images: NDArray[Any]) -> list[NDArray[Any]]:
         answers = [network.run(Picture(picture, "rgb8"), place) for picture in images]
         return [np.stack(values) for values in zip(*answers, strict=True)]
 
@@ -119,7 +121,7 @@ def draw_samples(pictures: Pictures, target: Path, *, count: int = 20, seed: int
     save_sheet(tiles, target)
 
 
-def save_sheet(tiles: list[np.ndarray], target: Path, *, columns: int = 5) -> None:
+def save_sheet(tiles: list[NDArray[Any]], target: Path, *, columns: int = 5) -> None:
     """Pictures beside each other, as a jpeg."""
     if not tiles:
         return
@@ -129,19 +131,19 @@ def save_sheet(tiles: list[np.ndarray], target: Path, *, columns: int = 5) -> No
     cv2.imwrite(str(target), np.vstack(rows)[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 78])
 
 
-def _picture(pictures: Pictures, found: Found, number: int) -> np.ndarray:
+def _picture(pictures: Pictures, found: Found, number: int) -> NDArray[Any]:
     return pictures.picture(*found.index[number]).copy()
 
 
 def _tile(
-    pictures: Pictures, found: Found, number: int, box: np.ndarray, colour: tuple[int, int, int], text: str
-) -> np.ndarray:
+    pictures: Pictures, found: Found, number: int, box: NDArray[Any], colour: tuple[int, int, int], text: str
+) -> NDArray[Any]:
     picture = _picture(pictures, found, number)
     _frame(picture, box, colour, text)
     return picture
 
 
-def _frame(picture: np.ndarray, box: np.ndarray, colour: tuple[int, int, int], text: str) -> None:
+def _frame(picture: NDArray[Any], box: NDArray[Any], colour: tuple[int, int, int], text: str) -> None:
     x0, y0, x1, y1 = (box * [WIDTH, HEIGHT, WIDTH, HEIGHT]).astype(int)
     cv2.rectangle(picture, (x0, y0), (x1 - 1, y1 - 1), colour, 1)
     cv2.putText(picture, text, (x0, max(y0 - 3, 9)), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet import decode
 from training.learning.dataset import asked
@@ -44,27 +46,29 @@ class Found:
         index: (shard, picture) of each picture.
     """
 
-    boxes: np.ndarray
-    labels: np.ndarray
-    hit: np.ndarray
-    index: np.ndarray = field(repr=False)
+    boxes: NDArray[Any]
+    labels: NDArray[Any]
+    hit: NDArray[Any]
+    index: NDArray[Any] = field(repr=False)
 
     @property
-    def wanted(self) -> np.ndarray:
+    def wanted(self) -> NDArray[Any]:
         """Which labels are asked for."""
         return asked(self.labels)
 
-    def false(self, kind: int) -> np.ndarray:
+    def false(self, kind: int) -> NDArray[Any]:
         """Which detections are false alarms of that kind."""
-        return (self.boxes[:, 1] == kind) & (self.boxes[:, 7] < 0) & (self.boxes[:, 8] == 0)
+        alarms: NDArray[Any] = (self.boxes[:, 1] == kind) & (self.boxes[:, 7] < 0) & (self.boxes[:, 8] == 0)
+        return alarms
 
-    def good(self, kind: int) -> np.ndarray:
+    def good(self, kind: int) -> NDArray[Any]:
         """Which detections of that kind hit what is asked for."""
         at = self.boxes[:, 7].astype(int)
-        return (self.boxes[:, 1] == kind) & (at >= 0) & (self.wanted[at] if len(self.labels) else False)
+        hits: NDArray[Any] = (self.boxes[:, 1] == kind) & (at >= 0) & (self.wanted[at] if len(self.labels) else False)
+        return hits
 
 
-def match(number: int, found: decode.Candidates, rows: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+def match(number: int, found: decode.Candidates, rows: NDArray[Any], first: int) -> tuple[NDArray[Any], NDArray[Any]]:
     """Rows of `Found.boxes` of one picture, and with which probability each of its labels was found.
 
     Args:
@@ -126,7 +130,7 @@ def found_at(found: Found, precision: float) -> tuple[float, int, int]:
     return threshold, int((found.hit[aimed] >= threshold).sum()), int(aimed.sum())
 
 
-def groups(found: Found) -> dict[str, np.ndarray]:
+def groups(found: Found) -> dict[str, NDArray[Any]]:
     """The sets of labels whose recall is told, the one that is aimed at first."""
     rows = found.labels
     person, distance = column(rows, "kind") == 0, column(rows, "distance")
@@ -191,7 +195,7 @@ def false_alarms(found: Found, threshold: float) -> dict[str, int]:
     return counts
 
 
-def spared(found: Found, sure: np.ndarray) -> int:
+def spared(found: Found, sure: NDArray[Any]) -> int:
     """How many of the persons that are aimed at darknet's suppression leaves, if every box is as it should be.
 
     Args:
@@ -269,16 +273,17 @@ def share(hits: float, count: float) -> str:
     return f"{hits:.0f}/{count:.0f} = {100 * hits / count:.2f} % (95 %: {100 * low:.1f} to {100 * high:.1f})"
 
 
-def _iou(box: np.ndarray, others: np.ndarray) -> np.ndarray:
+def _iou(box: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
     shared = _shared(box, others)
     union = (box[2:] - box[:2]).prod() + (others[:, 2:] - others[:, :2]).prod(axis=1) - shared
-    return shared / np.maximum(union, 1e-9)
+    overlaps: NDArray[Any] = shared / np.maximum(union, 1e-9)
+    return overlaps
 
 
-def _inside(box: np.ndarray, others: np.ndarray) -> np.ndarray:
+def _inside(box: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
     return _shared(box, others) / max(float((box[2:] - box[:2]).prod()), 1e-9)
 
 
-def _shared(box: np.ndarray, others: np.ndarray) -> np.ndarray:
+def _shared(box: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
     corners = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
     return np.asarray(np.clip(corners, 0, None).prod(axis=1))

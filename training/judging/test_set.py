@@ -80,7 +80,8 @@ def _hexagons(rng: np.random.Generator) -> Texture:
     side_x, side_y = SIDE / 4, SIDE / 4
 
     def nearest(shift: float) -> tuple[Field, Field]:
-        cx, cy = (x + shift * side_x) % side_x - side_x / 2, (y + shift * side_y) % side_y - side_y / 2
+        cx: Field = (x + shift * side_x) % side_x - side_x / 2
+        cy: Field = (y + shift * side_y) % side_y - side_y / 2
         return cx * cx + 0.75 * cy * cy, np.floor((x + shift * side_x) / side_x) + 7 * np.floor(y / side_y + shift)
 
     (near_a, cell_a), (near_b, cell_b) = nearest(0.0), nearest(0.5)

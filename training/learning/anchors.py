@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from training.learning.dataset import Pictures, asked
 from training.pictures.labels import HEIGHT, WIDTH, column
 
 
-def find_anchors(pictures: Pictures, count: int, seed: int) -> np.ndarray:
+def find_anchors(pictures: Pictures, count: int, seed: int) -> NDArray[Any]:
     """Widths and heights [px of the network's input], by area, shape (count, 2)."""
     rows = np.concatenate([rows for shard in pictures.labels for rows in shard])
     rows = rows[asked(rows)]
@@ -27,10 +29,11 @@ def find_anchors(pictures: Pictures, count: int, seed: int) -> np.ndarray:
         centres = np.array(
             [np.median(sizes[nearest == k], axis=0) if (nearest == k).any() else centres[k] for k in range(count)]
         )
-    return centres[centres.prod(axis=1).argsort()]
+    by_size: NDArray[Any] = centres[centres.prod(axis=1).argsort()]
+    return by_size
 
 
-def write_anchors(cfg: Path, anchors: np.ndarray) -> None:
+def write_anchors(cfg: Path, anchors: NDArray[Any]) -> None:
     """Put anchors into a cfg file."""
     text = ", ".join(f"{w:.0f},{h:.0f}" for w, h in anchors)
     cfg.write_text(re.sub(r"(?m)^anchors\s*=.*$", f"anchors={text}", cfg.read_text()))

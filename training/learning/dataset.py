@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from training.learning.mixing import View, disguise, mix, repaper, zoom
 from training.pictures.labels import COLUMNS, HEIGHT, WIDTH, column
@@ -29,11 +31,11 @@ class Packed:
         files: a jpeg each, uint8.
     """
 
-    def __init__(self, files: list[np.ndarray]) -> None:
+    def __init__(self, files: list[NDArray[Any]]) -> None:
         self._files = files
 
     @classmethod
-    def of(cls, pictures: np.ndarray) -> Packed:
+    def of(cls, pictures: NDArray[Any]) -> Packed:
         """Of pictures, RGB, uint8, shape (N, 288, 384, 3)."""
         return cls([_packed(picture) for picture in pictures])
 
@@ -51,21 +53,22 @@ class Packed:
     def __len__(self) -> int:
         return len(self._files)
 
-    def file(self, i: int) -> np.ndarray:
+    def file(self, i: int) -> NDArray[Any]:
         """The jpeg of a picture, uint8."""
         return self._files[i]
 
-    def __getitem__(self, i: int) -> np.ndarray:
-        return cv2.cvtColor(cv2.imdecode(self._files[i], cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    def __getitem__(self, i: int) -> NDArray[Any]:
+        picture: NDArray[Any] = cv2.cvtColor(cv2.imdecode(self._files[i], cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+        return picture
 
 
 @dataclass
 class Pictures:
     """A set of pictures, opened as memory maps or packed into memory, and the label rows of each."""
 
-    shards: Sequence[np.ndarray | Packed]
-    labels: list[list[np.ndarray]]
-    masks: list[list[np.ndarray] | None] = field(default_factory=list)
+    shards: Sequence[NDArray[Any] | Packed]
+    labels: list[list[NDArray[Any]]]
+    masks: list[list[NDArray[Any]] | None] = field(default_factory=list)
 
     @classmethod
     def open(cls, folder: Path, name: str) -> Pictures:
@@ -106,15 +109,15 @@ class Pictures:
     def __len__(self) -> int:
         return sum(len(shard) for shard in self.shards)
 
-    def index(self) -> np.ndarray:
+    def index(self) -> NDArray[Any]:
         """(shard, picture) of each picture, shape (N, 2)."""
         return np.array([(s, i) for s, shard in enumerate(self.shards) for i in range(len(shard))])
 
-    def picture(self, shard: int, i: int) -> np.ndarray:
+    def picture(self, shard: int, i: int) -> NDArray[Any]:
         """RGB, uint8, shape (288, 384, 3)."""
         return self.shards[shard][i]
 
-    def jpeg(self, shard: int, i: int) -> np.ndarray:
+    def jpeg(self, shard: int, i: int) -> NDArray[Any]:
         """The file of a picture as it is packed, uint8."""
         held = self.shards[shard]
         return held.file(i) if isinstance(held, Packed) else _packed(held[i])
@@ -127,7 +130,7 @@ class Pictures:
         return View(self.picture(shard, i), self.labels[shard][i], cv2.imdecode(held[i], cv2.IMREAD_GRAYSCALE))
 
 
-def read_labels(file: Path, count: int) -> tuple[list[np.ndarray], list[np.ndarray] | None]:
+def read_labels(file: Path, count: int) -> tuple[list[NDArray[Any]], list[NDArray[Any]] | None]:
     """Rows of each picture of a shard, and the png of its mask; None for a set of before there were masks."""
     with np.load(file) as held:
         rows = held["boxes"]
@@ -138,7 +141,7 @@ def read_labels(file: Path, count: int) -> tuple[list[np.ndarray], list[np.ndarr
     return [rows[column(rows, "picture") == i] for i in range(count)], masks
 
 
-def pack_masks(masks: np.ndarray) -> dict[str, np.ndarray]:
+def pack_masks(masks: NDArray[Any]) -> dict[str, NDArray[Any]]:
     """Masks of a shard, shape (N, 288, 384), as arrays for its file: each a png.
 
     A pixel's value is the actor's number (from 1, column `mask` of its row; a pet has a number and no row), or
@@ -147,20 +150,21 @@ def pack_masks(masks: np.ndarray) -> dict[str, np.ndarray]:
     return join_masks([cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_COMPRESSION, 4])[1] for mask in masks])
 
 
-def join_masks(files: list[np.ndarray]) -> dict[str, np.ndarray]:
+def join_masks(files: list[NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Masks that are pngs already, as arrays for a shard's file."""
     return {"masks": np.concatenate(files), "mask_ends": np.cumsum([len(file) for file in files])}
 
 
-def asked(rows: np.ndarray) -> np.ndarray:
+def asked(rows: NDArray[Any]) -> NDArray[Any]:
     """Whether a network is asked to find each: not the hardly visible, nor what is too dark or small to make out."""
     big = column(rows, "pixels") > np.where(column(rows, "distance") > 4.0, 150, 400)
     height = column(rows, "y1") - column(rows, "y0")
     clear = (column(rows, "light") > 6.0) & (column(rows, "contrast") > FAINT)
-    return big & (column(rows, "seen_of_part") > 0.25) & clear & (height > 0.05)
+    findable: NDArray[Any] = big & (column(rows, "seen_of_part") > 0.25) & clear & (height > 0.05)
+    return findable
 
 
-def sureness(rows: np.ndarray) -> np.ndarray:
+def sureness(rows: NDArray[Any]) -> NDArray[Any]:
     """How sure a network is to be of each row at most: less of a person who hides, or of whom the edge leaves little.
 
     Of the boxes that are false, those surer than most right ones are of the wrong size on such people; so no box on
@@ -170,7 +174,9 @@ def sureness(rows: np.ndarray) -> np.ndarray:
     return np.where(column(rows, "kind") == 0, HIDDEN + (1.0 - HIDDEN) * np.min(shown, axis=0), 1.0)
 
 
-def batch_of(pictures: Pictures, chosen: np.ndarray, rng: np.random.Generator | None) -> tuple[np.ndarray, np.ndarray]:
+def batch_of(
+    pictures: Pictures, chosen: NDArray[Any], rng: np.random.Generator | None
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Pictures uint8 (B, 288, 384, 3) and rows (batch, kind, centre x, y, width, height [px], sureness).
 
     Args:
@@ -219,11 +225,12 @@ def _mixed(view: View, pictures: Pictures, rng: np.random.Generator) -> View:
     return zoom(view, rng) if rng.random() < ZOOM else view
 
 
-def _packed(picture: np.ndarray) -> np.ndarray:
-    return cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 96])[1]
+def _packed(picture: NDArray[Any]) -> NDArray[Any]:
+    jpeg: NDArray[Any] = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 96])[1]
+    return jpeg
 
 
-def _recolour(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _recolour(picture: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
     if rng.random() < 0.4:
         return picture
     levels = np.arange(256, dtype=np.float32)
@@ -231,4 +238,5 @@ def _recolour(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     tables = [np.clip(levels * gain + rng.normal(0, 4), 0, 255).astype(np.uint8) for gain in gains]
     if rng.random() < 0.1:
         picture = picture[..., rng.permutation(3)].copy()
-    return cv2.LUT(picture, np.stack(tables, axis=-1)[None])
+    recoloured: NDArray[Any] = cv2.LUT(picture, np.stack(tables, axis=-1)[None])
+    return recoloured

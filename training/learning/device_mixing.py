@@ -9,7 +9,7 @@ picture are dressed anew; how bright somebody is, is taken from himself, not fro
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
@@ -26,6 +26,7 @@ _DONOR = 100  # added to the number of an actor who comes from the donor
 _BOX = slice(AT["x0"], AT["y1"] + 1)
 
 Chance = dict[str, torch.Tensor]
+_Draw = Callable[..., torch.Tensor]
 
 
 class Mixer:
@@ -58,8 +59,8 @@ class Mixer:
         pool, count = pool or self._pool, len(places)
         donors = torch.randint(pool.size, (count,), device=self._device, generator=self._generator)
         chance = draw_chance(count, len(self._bank), self._device, self._generator)
-        views = [(pool.pictures[at], pool.masks[at], pool.rows[at], pool.counts[at]) for at in (places, donors)]
-        images, rows = self._mix(*views, chance, self._bank)
+        view, donor = ((pool.pictures[at], pool.masks[at], pool.rows[at], pool.counts[at]) for at in (places, donors))
+        images, rows = self._mix(view, donor, chance, self._bank)
         return images, truth_of(rows)
 
 
@@ -133,7 +134,7 @@ def draw_chance(count: int, patterns: int, device: torch.device, generator: torc
     }
 
 
-def _quads(uniform, normal, integers) -> torch.Tensor:  # type: ignore[no-untyped-def]
+def _quads(uniform: _Draw, normal: _Draw, integers: _Draw) -> torch.Tensor:
     """From a picture's pixels (x, y, 1) to places on patterns, 0 to 1: homographies, shape (B, PATTERNS, 3, 3)."""
     tall = (uniform(PATTERNS) < 0.5)[..., None]
     size = torch.where(

@@ -39,7 +39,8 @@ class Learner:
         compile_it: bool = False,
     ) -> None:
         self.spec, self.device, self._bf16 = spec, device, bf16 and computes_bf16(device)
-        self.network = Darknet(spec).to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        network: Any = Darknet(spec)
+        self.network: Darknet = network.to(device, memory_format=torch.channels_last)
         self.network.set_prior(0.01)
         self.mean = copy.deepcopy(self.network).eval()
         self._mean_values, self._values = (
@@ -66,7 +67,8 @@ class Learner:
         self.optimiser.set_rate(rate)
         parts, each = self._run(inputs, truth)
         self.network.zero_grad(set_to_none=True)
-        sum(parts.values()).backward()  # type: ignore[union-attr]
+        loss: Any = sum(parts.values())
+        loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 10.0)
         self.optimiser.step()
         self.step += 1
@@ -162,11 +164,11 @@ class Optimiser:
         for part in self._parts:
             part.state.clear()
 
-    def state_dict(self) -> list[dict]:
+    def state_dict(self) -> list[dict[str, Any]]:
         """Of each part."""
         return [part.state_dict() for part in self._parts]
 
-    def load_state_dict(self, states: list[dict]) -> None:
+    def load_state_dict(self, states: list[dict[str, Any]]) -> None:
         """What `state_dict` gave."""
         if len(states) != len(self._parts):
             raise ValueError("the checkpoint is of another optimiser: give --muon as when it was begun")

@@ -8,9 +8,11 @@ Costs a few ms a picture, a tenth of drawing one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from training.pictures.labels import COLUMNS, column
 from training.pictures.overlay import draw_from_bank, lay_patterns
@@ -33,9 +35,9 @@ class View:
         mask: uint8, shape (288, 384): 1 to 99 an actor, `FURNITURE` and more what else is labelled, 0 the rest.
     """
 
-    picture: np.ndarray
-    rows: np.ndarray
-    mask: np.ndarray
+    picture: NDArray[Any]
+    rows: NDArray[Any]
+    mask: NDArray[Any]
 
     def mirrored(self) -> View:
         """Left and right changed."""
@@ -121,13 +123,13 @@ def zoom(view: View, rng: np.random.Generator, *, most: float = 0.25) -> View:
     high, wide = view.mask.shape
     sx, sy = 1 + rng.uniform(0, most, 2)
     middle = float(rng.uniform(0, wide - 1))
-    matrix = np.float64([[sx, 0, middle * (1 - sx)], [0, sy, (high - 1) / 2 * (1 - sy)]])
+    matrix = np.array([[sx, 0, middle * (1 - sx)], [0, sy, (high - 1) / 2 * (1 - sy)]], np.float64)
     picture = cv2.warpAffine(view.picture, matrix, (wide, high), flags=cv2.INTER_LINEAR)
     mask = cv2.warpAffine(view.mask, matrix, (wide, high), flags=cv2.INTER_NEAREST)
     return View(picture, _cut(view.rows, view.mask, mask, scale=sx * sy), mask)
 
 
-def _lay(under: np.ndarray, over: np.ndarray, where: np.ndarray, *, soft: bool) -> None:
+def _lay(under: NDArray[Any], over: NDArray[Any], where: NDArray[Any], *, soft: bool) -> None:
     """Put one picture over another where it is to be, in place; `soft` with edges as a camera has them."""
     columns, lines = np.flatnonzero(where.any(axis=0)), np.flatnonzero(where.any(axis=1))
     part = slice(max(lines[0] - 1, 0), lines[-1] + 2), slice(max(columns[0] - 1, 0), columns[-1] + 2)
@@ -139,13 +141,14 @@ def _lay(under: np.ndarray, over: np.ndarray, where: np.ndarray, *, soft: bool) 
     under[part] = cv2.add(above, cv2.multiply(under[part], cv2.bitwise_not(share), scale=1 / 255.0))
 
 
-def _dyed(part: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _dyed(part: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
     kind = rng.random()
     if kind < 0.35:  # one colour, shaded as before
         grey = part.max(axis=2).astype(np.float32)
         colour = rng.random(3) * rng.uniform(0.15, 1.0)
         level = 255.0 / max(float(grey.mean()), 8.0) * float(np.clip(grey.mean() / 128.0, 0.2, 1.0))
-        return np.clip(grey[:, :, None] * (colour * level), 0, 255).astype(np.uint8)
+        dyed: NDArray[Any] = np.clip(grey[:, :, None] * (colour * level), 0, 255).astype(np.uint8)
+        return dyed
     if kind < 0.7:  # a pattern, on what is there or on white
         pattern = draw_from_bank(rng)
         times = float(np.exp(rng.uniform(np.log(0.15), np.log(1.0))))
@@ -153,21 +156,24 @@ def _dyed(part: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         y, x = rng.integers(0, pattern.shape[0] - side + 1, 2)
         laid = cv2.resize(pattern[y : y + side, x : x + side], part.shape[1::-1], interpolation=cv2.INTER_LINEAR)
         if rng.random() < 0.5:
-            return cv2.multiply(part, laid, scale=1 / 255.0)
+            darkened: NDArray[Any] = cv2.multiply(part, laid, scale=1 / 255.0)
+            return darkened
         grey = cv2.multiply(laid, np.repeat(part.max(axis=2)[:, :, None], 3, axis=2), scale=1 / 200.0)
-        return (grey * rng.uniform(0.3, 1.0, 3)).astype(np.uint8)
+        tinted: NDArray[Any] = (grey * rng.uniform(0.3, 1.0, 3)).astype(np.uint8)
+        return tinted
     out = part[:, :, rng.permutation(3)]
     gains = np.exp(rng.normal(0, 0.4, 3)).astype(np.float32)
-    return np.clip(out * gains, 0, 255).astype(np.uint8)
+    recoloured: NDArray[Any] = np.clip(out * gains, 0, 255).astype(np.uint8)
+    return recoloured
 
 
-def _pixels(row: np.ndarray, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
+def _pixels(row: NDArray[Any], shape: tuple[int, ...]) -> tuple[int, int, int, int]:
     """The row's box in pixels, one more on each side: it was measured at 640 x 480."""
     x0, y0, x1, y1 = row[_BOX] * [shape[1], shape[0], shape[1], shape[0]]
     return max(int(x0) - 1, 0), max(int(y0) - 1, 0), min(int(x1) + 2, shape[1]), min(int(y1) + 2, shape[0])
 
 
-def _seen(rows: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def _seen(rows: NDArray[Any], before: NDArray[Any], after: NDArray[Any]) -> NDArray[Any]:
     """Rows of who is still seen where something was laid over a part of the mask: boxes and shares as it is now."""
     kept = []
     for row in rows:
@@ -186,7 +192,7 @@ def _seen(rows: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray
     return np.array(kept, rows.dtype).reshape(-1, rows.shape[1])
 
 
-def _cut(rows: np.ndarray, before: np.ndarray, after: np.ndarray, *, scale: float = 1.0) -> np.ndarray:
+def _cut(rows: NDArray[Any], before: NDArray[Any], after: NDArray[Any], *, scale: float = 1.0) -> NDArray[Any]:
     """Rows of who is inside the picture still, of masks that were moved or enlarged."""
     kept = []
     for row in rows:
@@ -203,7 +209,7 @@ def _cut(rows: np.ndarray, before: np.ndarray, after: np.ndarray, *, scale: floa
     return np.array(kept, rows.dtype).reshape(-1, rows.shape[1])
 
 
-def _bounds(where: np.ndarray, x0: int, y0: int, shape: tuple[int, ...]) -> list[float]:
+def _bounds(where: NDArray[Any], x0: int, y0: int, shape: tuple[int, ...]) -> list[float]:
     columns, lines = np.flatnonzero(where.any(axis=0)), np.flatnonzero(where.any(axis=1))
     wide, high = shape[1], shape[0]
     return [

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import nn
 
 from rosbot_patrol.detection.darknet.layers import (
@@ -99,11 +101,11 @@ def _block(layer: Layer) -> nn.Module:
     raise DetectorError(f"line {layer.line}: a layer of kind {type(layer).__name__} cannot be trained here")
 
 
-def _weights(block: nn.Module) -> ConvWeights:
-    plain = block[0]  # type: ignore[index]
-    if not isinstance(block[1], nn.BatchNorm2d):  # type: ignore[index]
+def _weights(block: Any) -> ConvWeights:
+    plain = block[0]
+    if not isinstance(block[1], nn.BatchNorm2d):
         return ConvWeights(weights=_array(plain.weight), biases=_array(plain.bias))
-    norm = block[1]  # type: ignore[index]
+    norm = block[1]
     # PyTorch divides by sqrt(variance + epsilon), darknet by sqrt(variance) + 1e-6
     variances = (np.sqrt(_array(norm.running_var).astype(np.float64) + _EPSILON) - 1e-6) ** 2
     return ConvWeights(
@@ -115,14 +117,14 @@ def _weights(block: nn.Module) -> ConvWeights:
     )
 
 
-def _load(block: nn.Module, numbers: ConvWeights) -> None:
-    plain = block[0]  # type: ignore[index]
+def _load(block: Any, numbers: ConvWeights) -> None:
+    plain = block[0]
     with torch.no_grad():
         plain.weight.copy_(torch.from_numpy(numbers.weights.copy()))
         if numbers.scales is None or numbers.means is None or numbers.variances is None:
             plain.bias.copy_(torch.from_numpy(numbers.biases.copy()))
             return
-        norm = block[1]  # type: ignore[index]
+        norm = block[1]
         norm.bias.copy_(torch.from_numpy(numbers.biases.copy()))
         norm.weight.copy_(torch.from_numpy(numbers.scales.copy()))
         norm.running_mean.copy_(torch.from_numpy(numbers.means.copy()))
@@ -130,5 +132,6 @@ def _load(block: nn.Module, numbers: ConvWeights) -> None:
         norm.running_var.copy_(torch.from_numpy(np.maximum(variances, 0.0).astype(np.float32)))
 
 
-def _array(tensor: torch.Tensor) -> np.ndarray:
-    return tensor.detach().cpu().numpy().astype(np.float32)
+def _array(tensor: torch.Tensor) -> NDArray[Any]:
+    values: NDArray[Any] = tensor.detach().cpu().numpy().astype(np.float32)
+    return values

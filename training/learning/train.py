@@ -15,10 +15,12 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rosbot_patrol.detection.darknet.cfg import read_cfg
@@ -87,16 +89,17 @@ class Trainer:
         """Share of the minutes that are over; 0 where it may take as long as it does."""
         return (time.monotonic() - self.begun) / 60 / self.options.minutes if self.options.minutes else 0.0
 
-    def _share(self, index: np.ndarray) -> np.ndarray:
+    def _share(self, index: NDArray[Any]) -> NDArray[Any]:
         """This epoch's pictures: each picture comes once before any comes again."""
         count = self.steps_each * self.options.batch
         first = self.epoch * count
         rounds = range(first // len(index), (first + count) // len(index) + 1)
         orders = [np.random.default_rng([self.options.seed, r]).permutation(len(index)) for r in rounds]
         start = first - rounds[0] * len(index)
-        return index[np.concatenate(orders)[start : start + count]]
+        share: NDArray[Any] = index[np.concatenate(orders)[start : start + count]]
+        return share
 
-    def _step(self, images: np.ndarray, rows: np.ndarray) -> dict[str, float]:
+    def _step(self, images: NDArray[Any], rows: NDArray[Any]) -> dict[str, float]:
         learner = self.learner
         share = schedule(max(learner.step / self.total, self._spent()), learner.step, self.options.cool)
         inputs = torch.from_numpy(images).to(learner.device).permute(0, 3, 1, 2).float().div_(255.0)
@@ -123,7 +126,8 @@ class Trainer:
         self.learner.load_state_dict(state)
         self.epoch = state["epoch"]
         sys.stdout.write(f"going on after epoch {self.epoch} and {state['spent']:.0f} s\n")
-        return state["spent"]
+        spent: float = state["spent"]
+        return spent
 
 
 class Batches(torch.utils.data.Dataset):
@@ -136,17 +140,17 @@ class Batches(torch.utils.data.Dataset):
         seed: of the epoch's chance.
     """
 
-    def __init__(self, pictures: Pictures, index: np.ndarray, batch: int, seed: tuple[int, int]) -> None:
+    def __init__(self, pictures: Pictures, index: NDArray[Any], batch: int, seed: tuple[int, int]) -> None:
         self._pictures, self._index, self._batch, self._seed = pictures, index, batch, seed
 
     def __len__(self) -> int:
         return -(-len(self._index) // self._batch)
 
-    def __getitem__(self, k: int) -> tuple[np.ndarray, np.ndarray]:
+    def __getitem__(self, k: int) -> tuple[NDArray[Any], NDArray[Any]]:
         chosen = self._index[k * self._batch : (k + 1) * self._batch]
         return batch_of(self._pictures, chosen, np.random.default_rng([*self._seed, k]))
 
-    def ahead(self, loaders: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def ahead(self, loaders: int) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
         """All of them, made by so many processes, or by one thread where that is 0.
 
         A process is better even beside two cores: a thread takes the interpreter from a compiled network, which asks
@@ -159,7 +163,7 @@ class Batches(torch.utils.data.Dataset):
             for images, rows in made:
                 yield images.numpy(), rows.numpy()
             return
-        ready: queue.Queue = queue.Queue(2)
+        ready: queue.Queue[Any] = queue.Queue(2)
 
         def fill() -> None:
             for k in range(len(self)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rosbot_patrol.simulation.scene.scene import Intrinsics
@@ -78,7 +80,9 @@ def draw_case(
         Of the case "edge" the first: often nobody is to be there.
     """
     attempts = range(1 if case == "edge" else 4)
-    return max((_draw(case, scene, camera, rng, reserved, shapeless) for _ in attempts), key=len)
+    return max(
+        (_Drawing(scene, camera, rng, reserved=reserved, shapeless=shapeless).draw(case) for _ in attempts), key=len
+    )
 
 
 def _to_edge(rng: Rng, half: float) -> float:
@@ -86,66 +90,99 @@ def _to_edge(rng: Rng, half: float) -> float:
     return float(rng.choice([-1.0, 1.0])) * (HALF_VIEW + float(rng.uniform(-half, half)))
 
 
-def _draw(
-    case: str, scene: Scene, camera: tuple[float, float, float], rng: Rng, reserved: bool, shapeless: float
-) -> list[Actor]:
-    actors: list[Actor] = []
-    first, view = len(scene.places), reach(scene, *camera)
+class _Drawing:
+    """One attempt at a case: puts actors into a scene, and afterwards leaves the scene as it was."""
 
-    def away(least: float, most: float) -> float:
-        return float(rng.uniform(least, max(least, min(most, view - 0.5))))
+    def __init__(
+        self, scene: Scene, camera: tuple[float, float, float], rng: Rng, *, reserved: bool, shapeless: float
+    ) -> None:
+        self._scene, self._camera, self._rng = scene, camera, rng
+        self._reserved, self._shapeless = reserved, shapeless
+        self._view = reach(scene, *camera)
+        self._actors: list[Actor] = []
 
-    def put(kind: str, spot: tuple[float, float] | None) -> None:
+    def draw(self, case: str) -> list[Actor]:
+        """Actors of a case."""
+        first = len(self._scene.places)
+        draw: dict[str, Callable[[], None]] = {
+            "pair": self._pair,
+            "legs": self._legs,
+            "screen": self._screen,
+            "decoys": self._decoys,
+            "far": self._far,
+            "hydrants": self._hydrants,
+            "edge": self._edge,
+        }
+        draw[case]()
+        del self._scene.places[first:]
+        return self._actors
+
+    def _pair(self) -> None:
+        self._row(["person"] * (2 if self._rng.random() < 0.8 else 3), self._away(0.9, 4.5), (0.4, 1.8), 0.35)
+
+    def _legs(self) -> None:
+        rng = self._rng
+        for _ in range(1 if rng.random() < 0.75 else 2):
+            self._put("person", self._place(self._away(0.6, 1.4), float(rng.uniform(-0.75, 0.75))))
+        if rng.random() < 0.5:
+            kind = "person" if rng.random() < 0.3 else "any"
+            self._put(kind, find_spot(self._scene, self._camera, rng, most=4.0))
+
+    def _screen(self) -> None:
+        screens = ["any"] * (1 if self._rng.random() < 0.7 else 2)
+        self._row([*screens, "person"], self._away(0.6, 4.5), (0.35, 1.2), 0.3)
+
+    def _decoys(self) -> None:
+        self._row(["any"] * int(self._rng.integers(2, 5)), self._away(0.6, 4.0), (0.3, 1.2), 0.35)
+
+    def _far(self) -> None:
+        for _ in range(int(self._rng.integers(1, 4))):
+            distance = self._away(min(4.5, 0.7 * self._view), 8.5)
+            self._put("person", self._place(distance, float(self._rng.uniform(-0.5, 0.5))))
+
+    def _edge(self) -> None:
+        rng = self._rng
+        for kind, share in (("thing", 0.35), ("person", 0.3), ("any", 0.1)):
+            if rng.random() < share:
+                distance = float(rng.uniform(0.7, 3.0))
+                self._put(kind, self._place(distance, _to_edge(rng, 0.25 / distance)))
+        if rng.random() < 0.2:
+            self._put("person", find_spot(self._scene, self._camera, rng))
+
+    def _hydrants(self) -> None:
+        screen = str(self._rng.choice(["hydrant", "pet", "thing", "person"]))
+        self._row([screen, "hydrant"], self._away(0.6, 4.0), (0.3, 1.0), 0.25)
+
+    def _place(self, distance: float, bearing: float) -> tuple[float, float] | None:
+        return _place(self._scene, self._camera, distance, bearing)
+
+    def _away(self, least: float, most: float) -> float:
+        return float(self._rng.uniform(least, max(least, min(most, self._view - 0.5))))
+
+    def _row(self, kinds: list[str], distance: float, behind: tuple[float, float], aside: float) -> None:
+        """One behind the other, each at most `aside` [m] out of line."""
+        bearing = float(self._rng.uniform(-0.5, 0.5))
+        for kind in kinds:
+            turn = float(self._rng.uniform(-aside, aside)) / distance
+            self._put(kind, self._place(distance, bearing + turn))
+            distance += float(self._rng.uniform(*behind))
+
+    def _put(self, kind: str, spot: tuple[float, float] | None) -> None:
         if spot is None:
             return
+        rng, actors = self._rng, self._actors
         name, pose = f"actor{len(actors)}", placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi)))
         if kind == "any":
             kind = str(rng.choice(["thing", "pet", "hydrant"], p=[0.55, 0.3, 0.15]))
         if kind == "person":
-            actors.append(draw_person(rng, name, pose, reserved, low=bool(rng.random() < 0.5)))
+            actors.append(draw_person(rng, name, pose, self._reserved, low=bool(rng.random() < 0.5)))
         elif kind == "hydrant":
-            actors.append(draw_hydrant(rng, name, pose, reserved))
+            actors.append(draw_hydrant(rng, name, pose, self._reserved))
         elif kind == "pet":
             actors.append(draw_animal(rng, name, spot))
         else:
-            actors.append(Actor(draw_thing(rng, name, pose, shapeless=shapeless), pose, None, []))
-        scene.places.append(Place(*spot, 0.1, 0.1, 0.0))
-
-    def row(kinds: list[str], distance: float, behind: tuple[float, float], aside: float) -> None:
-        """One behind the other, each at most `aside` [m] out of line."""
-        bearing = float(rng.uniform(-0.5, 0.5))
-        for kind in kinds:
-            turn = float(rng.uniform(-aside, aside)) / distance
-            put(kind, _place(scene, camera, distance, bearing + turn))
-            distance += float(rng.uniform(*behind))
-
-    if case == "pair":
-        row(["person"] * (2 if rng.random() < 0.8 else 3), away(0.9, 4.5), (0.4, 1.8), 0.35)
-    elif case == "legs":
-        for _ in range(1 if rng.random() < 0.75 else 2):
-            put("person", _place(scene, camera, away(0.6, 1.4), float(rng.uniform(-0.75, 0.75))))
-        if rng.random() < 0.5:
-            put("person" if rng.random() < 0.3 else "any", find_spot(scene, camera, rng, most=4.0))
-    elif case == "screen":
-        screens = ["any"] * (1 if rng.random() < 0.7 else 2)
-        row([*screens, "person"], away(0.6, 4.5), (0.35, 1.2), 0.3)
-    elif case == "decoys":
-        row(["any"] * int(rng.integers(2, 5)), away(0.6, 4.0), (0.3, 1.2), 0.35)
-    elif case == "far":
-        for _ in range(int(rng.integers(1, 4))):
-            put("person", _place(scene, camera, away(min(4.5, 0.7 * view), 8.5), float(rng.uniform(-0.5, 0.5))))
-    elif case == "edge":
-        for kind, share in (("thing", 0.35), ("person", 0.3), ("any", 0.1)):
-            if rng.random() < share:
-                distance = float(rng.uniform(0.7, 3.0))
-                put(kind, _place(scene, camera, distance, _to_edge(rng, 0.25 / distance)))
-        if rng.random() < 0.2:
-            put("person", find_spot(scene, camera, rng))
-    else:
-        screen = str(rng.choice(["hydrant", "pet", "thing", "person"]))
-        row([screen, "hydrant"], away(0.6, 4.0), (0.3, 1.0), 0.25)
-    del scene.places[first:]
-    return actors
+            actors.append(Actor(draw_thing(rng, name, pose, shapeless=self._shapeless), pose, None, []))
+        self._scene.places.append(Place(*spot, 0.1, 0.1, 0.0))
 
 
 def _place(

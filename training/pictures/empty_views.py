@@ -14,9 +14,11 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.simulation.render.egl import EglRenderer
 from rosbot_patrol.simulation.sdf.world import World, load_world
@@ -32,7 +34,7 @@ KINDS = {"chance": "by chance", "edge": "of which the edge cuts a thing", "plant
 PERSON = 0
 
 
-def views(world: World, kind: str, count: int, seed: int) -> Iterator[np.ndarray]:
+def views(world: World, kind: str, count: int, seed: int) -> Iterator[NDArray[Any]]:
     """Pictures of a world with nobody in it, as a network gets them: RGB, uint8, shape (288, 384, 3).
 
     Args:
@@ -66,7 +68,7 @@ def _indoors(scene: scenes.Scene, x: float, y: float) -> bool:
     return sum(scenes.reach(scene, x, y, yaw) < 9.0 for yaw in np.arange(8) * np.pi / 4) >= 6
 
 
-def surest(shots: np.ndarray, cfg: Path, forward: Forward) -> np.ndarray:
+def surest(shots: NDArray[Any], cfg: Path, forward: Forward) -> NDArray[Any]:
     """The probability of the surest person that a network sees in each of N pictures, shape (N,); 0 for none."""
     nobody = np.zeros((0, len(COLUMNS)), np.float32)
     boxes = find_all(Pictures([shots], [[nobody] * len(shots)]), cfg, forward).boxes
@@ -76,7 +78,7 @@ def surest(shots: np.ndarray, cfg: Path, forward: Forward) -> np.ndarray:
     return most
 
 
-def _work(job: tuple[argparse.Namespace, str, str]) -> tuple[str, np.ndarray]:
+def _work(job: tuple[argparse.Namespace, str, str]) -> tuple[str, NDArray[Any]]:
     options, kind, house = job
     cv2.setNumThreads(1)
     world = load_world(options.worlds / f"{house}.world")

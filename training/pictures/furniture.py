@@ -269,7 +269,10 @@ def turned(rng: Rng) -> list[Piece]:
     """One thing turned of any profile: vases, bags, figures, bollards, bottles."""
     z, wide = float(rng.uniform(0.2, 1.9)), float(rng.uniform(0.06, 0.35))
     heights = np.sort(rng.uniform(0, z, int(rng.integers(2, 7))))[::-1]
-    rings = [(float(h), *(float(wide * w) for w in rng.uniform(0.2, 1.0, 2)), 0.0) for h in (z, *heights, 0.0)]
+    rings = []
+    for height in (z, *heights, 0.0):
+        across, deep = rng.uniform(0.2, 1.0, 2)
+        rings.append((float(height), float(wide * across), float(wide * deep), 0.0))
     colour = (float(rng.uniform(0.5, 0.95)), 0.1, 0.08) if rng.random() < 0.12 else any_colour(rng)
     return [(loft(rings), (0, 0, 0), colour, str(rng.choice(CLOTHS)))]
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
+
+from numpy.typing import NDArray
 
 WIDTH, HEIGHT = 384, 288
 COLUMNS = (
@@ -12,7 +14,7 @@ COLUMNS = (
 _AT = {name: i for i, name in enumerate(COLUMNS)}
 
 
-def column(rows: np.ndarray, name: str) -> np.ndarray:
+def column(rows: NDArray[Any], name: str) -> NDArray[Any]:
     """One column of label rows by its name.
 
     `kind` is 0 for a person and 1 for a hydrant; x0 to y1 are shares of the picture, `distance` [m] along the floor;

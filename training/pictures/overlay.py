@@ -7,9 +7,11 @@ a person must not tell him by being plain.
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from training.pictures.patterns import draw_pattern
 
@@ -17,18 +19,18 @@ BANK = 300
 
 
 @functools.cache
-def pattern_bank() -> list[np.ndarray]:
+def pattern_bank() -> list[NDArray[Any]]:
     """The patterns, RGB, uint8, square, all of one size."""
     rng = np.random.default_rng(31)
     return [draw_pattern(rng).pixels for _ in range(BANK)]
 
 
-def draw_from_bank(rng: np.random.Generator) -> np.ndarray:
+def draw_from_bank(rng: np.random.Generator) -> NDArray[Any]:
     """Any pattern of the bank, RGB, uint8, square."""
     return pattern_bank()[int(rng.integers(BANK))]
 
 
-def lay_patterns(picture: np.ndarray, boxes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def lay_patterns(picture: NDArray[Any], boxes: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
     """The picture with patterns by chance.
 
     Args:
@@ -49,16 +51,16 @@ def lay_patterns(picture: np.ndarray, boxes: np.ndarray, rng: np.random.Generato
         touches = (boxes[:, 0] < x1 + 3) & (boxes[:, 2] > x0 - 3) & (boxes[:, 1] < y1 + 3) & (boxes[:, 3] > y0 - 3)
         if x1 - x0 < 4 or y1 - y0 < 4 or touches.any():
             continue
-        _lay(out[y0:y1, x0:x1], corners - np.float32([x0, y0]), rng)
+        _lay(out[y0:y1, x0:x1], corners - np.array([x0, y0], np.float32), rng)
     return out
 
 
-def _lay(part: np.ndarray, corners: np.ndarray, rng: np.random.Generator) -> None:
+def _lay(part: NDArray[Any], corners: NDArray[Any], rng: np.random.Generator) -> None:
     pattern = draw_from_bank(rng)
     times = int(rng.choice([1, 1, 2, 3]))
     side = pattern.shape[0]
     pattern = np.tile(pattern, (times, times, 1)) if times > 1 else pattern
-    start = np.float32([[0, 0], [side, 0], [side, side], [0, side]]) * times
+    start = np.array([[0, 0], [side, 0], [side, side], [0, side]], np.float32) * times
     warp = cv2.getPerspectiveTransform(start, np.roll(corners, int(rng.integers(4)), axis=0))
     size = (part.shape[1], part.shape[0])
     laid = cv2.warpPerspective(pattern, warp, size, flags=cv2.INTER_LINEAR, borderValue=(255, 255, 255))

@@ -20,7 +20,9 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from rosbot_patrol.simulation.actors.looks import Look
 from rosbot_patrol.simulation.actors.people import person_body, person_pose_parts
 from rosbot_patrol.simulation.render.egl import EglRenderer, Light
 from rosbot_patrol.simulation.scene.scene import Intrinsics, Matrix
@@ -31,6 +33,7 @@ from training.learning.dataset import JPEGS, Packed, pack_masks
 from training.learning.mixing import FURNITURE
 from training.pictures import scenes
 from training.pictures.cases import case_camera, draw_case, pick_case
+from training.pictures.furniture import placed
 from training.pictures.kinds import KINDS, MOST
 from training.pictures.labels import COLUMNS, HEIGHT, WIDTH
 from training.pictures.patterns import draw_textures
@@ -76,7 +79,7 @@ class Studio:
         pets: float = 0.0,
         hard: float = 0.0,
         cases: float = 0.0,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         """`count` pictures, the rows of their labels, and masks; a share is taken in the house, if there is one.
 
         Args:
@@ -92,7 +95,9 @@ class Studio:
         rng = np.random.default_rng(seed)
         self.furnish(np.random.default_rng([*seed, 1]))
         assert self.renderer is not None
-        pictures, rows, masks = [], [], []
+        pictures: list[NDArray[Any]] = []
+        rows: list[list[Any]] = []
+        masks: list[NDArray[Any]] = []
         while len(pictures) < count:
             scene = self._scene(rng, house_share, plain)
             self.renderer.clear()
@@ -126,7 +131,7 @@ class Studio:
         pets: float = 0.0,
         hard: float = 0.0,
         case: str = "",
-    ):
+    ) -> tuple[NDArray[Any], list[list[Any]], NDArray[Any]]:
         assert self.renderer is not None
         if case:
             actors = draw_case(case, scene, camera, rng, reserved=test, shapeless=self.shapeless)
@@ -144,11 +149,9 @@ class Studio:
         both = self.renderer.render_labelled(optical, intrinsics)
         picture, seen = cv2.cvtColor(both, cv2.COLOR_RGBA2RGB), cv2.extractChannel(both, 3)
         finished = degrade(picture, rng)
-        light = float(picture.mean())
+        shot = _Shot(finished, seen, optical, intrinsics, camera, float(picture.mean()))
         labels = [
-            _label(actor, seen, i + 1, optical, intrinsics, camera, light, test, finished)
-            for i, actor in enumerate(actors)
-            if actor.body.kind in FINDABLE
+            _label(actor, i + 1, shot, is_test=test) for i, actor in enumerate(actors) if actor.body.kind in FINDABLE
         ]
         for actor in actors:
             for body in (actor.body, *actor.extra):
@@ -157,7 +160,7 @@ class Studio:
         return finished, [label for label in labels if label], mask
 
 
-def degrade(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def degrade(picture: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
     """What a camera, a turning robot and jpeg make of a picture, and the network's own reduction to 384 x 288."""
     out = picture
     if rng.random() < 0.7:
@@ -177,23 +180,25 @@ def degrade(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 @functools.cache
-def _noise_bank() -> np.ndarray:
+def _noise_bank() -> NDArray[Any]:
     return np.random.default_rng(5).normal(0, 20, (1200, 1200, 3)).astype(np.int16)
 
 
-def _noise(rng: np.random.Generator, level: float) -> np.ndarray:
+def _noise(rng: np.random.Generator, level: float) -> NDArray[Any]:
     """Noise of a standard deviation of `level`, cut out of a bank anywhere."""
     y, x = rng.integers(0, 700), rng.integers(0, 540)
     return _noise_bank()[y : y + 480, x : x + 640] * np.int16(level * 12.8) >> 8
 
 
-def reduce(picture: np.ndarray, *, exact: bool = True) -> np.ndarray:
+def reduce(picture: NDArray[Any], *, exact: bool = True) -> NDArray[Any]:
     """640 x 480 to 384 x 288, as darknet's letterbox does it, or by area."""
     if not exact:
-        return cv2.resize(picture, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+        by_area: NDArray[Any] = cv2.resize(picture, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+        return by_area
     x = np.linspace(0, picture.shape[1] - 1, WIDTH, dtype=np.float32)
     y = np.linspace(0, picture.shape[0] - 1, HEIGHT, dtype=np.float32)
-    return cv2.remap(picture, *np.meshgrid(x, y), cv2.INTER_LINEAR)
+    reduced: NDArray[Any] = cv2.remap(picture, *np.meshgrid(x, y), cv2.INTER_LINEAR)
+    return reduced
 
 
 def eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[Matrix, Intrinsics]:
@@ -205,32 +210,54 @@ def eye(camera: tuple[float, float, float], rng: np.random.Generator) -> tuple[M
     zoom = float(rng.uniform(0.97, 1.03))
     height = 0.22 + float(rng.normal(0, 0.01))
     intrinsics = Intrinsics(fx=554.3827 * zoom, fy=554.3827 * zoom)
-    return scenes.placed(x, y, height, yaw) @ tilt @ _FORWARD, intrinsics
+    return placed(x, y, height, yaw) @ tilt @ _FORWARD, intrinsics
 
 
-def _label(actor, seen, value: int, optical: Matrix, intrinsics: Intrinsics, camera, light: float, test, finished):
-    mask = seen == value
+@dataclass(frozen=True)
+class _Shot:
+    """A picture as the network gets it, and how it was taken.
+
+    Attributes:
+        finished: the picture, shape (288, 384, 3).
+        seen: number of the actor at each pixel, shape (480, 640).
+        optical: world_from_optical.
+        intrinsics: the lens.
+        camera: x, y, yaw.
+        light: mean of all colours, before the camera's faults.
+    """
+
+    finished: NDArray[Any]
+    seen: NDArray[Any]
+    optical: Matrix
+    intrinsics: Intrinsics
+    camera: tuple[float, float, float]
+    light: float
+
+
+def _label(actor: scenes.Actor, value: int, shot: _Shot, *, is_test: bool) -> list[Any] | None:
+    """Row of an actor without its picture's number (`labels.COLUMNS`), None if hardly a pixel of it is seen."""
+    mask = shot.seen == value
     pixels = int(np.count_nonzero(mask))
     if pixels < 12:
         return None
     columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
-    whole, part = silhouette(actor, optical, intrinsics)
-    distance = float(np.hypot(actor.pose[0, 3] - camera[0], actor.pose[1, 3] - camera[1]))
+    whole, part = silhouette(actor, shot.optical, shot.intrinsics)
+    distance = float(np.hypot(actor.pose[0, 3] - shot.camera[0], actor.pose[1, 3] - shot.camera[1]))
     kind = 0 if actor.body.kind == "person" else 1
-    w, h = intrinsics.width, intrinsics.height
+    w, h = shot.intrinsics.width, shot.intrinsics.height
     corners = [columns[0] / w, rows[0] / h, (columns[-1] + 1) / w, (rows[-1] + 1) / h]
     shares = (pixels / max(whole, pixels), pixels / max(part, pixels))
-    return [kind, *corners, distance, *shares, pixels, light, test, contrast(finished, mask), value]
+    return [kind, *corners, distance, *shares, pixels, shot.light, is_test, contrast(shot.finished, mask), value]
 
 
-def _poster(painter: EglRenderer, look, rng: np.random.Generator) -> Texture:
+def _poster(painter: EglRenderer, look: Look, rng: np.random.Generator) -> Texture:
     painter.clear()
     painter.light = Light(sky=tuple(rng.uniform(0.1, 1, 3)))
     painter.add(person_body("model", look))
-    painter.move("model", scenes.placed(0, 0, 0, float(rng.uniform(2.2, 4.0))))
+    painter.move("model", placed(0, 0, 0, float(rng.uniform(2.2, 4.0))))
     painter.pose_visuals("model", person_pose_parts(look, float(rng.random()), bool(rng.random() < 0.5)))
     high = float(rng.uniform(0.7, 1.3))
-    eye = scenes.placed(-3.0, 0.0, high) @ _FORWARD
+    eye = placed(-3.0, 0.0, high) @ _FORWARD
     view = Intrinsics(width=SIDE, height=SIDE, fx=200.0, fy=150.0, cx=(SIDE - 1) / 2, cy=(SIDE - 1) / 2)
     return Texture(painter.render(eye, view)[0][::-1].copy(), 0.0)
 
@@ -263,7 +290,7 @@ def studio_of(house: Path | None, *, unseen: bool = False) -> Studio:
     return Studio(load_world(house) if house else None, unseen=unseen)
 
 
-def write_shard(target: Path, pictures: np.ndarray, boxes: np.ndarray, masks: np.ndarray) -> None:
+def write_shard(target: Path, pictures: NDArray[Any], boxes: NDArray[Any], masks: NDArray[Any]) -> None:
     """Write what `Studio.shard` gave, as jpegs where the name ends so; the file is there when it is whole."""
     np.savez(target.with_suffix(".npz"), boxes=boxes, **pack_masks(masks))
     part = target.with_suffix(".part" + target.suffix)
@@ -274,7 +301,9 @@ def write_shard(target: Path, pictures: np.ndarray, boxes: np.ndarray, masks: np
     part.rename(target)
 
 
-def _jobs(options: argparse.Namespace, name: str, pictures: float, seed: int, house: Path | None, **told) -> list[_Job]:
+def _jobs(
+    options: argparse.Namespace, name: str, pictures: float, seed: int, house: Path | None, **told: Any
+) -> list[_Job]:
     """The shards of a set."""
     test = options.set is not None
     targets = [

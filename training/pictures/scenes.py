@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.simulation.actors.looks import HEIGHTS, LOOKS, RESERVED_HEIGHTS, Look, draw_look
 from rosbot_patrol.simulation.actors.people import POSTURES, hydrant_body, person_body, person_pose_parts
@@ -116,7 +118,8 @@ def draw_house(rng: Rng, world: World, *, plain: bool = False, shapeless: float 
         bodies = [_repaint(b, rng) for b in bodies]
     walls = np.array([(p.x, p.y) for p in places])
     low, high = walls.min(axis=0), walls.max(axis=0)
-    light = _draw_light(rng, *(high - low), 2.5) if not plain and rng.random() < 0.6 else Light()
+    wide, deep = high - low
+    light = _draw_light(rng, wide, deep, 2.5) if not plain and rng.random() < 0.6 else Light()
     scene = Scene(bodies, light, (low[0], high[0], low[1], high[1]), places)
     furnish(scene, rng, 0 if plain else int(rng.integers(0, 25)), shapeless=shapeless)
     return scene
@@ -329,7 +332,7 @@ def _near(place: Place, x: float, y: float, margin: float) -> bool:
     return abs(c * dx + s * dy) < half_x + margin and abs(-s * dx + c * dy) < half_y + margin
 
 
-def _taken(places: list[Place], x: np.ndarray, y: np.ndarray, margin: float) -> np.ndarray:
+def _taken(places: list[Place], x: NDArray[Any], y: NDArray[Any], margin: float) -> NDArray[Any]:
     """Of many points, shape (N,), whether one of the places is as near as that: `_near` for all of them at once."""
     frames = np.array([place.frame for place in places]).reshape(-1, 6, 1)
     place_x, place_y, half_x, half_y, c, s = frames.transpose(1, 0, 2)
@@ -353,14 +356,20 @@ def footprints(body: Body) -> list[Place]:
         if shape.kind == "box":
             half = (size[0] / 2, size[1] / 2)
         elif shape.kind == "mesh":
-            half = tuple(np.abs(mesh_of(shape).positions[:, :2]).max(axis=0))  # type: ignore[assignment]
+            half = _half_sizes(mesh_of(shape).positions)
         elif shape.vertices is not None:
-            half = tuple(np.abs(shape.vertices[:, :2]).max(axis=0))  # type: ignore[assignment]
+            half = _half_sizes(shape.vertices)
         else:
             half = (size[0], size[0]) if size else (0.3, 0.3)
         yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
         places.append(Place(float(matrix[0, 3]), float(matrix[1, 3]), *half, yaw))
     return places
+
+
+def _half_sizes(vertices: Matrix) -> tuple[float, float]:
+    """Of the upright box about the origin that holds vertices, shape (V, 3)."""
+    x, y = np.abs(vertices[:, :2]).max(axis=0)
+    return x, y
 
 
 def _floor(rng: Rng) -> Body:
@@ -424,7 +433,7 @@ def _draw_light(rng: Rng, x: float, y: float, z: float) -> Light:
     )
 
 
-def _rgb(values: np.ndarray | float) -> tuple[float, float, float]:
+def _rgb(values: NDArray[Any] | float) -> tuple[float, float, float]:
     r, g, b = np.broadcast_to(np.clip(values, 0.0, 1.5), 3)
     return (float(r), float(g), float(b))
 

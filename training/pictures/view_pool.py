@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from training.pictures.labels import COLUMNS, HEIGHT, WIDTH
 
@@ -30,7 +32,7 @@ class Views:
     rows: torch.Tensor
 
     @classmethod
-    def of(cls, pictures: np.ndarray, masks: Sequence[np.ndarray], rows: Sequence[np.ndarray]) -> Views:
+    def of(cls, pictures: NDArray[Any], masks: Sequence[NDArray[Any]], rows: Sequence[NDArray[Any]]) -> Views:
         """Of a shard; views with more than `MOST_ROWS` rows are left out.
 
         Args:

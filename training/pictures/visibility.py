@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from rosbot_patrol.simulation.scene.scene import Intrinsics, Matrix
+from rosbot_patrol.simulation.scene.scene import Intrinsics, Matrix, Shape
 from rosbot_patrol.simulation.scene.shapes import mesh_of
 from training.pictures.labels import HEIGHT, WIDTH
+from training.pictures.scenes import Actor
 
 
-def silhouette(actor, optical: Matrix, intrinsics: Intrinsics) -> tuple[int, int]:
+def silhouette(actor: Actor, optical: Matrix, intrinsics: Intrinsics) -> tuple[int, int]:
     """Pixels of an actor were nothing before it: on a picture without edges, and inside the real one's edges."""
     scale, pad = 2, 640
     canvas = np.zeros(((480 + 2 * pad) // scale, (640 + 2 * pad) // scale), np.uint8)
@@ -28,11 +32,11 @@ def silhouette(actor, optical: Matrix, intrinsics: Intrinsics) -> tuple[int, int
     return cv2.countNonZero(canvas) * scale * scale, cv2.countNonZero(inner) * scale * scale
 
 
-def _corners(shape) -> np.ndarray:
+def _corners(shape: Shape) -> NDArray[Any]:
     return mesh_of(shape).positions
 
 
-def contrast(picture: np.ndarray, mask: np.ndarray, *, reach: int = 11) -> float:
+def contrast(picture: NDArray[Any], mask: NDArray[Any], *, reach: int = 11) -> float:
     """By how much [levels] what lies inside of an outline differs from what lies beside it, at its clearer quarter.
 
     Args:
@@ -55,7 +59,7 @@ def contrast(picture: np.ndarray, mask: np.ndarray, *, reach: int = 11) -> float
     return float(np.percentile(gap, 75))
 
 
-def _around(mask: np.ndarray, reach: int) -> tuple[slice, slice]:
+def _around(mask: NDArray[Any], reach: int) -> tuple[slice, slice]:
     """The rows and columns in which a mask is set, and `reach` more on each side: nothing beyond is looked at."""
     spans = []
     for axis in (1, 0):

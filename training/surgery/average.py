@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ def average(one: Sequence[ConvWeights], other: Sequence[ConvWeights]) -> list[Co
 
 
 def _mean(one: ConvWeights, other: ConvWeights) -> ConvWeights:
-    numbers = {}
+    numbers: dict[str, Any] = {}
     for name in (field.name for field in fields(ConvWeights)):
         a, b = getattr(one, name), getattr(other, name)
         numbers[name] = None if a is None else ((a.astype(np.float64) + b) / 2).astype("<f4")

@@ -9,15 +9,18 @@ zeros where that copies, and the zero scale of "Accurate, Large Minibatch SGD", 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet.layers import Convolutional, Layer, NetworkSpec, Route, Shortcut
 from rosbot_patrol.detection.darknet.weights import ConvWeights
 from training.learning.network import Darknet
 from training.surgery.shrink import change_weights_file
 
-Map = np.ndarray
+Map = NDArray[Any]
 
 
 def grow(

@@ -11,8 +11,10 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from training.judging.report import find_all, load_forward
 from training.judging.scoring import Found
@@ -23,7 +25,7 @@ from training.pictures.render import PER_SHARD
 LEAST, FAINTEST = 0.15, 0.05  # of a picture's errors, to be picked at all; of a false alarm's probability, to count
 
 
-def errors(found: Found, threshold: float) -> np.ndarray:
+def errors(found: Found, threshold: float) -> NDArray[Any]:
     """How badly each picture goes wrong: the sum of the probabilities of false alarms and of what misses lack.
 
     Args:
@@ -38,7 +40,7 @@ def errors(found: Found, threshold: float) -> np.ndarray:
     return score
 
 
-def write_set(pictures: Pictures, chosen: np.ndarray, folder: Path, name: str) -> None:
+def write_set(pictures: Pictures, chosen: NDArray[Any], folder: Path, name: str) -> None:
     """Write chosen (shard, picture) pairs, with their masks, as shards of another name; the first of them last."""
     for number, start in reversed(list(enumerate(range(0, len(chosen), PER_SHARD)))):
         part = chosen[start : start + PER_SHARD]

@@ -17,14 +17,16 @@ import argparse
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet.cfg import read_cfg
 from rosbot_patrol.detection.darknet.layers import Convolutional, Layer, NetworkSpec, Route, Shortcut
 from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights, read_weights
 
-Ids = np.ndarray
+Ids = NDArray[Any]
 LINEAR = 2.0  # deviations by which new channels are lifted, so that the leaky activation hardly bends them
 
 
@@ -83,7 +85,7 @@ def _channels(spec: NetworkSpec) -> list[Ids]:
     return ids
 
 
-def _scores(spec: NetworkSpec, mine: dict[int, ConvWeights], ids: list[Ids]) -> tuple[np.ndarray, np.ndarray]:
+def _scores(spec: NetworkSpec, mine: dict[int, ConvWeights], ids: list[Ids]) -> tuple[NDArray[Any], NDArray[Any]]:
     """By how much each channel varies, as far as the numbers tell, and how much it matters."""
     count = 1 + max(int(part.max()) for part in ids)
     told, heard = np.zeros(count), np.zeros(count)
@@ -114,12 +116,12 @@ def _hearing(theirs: ConvWeights, heard: Ids, left: Ids, i: int) -> ConvWeights:
     return replace(theirs, weights=theirs.weights[:, [at[int(number)] for number in left]])
 
 
-def _filters(theirs: ConvWeights, chosen: np.ndarray) -> ConvWeights:
+def _filters(theirs: ConvWeights, chosen: NDArray[Any]) -> ConvWeights:
     parts = {name: part[chosen] for name, part in vars(theirs).items() if part is not None}
     return replace(theirs, **parts)
 
 
-def _split(theirs: ConvWeights, spread: np.ndarray, out: list[ConvWeights], middle: int) -> ConvWeights:
+def _split(theirs: ConvWeights, spread: NDArray[Any], out: list[ConvWeights], middle: int) -> ConvWeights:
     """Put a 1 x 1 into `out` that gives the `middle` directions of most weight, and make the convolution hear those.
 
     Args:

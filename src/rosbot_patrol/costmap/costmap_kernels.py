@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
@@ -12,7 +13,7 @@ CLEARED = 1  # a lethal cell cleared by a ray in this update and not marked agai
 
 
 @kernel("void(int64[::1], int64, int64)")
-def _touch(changes, x, y):
+def _touch(changes: NDArray[np.int64], x: int, y: int) -> None:
     changes[0], changes[1] = min(changes[0], x), min(changes[1], y)
     changes[2], changes[3] = max(changes[2], x + 1), max(changes[3], y + 1)
 
@@ -20,7 +21,18 @@ def _touch(changes, x, y):
 @kernel(
     "void(uint8[:, ::1], float64, float64, float64, float64, float64, float64[:, ::1], int64, int32[::1], int64[::1])"
 )
-def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, reach, cleared, changes):
+def clear_rays(
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    sensor_x: float,
+    sensor_y: float,
+    ends: NDArray[np.float64],
+    reach: int,
+    cleared: NDArray[np.int32],
+    changes: NDArray[np.int64],
+) -> None:
     """Free the cells from the sensor to each end [m], at most `reach` cells far.
 
     Lines are costmap_2d's: cut at the window's edge, then Bresenham's, both ends included. A lethal cell becomes
@@ -90,7 +102,17 @@ def clear_rays(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, ends, 
 
 
 @kernel("void(uint8[:, ::1], float64, float64, float64, float64, float64, float64[:, ::1], float64, int64[::1])")
-def mark_points(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, points, obstacle_range, changes):
+def mark_points(
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    sensor_x: float,
+    sensor_y: float,
+    points: NDArray[np.float64],
+    obstacle_range: float,
+    changes: NDArray[np.int64],
+) -> None:
     """Make the cells of points [m] within `obstacle_range` of the sensor lethal; see `clear_rays`."""
     height, width = cells.shape
     reach = obstacle_range * obstacle_range
@@ -109,7 +131,7 @@ def mark_points(cells, resolution, origin_x, origin_y, sensor_x, sensor_y, point
 
 
 @kernel("void(uint8[:, ::1], int32[::1], int64[::1])")
-def settle(cells, cleared, changes):
+def settle(cells: NDArray[np.uint8], cleared: NDArray[np.int32], changes: NDArray[np.int64]) -> None:
     """Free the cells that were cleared and not marked again; see `clear_rays`."""
     height, width = cells.shape
     if changes[4] > len(cleared):  # more than could be noted
@@ -128,7 +150,7 @@ def settle(cells, cleared, changes):
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)")
-def merge_max(master, layer, x0, y0, x1, y1):
+def merge_max(master: NDArray[np.uint8], layer: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int) -> None:
     """Combine by maximum, as upstream; unknown cells of the layer are ignored, those of the master replaced."""
     for y in range(y0, y1):
         old, new = master[y, x0:x1], layer[y, x0:x1]
@@ -139,7 +161,7 @@ def merge_max(master, layer, x0, y0, x1, y1):
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)")
-def merge_over(master, layer, x0, y0, x1, y1):
+def merge_over(master: NDArray[np.uint8], layer: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int) -> None:
     """Combine by overwriting, as upstream: every known cell of the layer replaces the master's."""
     for y in range(y0, y1):
         old, new = master[y, x0:x1], layer[y, x0:x1]
@@ -148,7 +170,16 @@ def merge_over(master, layer, x0, y0, x1, y1):
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64, float64[::1], boolean)")
-def sample_map(master, source, x0, y0, x1, y1, affine, use_maximum):
+def sample_map(
+    master: NDArray[np.uint8],
+    source: NDArray[np.uint8],
+    x0: int,
+    y0: int,
+    x1: int,
+    y1: int,
+    affine: NDArray[np.float64],
+    use_maximum: bool,
+) -> None:
     """Write a map with another place, resolution or rotation into the master.
 
     `affine` is (a, b, c, d, e, f): source ix = a * x + b * y + c, source iy = d * x + e * y + f, for the master's
@@ -176,7 +207,16 @@ def sample_map(master, source, x0, y0, x1, y1, affine, use_maximum):
 
 
 @kernel("void(uint8[:, ::1], float64[:, ::1], uint8, int64, int64, int64, int64, int64[::1])")
-def fill_polygon(cells, corners, value, left, low, right, high, changes):
+def fill_polygon(
+    cells: NDArray[np.uint8],
+    corners: NDArray[np.float64],
+    value: int,
+    left: int,
+    low: int,
+    right: int,
+    high: int,
+    changes: NDArray[np.int64],
+) -> None:
     """Set the cells whose centres lie in a polygon and in a rectangle; `changes` as in `clear_rays`.
 
     Args:

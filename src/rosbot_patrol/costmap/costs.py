@@ -53,4 +53,5 @@ def costs_of_occupancy(
     # Upstream reads the bytes unsigned: 255 (that is -1) and everything else above the threshold is lethal.
     table[(value >= lethal_threshold) | (value < 0)] = LETHAL
     table[(value & 255) == (unknown_value & 255)] = UNKNOWN if track_unknown else FREE
-    return table[occupancy.astype(np.int16) + 128]
+    costs: CostCells = table[occupancy.astype(np.int16) + 128]
+    return costs

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.costmap.bounds import Bounds
 from rosbot_patrol.costmap.inputs import Input, ScanInput, make_inputs
@@ -110,7 +111,7 @@ class FedCostmap:
             layer.set_map(grid)
             self._map_frames[id(layer)] = frame
 
-    def hear_map_update(self, layer: StaticLayer, x: int, y: int, cells: np.ndarray) -> None:
+    def hear_map_update(self, layer: StaticLayer, x: int, y: int, cells: NDArray[np.int8]) -> None:
         """Give a layer a part of its map, which starts at a cell."""
         with self.lock:
             layer.update_map(x, y, cells)

@@ -56,7 +56,8 @@ def _edge_distances(corners: Array) -> Array:
     edges = ends - corners
     lengths = np.einsum("ij,ij->i", edges, edges)
     along = np.clip(-np.einsum("ij,ij->i", corners, edges) / np.where(lengths > 0, lengths, 1.0), 0.0, 1.0)
-    return np.hypot(*(corners + along[:, None] * edges).T)
+    distances: Array = np.hypot(*(corners + along[:, None] * edges).T)
+    return distances
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from rosbot_patrol.costmap.layered import LayeredCostmap
 from rosbot_patrol.costmap.layers.obstacle import ObservationBuffer, ObstacleLayer, height_problem, observe_level
 from rosbot_patrol.costmap.layers.range_layer import RangeReading, RangeSensorLayer
-from rosbot_patrol.costmap.params import SourceParams
 from rosbot_patrol.costmap.records import CloudRecord, DepthRecord, OpticsRecord, RangeRecord
-from rosbot_patrol.costmap.sensor_params import DepthSourceParams
+from rosbot_patrol.costmap.sensor_params import DepthSourceParams, SourceParams
 from rosbot_patrol.costmap.sources.cloud import cloud_points, observe_cloud
 from rosbot_patrol.costmap.sources.depth import DepthPicture, observe_depth
 from rosbot_patrol.errors import ImageError, LaserTilted, SensorError, TransformError
@@ -172,7 +171,8 @@ class _ObstacleInput(Input[T]):
 
     @property
     def _top(self) -> float:
-        return self._layer.params.max_obstacle_height
+        highest: float = self._layer.params.max_obstacle_height
+        return highest
 
 
 class ScanInput(_ObstacleInput[LaserScan]):
@@ -220,7 +220,8 @@ class CloudInput(_ObstacleInput["NDArray[np.float64]"]):
         if record.layout is not None:
             return cloud_points(record.data, record.layout, stride)
         points = np.array([(p.x, p.y, p.z) for p in record.data[::stride]], np.float64).reshape(-1, 3)
-        return points[np.isfinite(points).all(axis=1)]
+        finite: NDArray[np.float64] = points[np.isfinite(points).all(axis=1)]
+        return finite
 
     def _place(self, entry: _Waiting[NDArray[np.float64]], frames: Frames, target: str, now: float) -> None:
         del now

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet.decode import Candidates, suppress_by_objectness
 from rosbot_patrol.detection.detector import IOU_THRESHOLD, Detection, to_detections
@@ -69,7 +70,7 @@ class HogDetector:
         return to_detections(suppress_by_objectness(best, IOU_THRESHOLD), NAMES, picture.width, picture.height)
 
 
-def _people(windows: np.ndarray, width: int, height: int) -> np.ndarray:
+def _people(windows: NDArray[np.float64], width: int, height: int) -> NDArray[np.float64]:
     """Candidates from windows (left, top, width, height [px], shape (N, 4)): relative centres and sizes."""
     size = np.array([width, height], dtype=np.float64)
     centres = (windows[:, :2] + windows[:, 2:] / 2.0) / size

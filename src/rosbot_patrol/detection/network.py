@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet.layers import Convolutional, Head, NetworkSpec
 from rosbot_patrol.detection.darknet.letterbox import Letterbox
@@ -26,7 +27,7 @@ class Network(Protocol):
     def name(self) -> str:
         """The run-time, for logs."""
 
-    def run(self, picture: Picture, place: Letterbox) -> list[np.ndarray]:
+    def run(self, picture: Picture, place: Letterbox) -> list[NDArray[np.float32]]:
         """Values before each head, shape (channels, rows, columns), for an 8-bit picture."""
 
 
@@ -51,7 +52,7 @@ class OnnxNetwork:
         self._grey = channels == 1
         self.name = f"onnxruntime {runtime.__version__}"
 
-    def run(self, picture: Picture, place: Letterbox) -> list[np.ndarray]:
+    def run(self, picture: Picture, place: Letterbox) -> list[NDArray[np.float32]]:
         """Values before each head."""
         width, height = place.fitted
         left, top, right, bottom = place.margins
@@ -88,7 +89,7 @@ class CvNetwork:
         self._encoding = "mono8" if spec.channels == 1 else "rgb8"
         self.name = f"OpenCV {cv2.__version__} dnn"
 
-    def run(self, picture: Picture, place: Letterbox) -> list[np.ndarray]:
+    def run(self, picture: Picture, place: Letterbox) -> list[NDArray[np.float32]]:
         """Values before each head."""
         self._net.setInput(place.draw(picture.to(self._encoding).pixels)[None])
         return [values[0] for values in self._net.forward(self._before_heads)]

@@ -127,9 +127,10 @@ def fit_of(
 @kernel()
 def prior_cost(dx: float, dy: float, turn: float, prior: Array) -> float:
     """Half the squared Mahalanobis distance from the odometry's guess; `prior` is its information, shape (3, 3)."""
-    return 0.5 * (
+    squared: float = (
         prior[0, 0] * dx * dx + 2.0 * prior[0, 1] * dx * dy + prior[1, 1] * dy * dy + prior[2, 2] * turn * turn
     )
+    return 0.5 * squared
 
 
 @kernel()

@@ -13,8 +13,10 @@ from __future__ import annotations
 import importlib
 import struct
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.images.encodings import Picture
@@ -93,21 +95,21 @@ def decompress_depth(text: str, data: bytes) -> Picture:
     return Picture(np.where(values == 0, np.float32(np.nan), depth).astype(np.float32)[:, :, None], encoding)
 
 
-def _inverse(depth: np.ndarray, a: np.float32, b: np.float32, depth_max: np.float32) -> np.ndarray:
+def _inverse(depth: NDArray[Any], a: np.float32, b: np.float32, depth_max: np.float32) -> NDArray[Any]:
     with np.errstate(divide="ignore", invalid="ignore"):
         scaled = np.minimum(a / depth + b, np.float32(65535.0))
         known = (depth > 0.0) & (depth < depth_max)
         return np.where(known, scaled, np.float32(0.0)).astype(np.uint16)
 
 
-def _rvl(values: np.ndarray) -> bytes:
+def _rvl(values: NDArray[Any]) -> bytes:
     kernels = importlib.import_module("rosbot_patrol.images.rvl_kernels")  # brings numba, 100 MB
     room = np.empty(3 * values.size + 16, dtype=np.uint8)
     used = kernels.encode(np.ascontiguousarray(values).reshape(-1), room)
     return _SIZE.pack(values.shape[1], values.shape[0]) + room[:used].tobytes()
 
 
-def _from_rvl(body: bytes, text: str) -> np.ndarray:
+def _from_rvl(body: bytes, text: str) -> NDArray[Any]:
     width, height = _SIZE.unpack_from(body) if len(body) >= _SIZE.size else (0, 0)
     if not 0 < width * height <= MOST_PIXELS:
         raise ImageError(f"{len(body)} bytes of the format '{text}' claim a picture of {width}x{height}")
@@ -118,7 +120,7 @@ def _from_rvl(body: bytes, text: str) -> np.ndarray:
     return values.reshape(height, width)
 
 
-def _from_png(body: bytes, text: str) -> np.ndarray:
+def _from_png(body: bytes, text: str) -> NDArray[Any]:
     cv2 = importlib.import_module("cv2")
     values = cv2.imdecode(np.frombuffer(body, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     if values is None or values.ndim != 2 or values.dtype != np.uint16:

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.errors import ImageError
 
@@ -66,7 +68,7 @@ class Picture:
         encoding: a key of `ENCODINGS`.
     """
 
-    pixels: np.ndarray
+    pixels: NDArray[Any]
     encoding: str
 
     @property
@@ -122,12 +124,13 @@ class Picture:
         colours = ", ".join(name for name, known in ENCODINGS.items() if known.order or known.raw)
         return ImageError(f"a picture of encoding {self.encoding} has no colours, expected one of {colours}")
 
-    def _grey(self) -> np.ndarray:
+    def _grey(self) -> NDArray[Any]:
         if self.pixels.shape[2] == 1:
             return self.pixels
         red, green, blue = (self.pixels[:, :, i].astype(np.uint32) for i in self.order)
         # weights of BT.601 in 14 bits, as in OpenCV
-        return ((red * 4899 + green * 9617 + blue * 1868 + 8192) >> 14).astype(np.uint8)[:, :, None]
+        grey: NDArray[np.uint8] = ((red * 4899 + green * 9617 + blue * 1868 + 8192) >> 14).astype(np.uint8)[:, :, None]
+        return grey
 
 
 def unpack(

@@ -4,11 +4,14 @@ Compression", ISS 2017). Words of 32 bits, little-endian, filled from their high
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rosbot_patrol.kernels import kernel
 
 
 @kernel("int64(uint16[::1], uint8[::1])")
-def encode(values, out):
+def encode(values: NDArray[np.uint16], out: NDArray[np.uint8]) -> int:
     """Write values into `out`, which has room for 3 bytes per value and 16 more; returns the number of bytes used."""
     word, filled, at = 0, 0, 0
     i, previous, count = 0, 0, len(values)
@@ -54,7 +57,7 @@ def encode(values, out):
 
 
 @kernel("UniTuple(int64, 2)(uint8[::1], int64)")
-def read_number(data, at):
+def read_number(data: NDArray[np.uint8], at: int) -> tuple[int, int]:
     """Read the number at a nibble; returns it and the next nibble, which is -1 if the data end or are invalid."""
     nibbles = (len(data) // 4) * 8
     number, shift = 0, 0
@@ -69,7 +72,7 @@ def read_number(data, at):
 
 
 @kernel("int64(uint8[::1], uint16[::1])")
-def decode(data, out):
+def decode(data: NDArray[np.uint8], out: NDArray[np.uint16]) -> int:
     """Read values into `out`; returns their number, -1 if the data end too soon or are invalid."""
     at, done, previous, count = 0, 0, 0, len(out)
     while done < count:

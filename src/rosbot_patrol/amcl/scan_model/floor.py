@@ -60,4 +60,5 @@ class Floor:
         weights = np.cumsum(np.exp(SHARPNESS * (weighing.fit - weighing.fit.max())))
         evenly = (np.arange(count) + self._rng.random()) / count * weights[-1]
         chosen = poses[np.minimum(np.searchsorted(weights, evenly, side="right"), tried - 1)]
-        return chosen + self._rng.standard_normal(chosen.shape) * np.array(JITTER)
+        spread: Array = chosen + self._rng.standard_normal(chosen.shape) * np.array(JITTER)
+        return spread

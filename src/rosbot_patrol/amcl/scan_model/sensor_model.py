@@ -209,7 +209,8 @@ class BeamModel:
 def _sharpened(sums: Array) -> Array:
     """Likelihood from sums of cubed probabilities."""
     factor = 1.0 + sums
-    return factor * factor * factor
+    cubes: Array = factor * factor * factor
+    return cubes
 
 
 def _is_converged(poses: Array) -> bool:
@@ -226,7 +227,8 @@ MODELS: dict[str, type[LikelihoodFieldModel] | type[LikelihoodFieldProbModel] | 
 
 
 def _log(p: Array, _power: float) -> Array:
-    return np.log(np.maximum(p, 1e-12))
+    logs: Array = np.log(np.maximum(p, 1e-12))
+    return logs
 
 
 class _Table:

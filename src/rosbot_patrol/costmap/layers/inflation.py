@@ -33,7 +33,7 @@ def cost_table(
     """`cost_at` for each squared distance in cells, 0 to radius_cells squared."""
     metres = np.sqrt(np.arange(radius_cells * radius_cells + 1)) * resolution
     decayed = (INSCRIBED - 1) * np.exp(-cost_scaling_factor * np.maximum(metres - inscribed_radius, 0.0))
-    table = decayed.astype(np.uint8)
+    table: NDArray[np.uint8] = decayed.astype(np.uint8)
     table[metres <= inscribed_radius] = INSCRIBED
     table[0] = LETHAL
     return table

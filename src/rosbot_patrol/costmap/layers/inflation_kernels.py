@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
@@ -26,19 +27,21 @@ _ONE, _TWO, _THREE = np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 @kernel("uint16(int64)")
-def _square(d):
+def _square(d: int) -> int:
     return np.uint16(min(d * d, 65535))
 
 
 @kernel("uint16(uint16, uint16)")
-def _plus(a, b):
+def _plus(a: int, b: int) -> int:
     """Saturating sum."""
     total = np.uint16(a + b)
     return total if total >= b else _NONE
 
 
 @kernel("boolean(uint16[::1], int64, int64, uint16[::1], int64, uint16[::1])", inline="never")
-def _nearest_in_row(squares, at, reach, least, d2_max, found):
+def _nearest_in_row(
+    squares: NDArray[np.uint16], at: int, reach: int, least: NDArray[np.uint16], d2_max: int, found: NDArray[np.uint16]
+) -> bool:
     """Compute the least d2 of a block of cells; False if none is near enough to change, or all are lethal.
 
     Args:
@@ -94,7 +97,17 @@ def _nearest_in_row(squares, at, reach, least, d2_max, found):
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64, int64, uint8[::1], uint8)")
-def inflate(source, out, x0, y0, x1, y1, reach, table, floor):
+def inflate(
+    source: NDArray[np.uint8],
+    out: NDArray[np.uint8],
+    x0: int,
+    y0: int,
+    x1: int,
+    y1: int,
+    reach: int,
+    table: NDArray[np.uint8],
+    floor: int,
+) -> None:
     """Raise the costs of out[y0:y1, x0:x1] by the distance to the nearest lethal cell of `source`.
 
     Args:
@@ -169,7 +182,17 @@ def inflate(source, out, x0, y0, x1, y1, reach, table, floor):
 
 
 @kernel("void(uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64, int64, uint8[::1], uint8)")
-def inflate_far(source, out, x0, y0, x1, y1, reach, table, floor):
+def inflate_far(
+    source: NDArray[np.uint8],
+    out: NDArray[np.uint8],
+    x0: int,
+    y0: int,
+    x1: int,
+    y1: int,
+    reach: int,
+    table: NDArray[np.uint8],
+    floor: int,
+) -> None:
     """As `inflate`, for any reach; `table` has reach^2 + 1 costs."""
     height, width = source.shape
     rx0, rx1 = max(x0 - reach, 0), min(x1 + reach, width)

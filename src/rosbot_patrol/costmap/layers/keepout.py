@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.costmap import costmap_kernels as kernels
 from rosbot_patrol.costmap.bounds import Bounds
@@ -28,7 +29,7 @@ class KeepoutLayer(StaticLayer):
         super().__init__(params, name=name)
         self.mask_file, self.mask_frame = params.mask_file, params.mask_frame
 
-    def _translate(self, occupancy: np.ndarray) -> CostCells:
+    def _translate(self, occupancy: NDArray[np.int8]) -> CostCells:
         costs = super()._translate(occupancy)
         costs[costs == FREE] = UNKNOWN  # says nothing
         costs[occupancy < 0] = UNKNOWN

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.costmap.costs import LETHAL, CostCells
-from rosbot_patrol.costmap.params import SourceParams
+from rosbot_patrol.costmap.sensor_params import SourceParams
 from rosbot_patrol.costmap.sources.observation import Observation
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.grid import GridInfo
@@ -108,7 +108,8 @@ class MarkMemory:
                 longest[np.hypot(x - robot.x, y - robot.y) < _BESIDE] = self._beside
             old |= now - self._last_view >= longest
         self._keep(~old)
-        return at[old]
+        forgotten: NDArray[np.int64] = at[old]
+        return forgotten
 
     def _cells(self) -> NDArray[np.int64]:
         iy, ix = np.divmod(self._keys, _ROW)

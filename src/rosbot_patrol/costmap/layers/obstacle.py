@@ -13,8 +13,9 @@ from rosbot_patrol.costmap.costs import FREE, UNKNOWN, CostCells
 from rosbot_patrol.costmap.footprint import Footprint
 from rosbot_patrol.costmap.layers.layer import Layer
 from rosbot_patrol.costmap.layers.marks import MarkMemory, Seen
-from rosbot_patrol.costmap.params import ObstacleParams, SourceParams, VoxelParams
+from rosbot_patrol.costmap.params import ObstacleParams, VoxelParams
 from rosbot_patrol.costmap.scrolling import ScrollingCells, fill_outside
+from rosbot_patrol.costmap.sensor_params import SourceParams
 from rosbot_patrol.costmap.sources.depth import DepthObservation
 from rosbot_patrol.costmap.sources.observation import (
     Observation,
@@ -125,7 +126,8 @@ class ObstacleLayer(Layer):
             top = p.origin_z + p.z_voxels * p.z_resolution
             if height >= top or p.mark_threshold > 0:  # one scan marks one voxel of a column
                 return False
-        return height <= p.max_obstacle_height
+        is_low: bool = height <= p.max_obstacle_height
+        return is_low
 
     def _forget(self, now: float, info: GridInfo, pose: Pose2D, seen: Seen, changes: NDArray[np.int64]) -> None:
         assert self._marks is not None

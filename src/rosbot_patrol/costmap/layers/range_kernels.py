@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rosbot_patrol.kernels import kernel
 
 
@@ -12,8 +15,20 @@ from rosbot_patrol.kernels import kernel
     "boolean, int64[::1])"
 )
 def update_cone(
-    cells, resolution, origin_x, origin_y, sensor_x, sensor_y, yaw, reading, half_angle, phi, inflate, is_clear, changes
-):
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    sensor_x: float,
+    sensor_y: float,
+    yaw: float,
+    reading: float,
+    half_angle: float,
+    phi: float,
+    inflate: float,
+    is_clear: bool,
+    changes: NDArray[np.int64],
+) -> None:
     """Update the cells in a sensor's cone by Bayes' rule.
 
     Args:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.costmap import costmap_kernels as kernels
 from rosbot_patrol.costmap.bounds import NOTHING, Bounds
@@ -50,7 +51,7 @@ class StaticLayer(Layer):
         self._changed = changed.union(self._changed or NOTHING)
         self.map_info = grid.info
 
-    def update_map(self, x: int, y: int, cells: np.ndarray) -> None:
+    def update_map(self, x: int, y: int, cells: NDArray[np.int8]) -> None:
         """Use new occupancy values for a rectangle of the map; cells outside the map are ignored."""
         if self.map_info is None:
             return
@@ -62,7 +63,7 @@ class StaticLayer(Layer):
         self._costs[part.y0 : part.y1, part.x0 : part.x1] = self._translate(inner)
         self._changed = part.union(self._changed or NOTHING)
 
-    def _translate(self, occupancy: np.ndarray) -> CostCells:
+    def _translate(self, occupancy: NDArray[np.int8]) -> CostCells:
         p = self.params
         costs = costs_of_occupancy(
             occupancy,
@@ -124,7 +125,7 @@ class StaticLayer(Layer):
         self._sampled_from = self.master_from_map
         kernels.sample_map(master, self._costs, *bounds, self._affine(self._info, self.map_info), use_maximum)
 
-    def _affine(self, info: GridInfo, source: GridInfo) -> np.ndarray:
+    def _affine(self, info: GridInfo, source: GridInfo) -> NDArray[np.float64]:
         """Transform from cells of the master to cells of the map, as `sample_map` expects it."""
         back = invert(self.master_from_map)
         c, s = math.cos(back.yaw), math.sin(back.yaw)

@@ -69,7 +69,8 @@ def cloud_points(data: bytes, layout: CloudLayout, stride: int = 1) -> Array:
         )
         parts.append(np.asarray(view[across, along], np.float64).ravel())
     points = np.column_stack(parts)
-    return points[np.isfinite(points).all(axis=1)]
+    finite: Array = points[np.isfinite(points).all(axis=1)]
+    return finite
 
 
 def observe_cloud(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
@@ -15,7 +16,21 @@ _CLEARED = 1  # as in costmap_kernels
     "int64(float32[:, ::1], float64[::1], float64[:, ::1], float64, float64, float64, float64, float64[::1], float64,"
     "int64, int64, float64[:, :, ::1], float64[:, ::1])"
 )
-def standing_points(depth, optics, pose, nearest, farthest, low, slope, heights, edge, min_points, reach, bins, found):
+def standing_points(
+    depth: NDArray[np.float32],
+    optics: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    nearest: float,
+    farthest: float,
+    low: float,
+    slope: float,
+    heights: NDArray[np.float64],
+    edge: float,
+    min_points: int,
+    reach: int,
+    bins: NDArray[np.float64],
+    found: NDArray[np.float64],
+) -> int:
     """Find obstacles on the floor that the lidar does not see.
 
     Points above the floor's band and below the top fall into squares around the camera. A square with enough points is
@@ -98,22 +113,22 @@ def standing_points(depth, optics, pose, nearest, farthest, low, slope, heights,
     "float64, float64, float64, float64, int32[::1], int64[::1])"
 )
 def clear_looked_behind(
-    cells,
-    resolution,
-    origin_x,
-    origin_y,
-    depth,
-    optics,
-    pose,
-    nearest,
-    farthest,
-    low,
-    slope,
-    top,
-    step,
-    cleared,
-    changes,
-):
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    depth: NDArray[np.float32],
+    optics: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    nearest: float,
+    farthest: float,
+    low: float,
+    slope: float,
+    top: float,
+    step: float,
+    cleared: NDArray[np.int32],
+    changes: NDArray[np.int64],
+) -> None:
     """Free the marks that the camera looks behind, from the floor's band to the top.
 
     The ray to each point above a marked cell's centre, from the floor's band to the top, must continue behind it. If

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.costmap.params import SourceParams
+from rosbot_patrol.costmap.sensor_params import SourceParams
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.scan import LaserScan, LevelScan
 
@@ -42,7 +42,8 @@ class View:
         second = first + 1
         count = len(self.clear)
         if count >= period - 1.5:  # all around
-            return np.minimum(self.clear[first % count], self.clear[second % count])
+            nearer: Array = np.minimum(self.clear[first % count], self.clear[second % count])
+            return nearer
         known = second < count
         return np.where(known, np.minimum(self.clear[first % count], self.clear[second % count]), 0.0)
 

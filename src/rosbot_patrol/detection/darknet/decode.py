@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet.layers import Head, Region, Yolo
 from rosbot_patrol.detection.darknet.letterbox import Letterbox
@@ -27,19 +28,19 @@ class Candidates:
         probabilities: of each class, 0 where not above the threshold, shape (N, classes).
     """
 
-    boxes: np.ndarray
-    objectness: np.ndarray
-    probabilities: np.ndarray
+    boxes: NDArray[np.float32]
+    objectness: NDArray[np.float32]
+    probabilities: NDArray[np.float32]
 
     def __len__(self) -> int:
         return len(self.boxes)
 
-    def only(self, keep: np.ndarray) -> Candidates:
+    def only(self, keep: NDArray[np.bool_ | np.int64]) -> Candidates:
         """The boxes selected by `keep` (a mask, or indices in a new order)."""
         return Candidates(self.boxes[keep], self.objectness[keep], self.probabilities[keep])
 
 
-def decode_head(head: Head, values: np.ndarray, net_size: tuple[int, int], threshold: float) -> Candidates:
+def decode_head(head: Head, values: NDArray[np.float32], net_size: tuple[int, int], threshold: float) -> Candidates:
     """Boxes of one head above the threshold, relative to the network's input.
 
     Args:
@@ -63,7 +64,7 @@ def decode_head(head: Head, values: np.ndarray, net_size: tuple[int, int], thres
 
 
 def decode(
-    heads: list[Head], values: list[np.ndarray], place: Letterbox, *, threshold: float, iou_threshold: float
+    heads: list[Head], values: list[NDArray[np.float32]], place: Letterbox, *, threshold: float, iou_threshold: float
 ) -> Candidates:
     """Boxes of a picture: all heads, mapped back through the letterbox, suppressed as in darknet_ros.
 
@@ -77,7 +78,9 @@ def decode(
     return suppress_by_objectness(candidates(heads, values, place, threshold=threshold), iou_threshold)
 
 
-def candidates(heads: list[Head], values: list[np.ndarray], place: Letterbox, *, threshold: float) -> Candidates:
+def candidates(
+    heads: list[Head], values: list[NDArray[np.float32]], place: Letterbox, *, threshold: float
+) -> Candidates:
     """Like `decode`, without suppression."""
     net_size = (place.net_width, place.net_height)
     parts = [decode_head(head, array, net_size, threshold) for head, array in zip(heads, values, strict=True)]
@@ -112,7 +115,7 @@ def suppress_by_class(found: Candidates, iou_threshold: float) -> Candidates:
     return Candidates(found.boxes, found.objectness, probabilities)
 
 
-def iou(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+def iou(box: NDArray[np.float32], boxes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Intersection over union of boxes, last axis x, y, width, height, the others as numpy broadcasts them."""
     with np.errstate(invalid="ignore"):
         half, halves = box[..., 2:] / 2, boxes[..., 2:] / 2
@@ -121,22 +124,24 @@ def iou(box: np.ndarray, boxes: np.ndarray) -> np.ndarray:
         width, height = (np.maximum(high[..., axis] - low[..., axis], 0.0) for axis in (0, 1))
         shared = width * height
         union = box[..., 2] * box[..., 3] + boxes[..., 2] * boxes[..., 3] - shared
-    return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0.0)
+    overlaps: NDArray[np.float32] = np.divide(shared, union, out=np.zeros_like(shared), where=union > 0.0)
+    return overlaps
 
 
-def logistic(values: np.ndarray) -> np.ndarray:
+def logistic(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """1 / (1 + exp(-x)), computed in double as darknet does, float32."""
     with np.errstate(over="ignore"):
         return (1.0 / (1.0 + np.exp(-values.astype(np.float64)))).astype(np.float32)
 
 
-def softmax(values: np.ndarray) -> np.ndarray:
+def softmax(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Softmax along the last axis, float32."""
     powers = np.exp(values - values.max(axis=-1, keepdims=True))
-    return powers / powers.sum(axis=-1, keepdims=True)
+    shares: NDArray[np.float32] = powers / powers.sum(axis=-1, keepdims=True)
+    return shares
 
 
-def _objectness(head: Head, raw: np.ndarray) -> np.ndarray:
+def _objectness(head: Head, raw: NDArray[np.float32]) -> NDArray[np.float32]:
     if isinstance(head, Region) and head.background:
         return np.ones_like(raw)
     if isinstance(head, Yolo) and head.new_coords:
@@ -144,7 +149,7 @@ def _objectness(head: Head, raw: np.ndarray) -> np.ndarray:
     return logistic(raw)
 
 
-def _classes(head: Head, raw: np.ndarray) -> np.ndarray:
+def _classes(head: Head, raw: NDArray[np.float32]) -> NDArray[np.float32]:
     if isinstance(head, Region) and head.softmax:
         return softmax(raw)
     if isinstance(head, Yolo) and head.new_coords:
@@ -154,12 +159,12 @@ def _classes(head: Head, raw: np.ndarray) -> np.ndarray:
 
 def _boxes(
     head: Head,
-    raw: np.ndarray,
-    cells: np.ndarray,
-    anchors: np.ndarray,
+    raw: NDArray[np.float32],
+    cells: NDArray[np.float32],
+    anchors: NDArray[np.float32],
     grid_size: tuple[int, int],
     net_size: tuple[int, int],
-) -> np.ndarray:
+) -> NDArray[np.float32]:
     """Boxes relative to the input, shape (N, 4), from the network's output for each of N cells."""
     scale = np.asarray(net_size if isinstance(head, Yolo) else grid_size, dtype=np.float32)
     if isinstance(head, Yolo) and head.new_coords:
@@ -171,4 +176,5 @@ def _boxes(
     if isinstance(head, Yolo) and head.scale_x_y != 1.0:
         offsets = offsets * head.scale_x_y - 0.5 * (head.scale_x_y - 1.0)
     centres = (cells + offsets) / np.asarray(grid_size, dtype=np.float32)
-    return np.concatenate([centres, sizes * anchors / scale], axis=1).astype(np.float32)
+    boxes: NDArray[np.float32] = np.concatenate([centres, sizes * anchors / scale], axis=1).astype(np.float32)
+    return boxes

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Letterbox:
         return left, top, self.net_width - width - left, self.net_height - height - top
 
     @property
-    def row_gains(self) -> np.ndarray:
+    def row_gains(self) -> NDArray[np.float32]:
         """Factor of each row of the fitted picture, float32, shape (rows,): 1, except for the last.
 
         Darknet omits one of the last row's two summands, because the other has all the weight. If single precision puts
@@ -44,7 +45,7 @@ class Letterbox:
             gains[-1] = 1.0 - (at - np.floor(at))
         return gains
 
-    def to_picture(self, boxes: np.ndarray) -> np.ndarray:
+    def to_picture(self, boxes: NDArray[np.float32]) -> NDArray[np.float32]:
         """Convert boxes (x, y, width, height, relative to the input, shape (N, 4)) to the picture."""
         width, height = self.fitted
         out = np.empty_like(boxes)
@@ -55,7 +56,7 @@ class Letterbox:
         out[:, 3] = boxes[:, 3] * (self.net_height / height)
         return out
 
-    def draw(self, picture: np.ndarray) -> np.ndarray:
+    def draw(self, picture: NDArray[np.float32]) -> NDArray[np.float32]:
         """Input of the network: float32, shape (channels, net_height, net_width), 0 to 1, from a uint8 picture.
 
         It uses the same arithmetic as the first nodes of the ONNX graph, for run-times without them and for training.
@@ -69,11 +70,12 @@ class Letterbox:
         return out
 
 
-def _along(values: np.ndarray, length: int, *, axis: int) -> np.ndarray:
+def _along(values: NDArray[np.float32], length: int, *, axis: int) -> NDArray[np.float32]:
     """Linear interpolation to `length` samples along an axis; the first and last samples stay."""
     have = values.shape[axis]
     at = np.arange(length, dtype=np.float32) * np.float32((have - 1) / max(length - 1, 1))
     low = np.minimum(at.astype(np.intp), have - 1)
     high = np.minimum(low + 1, have - 1)
     share = (at - low).reshape([-1 if i == axis else 1 for i in range(values.ndim)])
-    return np.take(values, low, axis) * (1 - share) + np.take(values, high, axis) * share
+    resampled: NDArray[np.float32] = np.take(values, low, axis) * (1 - share) + np.take(values, high, axis) * share
+    return resampled

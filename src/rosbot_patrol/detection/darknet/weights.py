@@ -15,6 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet.layers import Convolutional, NetworkSpec
 from rosbot_patrol.errors import DetectorError
@@ -30,13 +31,13 @@ class ConvWeights:
         scales: of batch normalisation, shape (filters,); None without it, as are `means` and `variances`.
     """
 
-    weights: np.ndarray
-    biases: np.ndarray
-    scales: np.ndarray | None = None
-    means: np.ndarray | None = None
-    variances: np.ndarray | None = None
+    weights: NDArray[np.float32]
+    biases: NDArray[np.float32]
+    scales: NDArray[np.float32] | None = None
+    means: NDArray[np.float32] | None = None
+    variances: NDArray[np.float32] | None = None
 
-    def folded(self) -> tuple[np.ndarray, np.ndarray]:
+    def folded(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Weights and biases with folded batch normalisation; darknet divides by sqrt(variance) + 1e-6."""
         if self.scales is None or self.means is None or self.variances is None:
             return self.weights, self.biases
@@ -109,7 +110,7 @@ def format_weights(spec: NetworkSpec, layers: Iterable[ConvWeights], *, seen: in
     return b"".join(parts)
 
 
-def _rounded(array: np.ndarray, bits: int) -> np.ndarray:
+def _rounded(array: NDArray[np.float32], bits: int) -> NDArray[np.float32]:
     """Numbers rounded so that their last bits are zero."""
     gone = 23 - bits
     if not gone:
@@ -118,8 +119,8 @@ def _rounded(array: np.ndarray, bits: int) -> np.ndarray:
     return (whole >> gone << gone).astype("<u4").view("<f4")
 
 
-def _checked(conv: Convolutional, numbers: ConvWeights, source: str) -> Iterable[np.ndarray]:
-    arrays: dict[str, np.ndarray | None] = {"biases": numbers.biases}
+def _checked(conv: Convolutional, numbers: ConvWeights, source: str) -> Iterable[NDArray[np.float32]]:
+    arrays: dict[str, NDArray[np.float32] | None] = {"biases": numbers.biases}
     if conv.batch_normalize:
         arrays |= {"scales": numbers.scales, "means": numbers.means, "variances": numbers.variances}
     arrays["weights"] = numbers.weights
@@ -132,10 +133,10 @@ def _checked(conv: Convolutional, numbers: ConvWeights, source: str) -> Iterable
         yield np.ascontiguousarray(array, dtype="<f4")
 
 
-def _split(numbers: np.ndarray, convolutions: list[Convolutional]) -> list[ConvWeights]:
+def _split(numbers: NDArray[np.float32], convolutions: list[Convolutional]) -> list[ConvWeights]:
     layers, at = [], 0
 
-    def take(count: int) -> np.ndarray:
+    def take(count: int) -> NDArray[np.float32]:
         nonlocal at
         at += count
         return numbers[at - count : at]

@@ -10,4 +10,5 @@ class AlignmentCritic:
 
     def score(self, situation: Situation) -> Array:
         """Distances of the noses [m], shape (K,); inf where the trajectory's end cannot reach the plan."""
-        return situation.to_plan[1]
+        distances: Array = situation.to_plan[1]
+        return distances

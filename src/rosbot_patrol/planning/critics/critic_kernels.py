@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
 
 @kernel("float64(float32[:, ::1], float64, float64, float64, float64, float64)")
-def read_field(field, resolution, origin_x, origin_y, x, y):
+def read_field(
+    field: NDArray[np.float32], resolution: float, origin_x: float, origin_y: float, x: float, y: float
+) -> float:
     """Value of a field at a point, interpolated between the finite cells around; inf if there are none."""
     height, width = field.shape
     u = (x - origin_x) / resolution - 0.5
@@ -33,7 +36,14 @@ def read_field(field, resolution, origin_x, origin_y, x, y):
 
 
 @kernel("float64[:, ::1](float64[:, ::1], float32[:, ::1], float64, float64, float64, float64)")
-def end_distances(ends, field, resolution, origin_x, origin_y, nose):
+def end_distances(
+    ends: NDArray[np.float64],
+    field: NDArray[np.float32],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    nose: float,
+) -> NDArray[np.float64]:
     """Distances [cells] of poses, shape (K, 3), and of the points `nose` [m] ahead of them; shape (2, K).
 
     If the pose itself is unreachable, both are inf; a nose in an obstacle counts up to its edge.
@@ -53,7 +63,7 @@ def end_distances(ends, field, resolution, origin_x, origin_y, nose):
 
 
 @kernel("uint8[:, ::1](uint8[:, ::1], int64)")
-def shrink(cells, factor):
+def shrink(cells: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
     """Highest cost of each block of factor x factor cells (255, unknown, included)."""
     height, width = cells.shape
     h, w = (height + factor - 1) // factor, (width + factor - 1) // factor
@@ -74,7 +84,7 @@ def shrink(cells, factor):
 
 
 @kernel("float32[:, ::1](uint8[:, ::1], float64[:, ::1])")
-def spread(cells, sources):
+def spread(cells: NDArray[np.uint8], sources: NDArray[np.float64]) -> NDArray[np.float32]:
     """Distance [cells] from the nearest source around impassable cells (253 and more); inf if there is no path.
 
     First-order upwind differences (Sethian 1996), relaxed in the order of a queue; a source's own cell counts as free.
@@ -145,7 +155,14 @@ def spread(cells, sources):
 @kernel(
     "Tuple((float64[:, ::1], int64, int64))(float64[:, ::1], int64, float64[::1], float64[::1], float64[::1], boolean)"
 )
-def cut_plan(plan, passed, local_from_plan, here, window, prune):
+def cut_plan(
+    plan: NDArray[np.float64],
+    passed: int,
+    local_from_plan: NDArray[np.float64],
+    here: NDArray[np.float64],
+    window: NDArray[np.float64],
+    prune: bool,
+) -> tuple[NDArray[np.float64], int, int]:
     """Part of the plan in the local frame, from the robot to where it leaves the local costmap.
 
     Args:
@@ -200,7 +217,14 @@ def cut_plan(plan, passed, local_from_plan, here, window, prune):
 
 
 @kernel("float64[::1](float64[:, ::1], float64[:, ::1], uint8[:, ::1], float64, float64, float64)")
-def headings_off(ends, plan, cells, resolution, origin_x, origin_y):
+def headings_off(
+    ends: NDArray[np.float64],
+    plan: NDArray[np.float64],
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+) -> NDArray[np.float64]:
     """Angle between the heading of each end and the first visible pose of the plan; pi if none is visible.
 
     Args:

@@ -12,7 +12,8 @@ class GoalDistanceCritic:
 
     def score(self, situation: Situation) -> Array:
         """Distances of the trajectories [m], shape (K,); inf where the local goal cannot be reached."""
-        return situation.to_goal[0]
+        distances: Array = situation.to_goal[0]
+        return distances
 
 
 class AttractionCritic:
@@ -21,4 +22,5 @@ class AttractionCritic:
     def score(self, situation: Situation) -> Array:
         """Squared distances [m^2], shape (K,)."""
         off: Array = situation.ends[:, :2] - situation.plan[-1, :2]
-        return np.einsum("ij,ij->i", off, off)
+        squares: Array = np.einsum("ij,ij->i", off, off)
+        return squares

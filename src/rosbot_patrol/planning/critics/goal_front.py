@@ -15,7 +15,8 @@ class FacingGoalCritic:
 
     def score(self, situation: Situation) -> Array:
         """Distances of the noses [m], shape (K,)."""
-        return situation.to_goal[1]
+        distances: Array = situation.to_goal[1]
+        return distances
 
 
 class GoalFrontCritic:
@@ -34,4 +35,5 @@ class GoalFrontCritic:
             if not info.contains(x, y) or situation.coarse.at(x, y) >= INSCRIBED:
                 break
             front = (x, y)
-        return situation.read(distances_from(situation.coarse, np.array([front])))[1]
+        distances: Array = situation.read(distances_from(situation.coarse, np.array([front])))[1]
+        return distances

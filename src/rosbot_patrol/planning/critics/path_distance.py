@@ -10,4 +10,5 @@ class PathDistanceCritic:
 
     def score(self, situation: Situation) -> Array:
         """Distances of the trajectories [m], shape (K,); inf where the plan cannot be reached."""
-        return situation.to_plan[0]
+        distances: Array = situation.to_plan[0]
+        return distances

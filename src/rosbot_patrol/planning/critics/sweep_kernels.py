@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
@@ -12,7 +13,7 @@ SLACK = 1.42  # a point and a cell that touch lie at most this far from the cent
 
 
 @kernel("float32[:, ::1](uint8[:, ::1], int64, int64, int64, int64, int64)")
-def clearances(cells, x0, y0, x1, y1, cap):
+def clearances(cells: NDArray[np.uint8], x0: int, y0: int, x1: int, y1: int, cap: int) -> NDArray[np.float32]:
     """Distance from each cell of [y0:y1, x0:x1] to the nearest lethal or unknown cell in it, or beyond the grid's edge.
 
     Exact between centres of cells [cells], bounded by `cap` (two passes: Meijster, Roerdink, Hesselink 2000).
@@ -70,7 +71,19 @@ def clearances(cells, x0, y0, x1, y1, cap):
     "float64(float32[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64, float64, float64, "
     "float64)"
 )
-def footprint_clearance(near, left, low, resolution, outline, spacing, reach, scale, x, y, yaw):
+def footprint_clearance(
+    near: NDArray[np.float32],
+    left: float,
+    low: float,
+    resolution: float,
+    outline: NDArray[np.float64],
+    spacing: float,
+    reach: float,
+    scale: float,
+    x: float,
+    y: float,
+    yaw: float,
+) -> float:
     """Distance that the robot at a pose can move at least before it touches anything [cells]; -1: it touches.
 
     Args:
@@ -90,7 +103,7 @@ def footprint_clearance(near, left, low, resolution, outline, spacing, reach, sc
     jx, jy = math.floor((x - left) / resolution), math.floor((y - low) / resolution)
     if jx < 0 or jy < 0 or jx >= width or jy >= height:
         return -1.0
-    free = near[jy, jx] - SLACK - scale * reach / resolution
+    free: float = near[jy, jx] - SLACK - scale * reach / resolution
     if free > 0.0:
         return free
     c, s = math.cos(yaw) * scale / resolution, math.sin(yaw) * scale / resolution
@@ -114,7 +127,16 @@ def footprint_clearance(near, left, low, resolution, outline, spacing, reach, sc
 
 
 @kernel("int64(uint8[:, ::1], float64, float64, float64, float64[:, ::1], float64, float64, float64)")
-def count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw):
+def count_touching(
+    cells: NDArray[np.uint8],
+    resolution: float,
+    origin_x: float,
+    origin_y: float,
+    outline: NDArray[np.float64],
+    x: float,
+    y: float,
+    yaw: float,
+) -> int:
     """Number of outline points in lethal cells with the robot at a pose."""
     height, width = cells.shape
     c, s = math.cos(yaw), math.sin(yaw)
@@ -129,14 +151,17 @@ def count_touching(cells, resolution, origin_x, origin_y, outline, x, y, yaw):
 
 
 @kernel("int64(float64[:, ::1], int64, float64[::1])")
-def count_steps(samples, k, motion):
+def count_steps(samples: NDArray[np.float64], k: int, motion: NDArray[np.float64]) -> int:
     """Number of steps of sample k: none longer than the granularities [m], [rad]; at least four."""
     straight = math.sqrt(samples[k, 0] ** 2 + samples[k, 1] ** 2) * motion[0] / motion[2]
-    return max(4, math.ceil(max(straight, abs(samples[k, 2]) * motion[0] / motion[3])))
+    steps: int = max(4, math.ceil(max(straight, abs(samples[k, 2]) * motion[0] / motion[3])))
+    return steps
 
 
 @kernel("UniTuple(float64, 6)(float64[::1], float64[:, ::1], int64, float64, float64[::1])")
-def advance(state, samples, k, dt, motion):
+def advance(
+    state: NDArray[np.float64], samples: NDArray[np.float64], k: int, dt: float, motion: NDArray[np.float64]
+) -> tuple[float, float, float, float, float, float]:
     """State (x, y, yaw, vx, vy, wz) after dt [s], accelerating towards sample k."""
     x, y, yaw = state[0], state[1], state[2]
     vx = state[3] + min(max(samples[k, 0] - state[3], -motion[4] * dt), motion[4] * dt)
@@ -148,7 +173,9 @@ def advance(state, samples, k, dt, motion):
 
 
 @kernel("float64[:, ::1](float64[::1], float64[:, ::1], int64, float64[::1])")
-def trace(start, samples, k, motion):
+def trace(
+    start: NDArray[np.float64], samples: NDArray[np.float64], k: int, motion: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Poses after each step of sample k, shape (steps, 3); arguments as of `drive`."""
     steps = count_steps(samples, k, motion)
     out = np.empty((steps, 3), np.float64)
@@ -167,7 +194,21 @@ def trace(start, samples, k, motion):
     "void(float64[::1], float64[:, ::1], float64[::1], uint8[:, ::1], float64[::1], float32[:, ::1], int64, int64, "
     "int64, int64, float64[:, ::1], float64[:, ::1], float64[::1])"
 )
-def drive(start, samples, motion, cells, place, near, near_x, near_y, taken_from, touching, outline, ends, worst):
+def drive(
+    start: NDArray[np.float64],
+    samples: NDArray[np.float64],
+    motion: NDArray[np.float64],
+    cells: NDArray[np.uint8],
+    place: NDArray[np.float64],
+    near: NDArray[np.float32],
+    near_x: int,
+    near_y: int,
+    taken_from: int,
+    touching: int,
+    outline: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    worst: NDArray[np.float64],
+) -> None:
     """Simulate each sample until it hits something.
 
     Between two steps the outline is checked as often as it may have moved by its clearance, or by a cell.

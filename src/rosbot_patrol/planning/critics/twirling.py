@@ -12,4 +12,5 @@ class TwirlingCritic:
 
     def score(self, situation: Situation) -> Array:
         """Turning speeds [rad/s], shape (K,)."""
-        return np.abs(situation.samples[:, 2])
+        speeds: Array = np.abs(situation.samples[:, 2])
+        return speeds

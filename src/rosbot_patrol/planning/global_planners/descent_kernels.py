@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
 
 @kernel("UniTuple(float64, 2)(float32[:, ::1], int64, int64)")
-def slope(times, ix, iy):
+def slope(times: NDArray[np.float32], ix: int, iy: int) -> tuple[float, float]:
     """Gradient (uphill) at a cell's centre, upwind as in the field's computation."""
     height, width = times.shape
     here = times[iy, ix]
@@ -30,7 +31,9 @@ def slope(times, ix, iy):
 
 
 @kernel("Tuple((float64[:, ::1], int64))(float32[:, ::1], float64, float64, float64, float64, float64)")
-def descend(times, from_x, from_y, to_x, to_y, step):
+def descend(
+    times: NDArray[np.float32], from_x: float, from_y: float, to_x: float, to_y: float, step: float
+) -> tuple[NDArray[np.float64], int]:
     """Follow the descent of `times` from a point to (about) a source; cells have centres at whole numbers.
 
     Returns:
@@ -103,7 +106,9 @@ def descend(times, from_x, from_y, to_x, to_y, step):
 
 
 @kernel("Tuple((float64[:, ::1], int64))(float32[:, ::1], int64, int64, int64, int64)")
-def descend_cells(times, from_x, from_y, to_x, to_y):
+def descend_cells(
+    times: NDArray[np.float32], from_x: int, from_y: int, to_x: int, to_y: int
+) -> tuple[NDArray[np.float64], int]:
     """Follow the descent of `times` from cell to cell, in eight directions, never between cells without a time.
 
     Returns:

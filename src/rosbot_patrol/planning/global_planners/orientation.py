@@ -64,7 +64,8 @@ def directions(points: Array, window: int) -> NDArray[np.float64]:
     """Direction of the path at each point, from the point `window` before it to the one after it [rad], shape (N,)."""
     i = np.arange(len(points))
     steps = points[np.minimum(i + window, len(points) - 1)] - points[np.maximum(i - window, 0)]
-    return np.arctan2(steps[:, 1], steps[:, 0])
+    directions: NDArray[np.float64] = np.arctan2(steps[:, 1], steps[:, 0])
+    return directions
 
 
 def _last_run(yaws: NDArray[np.float64]) -> int:
@@ -78,4 +79,5 @@ def _last_run(yaws: NDArray[np.float64]) -> int:
 
 def _evenly(first: float, last: float, count: int) -> NDArray[np.float64]:
     yaws = first + math.remainder(last - first, math.tau) * np.linspace(0.0, 1.0, count)
-    return np.arctan2(np.sin(yaws), np.cos(yaws))
+    wrapped: NDArray[np.float64] = np.arctan2(np.sin(yaws), np.cos(yaws))
+    return wrapped

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
@@ -22,7 +23,7 @@ _SHIFT = 3
 
 
 @kernel("void(float32[:, ::1], float32[:, ::1])")
-def open_blocks(limits, times):
+def open_blocks(limits: NDArray[np.float32], times: NDArray[np.float32]) -> None:
     """Set `times` to inf in all blocks with a limit and in their neighbours."""
     height, width = times.shape
     rows, columns = limits.shape
@@ -39,7 +40,7 @@ def open_blocks(limits, times):
 
 
 @kernel("uint8[:, ::1](uint8[:, ::1], uint8[::1])")
-def cheapest_of_blocks(costs, rank):
+def cheapest_of_blocks(costs: NDArray[np.uint8], rank: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Least rank of each block's cells, shape (ceil(height / BLOCK), ceil(width / BLOCK)); rank has shape (256,)."""
     height, width = costs.shape
     columns = (width + BLOCK - 1) // BLOCK
@@ -63,7 +64,16 @@ def cheapest_of_blocks(costs, rank):
 @kernel(
     "int64(uint8[:, ::1], float32[::1], int64[:, ::1], float32[::1], int64, int64, float32[:, ::1], float32[:, ::1])",
 )
-def propagate(costs, table, sources, source_times, target_x, target_y, limits, times):
+def propagate(
+    costs: NDArray[np.uint8],
+    table: NDArray[np.float32],
+    sources: NDArray[np.int64],
+    source_times: NDArray[np.float32],
+    target_x: int,
+    target_y: int,
+    limits: NDArray[np.float32],
+    times: NDArray[np.float32],
+) -> int:
     """Fill `times` from the sources until the target is settled, or everywhere if `target_x` is negative.
 
     Args:

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
 
 @kernel("Tuple((uint8[:, ::1], int64))(uint8[:, ::1], uint8[::1], int64, int64, int64, int64, int64, int64)")
-def flood(costs, kinds, start_x, start_y, goal_x, goal_y, worst, enough):
+def flood(
+    costs: NDArray[np.uint8],
+    kinds: NDArray[np.uint8],
+    start_x: int,
+    start_y: int,
+    goal_x: int,
+    goal_y: int,
+    worst: int,
+    enough: int,
+) -> tuple[NDArray[np.uint8], int]:
     """Flood from a cell over its edges: through kind 0 as far as possible, then through kind 1, and so on.
 
     Args:

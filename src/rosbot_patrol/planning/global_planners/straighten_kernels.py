@@ -10,12 +10,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rosbot_patrol.kernels import kernel
 
 
 @kernel("float64(uint8[:, ::1], float32[::1], float64, float64, float64, float64)")
-def line_price(costs, table, x0, y0, x1, y1):
+def line_price(
+    costs: NDArray[np.uint8], table: NDArray[np.float32], x0: float, y0: float, x1: float, y1: float
+) -> float:
     """Exact price of a straight line, cell by cell (Amanatides and Woo 1987); inf if it is blocked.
 
     A line that passes the corner of an impassable cell is blocked, too.
@@ -59,7 +62,9 @@ def line_price(costs, table, x0, y0, x1, y1):
 
 
 @kernel("float64[:, ::1](uint8[:, ::1], float32[::1], float64[:, ::1], int64)")
-def pull(costs, table, points, window):
+def pull(
+    costs: NDArray[np.uint8], table: NDArray[np.float32], points: NDArray[np.float64], window: int
+) -> NDArray[np.float64]:
     """Find the cheapest chain of straight lines between points of a path, none over more than `window` points.
 
     Args:
@@ -99,7 +104,7 @@ def pull(costs, table, points, window):
 
 
 @kernel("float64[:, ::1](float64[:, ::1], float64)")
-def cut(points, step):
+def cut(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     """Points about `step` apart along a polyline of shape (N, 2), N > 0, including its corners."""
     count = 1
     for i in range(points.shape[0] - 1):
@@ -119,7 +124,9 @@ def cut(points, step):
 
 
 @kernel("float64[:, ::1](uint8[:, ::1], float32[::1], float64[:, ::1], int64, float64)")
-def smooth(costs, table, points, reach, most):
+def smooth(
+    costs: NDArray[np.uint8], table: NDArray[np.float32], points: NDArray[np.float64], reach: int, most: float
+) -> NDArray[np.float64]:
     """Move each point to the mean of its neighbours, fewer of them if the path would become more expensive.
 
     Args:
@@ -143,7 +150,7 @@ def smooth(costs, table, points, reach, most):
             costs, table, points[i - 1, 0], points[i - 1, 1], points[i, 0], points[i, 1]
         )
     after = np.zeros(n)
-    bad = np.int64(1)
+    bad = 1
     while bad > 0:
         for i in range(n):
             r = side[i]

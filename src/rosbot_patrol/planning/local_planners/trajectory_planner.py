@@ -208,7 +208,8 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         wz = np.concatenate((wz[np.abs(wz) >= least], [-least, least]))
         out = np.zeros((len(wz), 3))
         out[:, 2] = wz
-        return out[np.abs(wz) > 1e-3]
+        turning: Array = out[np.abs(wz) > 1e-3]
+        return turning
 
     def _motion(self, horizon: float) -> Motion:
         p = self._driven

@@ -66,7 +66,8 @@ def png_bytes(picture: NDArray[np.uint8]) -> bytes:
     """A colour picture, RGB, shape (rows, columns, 3), as a png; small ones are enlarged to 400 pixels or more."""
     scale = max(1, -(-400 // max(picture.shape[:2])))
     large = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
-    return cv2.imencode(".png", large[:, :, ::-1])[1].tobytes()
+    encoded: bytes = cv2.imencode(".png", large[:, :, ::-1])[1].tobytes()
+    return encoded
 
 
 def table_drawing(name: str, found: Table, stored: Table | None, fields: Mapping[str, Field]) -> str:

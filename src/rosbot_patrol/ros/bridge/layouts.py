@@ -158,9 +158,9 @@ def _walk(parts: Parts, data: bytes, at: int, flags: list[int]) -> int:
 
 
 def _walk_array(parts: Parts, count: int, data: bytes, at: int, flags: list[int]) -> int:
-    is_plain = all(isinstance(part, Run) and not part.flags for part in parts)
-    if is_plain:
-        return at + count * sum(part.size for part in parts)
+    runs = [part for part in parts if isinstance(part, Run) and not part.flags]
+    if len(runs) == len(parts):
+        return at + count * sum(run.size for run in runs)
     if count > len(data) - at:  # an element has at least one byte
         raise struct.error("too short")
     for _ in range(count):

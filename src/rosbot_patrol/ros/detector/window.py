@@ -7,6 +7,7 @@ import threading
 import cv2
 import numpy as np
 import rospy
+from numpy.typing import NDArray
 
 POLL_MS = 30
 
@@ -17,9 +18,9 @@ class Window:
     def __init__(self, title: str) -> None:
         self._title = title
         self._lock = threading.Lock()
-        self._newest: np.ndarray | None = None
+        self._newest: NDArray[np.uint8] | None = None
 
-    def show(self, pixels: np.ndarray) -> None:
+    def show(self, pixels: NDArray[np.uint8]) -> None:
         """Show this picture (bgr8) next."""
         with self._lock:
             self._newest = pixels

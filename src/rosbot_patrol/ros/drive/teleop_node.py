@@ -45,7 +45,8 @@ class Sender:
     @property
     def has_listener(self) -> bool:
         """Whether someone subscribes."""
-        return self._publisher.get_num_connections() > 0
+        is_heard: bool = self._publisher.get_num_connections() > 0
+        return is_heard
 
     @property
     def topic(self) -> str:

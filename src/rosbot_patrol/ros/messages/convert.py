@@ -8,6 +8,7 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import Pose, PoseStamped, PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry, Path
+from numpy.typing import NDArray
 from sensor_msgs.msg import LaserScan as LaserScanMsg
 
 from rosbot_patrol.amcl.initial_pose import PoseRecord
@@ -157,7 +158,7 @@ def grid_from_msg(msg: OccupancyGrid, source: str) -> Grid:
     return occupancy_grid(info, msg.data, source)
 
 
-def path_to_msg(poses: np.ndarray, frame: str, stamp: float) -> Path:
+def path_to_msg(poses: NDArray[np.float64], frame: str, stamp: float) -> Path:
     """Poses of shape (N, 3) as nav_msgs/Path."""
     msg = Path()
     msg.header.frame_id, msg.header.stamp = frame, time_to_msg(stamp)

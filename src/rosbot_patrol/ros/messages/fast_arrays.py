@@ -40,7 +40,7 @@ class SetMapFast(SetMap):
     _request_class = numpy_msg(SetMapRequest)
 
 
-class PoseArrayOfRows(PoseArray):  # type: ignore[misc]
+class PoseArrayOfRows(PoseArray):
     """A PoseArray for sending only: its poses are rows x, y, z, qx, qy, qz, qw of one array, shape (N, 7)."""
 
     __slots__ = ("rows",)

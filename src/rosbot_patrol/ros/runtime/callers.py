@@ -15,7 +15,7 @@ _LONGEST_NAME = 100  # of a caller, who chooses it
 _PEER = "rosbot_patrol_peer"  # in a connection's header: the caller's address
 
 
-class CallerService(rospy.Service):  # type: ignore[misc]
+class CallerService(rospy.Service):
     """A service that knows the address of its caller."""
 
     def handle(self, transport: Any, header: dict[str, str]) -> None:

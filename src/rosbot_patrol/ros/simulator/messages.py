@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
 from sensor_msgs.msg import BatteryState, CameraInfo, Image, Imu, JointState, PointCloud2, PointField, Range
 from std_msgs.msg import Header
 
@@ -148,7 +150,7 @@ def camera_info_msg(camera: Intrinsics, stamp: float, frame: str) -> CameraInfo:
     )
 
 
-def image_msg(picture: np.ndarray, encoding: str, stamp: float, frame: str) -> Image:
+def image_msg(picture: NDArray[Any], encoding: str, stamp: float, frame: str) -> Image:
     """A picture of shape (height, width, ...)."""
     height, width = picture.shape[:2]
     return Image(
@@ -162,7 +164,7 @@ def image_msg(picture: np.ndarray, encoding: str, stamp: float, frame: str) -> I
     )
 
 
-def cloud_msg(colour: np.ndarray, depth: np.ndarray, camera: Intrinsics, stamp: float, frame: str) -> PointCloud2:
+def cloud_msg(colour: NDArray[Any], depth: NDArray[Any], camera: Intrinsics, stamp: float, frame: str) -> PointCloud2:
     """Depth as points in the optical frame, with colours packed into the float `rgb` as upstream."""
     height, width = depth.shape
     points = np.empty((height, width, 4), dtype=np.float32)

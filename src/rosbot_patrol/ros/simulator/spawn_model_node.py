@@ -47,7 +47,8 @@ def _description(options: argparse.Namespace) -> str:
 
 def _service() -> str:
     """Full name of the running simulator's service: in this namespace, or Gazebo's for all robots."""
-    for name in map(rospy.resolve_name, SERVICES):
+    for service in SERVICES:
+        name: str = rospy.resolve_name(service)
         try:
             rospy.wait_for_service(name, timeout=PATIENCE / len(SERVICES))
         except rospy.ROSException:

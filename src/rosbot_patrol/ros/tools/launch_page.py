@@ -49,9 +49,10 @@ def _section(path: Path, purpose: str) -> str:
     parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     rows, group = [], ""
     for node in ElementTree.parse(path, parser).getroot():
-        if node.tag is ElementTree.Comment:
+        tag: object = node.tag
+        if tag is ElementTree.Comment:
             group = " ".join((node.text or "").split())
-        elif node.tag == "arg" and "default" in node.attrib:
+        elif tag == "arg" and "default" in node.attrib:
             if group and path.stem == "rosbot_patrol" and len(group) < 40:
                 rows.append(f"| **{group}** | | |")
             group = ""

@@ -30,6 +30,7 @@ from rosbot_patrol.params import declared, table
 from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
+from rosbot_patrol.patrol.mission.params import NodeParams
 from rosbot_patrol.patrol.search.look import LookParams
 from rosbot_patrol.patrol.search.turn import SpinParams
 from rosbot_patrol.patrol.senses.params import InputParams
@@ -43,7 +44,6 @@ from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
 from rosbot_patrol.ros.gmapping.explore_node import ExploreParams
 from rosbot_patrol.ros.maps.server_node import MapServerParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
-from rosbot_patrol.ros.patrol.settings import NodeParams
 from rosbot_patrol.ros.sensors.watch_node import SensorWatchParams
 from rosbot_patrol.ros.simulator.demo_intruder_node import DemoParams
 from rosbot_patrol.ros.simulator.node import SimulatorParams

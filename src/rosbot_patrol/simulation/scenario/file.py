@@ -274,7 +274,7 @@ def _expect(tree: Any, path: Path) -> Expect:
 
 def _check_names(scenario: Scenario) -> None:
     for key, entries in (("actors", scenario.actors), ("doors", scenario.doors)):
-        names = [entry.name for entry in entries]  # type: ignore[attr-defined]
+        names = [entry.name for entry in entries]
         for i, name in enumerate(names):
             if not name or name in names[:i]:
                 problem = "is used twice" if name else "is empty"

@@ -62,7 +62,8 @@ def _hull_points(shape: Shape) -> NDArray[np.float64] | None:
     """Points whose convex hull is the shape (round ones nearly), shape (N, 3)."""
     if shape.kind == "box":
         half = np.array(shape.size) / 2.0
-        return np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T * half
+        corners: NDArray[np.float64] = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T * half
+        return corners
     if shape.kind == "cylinder":
         radius, length = shape.size
         return np.concatenate([_ring(radius, -length / 2.0), _ring(radius, length / 2.0)])

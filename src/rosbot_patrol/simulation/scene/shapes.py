@@ -90,14 +90,15 @@ def _unit_box() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.fl
         corners[face, :, v] = np.array([-1, -1, 1, 1])
         signs[face] = np.stack([corners[face, :, u] * turned, corners[face, :, v]], axis=1)
     faces = _split(np.arange(24).reshape(6, 4))
-    return _kept(corners.reshape(-1, 3), normals.reshape(-1, 3), signs.reshape(-1, 2), faces)
+    parts = corners.reshape(-1, 3), normals.reshape(-1, 3), signs.reshape(-1, 2), faces
+    _protect(*parts)
+    return parts
 
 
-def _kept(*arrays: NDArray[Any]) -> Any:
-    """The same arrays, to be used again and again: nobody may write into them."""
+def _protect(*arrays: NDArray[Any]) -> None:
+    """Forbid writing into arrays that are kept and given again."""
     for array in arrays:
         array.flags.writeable = False
-    return arrays
 
 
 def plane(x: float, y: float) -> Mesh:
@@ -132,7 +133,9 @@ def _unit_cylinder(sides: int) -> Any:
     fan = np.arange(1, sides - 1)
     bottom = np.stack([np.zeros_like(fan), fan + 1, fan], axis=1) + 2 * n
     top = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1) + 3 * n
-    return _kept(angle, ring, np.vstack([ring, ring, down, up]), np.vstack([walls, bottom, top]))
+    parts = angle, ring, np.vstack([ring, ring, down, up]), np.vstack([walls, bottom, top])
+    _protect(*parts)
+    return parts
 
 
 def sphere(radius: float, length: float, *, sides: int = _SIDES, rings: int = _RINGS) -> Mesh:
@@ -158,7 +161,8 @@ def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
     """
     i = np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]
     quads = np.stack([i, i + columns, i + columns + 1, i + 1], axis=-1)
-    (faces,) = _kept(_split(quads.reshape(-1, 4)))
+    faces = _split(quads.reshape(-1, 4))
+    _protect(faces)
     return faces
 
 

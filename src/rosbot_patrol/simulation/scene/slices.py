@@ -100,7 +100,8 @@ def _cut_upright_boxes(boxes: Sequence[tuple[tuple[float, ...], Matrix]], height
     sizes, poses = sizes[met], poses[met]
     corners = _SQUARE * sizes[:, None, :2]
     placed = np.einsum("nij,nkj->nki", poses[:, :2, :2], corners) + poses[:, None, :2, 3]
-    return np.concatenate([placed, np.roll(placed, -1, axis=1)], axis=2).reshape(-1, 4)
+    outlines: Array = np.concatenate([placed, np.roll(placed, -1, axis=1)], axis=2).reshape(-1, 4)
+    return outlines
 
 
 def _grouped(segments: Array) -> tuple[Array, Array]:

@@ -151,7 +151,8 @@ def _spread(element: ET.Element, place: Place, kind: str, count: int) -> NDArray
     if radius and kind in ("random", "uniform"):
         far, bearing = radius * np.sqrt(share[:, 0]), math.tau * share[:, 1]
         across = np.column_stack((far * np.cos(bearing), far * np.sin(bearing)))
-        return middle + np.column_stack((across, (share[:, 2] - 0.5) * size[2]))
+        places: NDArray[np.float64] = middle + np.column_stack((across, (share[:, 2] - 0.5) * size[2]))
+        return places
     return middle + (share - 0.5) * size
 
 
