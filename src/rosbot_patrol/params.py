@@ -23,14 +23,17 @@ import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import ParamError
 
 log = logging.getLogger(__name__)
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
 
 _META = "rosbot_patrol.param"
 
@@ -111,7 +114,7 @@ def load(cls: type[T], tree: Mapping[str, Any], *, name: str = "~", ignore: Iter
     hints = typing.get_type_hints(cls)
     values: dict[str, Any] = {}
     known: set[str] = set(ignore)
-    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+    for field in dataclasses.fields(cls):
         info: ParamInfo = field.metadata.get(_META, ParamInfo())
         key = info.name or field.name
         known.add(key)
@@ -153,7 +156,7 @@ def load_strict(cls: type[T], tree: Mapping[str, Any], *, name: str) -> T:
     return load(cls, tree, name=name)
 
 
-def declared(cls: type, group: object = None) -> list[tuple[str, str, Any, ParamInfo]]:
+def declared(cls: type[DataclassInstance], group: object = None) -> list[tuple[str, str, Any, ParamInfo]]:
     """The parameters of `cls` as (name, type, default, info), for tables; required ones have default MISSING.
 
     Args:
@@ -173,7 +176,7 @@ def declared(cls: type, group: object = None) -> list[tuple[str, str, Any, Param
     return rows
 
 
-def table(cls: type, group: object = None) -> str:
+def table(cls: type[DataclassInstance], group: object = None) -> str:
     """A Markdown table of the parameters of `cls`; arguments as of `declared`."""
     lines = ["| parameter | default | unit | meaning |", "|---|---|---|---|"]
     for key, _, default, info in declared(cls, group):
@@ -189,8 +192,8 @@ def _is_required(field: dataclasses.Field[Any]) -> bool:
 
 
 def _convert(hint: Any, value: Any, info: ParamInfo, name: str) -> Any:
-    if dataclasses.is_dataclass(hint):
-        return load(hint, value, name=name + "/")  # type: ignore[arg-type]
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        return load(hint, value, name=name + "/")
     value = _typed(hint, value, name, info)
     if info.clamps:
         value = _clamped(value, info, name)
@@ -217,6 +220,7 @@ def _clamped(value: Any, info: ParamInfo, name: str) -> Any:
 
 
 def _typed(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
+    """A value as its type wants it; raises ParamError if it does not fit."""
     origin = typing.get_origin(hint)
     if origin in (typing.Union, types.UnionType):
         if value is None and type(None) in typing.get_args(hint):
@@ -225,24 +229,39 @@ def _typed(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
         return _typed(inner[0], value, name, info)
     if origin in (list, tuple):
         return _sequence(hint, value, name, info)
-    if origin is dict:
-        if isinstance(value, Mapping):
-            return dict(value)
-    elif hint is Any:
+    if hint is Any:
         return value
-    elif hint is float:
-        if isinstance(value, (int, float)) and not isinstance(value, bool) and not math.isnan(value):
-            return float(value)
-    elif hint is int:
-        if info.reads_text and isinstance(value, str) and re.fullmatch(r"\s*[-+]?\d+\s*", value):
-            return int(value)
-        if isinstance(value, int) and not isinstance(value, bool):
-            return value
-        if isinstance(value, float) and value.is_integer():
-            return int(value)
-    elif isinstance(value, hint):
-        return value
-    raise ParamError(name, f"expected {_describe(hint, info)}, got {value!r}")
+    found = _scalar(hint, value, info)
+    if found is None:
+        raise ParamError(name, f"expected {_describe(hint, info)}, got {value!r}")
+    return found
+
+
+def _scalar(hint: Any, value: Any, info: ParamInfo) -> Any:
+    """A number, text, truth value or group; None if it does not fit."""
+    if typing.get_origin(hint) is dict:
+        return dict(value) if isinstance(value, Mapping) else None
+    if hint is float:
+        return _float(value)
+    if hint is int:
+        return _int(value, reads_text=info.reads_text)
+    return value if isinstance(value, hint) else None
+
+
+def _float(value: Any) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or math.isnan(value):
+        return None
+    return float(value)
+
+
+def _int(value: Any, *, reads_text: bool) -> int | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, float):
+        return int(value) if value.is_integer() else None
+    if reads_text and isinstance(value, str) and re.fullmatch(r"\s*[-+]?\d+\s*", value):
+        return int(value)
+    return value if isinstance(value, int) else None
 
 
 def _sequence(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
@@ -261,8 +280,8 @@ def _sequence(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
 
 
 def _element(hint: Any, value: Any, name: str, info: ParamInfo) -> Any:
-    if dataclasses.is_dataclass(hint):
-        return load(hint, value, name=name + "/")  # type: ignore[arg-type]
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        return load(hint, value, name=name + "/")
     return _typed(hint, value, name, info)
 
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.params import declared, load, unknown_name
 
-P = TypeVar("P")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+P = TypeVar("P", bound="DataclassInstance")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +29,7 @@ class Tunable:
     doc: str
 
 
-def tunable(cls: type, names: Iterable[str]) -> tuple[Tunable, ...]:
+def tunable(cls: type[DataclassInstance], names: Iterable[str]) -> tuple[Tunable, ...]:
     """Descriptions of the named parameters of a class, in that order."""
     rows = {key: (kind, default, info) for key, kind, default, info in declared(cls)}
     found = []
@@ -49,7 +52,7 @@ def changed(params: P, changes: Mapping[str, Any], names: Iterable[str], *, name
     for key in changes:
         if key not in known:
             raise ParamError(f"{name}{key}", unknown_name(key, known))
-    own = {field.name: getattr(params, field.name) for field in dataclasses.fields(params)}  # type: ignore[arg-type]
+    own = {field.name: getattr(params, field.name) for field in dataclasses.fields(params)}
     plain = {key: value for key, value in own.items() if not dataclasses.is_dataclass(value)}
     loaded = load(type(params), {**plain, **changes}, name=name)
-    return dataclasses.replace(params, **{key: getattr(loaded, key) for key in changes})  # type: ignore[type-var]
+    return dataclasses.replace(params, **{key: getattr(loaded, key) for key in changes})

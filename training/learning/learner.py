@@ -80,7 +80,8 @@ class Learner:
     def _losses(self, inputs: torch.Tensor, truth: Truth) -> tuple[dict[str, torch.Tensor], torch.Tensor]:
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self._bf16):
             values = [value.float() for value in self._forward(inputs)]
-        return yolo_losses(self.spec.heads, values, truth, self.spec.width)  # type: ignore[arg-type]
+        heads: Any = self.spec.heads  # all [yolo], or `Darknet` has refused the cfg
+        return yolo_losses(heads, values, truth, self.spec.width)
 
     def weights(self, seen: int) -> bytes:
         """The running mean as a darknet file, rounded to half precision; `seen`: pictures that it has learnt."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.simulation.actors.looks import HEIGHTS, LOOKS, RESERVED_HEIGHTS, Look, draw_look
-from rosbot_patrol.simulation.actors.people import POSTURES, hydrant_body, person_body, person_pose_parts
+from rosbot_patrol.simulation.actors.people import POSTURES, Posture, hydrant_body, person_body, person_pose_parts
 from rosbot_patrol.simulation.actors.pets import PETS, draw_pet, pet_body, pet_pose_parts
 from rosbot_patrol.simulation.render.egl import Light
 from rosbot_patrol.simulation.scene.scene import Body, Material, Matrix, Shape, Visual
@@ -206,12 +206,12 @@ def draw_person(rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool 
         low: sits or crouches more often.
     """
     look = draw_look(rng) if rng.random() < 0.9 else _named(rng)
-    posture = str(rng.choice(POSTURES, p=[0.45, 0.30, 0.25] if low else [0.80, 0.12, 0.08]))
+    posture: Posture = rng.choice(POSTURES, p=[0.45, 0.30, 0.25] if low else [0.80, 0.12, 0.08]).item()
     if reserved:
         look = draw_reserved(rng)
-        posture = str(rng.choice(["standing", "creeping", "sitting", "crouching"], p=[0.55, 0.25, 0.1, 0.1]))
+        posture = rng.choice(["standing", "creeping", "sitting", "crouching"], p=[0.55, 0.25, 0.1, 0.1]).item()
     walking = posture == "creeping" or bool(rng.random() < 0.55)
-    parts = person_pose_parts(look, float(rng.random()), walking, posture)  # type: ignore[arg-type]
+    parts = person_pose_parts(look, float(rng.random()), walking, posture)
     extra: list[Body] = []
     if posture == "sitting" and rng.random() < 0.85:
         seat = float(parts[0][2, 3]) - 0.09

@@ -48,8 +48,9 @@ def grow(
                 _embed(mine[count], numbers[where[pairs[i]]], source)
                 maps.append(np.arange(len(numbers[where[pairs[i]]].weights)))
             else:
-                if mine[count].scales is not None and _ends_block(new.layers, i):
-                    mine[count].scales[:] = 0.0  # type: ignore[index]
+                scales = mine[count].scales
+                if scales is not None and _ends_block(new.layers, i):
+                    scales[:] = 0.0
                 maps.append(source)
             count += 1
         else:

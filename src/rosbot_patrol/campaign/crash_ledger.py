@@ -151,48 +151,62 @@ def balance(
     lines = list(journal)
     kills = [line for line in lines if line["kind"] == "kill"]
     calls = [line for line in lines if line["kind"] == "call"]
-    answered: Counter[str] = Counter()
-    lost, overlooked = [], []
+    verdicts = [_verdict_of(call, after, records) for call, after in zip(calls, [*calls[1:], None], strict=True)]
     watched = {line["call"] for line in lines if line["kind"] == "verdict" and line.get("there")}
-    for call, after in zip(calls, [*calls[1:], None], strict=True):
-        verdict = _verdict_of(call, after, records)
-        hit = [f"{k['victim']} {k['moment']}+{k['delay']:.2f} s" for k in kills if k["call"] == call["call"]]
-        told = f"call {call['call']} of room {call['room']}, killed: {', '.join(hit) or 'none'}:"
-        if verdict:
-            answered[verdict] += 1
-        else:
-            lost.append(f"{told} no verdict")
-        if verdict == CLEAR and call["call"] in watched:
-            overlooked.append(f"{told} clear, and somebody stood there")
+    told = [_told(call, kills) for call in calls]
     confirmed = [record for record in records if record.is_confirmed]
-    by_incident: dict[str, set[str]] = {}
-    for mail in mails:
-        by_incident.setdefault(mail.incident, set()).add(mail.message_id)
-    strangers = [
-        f"incident {record.id} has {count_of(len(by_incident.get(record.id, ())), 'mail')}"
-        for record in confirmed
-        if len(by_incident.get(record.id, ())) != 1
-    ]
-    verdicts = {record.id: record.verdict for record in records}
-    for name in sorted(by_incident.keys() - {record.id for record in confirmed}):
-        kept = f"is on record as {verdicts[name] or 'open'}" if name in verdicts else "is not kept"
-        strangers.append(f"a mail tells of the incident {name}, which {kept}")
-    copies = Counter(mail.message_id for mail in mails)
+    ids_of = _message_ids(mails)
     return Books(
         kills=Counter(str(kill["victim"]) for kill in kills),
         moments=Counter(str(kill["moment"]) for kill in kills),
         calls=len(calls),
-        answered=answered,
-        lost=lost,
+        answered=Counter(verdict for verdict in verdicts if verdict),
+        lost=[f"{text} no verdict" for text, verdict in zip(told, verdicts, strict=True) if not verdict],
         watched=len(watched),
-        overlooked=overlooked,
+        overlooked=[
+            f"{text} clear, and somebody stood there"
+            for call, text, verdict in zip(calls, told, verdicts, strict=True)
+            if verdict == CLEAR and call["call"] in watched
+        ],
         confirmed=len(confirmed),
-        mails=Counter(len(by_incident.get(record.id, ())) for record in confirmed),
-        strangers=strangers,
-        repeated=sum(count - 1 for count in copies.values()),
+        mails=Counter(len(ids_of.get(record.id, ())) for record in confirmed),
+        strangers=[*_wrong_counts(confirmed, ids_of), *_wrong_mails(records, ids_of)],
+        repeated=len(mails) - len({mail.message_id for mail in mails}),
         verified=verified,
         waiting=waiting,
     )
+
+
+def _told(call: Mapping[str, Any], kills: Iterable[Mapping[str, Any]]) -> str:
+    """A call in words, with what was killed during it."""
+    hit = [f"{k['victim']} {k['moment']}+{k['delay']:.2f} s" for k in kills if k["call"] == call["call"]]
+    return f"call {call['call']} of room {call['room']}, killed: {', '.join(hit) or 'none'}:"
+
+
+def _message_ids(mails: Iterable[KeptMail]) -> dict[str, set[str]]:
+    """Message-IDs of the mails about each incident."""
+    ids_of: dict[str, set[str]] = {}
+    for mail in mails:
+        ids_of.setdefault(mail.incident, set()).add(mail.message_id)
+    return ids_of
+
+
+def _wrong_counts(confirmed: Iterable[KeptRecord], ids_of: Mapping[str, set[str]]) -> list[str]:
+    """Sentences on confirmed incidents that have no mail, or several."""
+    counts = [(record.id, len(ids_of.get(record.id, ()))) for record in confirmed]
+    return [f"incident {name} has {count_of(count, 'mail')}" for name, count in counts if count != 1]
+
+
+def _wrong_mails(records: Iterable[KeptRecord], ids_of: Mapping[str, set[str]]) -> list[str]:
+    """Sentences on mails about incidents that are not on record as confirmed."""
+    by_id = {record.id: record for record in records}
+    sentences = []
+    for name in sorted(ids_of):
+        record = by_id.get(name)
+        if record is None or not record.is_confirmed:
+            kept = "is not kept" if record is None else f"is on record as {record.verdict or 'open'}"
+            sentences.append(f"a mail tells of the incident {name}, which {kept}")
+    return sentences
 
 
 def _verdict_of(call: Mapping[str, Any], after: Mapping[str, Any] | None, records: Sequence[KeptRecord]) -> str:

@@ -132,9 +132,13 @@ def _share_off(result: Result) -> float | None:
 
 
 def _times(results: Sequence[Result]) -> str:
-    quick = [(_WHEN[name], _known(results, lambda r, name=name: r.times.get(name)), None) for name in _QUICK]  # type: ignore[misc]
-    slow = [(_WHEN[name], _known(results, lambda r, name=name: r.times.get(name)), None) for name in _SLOW]  # type: ignore[misc]
+    quick, slow = ([(_WHEN[name], _seconds(results, name), None) for name in names] for names in (_QUICK, _SLOW))
     return spread_chart(quick, "s") + spread_chart(slow, "s")
+
+
+def _seconds(results: Sequence[Result], name: str) -> list[float]:
+    """Times of that name, of the patrols that have one [s]."""
+    return _known(results, lambda result: result.times.get(name))
 
 
 _QUICK, _SLOW = ("goal", "seen_to_notice"), ("notice", "arrived", "looked", "home")

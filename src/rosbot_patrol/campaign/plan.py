@@ -108,7 +108,7 @@ def plan_patrol(seed: int, number: int, files: HouseFiles, floor: Floor, *, faul
         for room in rng.permutation(rooms):
             cast = make(Stage(floor, int(room), rng))
             if cast is not None:
-                patrol = _patrol(seed, number, kind, files, floor, int(room), cast)
+                patrol = _patrol(seed, number, kind, files=files, floor=floor, room=int(room), cast=cast)
                 return _broken(patrol, rooms) if faults else patrol
     raise WorldError(files.name, f"has no room with a place for a patrol of the kind '{kind}'")
 
@@ -128,7 +128,7 @@ def _broken(patrol: Patrol, rooms: Sequence[int]) -> Patrol:
     return replace(patrol, scenario=tree, mishap=mishap.told, allowed=mishap.allowed)
 
 
-def _patrol(seed: int, number: int, kind: str, files: HouseFiles, floor: Floor, room: int, cast: Cast) -> Patrol:
+def _patrol(seed: int, number: int, kind: str, *, files: HouseFiles, floor: Floor, room: int, cast: Cast) -> Patrol:
     known = floor.rooms.find(room)
     assert known is not None
     expected = CONFIRMED if kind in INTRUDERS else CLEAR

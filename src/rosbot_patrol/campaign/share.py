@@ -21,7 +21,7 @@ _SAME = 0.01  # positions closer than this share one view [m]
 
 
 def true_share(
-    floor: Floor, room: int, robot: Track, begin: float, end: float, params: CoverageParams | None = None
+    floor: Floor, room: int, robot: Track, begin: float, end: float, *, params: CoverageParams | None = None
 ) -> float:
     """Share of a room's floor that was in view, 0 to 1.
 

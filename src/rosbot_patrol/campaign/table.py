@@ -73,13 +73,17 @@ def measures(results: Sequence[Result]) -> list[tuple[str, str, float, float, in
         ("localisation, largest error of a patrol", "m", lambda r: r.localisation[1] if r.localisation else None),
         ("home, off the start", "m", lambda r: r.home_error if r.home is not None else None),
     ]
-    asked += [(f"time: {_TOLD[name]}", "s", lambda r, name=name: r.times.get(name)) for name in TIMES]  # type: ignore[misc]
+    asked += [(f"time: {_TOLD[name]}", "s", _time_of(name)) for name in TIMES]
     found = []
     for name, unit, ask in asked:
         values = [abs(value) for r in results if (value := ask(r)) is not None]
         if values:
             found.append((name, unit, statistics.median(values), max(values), len(values)))
     return found
+
+
+def _time_of(name: str) -> Callable[[Result], float | None]:
+    return lambda result: result.times.get(name)
 
 
 _TOLD = {

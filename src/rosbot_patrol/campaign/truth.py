@@ -70,6 +70,7 @@ def presence(
     people: Sequence[Person],
     tracks: dict[str, Track],
     robot: Track,
+    *,
     begin: float,
     end: float,
 ) -> Presence:

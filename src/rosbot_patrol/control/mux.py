@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.errors import ParamError
@@ -131,7 +132,7 @@ class TwistMux:
         return Choice(None, STOP, barrier.params.name if barrier is not None else None)
 
 
-def _check_distinct(group: str, key: str, values: list[object] | list[str] | list[int]) -> None:
+def _check_distinct(group: str, key: str, values: Sequence[object]) -> None:
     for value in values:
-        if values.count(value) > 1:  # type: ignore[arg-type]
+        if values.count(value) > 1:
             raise ParamError(f"{group}/{key}", f"{value!r} is given twice")

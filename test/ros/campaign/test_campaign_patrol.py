@@ -17,7 +17,7 @@ from rosbot_patrol.campaign.houses import load_house
 from rosbot_patrol.campaign.plan import Patrol
 from rosbot_patrol.campaign.record import Result
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.ros.campaign.patrol import evaluate
+from rosbot_patrol.ros.campaign.evaluation import Run, evaluate
 from rosbot_patrol.ros.campaign.watch import Recording, State
 
 ROOT = Path(__file__).parents[3]
@@ -63,7 +63,7 @@ def recording(*, seen_at: float | None, verdict: str, after: str = "") -> Record
 
 def judged(patrol: Patrol, heard: Recording, folder: Path, **changes: Any) -> Result:
     given: dict[str, Any] = {"problem": "", "mails": 1, "contacts": [], "wall_s": 60.0}
-    return evaluate(patrol, heard, ROOT, folder, **{**given, **changes})
+    return evaluate(patrol, heard, ROOT, folder, Run(**{**given, **changes}))
 
 
 def test_who_was_found_was_found_in_time(patrol: Patrol, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ def still(x: float, y: float, yaw: float = 0.0, end: float = 10.0) -> Track:
 
 @pytest.mark.parametrize(("yaw", "seen"), [(0.0, 10.0), (math.pi, 0.0), (0.4, 10.0), (0.7, 0.0)])
 def test_who_stands_before_the_camera_is_in_view(flat_floor: Floor, yaw: float, seen: float) -> None:
-    found = presence(flat_floor, ROOM, [BOB], {"bob": still(*PLACE)}, still(*POINT, yaw), 0.0, 10.0)
+    found = presence(flat_floor, ROOM, [BOB], {"bob": still(*PLACE)}, still(*POINT, yaw), begin=0.0, end=10.0)
     assert found.in_view == pytest.approx(seen, abs=0.3)
     assert found.in_room == pytest.approx(10.0, abs=0.3)
     assert found.first_view == (0.0 if seen else None)
@@ -34,19 +34,19 @@ def test_who_stands_before_the_camera_is_in_view(flat_floor: Floor, yaw: float, 
 
 def test_who_comes_after_the_verdict_was_not_there(flat_floor: Floor) -> None:
     late = Track([8.0, 8.2, 8.4], [Pose2D(*PLACE, 0.0)] * 3)
-    assert not presence(flat_floor, ROOM, [BOB], {"bob": late}, still(*POINT), 0.0, 7.0).was_there
-    assert not presence(flat_floor, ROOM, [BOB], {"bob": late}, still(*POINT, math.pi), 0.0, 10.0).was_there
+    assert not presence(flat_floor, ROOM, [BOB], {"bob": late}, still(*POINT), begin=0.0, end=7.0).was_there
+    assert not presence(flat_floor, ROOM, [BOB], {"bob": late}, still(*POINT, math.pi), begin=0.0, end=10.0).was_there
 
 
 def test_a_wall_hides(flat_floor: Floor) -> None:
     bath = (-2.25, 0.15)
     towards = math.atan2(PLACE[1] - bath[1], PLACE[0] - bath[0])
-    found = presence(flat_floor, ROOM, [BOB], {"bob": still(*PLACE)}, still(*bath, towards), 0.0, 10.0)
+    found = presence(flat_floor, ROOM, [BOB], {"bob": still(*PLACE)}, still(*bath, towards), begin=0.0, end=10.0)
     assert found.in_view == 0.0
 
 
 def test_a_dog_does_not_count(flat_floor: Floor) -> None:
-    assert not presence(flat_floor, ROOM, [], {"rex": still(*PLACE)}, still(*POINT), 0.0, 10.0).was_there
+    assert not presence(flat_floor, ROOM, [], {"rex": still(*PLACE)}, still(*POINT), begin=0.0, end=10.0).was_there
 
 
 def test_the_place_that_was_told_is_held_against_the_nearest() -> None:

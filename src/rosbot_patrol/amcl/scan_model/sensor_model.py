@@ -9,6 +9,7 @@ m. `likelihood_field_prob` multiplies the probabilities.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -234,7 +235,9 @@ def _log(p: Array, _power: float) -> Array:
 class _Table:
     """Value of each cell for one beam; recomputed when the sensor's reach changes."""
 
-    def __init__(self, distances: Field, params: AmclParams, shape: object, power: float) -> None:
+    def __init__(
+        self, distances: Field, params: AmclParams, shape: Callable[[Array, float], Array], power: float
+    ) -> None:
         self._distances = distances
         self._params = params
         self._shape = shape
@@ -248,7 +251,7 @@ class _Table:
             distances = self._distances.values.astype(np.float64)
             hit = p.laser_z_hit * np.exp(-(distances**2) / (2.0 * p.laser_sigma_hit**2))
             probability = hit + p.laser_z_rand / reach
-            self._field = self._distances.mapped(self._shape(probability, self._power))  # type: ignore[operator]
+            self._field = self._distances.mapped(self._shape(probability, self._power))
             self._reach = reach
         return self._field
 

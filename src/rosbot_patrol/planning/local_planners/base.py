@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -20,7 +20,10 @@ from rosbot_patrol.planning.local_planners.stop import StopAndTurn, StopLimits
 from rosbot_patrol.planning.local_planners.track import Track
 from rosbot_patrol.tunable import changed
 
-P = TypeVar("P")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+P = TypeVar("P", bound="DataclassInstance")
 
 _LOOKAHEAD = 1.0  # minimum distance of the local goal along the plan [m]
 

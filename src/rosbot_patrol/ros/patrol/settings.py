@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from datetime import tzinfo
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
@@ -25,9 +25,13 @@ from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
 from rosbot_patrol.ros.runtime.diagnostics import WARN, Health
 from rosbot_patrol.ros.runtime.node import load_params
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 log = logging.getLogger(__name__)
 
-P = TypeVar("P")
+P = TypeVar("P", bound="DataclassInstance")
+V = TypeVar("V")
 
 NO_ROUNDS: tuple[tuple[Round, ...], tzinfo | None] = ((), None)
 
@@ -57,7 +61,7 @@ def load_manager_params(node: NodeParams, tree: dict[str, Any], prefix: str) -> 
     return manager_params(node, lambda cls: load_flat(cls, tree), prefix)
 
 
-def load_or_say(load: Callable[[str, Rooms], P], path: str, rooms: Rooms, without: P, health: Health) -> P:
+def load_or_say(load: Callable[[str, Rooms], V], path: str, rooms: Rooms, without: V, health: Health) -> V:
     """What a file says; a guard whose file of modes or rounds is wrong stands guard without it, and says so."""
     try:
         return load(path, rooms)

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import rospy
 from rospy.core import is_shutdown_requested
@@ -21,7 +21,10 @@ from rosbot_patrol.ros.runtime import greeting, logs
 from rosbot_patrol.ros.runtime.by_hand import require_master
 from rosbot_patrol.ros.runtime.process import Priority, take
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
 
 log = logging.getLogger(__name__)
 

@@ -162,8 +162,8 @@ class SerialServer:
             if not key.data.closed and mask & selectors.EVENT_READ:
                 self._read(key.data)
             self._flush(key.data)
-        else:
-            self._accept(key.fileobj)  # type: ignore[arg-type]
+        elif isinstance(key.fileobj, socket.socket):
+            self._accept(key.fileobj)
 
     def _tick(self, now: float) -> None:
         if self._serial is not None and not self.clients and now >= self._serial_due:

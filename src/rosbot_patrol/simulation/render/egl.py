@@ -349,7 +349,8 @@ def _open_context() -> Any:
     try:
         import moderngl
 
-        return moderngl.create_context(standalone=True, backend="egl", require=330)  # type: ignore[arg-type]
+        settings: dict[str, Any] = {"standalone": True, "backend": "egl", "require": 330}
+        return moderngl.create_context(**settings)
     except Exception as err:  # moderngl raises plain Exception, its loader OSError and ImportError
         raise WorldError("EGL", f"OpenGL 3.3 without a display cannot be had: {err}") from err
 

@@ -141,9 +141,10 @@ class FaultBoard:
 
     def driven(self, twist: Twist2D) -> Twist2D:
         """How the base is driven where the wheels ask for a velocity."""
-        for entry in self._of(OdometrySlip):
-            f = entry.fault.factor  # type: ignore[attr-defined]
-            twist = Twist2D(twist.vx * f, twist.vy * f, twist.wz * f)
+        for entry in self._in_force.values():
+            if isinstance(entry.fault, OdometrySlip):
+                factor = entry.fault.factor
+                twist = Twist2D(twist.vx * factor, twist.vy * factor, twist.wz * factor)
         return twist
 
     @property

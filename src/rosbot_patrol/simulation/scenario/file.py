@@ -13,7 +13,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -27,7 +27,10 @@ from rosbot_patrol.simulation.actors.walkers import Walker
 from rosbot_patrol.simulation.scenario.faults import EVENTS, Doorway, Fault, Timed, finite, read_fault
 from rosbot_patrol.yaml_files import read_mapping
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
 
 PLAYED = "Everything in the scenario has happened."  # the last thing that the simulator tells of it
 VERDICTS = ("confirmed", "clear", "unreachable", "unverified")

@@ -45,8 +45,8 @@ def to_quaternion(matrix: Matrix) -> tuple[float, float, float, float]:
     trace = float(np.trace(r))
     if trace > 0.0:
         s = 2.0 * math.sqrt(trace + 1.0)
-        q = ((r[2, 1] - r[1, 2]) / s, (r[0, 2] - r[2, 0]) / s, (r[1, 0] - r[0, 1]) / s, s / 4.0)
-        return tuple(float(v) for v in q)  # type: ignore[return-value]
+        x, y, z = ((r[2, 1] - r[1, 2]) / s, (r[0, 2] - r[2, 0]) / s, (r[1, 0] - r[0, 1]) / s)
+        return float(x), float(y), float(z), s / 4.0
     i = int(np.argmax(np.diag(r)))
     j, k = (i + 1) % 3, (i + 2) % 3
     s = 2.0 * math.sqrt(max(1.0 + r[i, i] - r[j, j] - r[k, k], 1e-12))
