@@ -112,14 +112,20 @@ def main() -> None:
                 there = put(stage, kind, place, rng)
                 if there is None:
                     continue
-                tell(stage, exclusions, kind, there, errors, told[kind])
+                tell(stage, exclusions, kind, there, errors=errors, told=told[kind])
                 stage.engine.population.remove("it")
         stage.engine.close()
     report(errors, told, arguments.json)
 
 
 def tell(
-    stage: Stage, exclusions: Exclusions, kind: str, there: Pose2D, errors: dict[str, list[float]], told: Counter[str]
+    stage: Stage,
+    exclusions: Exclusions,
+    kind: str,
+    there: Pose2D,
+    *,
+    errors: dict[str, list[float]],
+    told: Counter[str],
 ) -> None:
     """Look, measure, and write down."""
     boxes, depth, off = stage.look()

@@ -86,8 +86,13 @@ def draw_worst(pictures: Pictures, found: Found, threshold: float, target: Path,
     missed = missed[np.argsort(-column(labels, "pixels")[missed])][:count]
     false = found.boxes[found.false(0) | found.false(1)]
     false = false[np.argsort(-false[:, 2])][:count]
-    tiles = [_tile(pictures, found, int(labels[i, 0]), labels[i, 2:6], (255, 0, 0), "missed") for i in missed]
-    tiles += [_tile(pictures, found, int(b[0]), b[3:7], (255, 160, 0), f"{KINDS[int(b[1])]} {b[2]:.2f}") for b in false]
+    tiles = [
+        _tile(pictures, found, int(labels[i, 0]), labels[i, 2:6], colour=(255, 0, 0), text="missed") for i in missed
+    ]
+    tiles += [
+        _tile(pictures, found, int(b[0]), b[3:7], colour=(255, 160, 0), text=f"{KINDS[int(b[1])]} {b[2]:.2f}")
+        for b in false
+    ]
     save_sheet(tiles, target)
 
 
@@ -136,7 +141,7 @@ def _picture(pictures: Pictures, found: Found, number: int) -> NDArray[Any]:
 
 
 def _tile(
-    pictures: Pictures, found: Found, number: int, box: NDArray[Any], colour: tuple[int, int, int], text: str
+    pictures: Pictures, found: Found, number: int, box: NDArray[Any], *, colour: tuple[int, int, int], text: str
 ) -> NDArray[Any]:
     picture = _picture(pictures, found, number)
     _frame(picture, box, colour, text)

@@ -65,7 +65,7 @@ def yolo_losses(
     first = 0
     for head, raw in zip(heads, values, strict=True):
         count = len(head.anchors)
-        found = _head_loss(head, raw.float(), truth, other, take[:, first : first + count], width)
+        found = _head_loss(head, raw.float(), truth, other, take[:, first : first + count], width=width)
         for name in ("box", "kind"):
             parts[name] = parts[name] + found[name]
         each = each + 2.0 * found["object"]
@@ -76,7 +76,7 @@ def yolo_losses(
 
 
 def _head_loss(
-    head: Yolo, raw: torch.Tensor, truth: Truth, other: torch.Tensor, take: torch.Tensor, width: int
+    head: Yolo, raw: torch.Tensor, truth: Truth, other: torch.Tensor, take: torch.Tensor, *, width: int
 ) -> dict[str, torch.Tensor]:
     batch, _, rows, columns = raw.shape
     anchors = len(head.anchors)

@@ -28,7 +28,7 @@ def kind_of(number: int, seed: int) -> Kind:
     return ROUND[int(order[number % len(ROUND)])]
 
 
-def draw(folder: Path, worlds: Path, seed: int, first: int, step: int, last: int | None = None) -> None:
+def draw(folder: Path, worlds: Path, seed: int, first: int, step: int, *, last: int | None = None) -> None:
     """Draw the shards `first`, `first` + `step` and so on before `last` into a folder; waits while it is full."""
     cv2.setNumThreads(1)
     os.nice(5)

@@ -61,6 +61,7 @@ def draw_case(
     scene: Scene,
     camera: tuple[float, float, float],
     rng: Rng,
+    *,
     reserved: bool = False,
     shapeless: float = 0.0,
 ) -> list[Actor]:

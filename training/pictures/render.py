@@ -111,7 +111,7 @@ class Studio:
                 camera = case_camera(case, scene, rng) if case else scenes.draw_camera(scene, rng)
                 if camera is None or len(pictures) == count:
                     break
-                picture, labels, mask = self._view(scene, camera, rng, test, pets, hard, case)
+                picture, labels, mask = self._view(scene, camera, rng, test=test, pets=pets, hard=hard, case=case)
                 rows += [[len(pictures), *label] for label in labels]
                 pictures.append(picture)
                 masks.append(mask)
@@ -127,6 +127,7 @@ class Studio:
         scene: scenes.Scene,
         camera: tuple[float, float, float],
         rng: np.random.Generator,
+        *,
         test: bool,
         pets: float = 0.0,
         hard: float = 0.0,

@@ -32,7 +32,7 @@ def look_at(studio: render.Studio, monkeypatch: pytest.MonkeyPatch, distance: fl
     studio.renderer.clear()
     for body in scene.bodies:
         studio.renderer.add(body)
-    _, labels, _ = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), False)
+    _, labels, _ = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), test=False)
     return np.array([[0, *label] for label in labels]).reshape(-1, len(COLUMNS))
 
 
@@ -73,7 +73,7 @@ def test_a_pet_is_seen_and_is_nothing_to_be_found(studio: render.Studio, monkeyp
         monkeypatch.setattr(render.scenes, "draw_actors", lambda *a, there=there, **k: [dog] if there else [])
         studio.renderer.clear()
         scene = Scene([], Light(), (-9, 9, -9, 9))
-        seen[there] = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), False, 1.0)
+        seen[there] = studio._view(scene, (0.0, 0.0, 0.0), np.random.default_rng(0), test=False, pets=1.0)
     assert seen[True][1] == []
     assert (seen[True][0] != seen[False][0]).any()
 

@@ -232,7 +232,7 @@ class Localizer:
         self.map_from_odom = compose(estimate.pose, invert(odometry))
 
     def _move(self, poses: Array, start: Pose2D, end: Pose2D) -> None:
-        move_particles(poses, start, end, self._params.odom_model_type, self._alphas, self._rng)
+        move_particles(poses, start, end, self._params.odom_model_type, self._alphas, rng=self._rng)
 
     def _resample_when_due(self, known: KnownMap) -> bool:
         self._updates += 1

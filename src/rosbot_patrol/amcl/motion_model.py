@@ -38,22 +38,21 @@ class OdometryNoise:
 
 
 def move_particles(
-    poses: Array, start: Pose2D, end: Pose2D, name: str, alphas: OdometryNoise, rng: np.random.Generator
+    poses: Array, start: Pose2D, end: Pose2D, name: str, alphas: OdometryNoise, *, rng: np.random.Generator
 ) -> None:
     """Move particles in place by the odometry from `start` to `end`, each with its own noise."""
-    move = _slide if name.startswith("omni") else _turn_drive_turn
     deviation = math.sqrt if name.endswith("-corrected") else float
-    move(poses, start, end, alphas, rng, deviation)
+    noise = rng.standard_normal(poses.shape)
+    if name.startswith("omni"):
+        kernels.move_sliding(poses, *_slide(start, end, alphas, deviation), noise)
+    else:
+        kernels.move_turn_drive_turn(poses, *_turn_drive_turn(start, end, alphas, deviation), noise)
 
 
 def _turn_drive_turn(
-    poses: Array,
-    start: Pose2D,
-    end: Pose2D,
-    a: OdometryNoise,
-    rng: np.random.Generator,
-    deviation: Callable[[float], float],
-) -> None:
+    start: Pose2D, end: Pose2D, a: OdometryNoise, deviation: Callable[[float], float]
+) -> tuple[Array, Array]:
+    """Turn, drive, turn, and their standard deviations, each of shape (3,)."""
     way = math.hypot(end.x - start.x, end.y - start.y)
     first = 0.0 if way < _STILL else angle_difference(math.atan2(end.y - start.y, end.x - start.x), start.yaw)
     second = angle_difference(angle_difference(end.yaw, start.yaw), first)
@@ -65,22 +64,15 @@ def _turn_drive_turn(
             deviation(a.alpha1 * turn2**2 + a.alpha2 * way**2),
         ]
     )
-    noise = rng.standard_normal(poses.shape)
-    kernels.move_turn_drive_turn(poses, np.array([first, way, second]), sigma, noise)
+    return np.array([first, way, second]), sigma
 
 
 def _turn_size(turn: float) -> float:
     return min(abs(turn), abs(angle_difference(turn, math.pi)))
 
 
-def _slide(
-    poses: Array,
-    start: Pose2D,
-    end: Pose2D,
-    a: OdometryNoise,
-    rng: np.random.Generator,
-    deviation: Callable[[float], float],
-) -> None:
+def _slide(start: Pose2D, end: Pose2D, a: OdometryNoise, deviation: Callable[[float], float]) -> tuple[Array, Array]:
+    """Direction, distance and turn, and their standard deviations, each of shape (3,)."""
     way = math.hypot(end.x - start.x, end.y - start.y)
     turn = angle_difference(end.yaw, start.yaw)
     direction = angle_difference(math.atan2(end.y - start.y, end.x - start.x), start.yaw)
@@ -91,5 +83,4 @@ def _slide(
             deviation(a.alpha4 * turn**2 + a.alpha2 * way**2),
         ]
     )
-    noise = rng.standard_normal(poses.shape)
-    kernels.move_sliding(poses, np.array([direction, way, turn]), sigma, noise)
+    return np.array([direction, way, turn]), sigma

@@ -131,13 +131,13 @@ class Floor:
     def wall_behind(self, x: float, y: float, farthest: float = 1.2) -> Pose2D | None:
         """Pose of something on the nearest wall to a place, facing the room; None if no wall is near."""
         cut = self.ways.cut(EYE_LEVEL)
-        ranges = cut.cast(x, y, -math.pi, math.tau / 72, 72, 9.0)
+        ranges = cut.cast(x, y, -math.pi, math.tau / 72, 72, longest=9.0)
         best = int(np.argmin(ranges))
         if ranges[best] > farthest:
             return None
         towards = -math.pi + best * math.tau / 72
         off = ranges[best] - 0.02
-        flat = [cut.cast(x, y, towards + d, 1.0, 1, 9.0)[0] * math.cos(d) for d in (-0.3, 0.3)]
+        flat = [cut.cast(x, y, towards + d, 1.0, 1, longest=9.0)[0] * math.cos(d) for d in (-0.3, 0.3)]
         if max(abs(f - ranges[best]) for f in flat) > 0.04:
             return None  # a corner, or a post
         yaw = math.atan2(-math.sin(towards), -math.cos(towards))

@@ -49,4 +49,4 @@ def true_share(
 
 def _sight(cut: Slice, pose: Pose2D, reach: float) -> Sight:
     step = math.tau / _BEAMS
-    return Sight(pose.x, pose.y, 0.0, step, cut.cast(pose.x, pose.y, 0.0, step, _BEAMS, reach))
+    return Sight(pose.x, pose.y, 0.0, step, cut.cast(pose.x, pose.y, 0.0, step, _BEAMS, longest=reach))

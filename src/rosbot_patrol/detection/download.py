@@ -80,7 +80,7 @@ def _fetch_some(url: str, part: Path, have: int, size: int, progress: Callable[[
             with part.open("r+b" if part.exists() else "wb") as file:
                 file.seek(start)
                 file.truncate()
-                return _copy(answer, file, start, size, url, progress)
+                return _copy(answer, file, start, size, url, progress=progress)
     except urllib.error.HTTPError as err:
         if err.code == http.client.REQUESTED_RANGE_NOT_SATISFIABLE and have:
             part.unlink()  # the file has changed: start again
@@ -111,7 +111,7 @@ def _check(url: str, answer: http.client.HTTPResponse, have: int, size: int) -> 
 
 
 def _copy(
-    answer: http.client.HTTPResponse, file: BinaryIO, have: int, size: int, url: str, progress: Callable[[int], None]
+    answer: http.client.HTTPResponse, file: BinaryIO, have: int, size: int, url: str, *, progress: Callable[[int], None]
 ) -> str:
     while chunk := answer.read(CHUNK):
         have += len(chunk)

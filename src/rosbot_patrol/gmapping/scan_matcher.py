@@ -57,7 +57,7 @@ class ScanMatcher:
         self._matched = 0
 
     def match(
-        self, maps: ParticleMaps, guesses: Array, headings: Array, beams: Beams, deviation: Array, noise: Array
+        self, maps: ParticleMaps, guesses: Array, headings: Array, beams: Beams, deviation: Array, *, noise: Array
     ) -> Matches:
         """Match a scan into each particle's map.
 
@@ -72,14 +72,14 @@ class ScanMatcher:
         hits = beams.hits
         hits[:, :2] /= maps.resolution
         sigmas = deviation / np.array([maps.resolution, maps.resolution, 1.0])
-        given = maps.to_cells(guesses), hits, np.ascontiguousarray(headings), sigmas, noise
+        given = maps.to_cells(guesses), hits, np.ascontiguousarray(headings)
         if self._matched == 0:  # match once to learn the beams' variance, because the first draws turn the whole map
-            self._match(maps, *given)
-        poses, fits = self._match(maps, *given)
+            self._match(maps, *given, sigmas=sigmas, noise=noise)
+        poses, fits = self._match(maps, *given, sigmas=sigmas, noise=noise)
         return Matches(maps.from_cells(poses), maps.from_cells(fits[:, 2:5]), fits[:, 0], fits[:, 1])
 
     def _match(
-        self, maps: ParticleMaps, guesses: Array, hits: Array, headings: Array, sigmas: Array, noise: Array
+        self, maps: ParticleMaps, guesses: Array, hits: Array, headings: Array, *, sigmas: Array, noise: Array
     ) -> tuple[Array, Array]:
         """Poses and fits from `match_particles`; updates the beams' variance."""
         poses, fits = np.empty_like(guesses), np.empty((len(guesses), 6))

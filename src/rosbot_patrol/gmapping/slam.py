@@ -171,7 +171,7 @@ class Slam:
             self.poses += _in_map(noise * sigmas, headings)
             self._trajectories.add(self.poses, np.arange(len(self.poses)))
             return Outcome(updated=True, is_blind=True)
-        found = self._matcher.match(self.maps, guesses, headings, beams, sigmas, noise)
+        found = self._matcher.match(self.maps, guesses, headings, beams, sigmas, noise=noise)
         self.poses = found.poses
         self._log_weights += found.log_likelihoods
         self._totals += found.log_likelihoods

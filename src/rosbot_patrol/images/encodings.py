@@ -114,7 +114,7 @@ class Picture:
             raise ImageError(f"pictures are not converted to {encoding}, expected mono8, rgb8 or bgr8")
         source = self.eight_bits()
         if encoding == "mono8":
-            return Picture(source._grey(), encoding)
+            return Picture(source.grey(), encoding)
         order = source.order if encoding == "rgb8" else source.order[::-1]
         if source.pixels.shape[2] == 3 and order == (0, 1, 2):
             return Picture(source.pixels, encoding)
@@ -124,7 +124,8 @@ class Picture:
         colours = ", ".join(name for name, known in ENCODINGS.items() if known.order or known.raw)
         return ImageError(f"a picture of encoding {self.encoding} has no colours, expected one of {colours}")
 
-    def _grey(self) -> NDArray[Any]:
+    def grey(self) -> NDArray[Any]:
+        """Brightness of each pixel by BT.601, shape (height, width, 1)."""
         if self.pixels.shape[2] == 1:
             return self.pixels
         red, green, blue = (self.pixels[:, :, i].astype(np.uint32) for i in self.order)

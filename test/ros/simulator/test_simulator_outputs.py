@@ -67,9 +67,9 @@ def casts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     counted: list[int] = []
     cast = Slice.cast
 
-    def counting(self: Slice, *args: Any) -> Any:
+    def counting(self: Slice, *args: Any, longest: float) -> Any:
         counted.append(args[4])
-        return cast(self, *args)
+        return cast(self, *args, longest=longest)
 
     monkeypatch.setattr(Slice, "cast", counting)
     return counted

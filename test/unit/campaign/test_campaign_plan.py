@@ -125,7 +125,7 @@ def test_a_poster_hangs_on_a_wall_and_faces_the_room(patrols: list[Patrol], flat
     for patrol in posters:
         x, y, yaw = patrol.scenario["actors"][0]["start"]
         cut = flat_floor.ways.cut(EYE_LEVEL)
-        before, behind = (cut.cast(x, y, yaw + turn, 1.0, 1, 9.0)[0] for turn in (0.0, math.pi))
+        before, behind = (cut.cast(x, y, yaw + turn, 1.0, 1, longest=9.0)[0] for turn in (0.0, math.pi))
         assert behind < 0.05
         assert before > 0.5
         assert not patrol.people

@@ -58,7 +58,7 @@ EACH_SENSOR = [(house, sensor) for house in HOUSES for sensor in sensors_of(hous
 def test_the_robot_has_room_to_turn_at_each_room_point(house: str, room: int) -> None:
     for height in (0.02, 0.1, LIDAR, 0.24):
         x, y, _ = rooms_of(house)[room]
-        gap = slice_bodies(world_of(house).bodies, height).cast(x, y, 0.0, math.tau / 360, 360, 50.0).min()
+        gap = slice_bodies(world_of(house).bodies, height).cast(x, y, 0.0, math.tau / 360, 360, longest=50.0).min()
         assert gap > 0.5, f"{gap:.2f} m at the height {height}"
 
 
@@ -123,8 +123,8 @@ def test_each_room_but_the_base_has_a_sensor_and_a_walk(house: str) -> None:
 @pytest.mark.parametrize(("house", "sensor"), EACH_SENSOR, ids=lambda v: f"sensor{getattr(v, 'id', v)}")
 def test_a_sensor_hangs_on_a_wall_and_notices_who_walks_in_its_room(house: str, sensor: SensorPlace) -> None:
     walls = [body for body in world_of(house).bodies if body.kind == "wall"]
-    assert slice_bodies(walls, sensor.z).cast(sensor.x, sensor.y, 0.0, math.tau / 360, 360, 50.0).min() < 0.15
-    ahead = slice_bodies(world_of(house).bodies, sensor.z).cast(sensor.x, sensor.y, sensor.yaw, 0.1, 1, 50.0)[0]
+    assert slice_bodies(walls, sensor.z).cast(sensor.x, sensor.y, 0.0, math.tau / 360, 360, longest=50.0).min() < 0.15
+    ahead = slice_bodies(world_of(house).bodies, sensor.z).cast(sensor.x, sensor.y, sensor.yaw, 0.1, 1, longest=50.0)[0]
     assert ahead > 1.5
     engine = Engine(world_of(house), sensors=[sensor])
     walk = yaml.safe_load((ROOT / "config" / f"{house}_demo.yaml").read_text())["walks"][sensor.room]

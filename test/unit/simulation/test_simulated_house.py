@@ -32,7 +32,7 @@ SENSORS = [
 def test_the_robot_has_room_to_turn_at_each_room_point(room: int) -> None:
     for height in (0.05, 0.158):
         x, y = ROOMS[room]
-        assert slice_bodies(WORLD.bodies, height).cast(x, y, 0.0, math.tau / 360, 360, 50.0).min() > 0.9
+        assert slice_bodies(WORLD.bodies, height).cast(x, y, 0.0, math.tau / 360, 360, longest=50.0).min() > 0.9
 
 
 def test_each_room_but_the_base_has_a_sensor() -> None:
@@ -43,7 +43,7 @@ def test_each_room_but_the_base_has_a_sensor() -> None:
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda s: f"sensor{s.id}")
 def test_a_sensor_hangs_on_a_wall_and_notices_who_crosses_its_room(sensor: SensorPlace) -> None:
     eye_level = slice_bodies(WORLD.bodies, EYE_LEVEL)
-    assert eye_level.cast(sensor.x, sensor.y, 0.0, math.tau / 360, 360, 50.0).min() < 0.15
+    assert eye_level.cast(sensor.x, sensor.y, 0.0, math.tau / 360, 360, longest=50.0).min() < 0.15
     x, y = ROOMS[sensor.room]
     across = math.atan2(y - sensor.y, x - sensor.x) + math.pi / 2
     engine = Engine(WORLD, sensors=[sensor])

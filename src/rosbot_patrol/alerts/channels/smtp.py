@@ -102,7 +102,7 @@ class SmtpTransport:
 
     def _greet(self, server: smtplib.SMTP) -> None:
         s = self._server
-        server._host = s.host  # type: ignore[attr-defined]
+        server._host = s.host  # type: ignore[attr-defined]  # noqa: SLF001 - the name that starttls() verifies
         code, text = server.connect(s.host, s.port)
         if code != 220:
             raise smtplib.SMTPConnectError(code, text)

@@ -55,7 +55,7 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def link_hash(n: int, kind: str, incident: str, wall: float, body_digest: str, previous: str) -> str:
+def link_hash(n: int, kind: str, incident: str, wall: float, *, body_digest: str, previous: str) -> str:
     """The hash of a link: over everything in it but the body, which its digest stands for."""
     head = {"n": n, "kind": kind, "incident": incident, "wall": wall, "digest": body_digest, "previous": previous}
     return digest(canonical(head))
@@ -64,7 +64,7 @@ def link_hash(n: int, kind: str, incident: str, wall: float, body_digest: str, p
 def make_link(before: tuple[int, str], kind: str, incident: str, wall: float, body: str) -> Link:
     """The link after one with this number and hash; (0, START) before the first."""
     n, previous, body_digest = before[0] + 1, before[1], digest(body)
-    own = link_hash(n, kind, incident, wall, body_digest, previous)
+    own = link_hash(n, kind, incident, wall, body_digest=body_digest, previous=previous)
     return Link(
         n=n, kind=kind, incident=incident, wall=wall, body=body, digest=body_digest, previous=previous, hash=own
     )
@@ -77,7 +77,9 @@ def link_problem(link: Link, before: tuple[int, str]) -> str:
         return f"{gone} link{'s are' if gone > 1 else ' is'} missing before it"
     if link.previous != before[1]:
         return "it does not follow the link before it: one of the two was changed, removed or moved"
-    if link.hash != link_hash(link.n, link.kind, link.incident, link.wall, link.digest, link.previous):
+    if link.hash != link_hash(
+        link.n, link.kind, link.incident, link.wall, body_digest=link.digest, previous=link.previous
+    ):
         return "its hash is not that of what it says: it was changed"
     if link.body is not None and digest(link.body) != link.digest:
         return "its record is not the one that was hashed: it was changed"

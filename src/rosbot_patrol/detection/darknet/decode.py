@@ -58,7 +58,9 @@ def decode_head(head: Head, values: NDArray[np.float32], net_size: tuple[int, in
     found = grid[anchor, :, row, column].reshape(len(at), head.classes + 5)
     scores = objectness[anchor, row, column]
     anchors = np.asarray(head.anchors, dtype=np.float32)[anchor]
-    boxes = _boxes(head, found[:, :4], np.stack([column, row], axis=1), anchors, (columns, rows), net_size)
+    boxes = _boxes(
+        head, found[:, :4], np.stack([column, row], axis=1), anchors, grid_size=(columns, rows), net_size=net_size
+    )
     probabilities = scores[:, None] * _classes(head, found[:, 5:])
     return Candidates(boxes, scores, np.where(probabilities > threshold, probabilities, np.float32(0.0)))
 
@@ -162,6 +164,7 @@ def _boxes(
     raw: NDArray[np.float32],
     cells: NDArray[np.float32],
     anchors: NDArray[np.float32],
+    *,
     grid_size: tuple[int, int],
     net_size: tuple[int, int],
 ) -> NDArray[np.float32]:

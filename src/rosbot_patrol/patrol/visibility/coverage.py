@@ -80,26 +80,24 @@ class Sight:
         return found
 
 
-def sight_on_map(floor: Floor, x: float, y: float, reach: float, first: float = 0.0, width: float = math.tau) -> Sight:
-    """How far one can look by the map alone.
+def sight_on_map(floor: Floor, x: float, y: float, reach: float) -> Sight:
+    """How far one can look all around by the map alone.
 
     Args:
-        floor: of the map.
+        floor: free space of the map.
         x: of the eye [m].
         y: of the eye [m].
-        reach: nobody looks farther [m].
-        first: lowest bearing [rad].
-        width: of the arc that is looked at [rad].
+        reach: upper limit of the lengths [m].
     """
-    count = max(math.ceil(width / _WIDTH), 1)
-    step = width / count
-    bearings = first + step * np.arange(count if width >= math.tau else count + 1)
+    count = math.ceil(math.tau / _WIDTH)
+    step = math.tau / count
+    bearings = step * np.arange(count)
     along = np.arange(1, math.ceil(reach / floor.info.resolution) + 1) * floor.info.resolution
     stopped = ~floor.are_free(
         x + np.cos(bearings)[:, None] * along[None, :], y + np.sin(bearings)[:, None] * along[None, :]
     )
     lengths = np.where(stopped.any(axis=1), along[stopped.argmax(axis=1)], reach)
-    return Sight(x, y, first, step, lengths)
+    return Sight(x, y, 0.0, step, lengths)
 
 
 def sight_of_scan(scan: LaserScan, map_from_laser: Pose2D, floor: Floor, reach: float) -> Sight:

@@ -186,7 +186,7 @@ class ViewpointPlanner:
             good &= ~stands
         untried = good & ~floor.mark_near(np.array(tried), self.params.viewpoint_spacing) if tried else good
         if seen_from:
-            good = self._anew(good, untried, distances.reshape(good.shape), seen_from, x, y, tried)
+            good = self._anew(good, untried, distances.reshape(good.shape), seen_from, x=x, y=y, tried=tried)
         else:
             good = untried
         return self._nearest_view(good, ways, x, y) if good.any() else None
@@ -210,6 +210,7 @@ class ViewpointPlanner:
         untried: Mask,
         distances: Array,
         eyes: Sequence[Pose2D],
+        *,
         x: float,
         y: float,
         tried: Sequence[tuple[float, float]],

@@ -183,7 +183,7 @@ def _compare_tables(
         return [Difference(name, "is only in the stored result" if STAMP in stored else "is not in the stored result")]
     is_by_order = field_of(f"{name}.rows", fields).is_by_order
     pairing = paired(stored, found, is_by_order=is_by_order)
-    differences = _compare_rows(name, stored, found, pairing, fields, begin)
+    differences = _compare_rows(name, stored, found, pairing, fields, begin=begin)
     times = stored[STAMP][pairing.stored] - begin
     for column in _names(stored, found):
         full = f"{name}.{column}"
@@ -199,7 +199,7 @@ def _compare_tables(
 
 
 def _compare_rows(
-    name: str, stored: Table, found: Table, pairing: Pairing, fields: Mapping[str, Field], begin: float
+    name: str, stored: Table, found: Table, pairing: Pairing, fields: Mapping[str, Field], *, begin: float
 ) -> list[Difference]:
     tolerance = field_of(f"{name}.rows", fields).tolerance
     if len(pairing.missing) + len(pairing.extra) <= tolerance:

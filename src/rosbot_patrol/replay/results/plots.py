@@ -82,7 +82,7 @@ def table_drawing(name: str, found: Table, stored: Table | None, fields: Mapping
     stamps = np.concatenate([table[STAMP] for table in (found, stored) if table is not None and STAMP in table])
     span = (float(stamps.min()), float(stamps.max())) if len(stamps) else (0.0, 1.0)
     for i, column in enumerate(columns):
-        parts += _panel(TOP + i * (HEIGHT + GAP), name, column, found, stored, span, fields)
+        parts += _panel(TOP + i * (HEIGHT + GAP), name, column, found, stored, span=span, fields=fields)
     return "\n".join([*parts, "</svg>\n"])
 
 
@@ -92,6 +92,7 @@ def _panel(
     column: str,
     found: Table,
     stored: Table | None,
+    *,
     span: tuple[float, float],
     fields: Mapping[str, Field],
 ) -> list[str]:

@@ -47,14 +47,15 @@ class Result:
     def digest(self) -> str:
         """The same for two results that are the same bit for bit, whatever their facts."""
         found = hashlib.sha256(json.dumps([self.node, dict(self.counts)], sort_keys=True).encode())
-        for name, values in sorted(self._arrays().items()):
+        for name, values in sorted(self.arrays().items()):
             found.update(f"{name} {values.dtype} {values.shape}\n".encode())
             found.update(np.ascontiguousarray(values).tobytes())
         for name, grid in sorted(self.grids.items()):
             found.update(f"{name} {asdict(grid.info)}\n".encode())
         return found.hexdigest()[:16]
 
-    def _arrays(self) -> dict[str, NDArray[Any]]:
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Columns of all tables, and cells of all grids, by name."""
         columns = {f"{table}.{name}": values for table, rows in self.tables.items() for name, values in rows.items()}
         return columns | {name: grid.cells for name, grid in self.grids.items()}
 
@@ -102,7 +103,7 @@ def save_result(path: Path | str, result: Result) -> None:
         "grids": {name: asdict(grid.info) for name, grid in result.grids.items()},
     }
     held = io.BytesIO()
-    np.savez_compressed(held, header=np.array(json.dumps(header, indent=1, sort_keys=True)), **result._arrays())
+    np.savez_compressed(held, header=np.array(json.dumps(header, indent=1, sort_keys=True)), **result.arrays())
     try:
         write_atomic(Path(path), held.getvalue())
     except OSError as err:

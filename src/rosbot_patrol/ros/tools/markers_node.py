@@ -34,20 +34,20 @@ class MarkersParams:
     motion_sensors: str = param("", doc="file of the motion sensors; empty: none")
 
 
-def _marker(name: str, key: int, kind: int, x: float, y: float, z: float) -> Marker:
+def _marker(name: str, key: int, kind: int, place: Point) -> Marker:
     marker = Marker()
     marker.header.frame_id, marker.ns, marker.id, marker.type = "map", name, key, kind
-    marker.pose.position = Point(x, y, z)
+    marker.pose.position = place
     marker.pose.orientation.w = 1.0
     return marker
 
 
 def room_markers(room: Room, colour: ColorRGBA) -> list[Marker]:
     """A disc at the room point and the room's name above it."""
-    disc = _marker("rooms", room.id, Marker.CYLINDER, room.pose.x, room.pose.y, 0.01)
+    disc = _marker("rooms", room.id, Marker.CYLINDER, Point(room.pose.x, room.pose.y, 0.01))
     disc.scale.x = disc.scale.y = 0.5
     disc.scale.z = 0.02
-    text = _marker("room names", room.id, Marker.TEXT_VIEW_FACING, room.pose.x, room.pose.y, 0.5)
+    text = _marker("room names", room.id, Marker.TEXT_VIEW_FACING, Point(room.pose.x, room.pose.y, 0.5))
     text.scale.z = 0.4
     text.text = f"{room.id}: {room.name}"
     disc.color, text.color = colour, ColorRGBA(0.1, 0.1, 0.1, 1.0)
@@ -56,7 +56,7 @@ def room_markers(room: Room, colour: ColorRGBA) -> list[Marker]:
 
 def sensor_markers(sensor: SensorPlace, colour: ColorRGBA) -> list[Marker]:
     """An arrow from the sensor along its view."""
-    arrow = _marker("sensors", sensor.id, Marker.ARROW, sensor.x, sensor.y, 0.3)
+    arrow = _marker("sensors", sensor.id, Marker.ARROW, Point(sensor.x, sensor.y, 0.3))
     arrow.pose.orientation.z, arrow.pose.orientation.w = math.sin(sensor.yaw / 2), math.cos(sensor.yaw / 2)
     arrow.scale.x, arrow.scale.y, arrow.scale.z = 0.7, 0.12, 0.12
     arrow.color = colour

@@ -36,6 +36,8 @@ RETRY_FIRST, RETRY_LAST = 0.2, 3.0
 CONNECT_TIMEOUT = 3.0
 SEND_TIMEOUT = 5.0
 
+_TOPIC = TopicInfo(topic_id=PUBLISHER_ID, name="motion_trigger", message_type=ESP_TRIGGER_TYPES[0], md5=ESP_TRIGGER_MD5)
+
 
 def _readable(timeout: float, *sockets: socket.socket) -> list[socket.socket]:
     """Sockets that are readable within `timeout` [s]; uses poll, because select is limited to 1024 files."""
@@ -52,7 +54,6 @@ class EspClient:
     Args:
         host: name or address of the bridge, IPv4 or IPv6; port: its TCP port.
         sensor_id: 0 to 255, the room that it watches.
-        message_type: "rosbot_patrol/EspTrigger" or another package's message of the same definition.
         heartbeat_period: wall time between two heartbeats [s].
         stuck_after: time after which a high output is logged as stuck [s].
         key: 32 bytes that prove the sensor's identity to a bridge with keys.
@@ -66,8 +67,6 @@ class EspClient:
         port: int,
         sensor_id: int,
         *,
-        topic: str = "motion_trigger",
-        message_type: str = ESP_TRIGGER_TYPES[0],
         heartbeat_period: float = HEARTBEAT_PERIOD,
         key: bytes | None = None,
         insist: bool = False,
@@ -77,7 +76,6 @@ class EspClient:
         if not 0 <= sensor_id <= 255:
             raise ValueError(f"sensor id {sensor_id} does not fit into a byte")
         self.host, self.port, self.sensor_id = host, port, sensor_id
-        self._info = TopicInfo(topic_id=PUBLISHER_ID, name=topic, message_type=message_type, md5=ESP_TRIGGER_MD5)
         self._heartbeat_period = heartbeat_period
         self._key = key
         self._insist = insist
@@ -205,7 +203,7 @@ class EspClient:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         link.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         prover = Prover(self.sensor_id, self._key) if self._key is not None else None
-        session = DeviceSession([self._info], prover=prover, insist=self._insist)
+        session = DeviceSession([_TOPIC], prover=prover, insist=self._insist)
         self._line.begin(time.monotonic())
         self._stuck_told = False
         heartbeat_due = time.monotonic()

@@ -56,8 +56,8 @@ class Slice:
         ends = self.segments.reshape(-1, 2) @ turn + shift
         return Slice(ends.reshape(-1, 4), circles)
 
-    def cast(self, x: float, y: float, first: float, step: float, count: int, longest: float) -> Array:
-        """Lengths of a fan of beams from a point; `longest` where nothing is met [m], shape (count,)."""
+    def cast(self, x: float, y: float, first: float, step: float, count: int, *, longest: float) -> Array:
+        """Lengths of a fan of beams from a point; `longest` if nothing is met [m], shape (count,)."""
         ranges = np.full(count, float(longest))
         place = (float(x), float(y), float(first), float(step))
         kernels.cast_fan(*place, self.segments, self.circles, self.groups, ranges)

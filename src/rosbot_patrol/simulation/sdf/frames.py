@@ -44,12 +44,12 @@ class Frames:
         other = default
         if element is not None:
             other = element.get("relative_to") or element.get("frame") or default
-        if not self._knows(other):
+        if not self.knows(other):
             log.warning(
                 "%s: %s: the pose is relative to '%s', which is not known; read as relative to its parent",
                 place.path, place.where, other,
             )  # fmt: skip
-            other = default if self._knows(default) else ""
+            other = default if self.knows(default) else ""
         placement = child.get("placement_frame") or child.findtext("placement_frame")
         if child.tag == "model" and placement:
             own = own @ np.linalg.inv(Frames(child, place).frame(placement.strip(), place))
@@ -59,7 +59,7 @@ class Frames:
         """Pose of a named frame; raises WorldError where there is none of that name, or frames form a circle."""
         if name in _HERE:
             return identity()
-        if not self._knows(name):
+        if not self.knows(name):
             raise place.error(f"there is no frame '{name}'")
         if name not in self._known:
             if name in self._pending:
@@ -70,9 +70,10 @@ class Frames:
             self._pending.pop()
         return self._known[name]
 
-    def _knows(self, name: str) -> bool:
+    def knows(self, name: str) -> bool:
+        """Whether there is a frame of that name."""
         outer, _, inner = name.partition("::")
-        return name in _HERE or name in self._named or bool(inner and self._inner(outer)._knows(inner))
+        return name in _HERE or name in self._named or bool(inner and self._inner(outer).knows(inner))
 
     def _inner(self, model: str) -> Frames:
         element = self._named.get(model)

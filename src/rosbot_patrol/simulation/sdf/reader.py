@@ -142,7 +142,7 @@ class Reader:
         if file in self._including:
             chain = " -> ".join(p.parent.name for p in (*self._including, file))
             raise here.error(f"the models include each other in a circle: {chain}")
-        self._included(file, found, element, world_from_model, outer, given or found.get("name") or short)
+        self._included(file, found, element, world_from_model, outer=outer, name=given or found.get("name") or short)
 
     def _find_included(self, uri: str, place: Place) -> tuple[Path, ET.Element]:
         """The file that an <include> means, and the model, actor or light in it. Raises WorldError."""
@@ -156,7 +156,7 @@ class Reader:
         return file, found
 
     def _included(
-        self, file: Path, found: ET.Element, element: ET.Element, world_from_model: Matrix, outer: str, name: str
+        self, file: Path, found: ET.Element, element: ET.Element, world_from_model: Matrix, *, outer: str, name: str
     ) -> None:
         if found.tag == "light":
             self.lights += len(self._parse(file).findall("light"))

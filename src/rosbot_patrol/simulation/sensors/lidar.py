@@ -64,7 +64,7 @@ def measure_scan(
     """
     p = params
     step = (p.angle_max - p.angle_min) / (p.samples - 1)
-    ranges = _lengths(p, scene, world_from_laser, step, twist, flipped)
+    ranges = _lengths(p, scene, world_from_laser, step, twist=twist, flipped=flipped)
     if rng is not None:
         noise = rng.normal(0.0, p.noise, p.samples) if p.noise > 0.0 else 0.0
         ranges += noise  # inf stays inf
@@ -87,7 +87,7 @@ def measure_scan(
 
 
 def _lengths(
-    p: LidarParams, scene: Slice, pose: Pose2D, step: float, twist: Twist2D, flipped: bool
+    p: LidarParams, scene: Slice, pose: Pose2D, step: float, *, twist: Twist2D, flipped: bool
 ) -> NDArray[np.float64]:
     """Lengths of the beams, without limits [m], shape (samples,)."""
     sectors = _SECTORS if p.sweep_time > 0.0 and twist != STOP else 1
@@ -98,7 +98,7 @@ def _lengths(
         x, y, yaw = compose(pose, Pose2D(-twist.vx * ago, -twist.vy * ago, -twist.wz * ago))
         if flipped:  # its angles run clockwise: cast from the last beam to the first
             first = yaw - (p.angle_min + (high - 1) * step)
-            ranges[low:high] = scene.cast(x, y, first, step, high - low, math.inf)[::-1]
+            ranges[low:high] = scene.cast(x, y, first, step, high - low, longest=math.inf)[::-1]
         else:
-            ranges[low:high] = scene.cast(x, y, yaw + p.angle_min + low * step, step, high - low, math.inf)
+            ranges[low:high] = scene.cast(x, y, yaw + p.angle_min + low * step, step, high - low, longest=math.inf)
     return ranges

@@ -29,7 +29,7 @@ def measure_range(
     """Distance to the nearest thing in the cone [m], within the sensor's limits."""
     x, y, yaw = world_from_sensor
     step = params.field_of_view / (_BEAMS - 1)
-    beams = scene.cast(x, y, yaw - params.field_of_view / 2.0, step, _BEAMS, params.range_max)
+    beams = scene.cast(x, y, yaw - params.field_of_view / 2.0, step, _BEAMS, longest=params.range_max)
     nearest = float(beams.min())
     if rng is not None and nearest < params.range_max:
         nearest += params.noise * float(rng.standard_normal())

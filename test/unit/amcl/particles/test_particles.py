@@ -35,7 +35,7 @@ def particle_filter(rule: KldRule = KldRule(least=100, most=2000), **alphas: flo
 def test_exact_odometry_moves_each_particle_alike(name: str, end: Pose2D) -> None:
     start = Pose2D(1.0, 2.0, 0.5)
     poses = np.array([[0.0, 0.0, 0.0], [5.0, -1.0, 3.0]])
-    move_particles(poses, start, end, name, EXACT, np.random.default_rng(0))
+    move_particles(poses, start, end, name, EXACT, rng=np.random.default_rng(0))
     for row, before in zip(poses, [Pose2D(0, 0, 0), Pose2D(5.0, -1.0, 3.0)], strict=True):
         expected = compose(before, compose(invert(start), end))
         np.testing.assert_allclose(row[:2], expected[:2], atol=1e-9)
@@ -46,7 +46,7 @@ def test_exact_odometry_moves_each_particle_alike(name: str, end: Pose2D) -> Non
 def test_the_spread_of_a_drive(name: str, spread: float) -> None:
     poses = np.zeros((20000, 3))
     noise = OdometryNoise(alpha1=0.0, alpha2=0.0, alpha3=0.2, alpha4=0.0)
-    move_particles(poses, Pose2D(), Pose2D(0.5, 0.0, 0.0), name, noise, np.random.default_rng(0))
+    move_particles(poses, Pose2D(), Pose2D(0.5, 0.0, 0.0), name, noise, rng=np.random.default_rng(0))
     assert poses[:, 0].std() == pytest.approx(spread, rel=0.03)
     assert poses[:, 1].std() < 1e-9
 
@@ -54,14 +54,14 @@ def test_the_spread_of_a_drive(name: str, spread: float) -> None:
 def test_driving_backwards_is_no_half_turn() -> None:
     poses = np.zeros((5000, 3))
     noise = OdometryNoise(alpha1=0.2, alpha2=0.0, alpha3=0.0, alpha4=0.0)
-    move_particles(poses, Pose2D(), Pose2D(-0.5, 0.0, 0.0), "diff-corrected", noise, np.random.default_rng(0))
+    move_particles(poses, Pose2D(), Pose2D(-0.5, 0.0, 0.0), "diff-corrected", noise, rng=np.random.default_rng(0))
     assert np.abs(poses[:, 2]).max() < 1e-6
 
 
 def test_a_turn_on_the_spot_does_not_move() -> None:
     poses = np.zeros((5000, 3))
     noise = OdometryNoise(alpha1=0.2, alpha2=0.2, alpha3=0.2, alpha4=0.0)
-    move_particles(poses, Pose2D(), Pose2D(0.0, 0.0, 1.0), "diff-corrected", noise, np.random.default_rng(0))
+    move_particles(poses, Pose2D(), Pose2D(0.0, 0.0, 1.0), "diff-corrected", noise, rng=np.random.default_rng(0))
     assert np.abs(poses[:, :2]).max() < 1e-9
     assert poses[:, 2].std() == pytest.approx(math.sqrt(0.2), rel=0.05)
 

@@ -201,9 +201,9 @@ def test_a_planted_fault_in_amcl_is_caught_and_named(bag: Path, monkeypatch: pyt
     stored = replayed(bag, AmclReplay(AMCL))
     assert compare(stored, replayed(bag, AmclReplay(AMCL)), amcl_replay.FIELDS) == []
 
-    def turned_wrong(poses: np.ndarray, start: Pose2D, end: Pose2D, *more: object) -> None:
+    def turned_wrong(poses: np.ndarray, start: Pose2D, end: Pose2D, *more: object, rng: np.random.Generator) -> None:
         back = end._replace(yaw=start.yaw - 0.5 * (end.yaw - start.yaw))
-        move_particles(poses, start, back, *more)
+        move_particles(poses, start, back, *more, rng=rng)
 
     monkeypatch.setattr(localizer, "move_particles", turned_wrong)
     names = [each.name for each in compare(stored, replayed(bag, AmclReplay(AMCL)), amcl_replay.FIELDS)]

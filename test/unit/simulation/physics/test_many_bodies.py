@@ -52,8 +52,8 @@ def test_beams_that_pass_over_groups_are_as_long_as_those_that_meet_every_segmen
     assert len(cut.groups) > 400
     rng = np.random.default_rng(1)
     for x, y, first in rng.uniform(-30, 30, (60, 3)):
-        fan = (x, y, first, math.tau / 719, 720, math.inf)
-        assert np.array_equal(cut.cast(*fan), plain.cast(*fan))
+        fan = (x, y, first, math.tau / 719, 720)
+        assert np.array_equal(cut.cast(*fan, longest=math.inf), plain.cast(*fan, longest=math.inf))
         end = tuple(rng.uniform(-30, 30, 2))
         assert cut.is_blocked((x, y), end) == plain.is_blocked((x, y), end)
 
@@ -61,15 +61,15 @@ def test_beams_that_pass_over_groups_are_as_long_as_those_that_meet_every_segmen
 def test_a_cut_with_something_added_keeps_its_groups() -> None:
     cut = slice_bodies(many(), 0.16)
     wall = Slice(np.array([[0.5, -5.0, 0.5, 5.0]]), np.zeros((0, 3)))
-    beams = cut.plus(wall).cast(0.0, 0.0, 0.0, 0.1, 1, 50.0)
+    beams = cut.plus(wall).cast(0.0, 0.0, 0.0, 0.1, 1, longest=50.0)
     assert beams[0] == pytest.approx(0.5)
 
 
 def test_a_wall_seen_from_its_end_is_as_far_as_its_end() -> None:
     wall = Slice(np.array([[3.0, 1.5, 3.0, 2.5], [5.0, 0.0, 4.0, 0.0]]), np.zeros((0, 3)))
-    assert wall.cast(3.0, 0.5, math.pi / 2, 0.1, 1, 50.0)[0] == pytest.approx(1.0)
-    assert wall.cast(3.0, 0.0, 0.0, 0.1, 1, 50.0)[0] == pytest.approx(1.0)
-    assert wall.cast(3.0, 0.0, math.pi, 0.1, 1, 50.0)[0] == 50.0
+    assert wall.cast(3.0, 0.5, math.pi / 2, 0.1, 1, longest=50.0)[0] == pytest.approx(1.0)
+    assert wall.cast(3.0, 0.0, 0.0, 0.1, 1, longest=50.0)[0] == pytest.approx(1.0)
+    assert wall.cast(3.0, 0.0, math.pi, 0.1, 1, longest=50.0)[0] == 50.0
 
 
 def test_turned_and_upside_down_boxes_are_cut_alike() -> None:
@@ -81,7 +81,7 @@ def test_turned_and_upside_down_boxes_are_cut_alike() -> None:
     )
     for cut in (upright, slice_bodies([over], 0.2)):
         assert len(cut.segments) == 4
-        assert cut.cast(-5.0, 2.0, 0.0, 0.1, 1, 50.0)[0] == pytest.approx(6.0 - 0.2 / math.cos(0.3), abs=1e-6)
+        assert cut.cast(-5.0, 2.0, 0.0, 0.1, 1, longest=50.0)[0] == pytest.approx(6.0 - 0.2 / math.cos(0.3), abs=1e-6)
     assert not len(slice_bodies([over], 1.2).segments)
 
 

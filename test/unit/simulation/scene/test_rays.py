@@ -71,15 +71,15 @@ def test_limits_of_the_lidar() -> None:
 
 def test_a_circle_is_hit_at_its_edge_and_from_within() -> None:
     scene = Slice(np.zeros((0, 4)), np.array([[2.0, 0.0, 0.5]]))
-    ranges = scene.cast(0.0, 0.0, 0.0, 0.1, 4, 10.0)
+    ranges = scene.cast(0.0, 0.0, 0.0, 0.1, 4, longest=10.0)
     assert ranges[0] == pytest.approx(1.5)
     assert ranges[3] == 10.0
-    assert scene.cast(2.0, 0.0, 0.0, 0.1, 5, 10.0) == pytest.approx(0.5)
+    assert scene.cast(2.0, 0.0, 0.0, 0.1, 5, longest=10.0) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("first", [-math.pi, -0.3, 3.0, 6.0])
 def test_beams_wrap_around_wherever_the_fan_begins(first: float) -> None:
-    ranges = box_room().cast(0.3, 0.2, first, math.tau / 100, 100, 50.0)
+    ranges = box_room().cast(0.3, 0.2, first, math.tau / 100, 100, longest=50.0)
     assert np.allclose(ranges, exact_room(0.3, 0.2, first + np.arange(100) * math.tau / 100), atol=1e-9)
 
 

@@ -298,9 +298,9 @@ def test_a_polyline_is_pulled_up_and_has_its_holes(tmp_path: Path) -> None:
     outer, hole = ring("-2 -2", "-2 2", "2 2 ", "2 -2"), ring("-1 -1", "1 -1", "0 1")
     world = read(tmp_path, sdf(model(both(outer + hole, "<material><script>Gazebo/Yellow</script></material>"))))
     cut = slice_bodies(world.bodies, 1.0)
-    assert cut.cast(-5.0, 0.0, 0.0, 0.1, 1, 50.0)[0] == pytest.approx(3.0)
-    assert cut.cast(0.0, 0.0, -math.pi / 2.0, 0.1, 1, 50.0)[0] == pytest.approx(1.0)
-    assert slice_bodies(world.bodies, 2.1).cast(-5.0, 0.0, 0.0, 0.1, 1, 50.0)[0] == 50.0
+    assert cut.cast(-5.0, 0.0, 0.0, 0.1, 1, longest=50.0)[0] == pytest.approx(3.0)
+    assert cut.cast(0.0, 0.0, -math.pi / 2.0, 0.1, 1, longest=50.0)[0] == pytest.approx(1.0)
+    assert slice_bodies(world.bodies, 2.1).cast(-5.0, 0.0, 0.0, 0.1, 1, longest=50.0)[0] == 50.0
     shape = world.bodies[0].visuals[0].shape
     assert shape.vertices is not None
     assert shape.faces is not None
@@ -341,7 +341,7 @@ def test_capsules_ellipsoids_and_sheets(tmp_path: Path) -> None:
     assert ellipsoid.vertices is not None
     assert ellipsoid.vertices.max(axis=0) == pytest.approx((0.5, 1.0, 2.0))
     assert sheet.size == (1.0, 1.0, 0.001)
-    assert slice_bodies(world.bodies, 0.1).cast(-5.0, 3.0, 0.0, 0.1, 1, 50.0)[0] == pytest.approx(4.5, abs=0.02)
+    assert slice_bodies(world.bodies, 0.1).cast(-5.0, 3.0, 0.0, 0.1, 1, longest=50.0)[0] == pytest.approx(4.5, abs=0.02)
 
 
 CAN = model(both("<cylinder><radius>0.03</radius><length>0.12</length></cylinder>"), name="can")

@@ -32,7 +32,7 @@ def body_of(name: str, in_world: World) -> Body:
 
 
 def range_at(name: str, place: tuple[float, float], bearing: float, height: float = 0.16) -> float:
-    return float(slice_bodies(world(name).bodies, height).cast(*place, bearing, 0.1, 1, 50.0)[0])
+    return float(slice_bodies(world(name).bodies, height).cast(*place, bearing, 0.1, 1, longest=50.0)[0])
 
 
 @pytest.mark.parametrize("name", ["building", "dining", "old", "frames"])
@@ -98,7 +98,7 @@ def test_an_stl_is_scaled_and_takes_the_colour_of_the_sdf() -> None:
     (visual,) = body_of("stool_left", world("dining")).visuals
     assert visual.material.rgba[:3] == pytest.approx((0.05, 0.18, 1.0))
     assert visual.shape.size == pytest.approx((0.001,) * 3)
-    high = slice_bodies(world("dining").bodies, 0.2).cast(1.2, -2.0, math.pi / 2, 0.1, 1, 50.0)[0]
+    high = slice_bodies(world("dining").bodies, 0.2).cast(1.2, -2.0, math.pi / 2, 0.1, 1, longest=50.0)[0]
     assert high == pytest.approx(1.1 - 0.2, abs=1e-3)
 
 
