@@ -167,7 +167,7 @@ def best_pictures(candidates: Iterable[Candidate], count: int = 3, apart: float 
     sharpest = max((c.sharpness for c in known), default=0.0) or 1.0
 
     def score(candidate: Candidate) -> float:
-        size = min(candidate.share / 0.1, 1.0) ** 0.5
+        size: float = min(candidate.share / 0.1, 1.0) ** 0.5
         return candidate.probability * (0.3 + 0.7 * size) * (0.5 + 0.5 * candidate.sharpness / sharpest)
 
     taken: list[Candidate] = []

@@ -144,9 +144,11 @@ def used_bytes(store: IncidentStore) -> int:
     """What all incidents take on the disk. Raises StoreError."""
     with errors_of(store.path):
         files = store.connection.execute("SELECT total(bytes) FROM incidents").fetchone()[0]
-        pages = store.connection.execute("PRAGMA page_count").fetchone()[0]
-        free = store.connection.execute("PRAGMA freelist_count").fetchone()[0]
-        return int(files) + (pages - free) * int(store.connection.execute("PRAGMA page_size").fetchone()[0])
+        pages, free, size = (
+            int(store.connection.execute(f"PRAGMA {name}").fetchone()[0])
+            for name in ("page_count", "freelist_count", "page_size")
+        )
+        return int(files) + (pages - free) * size
 
 
 def free_bytes(folder: Path) -> int:

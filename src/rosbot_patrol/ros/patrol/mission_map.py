@@ -37,7 +37,7 @@ class MissionMap:
         data = draw_map(self._view or view_of_marks(marks), marks)
         return [NewFile(name="map.png", role="map", data=data, caption=caption)]
 
-    def _on_map(self, message: GridMsg) -> None:  # type: ignore[valid-type]
+    def _on_map(self, message: GridMsg) -> None:
         try:
             self._view = crop_map(convert.grid_from_msg(message, rospy.resolve_name("map")))
         except MapError as err:

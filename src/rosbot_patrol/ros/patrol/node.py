@@ -41,6 +41,7 @@ from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.patrol.mission.manager import PatrolManager
+from rosbot_patrol.patrol.mission.params import NodeParams
 from rosbot_patrol.patrol.mission.resume import PatrolStore
 from rosbot_patrol.patrol.records.commands import Commands, OwnerMessage
 from rosbot_patrol.patrol.records.inputs import Box, Inputs
@@ -64,7 +65,6 @@ from rosbot_patrol.ros.patrol.pictures import PictureRing
 from rosbot_patrol.ros.patrol.sensor_watch_alive import Neighbour
 from rosbot_patrol.ros.patrol.settings import (
     NO_ROUNDS,
-    NodeParams,
     load_flat,
     load_manager_params,
     load_or_say,

@@ -13,6 +13,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +147,7 @@ class OwnerPost:
         log.info("notices go to %s%s", self.describe(), f"; {waiting} wait from before" if waiting else "")
         Worker(self._supervise, name="post").start()
         for name in self._dispatcher.channels:
-            Worker(lambda name=name: self._carry(name), name=f"post: {name}").start()  # type: ignore[misc]
+            Worker(partial(self._carry, name), name=f"post: {name}").start()
 
     # -- the thread that looks
 
