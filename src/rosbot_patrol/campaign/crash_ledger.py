@@ -150,23 +150,21 @@ def balance(
     """
     lines = list(journal)
     kills = [line for line in lines if line["kind"] == "kill"]
-    calls = [line for line in lines if line["kind"] == "call"]
-    verdicts = [_verdict_of(call, after, records) for call, after in zip(calls, [*calls[1:], None], strict=True)]
     watched = {line["call"] for line in lines if line["kind"] == "verdict" and line.get("there")}
-    told = [_told(call, kills) for call in calls]
+    answers = _answers(lines, kills, records)
     confirmed = [record for record in records if record.is_confirmed]
     ids_of = _message_ids(mails)
     return Books(
         kills=Counter(str(kill["victim"]) for kill in kills),
         moments=Counter(str(kill["moment"]) for kill in kills),
-        calls=len(calls),
-        answered=Counter(verdict for verdict in verdicts if verdict),
-        lost=[f"{text} no verdict" for text, verdict in zip(told, verdicts, strict=True) if not verdict],
+        calls=len(answers),
+        answered=Counter(answer.verdict for answer in answers if answer.verdict),
+        lost=[f"{answer.told} no verdict" for answer in answers if not answer.verdict],
         watched=len(watched),
         overlooked=[
-            f"{text} clear, and somebody stood there"
-            for call, text, verdict in zip(calls, told, verdicts, strict=True)
-            if verdict == CLEAR and call["call"] in watched
+            f"{answer.told} clear, and somebody stood there"
+            for answer in answers
+            if answer.verdict == CLEAR and answer.call in watched
         ],
         confirmed=len(confirmed),
         mails=Counter(len(ids_of.get(record.id, ())) for record in confirmed),
@@ -175,6 +173,25 @@ def balance(
         verified=verified,
         waiting=waiting,
     )
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """Number of a call, the call in words with what was killed during it, and its verdict ("": none)."""
+
+    call: int
+    told: str
+    verdict: str
+
+
+def _answers(
+    lines: Iterable[Mapping[str, Any]], kills: Sequence[Mapping[str, Any]], records: Sequence[KeptRecord]
+) -> list[_Answer]:
+    calls = [line for line in lines if line["kind"] == "call"]
+    return [
+        _Answer(call["call"], _told(call, kills), _verdict_of(call, after, records))
+        for call, after in zip(calls, [*calls[1:], None], strict=True)
+    ]
 
 
 def _told(call: Mapping[str, Any], kills: Iterable[Mapping[str, Any]]) -> str:

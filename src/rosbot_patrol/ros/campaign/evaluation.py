@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import dropwhile
 from pathlib import Path
 
 from rosbot_patrol.alerts.records.database import NAME
@@ -57,14 +58,18 @@ class Mission:
     """
 
     def __init__(self, heard: Recording, room: int) -> None:
-        states = heard.states
-        begin = next((i for i, s in enumerate(states) if s.message.mission and s.message.room_id == room), len(states))
-        self.id: str | None = states[begin].message.mission if begin < len(states) else None
-        rest = (i for i, s in enumerate(states[begin:], begin) if s.message.mission != self.id)
-        end = next(rest, None)
-        self.end: State | None = None if end is None else states[end]
-        self.states = states[begin : None if end is None else end + 1]
-        self.was_called_again = end is None or any(s.message.mission for s in states[end:])
+        states = dropwhile(lambda s: not s.message.mission or s.message.room_id != room, heard.states)
+        self.states: list[State] = []
+        self.id: str | None = None
+        self.end: State | None = None
+        for state in states:
+            self.states.append(state)
+            self.id = self.id or state.message.mission
+            if state.message.mission != self.id:
+                self.end = state
+                break
+        rest = () if self.end is None else (self.end, *states)
+        self.was_called_again = self.end is None or any(s.message.mission for s in rest)
         trigger = next((t for t, triggered in heard.triggers if triggered == room), None)
         self.triggered = trigger or 0.0
         self._start = trigger if trigger is not None or not self.states else self.states[0].time

@@ -134,14 +134,7 @@ class RobotDescription:
         Raises:
             WorldError: a name is not there, or no wheels are left to drive by on a side.
         """
-        for side, names in (("left", left), ("right", right)):
-            for name in names:
-                if name not in {h.joint for h in self.hinges}:
-                    there = ", ".join(h.joint for h in self.hinges) or "none"
-                    told = f"drive.{side}_joints names '{name}', which is no joint that moves (there: {there})"
-                    raise WorldError(self.source, told)
-        if set(left) & set(right):
-            raise WorldError(self.source, f"'{min(set(left) & set(right))}' is named as a left and as a right joint")
+        self._check_joints(left, right)
         chosen = replace(self, left=tuple(left) or self.left, right=tuple(right) or self.right)
         if not chosen.left and not chosen.right:
             raise WorldError(self.source, "has no continuous joint across the robot, so no wheels to drive by")
@@ -154,6 +147,17 @@ class RobotDescription:
             imu=self._mount(frames.imu, "imu") or self.imu,
             ranges=tuple(m for f in frames.ranges if (m := self._mount(f, "ranges"))) or self.ranges,
         )
+
+    def _check_joints(self, left: Sequence[str], right: Sequence[str]) -> None:
+        known = [hinge.joint for hinge in self.hinges]
+        for side, names in (("left", left), ("right", right)):
+            missing = next((name for name in names if name not in known), None)
+            if missing is not None:
+                there = ", ".join(known) or "none"
+                told = f"drive.{side}_joints names '{missing}', which is no joint that moves (there: {there})"
+                raise WorldError(self.source, told)
+        if set(left) & set(right):
+            raise WorldError(self.source, f"'{min(set(left) & set(right))}' is named as a left and as a right joint")
 
     def _mount(self, link: str, key: str) -> Mount | None:
         if not link:
