@@ -27,6 +27,7 @@ from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.patrol.senses.records import (
     BoxesRecord,
     CountRecord,
+    ImageRecord,
     LensRecord,
     LookRecord,
     Moment,
@@ -150,13 +151,13 @@ class PatrolReplay:
             self._senses.hear_detector(content, _moment(now))
         elif name == CAMERA:
             self._camera_at = now
-        elif name == DEPTH:
-            self._senses.depth.hear(content)
+        elif name in (DEPTH, DEPTH_LENS):
+            self._hear_depth(content)
         elif isinstance(content, heard.AliveRecord):
             self._link.hear_status(now)
         elif not isinstance(content, Refused):
             self._is_awake = True
-            self._hear_state(name, content, now)
+            self._hear_state(content, now)
 
     def finish(self) -> Result:
         """Give what the patrol said and did."""
@@ -170,15 +171,22 @@ class PatrolReplay:
             self._senses.hear_call(room)
             self._step(now)  # the node is waked, too
 
-    def _hear_state(self, name: str, content: Any, now: float) -> None:
+    def _hear_depth(self, content: Any) -> None:
+        """Take a depth picture or its lens; neither ends the manager's rest."""
+        match content:
+            case ImageRecord():
+                self._senses.depth.hear(content)
+            case LensRecord():
+                self._senses.depth.hear_lens(content)
+
+    def _hear_state(self, content: Any, now: float) -> None:
         match content:
             case heard.GoalRecord():
                 self._link.hear_goal(content)
             case heard.OutcomeRecord():
                 self._link.hear_outcome(content)
             case LensRecord():
-                eye = self._senses.depth if name == DEPTH_LENS else self._senses.camera
-                eye.hear_lens(content)
+                self._senses.camera.hear_lens(content)
             case MapRecord():
                 self._senses.house_map.hear(content.grid)
             case Battery():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from made_bag import write_bag
 from made_patrol import POINTS, looking
-from made_sight import DEPTH_TOPIC, IMAGE, SightedWorld
+from made_sight import DEPTH_INFO, DEPTH_TOPIC, IMAGE, SightedWorld
 
 from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.nodes.patrol_records import KINDS
@@ -69,6 +69,17 @@ def test_a_picture_on_the_wall_is_told_by_its_depth(bags: dict[str, Path]) -> No
     result = replayed(bags["flat"])
     assert result.counts["notices"] == 0
     assert "it is flat, a picture or a screen" in result.tables["verdicts"]["reason"][0]
+
+
+def test_the_lens_of_a_depth_camera_alone_changes_nothing_and_ends_no_rest(
+    bags: dict[str, Path], tmp_path: Path
+) -> None:
+    world = recorded(tmp_path / "plain.bag")
+    info = next(message for _, topic, message in world.messages if topic == "/camera/rgb/camera_info")
+    first, last = world.messages[0][0], world.messages[-1][0]
+    lenses = [(stamp, DEPTH_INFO, info) for stamp in np.arange(first, last, 0.1).tolist()]
+    write_bag(tmp_path / "lens.bag", sorted([*world.messages, *lenses], key=lambda each: each[0]))
+    assert replayed(tmp_path / "lens.bag").digest == replayed(bags["plain"]).digest
 
 
 def test_a_patrol_without_a_depth_topic_does_as_without_depth(bags: dict[str, Path]) -> None:
