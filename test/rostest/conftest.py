@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,7 +26,7 @@ def ros(master: Ros) -> Iterator[Ros]:
 @pytest.fixture(scope="module")
 def sim_master(master: Ros) -> Ros:
     """A master whose nodes live in simulated time."""
-    subprocess.run(["rosparam", "set", "/use_sim_time", "true"], env=master.env, check=True)
+    master.set_param("/use_sim_time", True)
     return master
 
 
@@ -36,7 +35,7 @@ def sim_ros(sim_master: Ros) -> Iterator[Ros]:
     """That master, its nodes ended and the simulator's parameters forgotten after each test."""
     yield sim_master
     sim_master.stop_nodes()
-    subprocess.run(["rosparam", "delete", "/simulator"], env=sim_master.env, stderr=subprocess.DEVNULL)
+    sim_master.forget("/simulator")
 
 
 @pytest.fixture(scope="session")

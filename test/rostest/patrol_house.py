@@ -24,8 +24,10 @@ ROOT = HERE.parents[1]
 
 
 def stop(process, sig=signal.SIGINT):
+    """End it; with None it was told already."""
     if process.poll() is None:
-        process.send_signal(sig)
+        if sig is not None:
+            process.send_signal(sig)
         try:
             process.wait(10)
         except subprocess.TimeoutExpired:
@@ -188,11 +190,15 @@ class House:
         return list(mailbox.Maildir(folder, create=False)) if (folder / "cur").exists() else []  # made last
 
     def close(self):
+        for process in reversed(self.processes):  # told one and all, so that their ends take the time of one
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
         for process in reversed(self.processes):
-            stop(process)
+            stop(process, None)
         self.running = False
         self.thread.join()
         for end in [*self.ends, self.boxes, self.count, self.image, self.trigger]:
             end.unregister()
-        subprocess.run(["rosparam", "delete", "/patrolling_node"], capture_output=True, check=False)
-        subprocess.run(["rosparam", "delete", "/move_base"], capture_output=True, check=False)
+        for name in ("/patrolling_node", "/move_base"):
+            if rospy.has_param(name):
+                rospy.delete_param(name)

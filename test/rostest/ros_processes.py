@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+import xmlrpc.client
 from pathlib import Path
 
 from rosbot_patrol.ros.campaign.ports import free_port
@@ -104,6 +105,14 @@ class Ros:
         process = Process([sys.executable, "-c", text], self.env, stdin=subprocess.PIPE)
         self.processes.append(process)
         return Teller(process)
+
+    def set_param(self, name, value):
+        """On the parameter server, without a process of its own."""
+        xmlrpc.client.ServerProxy(self.env["ROS_MASTER_URI"]).setParam("/test", name, value)
+
+    def forget(self, name):
+        """Delete a parameter, or a tree of them, that may be there."""
+        xmlrpc.client.ServerProxy(self.env["ROS_MASTER_URI"]).deleteParam("/test", name)
 
     def stop_nodes(self):
         for process in reversed(self.processes):  # told one and all, so that their ends take the time of one
