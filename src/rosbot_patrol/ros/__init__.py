@@ -1,1 +1,1 @@
-"""The edge to ROS: the only modules that know it."""
+"""ROS adapters: the only modules that import ROS."""

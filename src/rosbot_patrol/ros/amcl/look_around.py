@@ -1,7 +1,7 @@
 """Turn of the robot on the spot while amcl searches: one scan may fit many places, the scans of a turn fit fewer.
 
-Commands go to `~cmd_vel`; at all other times amcl publishes nothing there. In our launch files that topic is a source
-of twist_mux with a higher priority than move_base, and the collision guard comes after it.
+It drives on `~cmd_vel`, where amcl publishes nothing at other times. In our launch files that is a source of twist_mux
+above move_base, with the collision guard behind it.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ PARAMS = SpinParams(spin_speed=0.6)
 
 
 class LookAround:
-    """Turns the robot once on request.
+    """Turn the robot once on request.
 
     Args:
         transforms: the node's tf.
-        odom: frame of the odometry.
-        base: frame of the robot.
-        is_over: function that returns whether the robot has been found, so that the turn may end early.
+        odom: odometry frame.
+        base: robot frame.
+        is_over: whether the robot has been found, so that the turn may end early.
     """
 
     def __init__(self, transforms: Transforms, odom: str, base: str, is_over: Callable[[], bool]) -> None:
@@ -51,7 +51,7 @@ class LookAround:
             self._wanted.set()
 
     def watch(self) -> None:
-        """Start the thread that turns."""
+        """Prepare for turns."""
         Worker(self._work, name="look around").start()
 
     def _work(self) -> None:

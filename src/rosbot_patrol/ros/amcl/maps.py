@@ -22,11 +22,11 @@ ASK_AGAIN_S = 0.5
 
 
 class MapSource:
-    """Gets the map and passes it on.
+    """Fetch the map and pass it on.
 
     Args:
-        params: of amcl.
-        take: function that takes a map; raises MapError if it cannot be used.
+        params: amcl's parameters.
+        take: receives a map; raises MapError if it cannot be used.
     """
 
     def __init__(self, params: AmclParams, take: Callable[[Grid], None]) -> None:
@@ -60,7 +60,7 @@ class MapSource:
             self._subscriber.unregister()
 
     def take(self, message: OccupancyGrid, source: str) -> bool:
-        """Pass on a map; False, with a log line that names the source, if it cannot be used."""
+        """Take a map; False, with a sentence that names the source, if it cannot be used."""
         frame = message.header.frame_id
         if frame.lstrip("/") != self._frame:
             log.warning(

@@ -1,29 +1,29 @@
-"""amcl: where the robot is on the map, by a particle filter on odometry and a lidar.
+"""amcl: the robot's pose on the map, by a particle filter on odometry and a lidar.
 
 Matches amcl of ROS Noetic's navigation 1.17: topics `scan`, `initialpose`, `map` (with `~use_map_topic`) in,
 `amcl_pose` and `particlecloud` (latched), `/diagnostics` and tf map -> odom out; services `global_localization`,
 `request_nomotion_update`, `set_map`; the map from the service `static_map`; parameters in `AmclParams`, with the pose
 saved to them for a respawn, and dynamic_reconfigure. Written from Probabilistic Robotics and upstream's documentation.
 
-Beyond upstream: `~health` publishes the trust in the estimate, from the agreement of scans and map. If they disagree, a
-second filter searches the whole map (`~seek`) and hands over its result. The service `~relocalize` starts that search
-by hand, with one turn of the robot on the spot, driven on `~cmd_vel`.
+Beyond upstream: `~health` says whether the estimate can be trusted, by how well the scans agree with the map there. If
+they contradict it, a second filter searches the whole map (`~seek`), and hands over the pose that it finds. The service
+`~relocalize` starts that search by hand, with one turn of the robot on the spot, driven on `~cmd_vel`.
 
 Differs:
-- Within the best cluster, particles that fit the newest scan count for more; upstream takes the plain mean. With the
-  tutorial's rare updates that is 5 cm off instead of 25.
-- Particles that are all in one bin need the fewest particles; upstream's rule then needs the most.
-- The weights of `likelihood_field` and `beam` count to the third power; otherwise a person beside the robot leads it
-  astray when updates are rare.
-- The averages behind the recovery are of the fit per beam, so that a changed number of beams causes no random poses.
-- Draws follow an even sequence instead of independent numbers.
-- A new map keeps the filter's pose. A pose saved in another run of a simulation is not used; to one of this run the
-  motion since then is added.
-- An odometry that jumps, with or without the clock, has restarted and is no motion. A scan older than the newest one is
-  ignored.
-- Only bins of some weight link clusters, so that random poses do not link the whole house.
-- A turned map is refused with a sentence.
-- dynamic_reconfigure: see `tuning`.
+- Within the best cluster, particles that fit the newest scan have more weight; upstream takes the plain mean. With the
+  tutorial's few updates this errs by 5 cm instead of 25.
+- If all particles are in one bin, the fewest particles are used; upstream's rule then asks for the most.
+- The weights of `likelihood_field` and `beam` are raised to the third power. Otherwise somebody beside the robot
+  misleads it when updates are few.
+- The averages behind the recovery use the fit per beam, so that the number of beams never causes random poses.
+- Draws follow a low-discrepancy sequence instead of independent numbers.
+- A new map keeps the filter's pose.
+- A pose saved in another run of a simulation is ignored. To one of this run the motion since then is added.
+- An odometry jump, with the clock or without, is a restart of the odometry and no motion.
+- A scan older than the last one used is ignored.
+- Only bins of some weight link clusters, so that random poses do not join the whole house into one.
+- A rotated map is refused with a sentence.
+- dynamic_reconfigure: see `amcl.tuning`.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class AmclNode:
     """The topics, services and threads of an AmclCore.
 
     Args:
-        params: of amcl.
+        params: amcl's parameters.
     """
 
     def __init__(self, params: AmclParams) -> None:
@@ -90,7 +90,7 @@ class AmclNode:
         ]
 
     def run(self) -> None:
-        """Work until shutdown."""
+        """Run until shutdown."""
         rospy.on_shutdown(self._save_pose)
         self._maps.start()
         Loop(1.0, self._tell_health, name="health").start()
@@ -168,7 +168,7 @@ class AmclNode:
             self._outputs.send_cloud(step.particles, step.stamp)
 
     def _resume(self, placed: PlacedScan) -> None:
-        """Start from the pose saved by an earlier amcl of this run."""
+        """Start from the pose that a previous amcl saved, if it is of this run."""
         own = self._saved.own(self._params, placed.scan.stamp)
         then = None if own is not None else self._saved.odometry(self._params, placed.odom_from_base)
         if own is not None or then is not None:
@@ -216,10 +216,10 @@ class AmclNode:
 
 
 def body() -> None:
-    """Load, build, run."""
+    """Load, build and run the node."""
     AmclNode(load_params(AmclParams, ignore=["saved_pose"])).run()
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     run_node("amcl", body, priority=Priority.CONTROL)

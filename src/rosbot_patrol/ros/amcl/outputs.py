@@ -1,4 +1,4 @@
-"""Outputs of amcl: pose, particles, map -> odom, and trust in the estimate."""
+"""Outputs of amcl: pose, particles, map -> odom, and the health of the estimate."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from rosbot_patrol.ros.runtime.diagnostics import OK, WARN
 
 
 class AmclOutputs:
-    """Topics of amcl.
+    """The published topics of amcl.
 
     Args:
-        params: of amcl; replaced when they change at run time.
+        params: amcl's parameters; set anew when they change.
     """
 
     def __init__(self, params: AmclParams) -> None:
@@ -63,7 +63,7 @@ class AmclOutputs:
         self._cloud.publish(pose_array_to_msg(poses, self._global, stamp))
 
     def send_health(self, trust: Trust, estimate: Estimate | None, stamp: float, *, seeking: bool) -> None:
-        """Send the trust in the estimate."""
+        """Send whether the estimate can be trusted."""
         message = LocalizationHealth(
             state=trust.state.name.lower(), belief=trust.belief, seeking=seeking, why=trust.reason
         )
@@ -81,7 +81,7 @@ def spread_of(estimate: Estimate) -> list[float]:
 
 
 def verdict(trust: Trust, estimate: Estimate | None, params: AmclParams, *, seeking: bool) -> tuple[int, str]:
-    """Level and sentence for /diagnostics on an estimate."""
+    """Level and sentence of /diagnostics for the current estimate."""
     if trust.state is State.LOST:
         action = "the whole map is searched" if seeking else "set an initial pose or call ~relocalize"
         return WARN, f"the robot is lost: {trust.reason}; {action}"

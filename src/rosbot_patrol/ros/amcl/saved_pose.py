@@ -1,8 +1,9 @@
-"""Pose saved by amcl in its parameters `initial_*`, with its time.
+"""The pose that amcl saves to its parameters `initial_*`, with its time and odometry.
 
-As upstream, a restarted node continues from there. But a master may outlive a simulation; in the next one the robot is
-at its start again, and the clock starts again. Therefore the time is saved, too: if the first scan is older, the saved
-pose belongs to another run and is replaced by the defaults. The odometry is saved for the motion since.
+As in upstream, a restarted node continues from there. But a master may outlive a simulation: in the next one the robot
+starts at its start again, with a clock that begins anew. So the time is saved too. If the first scan is older, the
+saved pose belongs to another run, and the defaults replace it. The odometry is saved too, to know the robot's motion
+since then.
 """
 
 from __future__ import annotations
@@ -23,24 +24,24 @@ NAMES = tuple(f"initial_{key}" for key in ("pose_x", "pose_y", "pose_a", "cov_xx
 SAVED = "~saved_pose"
 ODOMETRY = ("odom_x", "odom_y", "odom_a")
 SLACK_S = 1.0
-FAR_M = 3.0  # a robot without amcl stops; odometry farther away than this has restarted
+FAR_M = 3.0  # the robot stops without amcl, so odometry farther off must have restarted
 
 
 class SavedPose:
-    """Pose saved by an earlier node, and by this one."""
+    """The pose that a previous node saved, and the saving of this node's pose."""
 
     def __init__(self) -> None:
         self._before = self._found = _read(rospy.get_param(SAVED, None))
         self._last: tuple[float, ...] = ()
 
     def own(self, params: AmclParams, stamp: float) -> AmclParams | None:
-        """Start without a pose saved in another run, None if nothing needs to change.
+        """Initial pose without values saved in another run, None if nothing is to be changed.
 
-        A value set by a launch file since then is not the saved one, and stays.
+        A value that a launch file has set since then is not the saved one, and stays.
 
         Args:
-            params: read at the start.
-            stamp: of the first scan [s].
+            params: as read at the start.
+            stamp: stamp of the first scan [s].
         """
         before, self._before = self._before, {}
         if stamp >= before.get("stamp", -math.inf) - SLACK_S:
@@ -58,10 +59,10 @@ class SavedPose:
         return replace(params, **defaults)
 
     def odometry(self, params: AmclParams, now: Pose2D) -> Pose2D | None:
-        """odom_from_base at the saved pose, None if it is unknown or has restarted since.
+        """odom_from_base at the saved pose, None if it is unknown or the pose was set since then.
 
         Args:
-            params: read at the start; a pose other than the saved one has no odometry.
+            params: as read at the start; a pose in them other than the saved one has no odometry.
             now: odom_from_base at the first scan.
         """
         found = self._found

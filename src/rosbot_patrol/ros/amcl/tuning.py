@@ -1,8 +1,8 @@
-"""Parameters of amcl that can change at run time, by dynamic_reconfigure, with upstream's names.
+"""dynamic_reconfigure of amcl: parameters that can be changed at run time, with upstream's names.
 
-Differs: frames, `use_map_topic` and `first_map_only` cannot be changed; upstream's `restore_defaults` goes back to the
-values at start. The particles stay, upstream draws them anew about the last pose. Only what was changed is written to
-the parameter server, so that a respawned amcl has the recovery that its launch file gave it.
+Differs: frames, `use_map_topic` and `first_map_only` cannot be changed; `restore_defaults` restores the values at
+start. The particles stay; upstream draws them anew around the last pose. Only changed values are written to the
+parameter server, so that a respawned amcl has the recovery of its launch file.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ class AmclTuning:
     """The dynamic_reconfigure server of amcl.
 
     Args:
-        params: present parameters.
+        params: current parameters.
         prefix: amcl's name and a slash, for messages.
-        take: called with the parameters after a change.
+        take: receives the parameters after a change.
     """
 
     def __init__(self, params: AmclParams, prefix: str, take: Callable[[AmclParams], None]) -> None:

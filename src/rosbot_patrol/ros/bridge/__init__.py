@@ -1,1 +1,1 @@
-"""serial_node, the bridge from motion sensors to ROS topics; and virtual sensors."""
+"""rosserial's serial_node, which brings motion sensors to ROS topics, and virtual sensors."""

@@ -1,4 +1,4 @@
-"""Subscriptions and services of ROS for one rosserial device."""
+"""Subscriptions and services of one rosserial device; its publishers are in `bridge.publishers`."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ Send = Callable[[int, bytes], None]
 
 
 def message_class(message_type: str) -> Any:
-    """Class of a message type "package/Type"; raises ProtocolError if it is not built here."""
+    """The class of "package/Type"; raises ProtocolError if it is not built here."""
     if message_type in ESP_TRIGGER_TYPES:
-        return EspTrigger  # both names mean the same message, and the other package may be absent
+        return EspTrigger  # both names mean the same message, and the other package may be missing
     try:
         found = roslib.message.get_message_class(message_type)
     except (ImportError, ValueError) as err:
@@ -55,7 +55,7 @@ def message_class(message_type: str) -> Any:
 
 
 def service_class(service_type: str) -> Any:
-    """Class of a service type "package/Type"; raises ProtocolError if it is not built here."""
+    """The class of a service "package/Type"; raises ProtocolError if it is not built here."""
     try:
         found = roslib.message.get_service_class(service_type)
     except (ImportError, ValueError) as err:
@@ -85,20 +85,20 @@ def _definition(cls: Any) -> str:
 
 
 def _definition_of(md5: str) -> str:
-    """Definition used by a device, if a message type in this process has its MD5 sum."""
+    """Definition of a device's message, if this process knows it; the device sends only its sum."""
     classes = [cls for cls in genpy.Message.__subclasses__() if getattr(cls, "_md5sum", "") == md5]
     return f"as {classes[0]._type}: {_definition(classes[0])}" if classes else "a definition not known here"
 
 
 def serialize(message: Any) -> bytes:
-    """Serialise a message."""
+    """Serialise a message to bytes."""
     buffer = io.BytesIO()
     message.serialize(buffer)
     return buffer.getvalue()
 
 
 class Subscription:
-    """Forwards messages of a ROS topic to the device."""
+    """Forwarding of a ROS topic to the device."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         cls = message_class(info.message_type)
@@ -110,7 +110,7 @@ class Subscription:
         self._subscriber = rospy.Subscriber(info.name, raw_message(cls), self._callback, queue_size=QUEUE_SIZE)
 
     def close(self) -> None:
-        """Stop."""
+        """Stop forwarding."""
         self._subscriber.unregister()
 
     def _callback(self, message: Any) -> None:
@@ -124,7 +124,7 @@ class Subscription:
 
 
 class DeviceService:
-    """A service that the device offers to ROS: requests use one topic id, answers another."""
+    """A service that the device offers to ROS: requests go out with one topic id, answers come with another."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self._cls = service_class(info.message_type)
@@ -147,7 +147,7 @@ class DeviceService:
             self._service = rospy.Service(self._name, raw_service(self._cls), self._call)
 
     def receive(self, data: bytes) -> None:
-        """Process an answer; raises ProtocolError."""
+        """Take an answer; raises ProtocolError."""
         answer = raw_from(self._cls._response_class, data, self._info)
         if self._answers.empty():
             self._answers.put_nowait(answer)
@@ -159,7 +159,7 @@ class DeviceService:
 
     def _call(self, request: Any) -> Any:
         with self._one_at_a_time:
-            while not self._answers.empty():  # an answer too late for the previous call
+            while not self._answers.empty():  # an answer that came too late for the previous call
                 self._answers.get_nowait()
             if self._request_id is None:
                 raise rospy.ServiceException(f"{self._name}: the device has not announced it fully")
@@ -171,7 +171,7 @@ class DeviceService:
 
 
 class ServiceCaller:
-    """A ROS service that the device calls, on its own thread, so that reading from the device continues."""
+    """A ROS service that the device calls; calls wait on a thread of their own, so the device is still read."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self._cls = service_class(info.message_type)
@@ -192,14 +192,14 @@ class ServiceCaller:
         self._answer_id = info.topic_id
 
     def receive(self, data: bytes) -> None:
-        """Queue a request; raises ProtocolError if too many wait."""
+        """Take a request; raises ProtocolError if too many wait."""
         try:
             self._requests.put_nowait(data)
         except queue.Full as err:
             raise ProtocolError("", f"{self._name}: more than 16 calls wait for an answer") from err
 
     def close(self) -> None:
-        """End the thread."""
+        """Stop the thread."""
         try:
             self._requests.put_nowait(None)
         except queue.Full:

@@ -1,6 +1,6 @@
-"""Layouts of messages as bytes: checked against their definition and passed on without deserialisation.
+"""Layouts of devices' messages: their bytes are checked against the definition and passed on undecoded.
 
-So text that is not UTF-8, and numbers that Python would write differently, are passed on unchanged.
+So a text that is not UTF-8, or a number that Python would encode differently, leaves as it came.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SIZES |= {f"{sign}int{bits}": bits // 8 for sign in ("", "u") for bits in (8, 1
 
 
 class Run(NamedTuple):
-    """A run of bytes of fixed `size`, and the positions of its bools."""
+    """A sequence of fixed size: `size` in bytes, and the offsets of its bools."""
 
     size: int
     flags: tuple[int, ...] = ()
@@ -42,17 +42,17 @@ _TEXT = Many((Run(1),))
 
 @dataclass(frozen=True)
 class Layout:
-    """A message type of fixed size.
+    """A message type with messages of one fixed size.
 
     Attributes:
-        size: of the message [bytes]; flags: positions of its bools.
+        size: size of a message [bytes]; flags: offsets of its bools.
     """
 
     size: int
     flags: tuple[int, ...] = ()
 
     def check(self, data: bytes, info: TopicInfo) -> bytes:
-        """The bytes to send, with each bool 0 or 1.
+        """Check a message; returns it with each bool set to 0 or 1.
 
         Raises:
             ProtocolError: the message has another size.
@@ -71,7 +71,7 @@ class VaryingLayout:
     parts: Parts
 
     def check(self, data: bytes, info: TopicInfo) -> bytes:
-        """As in `Layout`; raises ProtocolError if the bytes are too few or too many."""
+        """Check a message as in `Layout`; raises ProtocolError if the bytes end too early or too late."""
         flags: list[int] = []
         try:
             end = _walk(self.parts, data, 0, flags)
@@ -86,7 +86,7 @@ class VaryingLayout:
 
 @cache
 def layout(cls: Any) -> Layout | VaryingLayout:
-    """Layout of a class's messages."""
+    """Layout in memory of a class's messages."""
     parts = _parts(cls._slot_types)
     if not parts:
         return Layout(0)
@@ -97,20 +97,20 @@ def layout(cls: Any) -> Layout | VaryingLayout:
 
 @cache
 def raw_message(cls: Any) -> Any:
-    """Class of the same messages for rospy that stores their bytes in `_buff`."""
+    """A class of the same messages for rospy that keeps their bytes in `_buff`."""
     known = {name: getattr(cls, name) for name in ("_type", "_md5sum", "_full_text", "_slot_types")}
     return type(cls.__name__, (rospy.AnyMsg,), {"__slots__": [], **known})
 
 
 @cache
 def raw_service(cls: Any) -> Any:
-    """Class of the same service for rospy with messages that store their bytes."""
+    """A class of the same service for rospy with messages that keep their bytes."""
     messages = {name: raw_message(getattr(cls, name)) for name in ("_request_class", "_response_class")}
     return type(cls.__name__, (), {"_type": cls._type, "_md5sum": cls._md5sum, **messages})
 
 
 def raw_from(cls: Any, data: bytes, info: TopicInfo) -> Any:
-    """Message of `raw_message(cls)` with these bytes.
+    """Make a message of `raw_message(cls)` from its bytes.
 
     Raises:
         ProtocolError: they are not such a message.
@@ -146,7 +146,7 @@ def _parts_of(name: str) -> Parts:
 
 
 def _walk(parts: Parts, data: bytes, at: int, flags: list[int]) -> int:
-    """End of parts that begin `at`, with positions of bools; may exceed the data. Raises struct.error."""
+    """End of the parts that begin at `at`; collects bools. May lie beyond the data; raises struct.error."""
     for part in parts:
         if isinstance(part, Run):
             flags += [at + flag for flag in part.flags]

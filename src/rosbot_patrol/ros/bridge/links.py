@@ -1,4 +1,4 @@
-"""Links of a bridge on /sensors/links, for the supervision: which sensor is heard over which connection."""
+"""The bridge's report to the supervision of sensors, on /sensors/links: which sensor is on which connection."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rosbot_patrol.sensors.links import Links
 from rosbot_patrol.sensors.problems import Link
 
 PERIOD = 1.0
-SHORTEST = 0.1  # [s] minimum time between messages
+SHORTEST = 0.1  # shortest time between two messages [s], however much changes
 
 
 class LinkTeller:
-    """Stores the links and publishes them: once a second, and at once when a connection begins or ends."""
+    """The links of the bridge: published once a second, and at once when a connection opens or closes."""
 
     def __init__(self) -> None:
         self._links = Links()
@@ -27,12 +27,12 @@ class LinkTeller:
         self._lock = threading.Lock()
         self._changed = threading.Event()
         self._is_started = False
-        # under simulated time a device's clock runs at another rate, which is no fault of the device
+        # in simulated time a device's clock has another speed, which is no fault
         self._compares_clocks = not rospy.get_param("/use_sim_time", False)
         self._publisher = rospy.Publisher("sensors/links", SensorLinks, queue_size=5)
 
     def start(self) -> None:
-        """Start publishing; a bridge without expected sensors starts with the first one that it hears."""
+        """Start to publish; without expected sensors, publishing starts with the first sensor heard."""
         if not self._is_started:
             self._is_started = True
             Worker(self._run, name="links").start()
@@ -48,7 +48,7 @@ class LinkTeller:
             self._changed.set()
 
     def logged(self, client: Client, text: str) -> None:
-        """Record a device's log line."""
+        """Record a log line of a device."""
         with self._lock:
             changed = self._links.logged(client.peer, text)
         if changed:
@@ -101,7 +101,7 @@ def _message(link: Link) -> SensorLink:
 
 
 def links_from_msg(message: SensorLinks) -> list[Link]:
-    """Links of a message; invalid ones are ignored."""
+    """Links of a message, without invalid ones."""
     return [
         Link(
             sensor_id=each.id,

@@ -5,14 +5,14 @@ Matches rosserial_python 0.9.2 (`serial_node.py`): `~port` ("tcp" or a device), 
 parameter requests, `/diagnostics`.
 
 Differs:
-- One process serves any number of clients a port, on IPv4 and IPv6; `~fork_server` is accepted and not needed.
-- On TCP only `/motion_trigger` of type EspTrigger may be published, and nothing subscribed, until the `~allow_*`
-  lists say more (`~restrict: never` lifts them); a serial device is not restricted.
-- Topics are asked for at once, not after 2 s; a message before negotiation makes it ask again instead of failing.
-- A client that is silent for 15 s is hung up on; a connection that a sensor left behind is closed when it is back.
-- A service that the device does not answer fails after 5 s; upstream waits for ever.
-- The allowed topics are advertised from the start, so that a sensor's first trigger finds its listeners.
-- A taken port ends the program with one sentence.
+- One process serves any number of clients per port, on IPv4 and IPv6; `~fork_server` is accepted and not needed.
+- On TCP only `/motion_trigger` of type EspTrigger may be published, and nothing subscribed, unless the `~allow_*`
+  lists permit more (`~restrict: never` lifts them); a serial device is not restricted.
+- Topics are requested at once, not after 2 s; after a message before negotiation they are requested again.
+- A client that is silent for 15 s is disconnected; a sensor's old connection is closed when the sensor reconnects.
+- A service call that the device does not answer fails after 5 s; upstream waits forever.
+- The allowed topics are advertised from the start, so that a sensor's first trigger reaches its subscribers.
+- A port in use ends the program with one sentence.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ from rosbot_patrol.sensors.registry import Change, MotionSensors, SensorStatus
 log = logging.getLogger(__name__)
 
 GLOBAL_TCP_PORT = "/rosserial_embeddedlinux/tcp_port"
-SWITCH_INTERVAL = 0.0005  # longest wait of a message for a thread that writes diagnostics [s]; Python's default: 0.005
+SWITCH_INTERVAL = 0.0005  # longest wait of a message for the diagnostics thread [s]; Python's own: 0.005
 _LEVELS = (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR, logging.CRITICAL)
 
 
 class RosSide:
-    """Exchanges messages between devices and ROS (`rosserial.dispatch.Handler`)."""
+    """The ROS side of the bridge: passes devices' messages to ROS and back (`rosserial.dispatch.Handler`)."""
 
     def __init__(self, sensor_timeout: float) -> None:
         self.server: SerialServer | None = None
@@ -62,7 +62,7 @@ class RosSide:
         self._channels: dict[Client, dict[tuple[str, str], Any]] = {}
 
     def advertise(self, policy: Policy) -> None:
-        """Advertise the permitted topics before the first device connects, so that its messages have subscribers."""
+        """Advertise the allowed topics before any device connects, so that its first message reaches subscribers."""
         for rule in policy.publish:
             if "*" not in (rule.name, rule.message_type):
                 self._publishers.advertise(rule.name, message_class(rule.message_type))
@@ -99,7 +99,7 @@ class RosSide:
             self._channels[client]["called", info.name].receive(data)
 
     def flush(self) -> None:
-        """Publish the messages received."""
+        """Publish the received messages."""
         self._publishers.flush()
 
     def tick(self) -> None:
@@ -123,14 +123,14 @@ class RosSide:
         log.log(_LEVELS[min(level, len(_LEVELS) - 1)], "%s: %s", client.peer, text)
 
     def parameter(self, name: str) -> object:
-        """Value of a ROS parameter; raises ProtocolError if it is not set."""
+        """Read a ROS parameter; raises ProtocolError if it is not set."""
         try:
             return rospy.get_param(name)
         except KeyError as err:
             raise ProtocolError("", f"parameter {name} is not set") from err
 
     def look_at_sensors(self, now: float) -> list[SensorStatus]:
-        """State of all sensors; logs those that have just become silent."""
+        """State of all sensors; logs those that have just fallen silent."""
         with self.sensors_lock:
             events = self.sensors.tick(now)
             statuses = self.sensors.statuses(now)
@@ -165,7 +165,7 @@ class RosSide:
 
 
 def _parameters() -> SerialNodeParams:
-    """Private parameters, upstream's global ones and the arguments, in rising order of precedence."""
+    """Private parameters, upstream's global ones and the arguments; the later ones take precedence."""
     tree = dict(rospy.get_param("~", {}) or {})
     if "tcp_port" not in tree:
         tree["tcp_port"] = rospy.get_param(GLOBAL_TCP_PORT, DEFAULT_TCP_PORT)
@@ -216,7 +216,7 @@ def body() -> None:
         server.attach(params.port, params.baud)
         what = params.port
     gc.collect()
-    gc.freeze()  # objects created so far stay; collecting them again would stop everything for 40 ms
+    gc.freeze()  # excludes existing objects from collection, which stopped everything for 40 ms
     rospy.on_shutdown(server.stop)
     Worker(Report(server, ros_side.look_at_sensors, what).run, name="report").start()
     if policy.restricted:

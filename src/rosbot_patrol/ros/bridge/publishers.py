@@ -1,11 +1,12 @@
-"""Publishers of the devices' messages: received bytes go to ROS without a thread, a queue or a message object.
+"""Publishers of devices' messages: the received bytes go to ROS without a thread, a queue or a message object between.
 
-A message is checked against its definition and sent unchanged; only a header is numbered by ROS. All messages of one
-moment go to a subscriber in one piece. A subscriber that does not read blocks nobody: its messages wait up to a limit,
-then the oldest are dropped.
+A message is checked against its definition and sent unchanged; only a header gets ROS's sequence number. All messages
+of one moment go to a subscriber in one piece. A subscriber that does not read delays nobody: its messages wait, up to a
+bound, and then the oldest are dropped.
 
-rospy negotiates with the subscribers; then this module writes to their connections itself (`Publisher.impl.connections`
-of rospy 1.16). rospy would use a thread per subscriber, which cost half of the bridge's time and up to 5 ms.
+rospy negotiates with the subscribers; then this module writes to their connections itself
+(`Publisher.impl.connections` of rospy 1.16). rospy's own thread per subscriber cost half of the bridge's time and up to
+5 ms.
 """
 
 from __future__ import annotations
@@ -28,18 +29,18 @@ from rosbot_patrol.rosserial.protocol.topics import TopicInfo
 log = logging.getLogger(__name__)
 
 SETTLING = 1.0  # time for subscribers to learn of a new publisher from the master [s]
-HELD = 1000  # messages stored for them meanwhile
-WAITING = 1 << 20  # bytes stored for a subscriber that does not read
+HELD = 1000  # messages kept meanwhile
+WAITING = 1 << 20  # bytes kept for a subscriber that does not read
 
 
 class Outlet:
-    """Non-blocking output to one subscriber.
+    """The connection to one subscriber; it never waits.
 
     Args:
-        connection: rospy's, header exchanged; name: of the topic, for messages.
+        connection: rospy's, after the header exchange; name: name of the topic, for messages.
 
     Attributes:
-        lost: number of dropped messages.
+        lost: number of messages that the subscriber will never get.
     """
 
     def __init__(self, connection: Any, name: str) -> None:
@@ -51,19 +52,19 @@ class Outlet:
         self._silent_until = 0.0
 
     def put(self, data: bytes, messages: int) -> None:
-        """Send, or store until it reads again; raises OSError if the subscriber has gone."""
+        """Send, or keep until the subscriber reads again; raises OSError if it has gone."""
         self._waiting.append((data, messages))
         self._bytes += len(data)
         self.flush()
         while self._bytes > WAITING and len(self._waiting) > 1:
-            dropped, count = self._waiting[1]  # the first may be partly sent
+            dropped, count = self._waiting[1]  # the first may be sent in part
             del self._waiting[1]
             self._bytes -= len(dropped)
             self.lost += count
             self._complain()
 
     def flush(self) -> None:
-        """Send as much as it accepts; raises OSError if the subscriber has gone."""
+        """Send as much as possible; raises OSError if the subscriber has gone."""
         while self._waiting:
             data, messages = self._waiting[0]
             link = self.connection.socket
@@ -90,7 +91,7 @@ class Outlet:
 
 
 class Topic:
-    """One ROS publisher; in its first second it holds messages back until the subscribers have found it."""
+    """One ROS publisher; for its first second it holds messages back until the subscribers have found it."""
 
     def __init__(self, name: str, cls: Any) -> None:
         self.cls = cls
@@ -106,7 +107,7 @@ class Topic:
         self._outlets: list[Outlet] = []
 
     def put(self, info: TopicInfo, data: bytes) -> None:
-        """Queue a message for `flush`; raises ProtocolError if it is not of this type."""
+        """Take a message for the next `flush`; raises ProtocolError if it is not of this type."""
         old = find_old_type(info.message_type, info.md5, self.cls._md5sum)
         data = self._layout.check(old.upgrade(data) if old else data, info)
         if self._has_header:
@@ -116,7 +117,7 @@ class Topic:
         self._batch.append(struct.pack("<I", len(data)) + data)
 
     def flush(self, now: float) -> None:
-        """Send queued messages, and those that a subscriber has not accepted yet."""
+        """Send the messages taken, and the remaining ones of slow subscribers."""
         if self._opens_at:
             if now < self._opens_at:
                 return
@@ -142,13 +143,13 @@ class Topic:
         impl.message_data_sent += len(data)
 
     def _numbered(self, data: bytes) -> bytes:
-        """The message with the header's sequence number, as ROS counts."""
+        """The message with ROS's sequence number in its header."""
         self._seq += 1
         return struct.pack("<I", self._seq & 0xFFFFFFFF) + data[4:]
 
 
 class Publishers:
-    """ROS publishers shared by the devices; they stay advertised after a device has gone, as in upstream."""
+    """ROS publishers shared by the devices; as in upstream, they stay advertised when a device disconnects."""
 
     def __init__(self) -> None:
         self._by_name: dict[str, Topic] = {}
@@ -162,7 +163,7 @@ class Publishers:
         self._resolved[info.name] = self.advertise(info.name, cls)
 
     def advertise(self, name: str, cls: Any) -> Topic:
-        """Advertise a topic, unless it is advertised already; raises ProtocolError."""
+        """Advertise a topic unless it is already; raises ProtocolError."""
         name = rospy.resolve_name(name)
         known = self._by_name.get(name)
         if known is None:
@@ -175,13 +176,13 @@ class Publishers:
         return known
 
     def put(self, info: TopicInfo, data: bytes) -> None:
-        """Queue a device's bytes for `flush`; raises ProtocolError."""
+        """Take a device's bytes for the next `flush`; raises ProtocolError."""
         topic = self._resolved[info.name]
         topic.put(info, data)
         self._full.add(topic)
 
     def flush(self) -> None:
-        """Publish the queued messages."""
+        """Publish the messages put since the last call."""
         if self._full:
             now = time.monotonic()
             for topic in self._full:
@@ -189,7 +190,7 @@ class Publishers:
             self._full.clear()
 
     def tick(self) -> None:
-        """Publish delayed messages, for slow or new subscribers."""
+        """Publish delayed messages: those of slow subscribers, and those held for the first ones."""
         now = time.monotonic()
         for topic in self._by_name.values():
             topic.flush(now)

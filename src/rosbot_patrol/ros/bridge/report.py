@@ -1,6 +1,6 @@
-"""Report of serial_node on /diagnostics once a second: the bridge, its sensors and its clients.
+"""Report of serial_node on /diagnostics, once a second: the bridge, its sensors and its clients.
 
-And the topic `~bytes` with the devices' bytes, for bags: `replay --node serial_node` reads it.
+`~bytes` publishes the devices' bytes unchanged, for bags: `replay --node serial_node` reads them again.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ PERIOD = 1.0
 
 
 class Report:
-    """Publishes clients and sensors on /diagnostics.
+    """Report clients and sensors on /diagnostics.
 
     Args:
-        sensors: function that returns the sensors at a time [s].
-        what: port or device of the server.
+        sensors: returns the sensors' state at a time [s].
+        what: the port or device that the server serves.
     """
 
     def __init__(self, server: SerialServer, sensors: Callable[[float], list[SensorStatus]], what: str) -> None:
@@ -35,7 +35,7 @@ class Report:
         self._what = what
         self._health = Health("rosserial")
         self._parts: set[str] = set()
-        self._strange = (0, 0)  # refused connections, refused requests
+        self._strange = (0, 0)  # connections refused, requests refused
         self._strange_since = float("-inf")
         self._ended = threading.Event()
 
@@ -92,21 +92,21 @@ class Report:
 
 
 class SerialTap:
-    """A Tap that publishes bytes."""
+    """A Tap that publishes the bytes."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("~bytes", SerialBytes, queue_size=1000)
 
     def opened(self, client: Client) -> None:
-        """A connection began."""
+        """Publish that a connection opened."""
         self._send(SerialBytes.OPENED, client, b"")
 
     def data(self, client: Client, data: bytes) -> None:
-        """Bytes arrived."""
+        """Publish received bytes."""
         self._send(SerialBytes.DATA, client, data)
 
     def closed(self, client: Client) -> None:
-        """A connection ended."""
+        """Publish that the connection closed."""
         self._send(SerialBytes.CLOSED, client, b"")
 
     def _send(self, event: int, client: Client, data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""sensor_key: makes the key by which a motion sensor proves its identity to the bridge; needs no ROS master.
+"""sensor_key: makes the key that identifies a motion sensor to the bridge; needs no ROS master.
 
 rosrun rosbot_patrol sensor_key 2 --file ~/.config/rosbot_patrol/sensor_keys.yaml
 """

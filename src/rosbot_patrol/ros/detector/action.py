@@ -1,4 +1,4 @@
-"""Action check_for_objects: each picture sent as a goal is answered with its own boxes."""
+"""The action check_for_objects: each picture sent is answered with its own boxes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_PENDING = 10
 
 
 class Goal:
-    """A picture to examine, and its client."""
+    """A picture to examine, and the client to answer."""
 
     def __init__(self, handle: actionlib.ServerGoalHandle) -> None:
         self._handle = handle
@@ -25,25 +25,25 @@ class Goal:
         self._over = False
 
     def is_of(self, handle: actionlib.ServerGoalHandle) -> bool:
-        """Whether the goal has this handle."""
+        """Whether this goal has the given handle."""
         return bool(self._handle == handle)
 
     def picture(self) -> tuple[Picture, Header]:
-        """The picture and its header; ImageError if it cannot be read."""
+        """The picture and its header; ImageError if it cannot be decoded."""
         image = self._handle.get_goal().image
         return picture_from_msg(image), image.header
 
     def finish(self, boxes: BoundingBoxes) -> None:
-        """Send the result, unless the goal was cancelled meanwhile."""
+        """Send the answer, unless the goal was cancelled meanwhile."""
         result = CheckForObjectsResult(id=self._handle.get_goal().id, bounding_boxes=boxes)
         self._end(lambda: self._handle.set_succeeded(result))
 
     def abort(self, reason: str) -> None:
-        """Report that the goal cannot be done."""
+        """Answer that the goal cannot be done."""
         self._end(lambda: self._handle.set_aborted(text=reason))
 
     def cancel(self) -> None:
-        """Preempt the goal: the client wants no result any more."""
+        """Cancel: the client no longer wants an answer; the goal is preempted."""
         self._end(self._handle.set_canceled)
 
     def _end(self, answer: Callable[[], None]) -> None:
@@ -52,21 +52,21 @@ class Goal:
                 return
             self._over = True
             answer()
-            # actionlib keeps a goal in a reference cycle until Python collects it: 1 MB each with its picture
+            # actionlib keeps a goal in a reference cycle until Python's collector runs: 1 MB each with its picture
             self._handle.get_goal().image.data = b""
 
     @property
     def over(self) -> bool:
-        """Whether it needs no result any more."""
+        """Whether no answer is needed any more."""
         return self._over
 
 
 class CheckForObjects:
-    """The action server; stores goals until the detector takes them.
+    """The action server; keeps goals until the detector takes them.
 
     Args:
-        name: of the action.
-        notify: called when a goal arrives.
+        name: name of the action.
+        notify: called when a goal has come.
     """
 
     def __init__(self, name: str, notify: Callable[[], None]) -> None:
@@ -81,11 +81,11 @@ class CheckForObjects:
 
     @property
     def pending(self) -> bool:
-        """Whether a goal waits."""
+        """Whether a goal is waiting."""
         return bool(self._goals)
 
     def take(self) -> Goal | None:
-        """The oldest goal that still needs a result."""
+        """Take the oldest goal that still wants an answer."""
         with self._lock:
             while self._goals:
                 goal = self._goals.popleft()

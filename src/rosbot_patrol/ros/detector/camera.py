@@ -1,4 +1,4 @@
-"""Camera topic: keeps only the newest picture, and supervises the camera."""
+"""A camera topic: its newest picture, and a watch for a silent or frozen camera."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ BUFFER_SIZE = 16 * 2**20
 
 
 class Camera:
-    """Keeps the newest unprocessed picture, and reports a silent or frozen camera.
+    """Subscribe to a camera, keep its newest unprocessed picture, and report if it is silent or frozen.
 
     Args:
         topic: base name of the topic.
         transport: raw, compressed or compressedDepth.
-        timeout: silence after which it counts as stopped [s] of wall time.
-        frozen_timeout: time of unchanging pictures after which it counts as frozen [s] of wall time, 0: never.
-        health: of the node.
-        notify: called when a picture arrives.
-        once: ignore a repeated picture (same stamp), and publish the camera's state on ~camera_ok.
+        timeout: silence after which the camera counts as stopped [s] of wall time.
+        frozen_timeout: time with equal pictures after which it counts as frozen [s] of wall time, 0 for never.
+        health: receives the camera's health.
+        notify: called when a picture has come.
+        once: skip a repeated picture (same stamp), and publish the camera's health on ~camera_ok.
         mode: decoding of compressed pictures: unchanged, color or gray.
     """
 
@@ -58,7 +58,7 @@ class Camera:
     ) -> None:
         self._kind = Image if transport == "raw" else CompressedImage
         self._transport = transport
-        base = rospy.resolve_name(topic)  # a remap applies to the base name, as in image_transport
+        base = rospy.resolve_name(topic)  # as in image_transport, remappings apply to the base name
         self._topic = base if transport == "raw" else f"{base}/{transport}"
         self._lock = threading.Lock()
         self._newest: Image | CompressedImage | None = None
@@ -78,17 +78,17 @@ class Camera:
 
     @property
     def pending(self) -> bool:
-        """Whether a picture waits."""
+        """Whether a picture is waiting."""
         return self._newest is not None
 
     def take(self) -> Image | CompressedImage | None:
-        """Take the newest unprocessed message."""
+        """Take the newest message, None if it was taken already."""
         with self._lock:
             message, self._newest = self._newest, None
             return message
 
     def decode(self, message: Image | CompressedImage) -> Picture:
-        """Decode the picture of a message; ImageError if it cannot be read."""
+        """Decode a message's picture; ImageError if that fails."""
         picture: Picture
         if not isinstance(message, CompressedImage):
             picture = picture_from_msg(message)
@@ -101,11 +101,11 @@ class Camera:
         return picture
 
     def accept(self) -> None:
-        """Report that a picture was usable."""
+        """Report that a picture could be processed."""
         self._refused = ""
 
     def refuse(self, problem: str) -> None:
-        """Report that a picture was unusable; logged once per reason."""
+        """Report that a picture could not be processed; the same reason is logged once."""
         if problem != self._refused:
             log.error("%s: %s", self._topic, problem)
         self._refused = problem
@@ -113,10 +113,10 @@ class Camera:
     def _on_picture(self, message: Image | CompressedImage) -> None:
         stamp = message.header.stamp
         with self._lock:
-            # a frozen driver repeats the camera's own time and some of its bytes
+            # the camera's stamp and a sample of the bytes: a frozen driver repeats them
             self._watch.note(time.monotonic(), bytes(message.data[::997]))
             if self._once and stamp == self._last_stamp and not stamp.is_zero():
-                return  # the same picture again
+                return  # a repeated picture
             self._last_stamp = stamp
             self._newest = message
             self._seen = _describe(message)
@@ -189,7 +189,7 @@ class Camera:
 
 
 def _describe(message: Image | CompressedImage) -> str:
-    """Size and encoding of a picture, as given in its message."""
+    """Size and encoding of a picture, as far as its message states them."""
     if isinstance(message, CompressedImage):
         return f"'{message.format}'"
     return f"{message.width}x{message.height} {message.encoding}"

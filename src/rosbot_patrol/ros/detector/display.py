@@ -1,4 +1,4 @@
-"""Check for a display on which a window can be opened."""
+"""Check for a display that can show a window."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 
 
 def display_problem() -> str:
-    """Reason why no window can be opened, "" if one can. (OpenCV's Qt ends the program without a display.)"""
+    """Reason why no window can be opened, "" if one can. (OpenCV's Qt ends the program if it finds no display.)"""
     name = os.environ.get("DISPLAY", "")
     if not name:
         return "DISPLAY is not set"

@@ -24,16 +24,16 @@ BAR_PERIOD = 0.2
 
 
 def main() -> None:
-    """Run the program; exit status 1 if the file is not available."""
+    """Run the program; exit status 1 if the file could not be downloaded."""
     try:
-        sys.exit(run([word for word in sys.argv[1:] if ":=" not in word]))  # __name:=... are roslaunch's
+        sys.exit(run([word for word in sys.argv[1:] if ":=" not in word]))  # roslaunch adds __name:=...
     except KeyboardInterrupt:
         print("\nstopped; what came is kept, the same command goes on with it", file=sys.stderr)
         sys.exit(130)
 
 
 def run(arguments: list[str]) -> int:
-    """Download the files named by the arguments; returns the exit status."""
+    """Download the files that the arguments name; returns the exit status."""
     parser = argparse.ArgumentParser(prog="download_weights", description="Fetch a network's weights for darknet_ros.")
     parser.add_argument("name", nargs="?", help="of the network; without it, all that are known are listed")
     parser.add_argument("--folder", type=Path, help="where to put it; default: where the launch files look")
@@ -80,10 +80,10 @@ def get(entry: WeightsFile, folder: Path, cfg: Path, url: str) -> int:
 
 
 class Bar:
-    """Progress bar; without a terminal, a line for each tenth.
+    """Progress bar; without a terminal, one line per tenth.
 
     Args:
-        size: of the whole file [bytes].
+        size: size of the whole file [bytes].
     """
 
     def __init__(self, size: int) -> None:
@@ -94,7 +94,7 @@ class Bar:
         self._tenth = -1
 
     def __call__(self, have: int) -> None:
-        """Show the number of bytes."""
+        """Show the number of bytes received."""
         now = time.monotonic()
         if self._begun is None:
             self._begun = (now, have)

@@ -1,19 +1,19 @@
 """Node darknet_ros: detects objects in a camera's pictures.
 
-Matches darknet_ros 1.1.5 (leggedrobotics/darknet_ros 1027a28): parameters, topics, types, action, thresholds, what is
-sent and when.
+Matches darknet_ros 1.1.5 (leggedrobotics/darknet_ros 1027a28): parameters, topics, types, action, thresholds, and the
+content and time of each message.
 
 Differs:
 - Boxes, count and drawn picture carry the stamp of the picture they belong to, and `image_header` its header.
-- A picture is looked at once, and only the newest; upstream looks at the last one again and again.
-- rgb8 and bgr8 both come out right; upstream swaps the colours of bgr8.
-- The action answers with the boxes of the picture that it was sent, each goal its own.
+- Each picture is processed once, and only the newest; upstream processes the last one repeatedly.
+- rgb8 and bgr8 both have correct colours; upstream swaps those of bgr8.
+- The action answers each goal with the boxes of its own picture.
 - Of more than 100 boxes the 100 most probable are sent; upstream sends none.
 - More encodings (`rosbot_patrol.images.encodings`); upstream takes mono8, mono16, rgb8, bgr8, rgba8 and bgra8.
-- Weights that do not fit the network, and class names that do not, end it in a sentence; upstream goes on.
-- Further: compressed input (`~image_transport`), `~network` hog, `~publish_empty`, `~max_rate`, `~threads`, the service
-  `~enable`, `~standby_after`, to stand in for another detector that has gone, `~camera_ok` (std_msgs/Bool, latched) and
-  /diagnostics, which know a camera that has stopped or is frozen.
+- Weights or class names that do not fit the network end the node with one sentence; upstream goes on.
+- Additional: compressed input (`~image_transport`), `~network` hog, `~publish_empty`, `~max_rate`, `~threads`, the
+  service `~enable`, `~standby_after` (replaces another detector that has gone), `~camera_ok` (std_msgs/Bool, latched)
+  and /diagnostics, which report a stopped or frozen camera.
 - There is no nodelet: Python has none.
 """
 
@@ -69,7 +69,7 @@ def _body() -> None:
 
 
 def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBoxes:
-    """Message with the detections of the picture with this header."""
+    """Convert the detections of the picture with this header to a message."""
     msg = BoundingBoxes(header=Header(stamp=image_header.stamp, frame_id="detection"), image_header=image_header)
     msg.bounding_boxes = [
         BoundingBox(
@@ -87,11 +87,11 @@ def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBo
 
 
 class DarknetNode:
-    """Connects one detector to its topics; `step` processes one picture.
+    """The node darknet_ros: one detector and its topics; `step` processes one picture.
 
     Args:
         params: its parameters.
-        detector: ready to run.
+        detector: a detector that is ready to run.
     """
 
     def __init__(self, params: DarknetParams, detector: Detector) -> None:
@@ -125,12 +125,12 @@ class DarknetNode:
             worker.join(0.2)
 
     def step(self) -> bool:
-        """Process one goal or the newest picture; returns whether there was one."""
+        """Answer one goal or process the newest picture; returns whether there was anything to do."""
         goal = self._action.take()
         if goal is not None:
             self._answer(goal)
             return True
-        message = self._camera.take()  # also while switched off, so that old pictures are not processed later
+        message = self._camera.take()  # also while switched off, so that an old picture is not processed later
         if not self._standby.is_wanted() or message is None or not self._enabled:
             return False
         started = time.monotonic()
@@ -170,7 +170,7 @@ class DarknetNode:
         self._drawn = _publisher(out.detection_image, Image)
 
     def _answer(self, goal: Any) -> None:
-        """Process the picture of a goal; it is published like a camera's picture, as in upstream."""
+        """Process the picture of an action's goal; as upstream, it is published like a camera's."""
         try:
             picture, header = goal.picture()
             found = self._detector.detect(picture)
@@ -219,7 +219,7 @@ class DarknetNode:
 
 
 class _Console:
-    """Prints rate and objects when the objects change, and now and then."""
+    """Console output of rate and objects: on each change, and at intervals."""
 
     def __init__(self) -> None:
         self._counted = 0
@@ -227,7 +227,7 @@ class _Console:
         self._told: tuple[str, ...] | None = None
 
     def tell(self, found: Sequence[Detection], now: float) -> None:
-        """Print, if due; called for each picture."""
+        """Count a picture and print if it is due; called for each picture."""
         if self._since is None:
             self._since = now
         self._counted += 1
@@ -241,7 +241,7 @@ class _Console:
 
 
 def _by_class(found: Sequence[Detection]) -> list[str]:
-    """Best probability and number of detections of each class."""
+    """Best probability and count of each class."""
     best: dict[str, list[float]] = {}
     for one in found:
         best.setdefault(one.name, []).append(one.probability)

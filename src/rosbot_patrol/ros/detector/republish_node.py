@@ -1,14 +1,14 @@
-"""Node republish: converts pictures from one transport to another.
+"""republish: receives pictures in one transport and sends them in another.
 
     republish IN_TRANSPORT in:=BASE [OUT_TRANSPORT] out:=BASE
 
 Matches image_transport's republish (image_common, noetic-devel) with the transports raw, compressed (jpeg, png) and
 compressedDepth (png, rvl): names of topics (`BASE` for raw, `BASE/TRANSPORT`), parameters of a publisher under its
 topic (and by dynamic_reconfigure there), of the subscriber under the node, `~image_transport`, anonymous unless named,
-always subscribed. Without an out transport it sends each that somebody listens to.
+always subscribed. Without an out transport it sends every transport that has a subscriber.
 
-Differs: compresses only while somebody listens; a picture that cannot be read is reported and left out; says what it
-waits for; /diagnostics; theora is not known.
+Differs: compresses only while there is a subscriber; reports and skips pictures that cannot be decoded; logs what it
+waits for; has /diagnostics; does not support theora.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ log = logging.getLogger(__name__)
 TRANSPORTS = ("raw", "compressed", "compressedDepth")
 USAGE = f"usage: republish IN_TRANSPORT in:=BASE [OUT_TRANSPORT] out:=BASE, transports {', '.join(TRANSPORTS)}"
 IDLE_WAIT = 0.25
-# of upstream's publishers: not used here
+# parameters of upstream's publishers that have no meaning here
 FOREIGN_KEYS = ("enable",)
 
 
@@ -72,10 +72,10 @@ def main() -> None:
 
 
 def parse_arguments(arguments: Sequence[str]) -> tuple[str, tuple[str, ...]]:
-    """In transport and out transports of a command line without its remappings.
+    """Parse a command line without its remappings: in transport and out transports.
 
     Raises:
-        ParamError: there are too few or too many, or a transport is not known here.
+        ParamError: there are too few or too many arguments, or a transport is unknown.
     """
     words = [word for word in arguments if word.strip()]
     if not 1 <= len(words) <= 2:
@@ -95,11 +95,11 @@ def _body() -> None:
 
 
 class Output:
-    """One output topic, used only while it has subscribers.
+    """One topic for outgoing pictures, with messages only while there is a subscriber.
 
     Args:
         topic: its full name.
-        kind: of its messages.
+        kind: type of its messages.
     """
 
     def __init__(self, topic: str, kind: type) -> None:
@@ -107,21 +107,21 @@ class Output:
 
     @property
     def is_heard(self) -> bool:
-        """Whether the topic has subscribers."""
+        """Whether there is a subscriber."""
         return bool(self._publisher.get_num_connections())
 
     def send(self, picture: Picture, message: Image | CompressedImage) -> None:
-        """Send a picture with its original header; ImageError if that is impossible."""
+        """Send a picture with the header of its original message; ImageError if it cannot be encoded."""
         self._publisher.publish(message if isinstance(message, Image) else picture_to_msg(picture, message.header))
 
 
 class CompressedOutput(Output):
-    """A compressed output; its parameters are below its topic and can change at run time.
+    """A compressed output; its parameters are below its topic, and can be changed at run time.
 
     Args:
         topic: its full name.
         params: declaration of its parameters.
-        codec: function that compresses a picture to format text and bytes.
+        codec: encodes a picture to format text and bytes.
     """
 
     def __init__(self, topic: str, params: type[Any], codec: Callable[[Picture, Any], tuple[str, bytes]]) -> None:
@@ -133,7 +133,7 @@ class CompressedOutput(Output):
         ReconfigureServer(topic, self._params, self._names, self._change)
 
     def send(self, picture: Picture, message: Image | CompressedImage) -> None:
-        """Send a picture, as in `Output`."""
+        """Compress and send a picture; ImageError if it cannot be encoded."""
         text, data = self._codec(picture, self._params)
         self._publisher.publish(CompressedImage(header=message.header, format=text, data=data))
 
@@ -143,7 +143,7 @@ class CompressedOutput(Output):
 
 
 class Republisher:
-    """One input, one or more outputs.
+    """The node republish: one input, one or more outputs.
 
     Args:
         params: its parameters.
@@ -179,7 +179,7 @@ class Republisher:
                     raise
 
     def step(self) -> None:
-        """Send the newest picture."""
+        """Pass the newest picture on."""
         message = self._input.take()
         heard = [output for output in self._outputs if output.is_heard]
         if message is None or not heard:

@@ -1,4 +1,4 @@
-"""Standby of a detector: the robot's own works only while the PC's is silent."""
+"""Standby of a detector for another one, such as the robot's for the PC's: active while the other is silent."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ PART = "standing in"
 
 
 class Standby:
-    """Listens to another node's topic with the number of objects, which a detector sends for each picture.
+    """Watch for another detector, by the topic that counts objects: a detector publishes it with each picture.
 
-    Times are of the wall clock.
+    It uses wall time, because a dead machine must be noticed in simulations too.
 
     Args:
-        topic: of the number of objects.
-        after: silence of the other after which it works [s]; 0: there is no other.
-        health: of the node.
+        topic: topic of the count.
+        after: silence of the other after which this one is active [s]; 0: there is no other.
+        health: receives the state.
     """
 
     def __init__(self, topic: str, after: float, health: Health) -> None:
@@ -35,7 +35,7 @@ class Standby:
             rospy.Subscriber(topic, ObjectCount, self._hear, queue_size=1)
 
     def is_wanted(self) -> bool:
-        """Whether it has to process pictures now; logs changes."""
+        """Whether this detector must work now; logs each change."""
         if self._after <= 0.0:
             return True
         is_working = time.monotonic() - self._heard > self._after

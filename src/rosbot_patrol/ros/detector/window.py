@@ -1,4 +1,4 @@
-"""Window with the newest picture, if there is a display."""
+"""A window with the newest picture, if there is a display."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ POLL_MS = 30
 
 
 class Window:
-    """Shows pictures; `run` belongs on the main thread, `show` may be called from any."""
+    """Window for pictures; `run` belongs on the main thread, `show` may be called from any."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -26,7 +26,7 @@ class Window:
             self._newest = pixels
 
     def run(self) -> None:
-        """Keep the window until shutdown."""
+        """Serve the window until shutdown."""
         cv2.namedWindow(self._title, cv2.WINDOW_NORMAL | cv2.WINDOW_KEEPRATIO)
         sized = False
         while not rospy.is_shutdown():

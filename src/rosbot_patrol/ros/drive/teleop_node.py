@@ -4,11 +4,11 @@ Matches teleop_twist_keyboard 1.0.0 for Noetic: keys, `cmd_vel` (queue 1), `~spe
 `~turn_limit`, `~repeat_rate`, `~key_timeout`, `~stamped`, `~frame_id`.
 
 Differs:
-- Without a terminal of its own, as under roslaunch, it says so and waits, instead of ending with an error that
-  respawns. roslaunch hands its own terminal on: upstream takes the keys there, also the Ctrl-C that should end the
-  launch. In the background of a shell it waits to be brought to the front.
+- Without a terminal of its own, as under roslaunch, it logs that and waits, instead of ending with an error that causes
+  respawns. roslaunch passes its own terminal on: upstream takes the keys there, also the Ctrl-C that should end the
+  launch. In the background of a shell it waits until it is in the foreground.
 - Typed by hand, it ends after 5 s without a ROS master.
-- The terminal is put back however the program ends, and a zero velocity is sent.
+- The terminal is restored however the program ends, and a zero velocity is sent.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from rosbot_patrol.ros.runtime.node import Worker, load_params, run_node
 
 
 class Sender:
-    """Publishes the last velocity, once or again and again."""
+    """Publish the last velocity, once or repeatedly."""
 
     def __init__(self, params: TeleopParams) -> None:
         self._params = params
@@ -50,7 +50,7 @@ class Sender:
 
     @property
     def topic(self) -> str:
-        """Where it publishes."""
+        """The topic's name."""
         return str(self._publisher.resolved_name)
 
     def send(self, velocity: Velocity) -> None:
@@ -79,7 +79,7 @@ class Sender:
 
 
 def _has_keys() -> bool:
-    """Whether what is typed is for this program: not without a terminal, under roslaunch or in the background."""
+    """Whether typed keys are for this program: false without a terminal, under roslaunch or in the background."""
     try:
         return sys.stdin is not None and sys.stdin.isatty() and os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
     except (OSError, ValueError):  # a terminal of another session, a closed input
@@ -87,7 +87,7 @@ def _has_keys() -> bool:
 
 
 def _wait_for_keys() -> bool:
-    """Wait until there are keys to drive by; whether to go on."""
+    """Wait for a terminal with keys; false at shutdown."""
     if not _has_keys():
         rospy.loginfo(
             "%s: no terminal here, so there are no keys to drive by; waiting. Run it in a terminal of its own:"
@@ -103,11 +103,11 @@ def _wait_for_keys() -> bool:
 
 @contextmanager
 def _single_keys() -> Iterator[None]:
-    """Keys come one by one and are not shown, until the end of the block."""
+    """Read keys one by one without echo, until the end of the block."""
     before = termios.tcgetattr(sys.stdin)
     tty.setraw(sys.stdin.fileno(), termios.TCSADRAIN)
     mode = termios.tcgetattr(sys.stdin)
-    mode[1] = before[1]  # output as usual
+    mode[1] = before[1]  # output processing stays on
     termios.tcsetattr(sys.stdin, termios.TCSADRAIN, mode)
     try:
         yield
@@ -116,7 +116,7 @@ def _single_keys() -> Iterator[None]:
 
 
 def _read_key(timeout: float | None) -> str:
-    """One key, "" after `timeout` [s] without one or at shutdown; the end of the input reads as Ctrl-C."""
+    """Read one key, "" after `timeout` [s] without one or at shutdown; the end of the input reads as Ctrl-C."""
     until = None if timeout is None else time.monotonic() + timeout
     while not rospy.is_shutdown():
         left = 0.2 if until is None else min(0.2, until - time.monotonic())
@@ -128,7 +128,7 @@ def _read_key(timeout: float | None) -> str:
 
 
 def _wait_for_listener(sender: Sender) -> bool:
-    """Wait until someone listens; whether to go on."""
+    """Wait for a subscriber; false if the program should end."""
     told = False
     while not sender.has_listener:
         if not told:
@@ -165,7 +165,7 @@ def body() -> None:
                 _drive(sender, params)
         finally:
             sender.send(Velocity())
-    time.sleep(0.1)  # the zero is sent by another thread
+    time.sleep(0.1)  # another thread sends the zero
     rospy.signal_shutdown("Ctrl-C")
 
 

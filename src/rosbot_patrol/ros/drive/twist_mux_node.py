@@ -3,14 +3,14 @@
 Matches twist_mux 3.1 (Noetic): `~topics` and `~locks` (name, topic, timeout, priority), `cmd_vel_out`.
 
 Differs:
-- Whoever commands, the base stands still for somebody whose way it would cross (`~give_way`).
-- What is chosen goes through the collision guard (`~guard`, true), which slows and stops for what `scan` and the range
-  sensors of `~range_topics` show in the direction of motion. A command is checked again with each scan, not only when
-  it comes. A scan that says nothing, or of a laser that is tilted, counts as none: the base creeps, and /diagnostics
+- Whatever the source, the base gives way to people that it would cross (`~give_way`).
+- The chosen command goes through the collision guard (`~guard`, true). It slows or stops for obstacles in the direction
+  of motion, seen by `scan` and the range sensors of `~range_topics`. It checks a command again with each scan, not only
+  when it comes. A scan without information, or from a tilted laser, counts as none: the base creeps, and /diagnostics
   and the log say why.
 - When every source has fallen silent, or a lock closes, a zero is published; upstream publishes nothing.
-- A topic whose last publisher has gone is silent at once: on one host a program that dies is noticed within
-  milliseconds. The time-out stays for one that hangs, or whose host has gone.
+- A topic that has lost its last publisher is silent at once: on one host the death of a program is noticed within
+  milliseconds. The time-out remains for a program that hangs, or a host that has gone.
 - Only the planar part of a Twist is passed on.
 """
 
@@ -49,8 +49,8 @@ from rosbot_patrol.tf.frames import NO_FRAME
 
 log = logging.getLogger(__name__)
 
-STEP = 0.04  # wall time between two looks where nothing comes [s]
-REPEAT_STOP = 0.2  # a lock's zero is repeated [s]
+STEP = 0.04  # longest wall time between two checks without input [s]
+REPEAT_STOP = 0.2  # period of a lock's repeated zero [s]
 REPEAT_LOG = 15.0
 
 
@@ -70,7 +70,7 @@ class TwistMuxParams(MuxParams):
 
 
 class Eyes:
-    """Feeds the guard: scans, and where the robot has moved since."""
+    """Inputs of the guard: scans, ranges, and the robot's motion since then."""
 
     def __init__(self, params: TwistMuxParams, wake: threading.Event) -> None:
         self.guard = CollisionGuard(params.collision_guard)
@@ -89,7 +89,7 @@ class Eyes:
             rospy.Subscriber(topic, Range, partial(self._on_range, topic), queue_size=1, tcp_nodelay=True)
 
     def look(self) -> bool:
-        """Show the guard the newest scan and readings; whether there was a scan."""
+        """Pass the newest scan and ranges to the guard; returns whether there was a scan."""
         for topic, latest in self._ranges.items():
             reading = latest.take()
             if reading is not None:
@@ -98,7 +98,7 @@ class Eyes:
         return message is not None and self._look_round(scan_from_msg(message), self._scans.stamp)
 
     def _look_round(self, scan: LaserScan, stamp: float) -> bool:
-        """Show a scan that came at a time [s] to the guard; whether it could be used."""
+        """Pass a scan received at a time [s] to the guard; returns whether it was usable."""
         base = self._params.base_frame
         if not self._check.accepts(scan, stamp):
             self.guard.refuse(self._check.problem)
@@ -125,7 +125,7 @@ class Eyes:
             self.guard.see_range(topic, reading, stamp, self.pose(message.header.stamp.to_sec()))
 
     def _mount(self, frame: str, what: str) -> Pose2D | None:
-        """base_from_sensor of a range sensor, None (and said) where it is not known."""
+        """base_from_sensor of a range sensor, None (with a log line) if it is unknown."""
         frame = frame.lstrip("/")
         if not frame:
             self._complain("the collision guard cannot place %s: its messages name no frame: %s", what, NO_FRAME)
@@ -144,7 +144,7 @@ class Eyes:
             log.warning(text, *args)
 
     def limit(self, wish: Twist2D, current: float) -> Verdict:
-        """The part of a command that is safe."""
+        """Limit a command to its safe part."""
         pose = self.pose()
         if pose is not None and abs(current - self._movers.stamp) < self._params.collision_guard.stale_after:
             someone = self._give_way.waits(wish, self._movers.movers(current), pose, current)
@@ -153,7 +153,7 @@ class Eyes:
         return self.guard.limit(wish, current, pose)
 
     def pose(self, stamp: float | None = None) -> Pose2D | None:
-        """odom_from_base at a time, else the newest, None where there is none."""
+        """odom_from_base at a time, else the newest, None if there is none."""
         odom, base = self._params.odom_frame, self._params.base_frame
         for when in (stamp, None):
             try:
@@ -172,7 +172,7 @@ class Eyes:
 
 
 class TwistMuxNode:
-    """Callbacks store and wake; one thread chooses, guards and publishes."""
+    """The node twist_mux: callbacks store and wake; one thread chooses, guards and publishes."""
 
     def __init__(self, params: TwistMuxParams) -> None:
         self._mux = TwistMux(params)
@@ -200,7 +200,7 @@ class TwistMuxNode:
             self._step(now())
 
     def stop(self) -> None:
-        """Send a zero."""
+        """Send a zero velocity."""
         self._publisher.publish(twist_to_msg(STOP))
 
     def _listen(self, source: SourceParams) -> None:
@@ -239,7 +239,7 @@ class TwistMuxNode:
                 log.warning("%s has gone while it drove", name)
 
     def _stand(self, choice: Choice, current: float) -> None:
-        """Publish a zero where the base was driven until now, and again and again where a lock holds."""
+        """Publish a zero if the base was driven until now, and repeatedly while a lock holds."""
         due = choice.lock is not None and not 0.0 <= current - self._stopped_at < REPEAT_STOP
         if self._last.source is not None or due:
             self._stopped_at = current

@@ -1,7 +1,7 @@
-"""explore: drives the robot by move_base until the map has no frontier, then home, and ends.
+"""explore: drives the robot by move_base until the map has no border to the unknown, drives it home and ends.
 
-It runs beside slam_gmapping (`simulation_gmapping.launch explore:=true`). `~save_map` names the map to write at the
-end, as with `map_saver -f`. `~frontiers` shows the frontiers in rviz.
+Runs beside slam_gmapping (`simulation_gmapping.launch explore:=true`). `~save_map` names the map to write at the end,
+as in `map_saver -f`. `~frontiers` shows the borders in rviz.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class ExploreParams:
 
 
 class Explore:
-    """The node.
+    """The node explore.
 
     Args:
         given: its parameters.
@@ -65,7 +65,7 @@ class Explore:
         self._move_base = MoveBase(self._frame)
 
     def run(self) -> None:
-        """Run until everything is explored, or the node is shut down."""
+        """Explore until nothing is left, or until shutdown."""
         said, since = "", 0.0
         rate = rospy.Rate(RATE)
         while not rospy.is_shutdown():
@@ -127,5 +127,5 @@ class Explore:
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     run_node("explore", lambda: Explore(load_params(ExploreParams)).run())

@@ -1,18 +1,20 @@
-"""slam_gmapping: map of the surroundings and the robot's pose on it, from odometry and a lidar.
+"""slam_gmapping: a map of the surroundings and the robot's pose on it, from odometry and a lidar.
 
 Matches slam_gmapping of ROS Noetic (gmapping 1.4): topic `scan` and tf in; `map` and `map_metadata` (latched),
-`~entropy` and tf map -> odom out, that stamped now + tf_delay every transform_publish_period; service `dynamic_map`;
+`~entropy` and tf map -> odom out, stamped now + tf_delay, every transform_publish_period; service `dynamic_map`;
 parameters in `GmappingParams`. Written from Grisetti, Stachniss, Burgard 2007 and upstream's documentation.
 
 Differs:
-- A map's cell lies where its origin says; upstream's lies half a cell off.
-- The search for the best fit is refined by Gauss-Newton across the walls. The proposal is the Gaussian of match and
-  odometry. Odometry noise grows with the distance between updates, not with the number of scans.
-- Beams that graze a wall do not erode it within a scan. A scan with another number of beams is used; upstream drops it.
-  A beam without a hit (inf) frees the floor if `maxRange` is at least range_max.
-- The entropy is that of the weights and comes with each update.
-- A saved map can be extended (`map_file`, `initial_pose_x`, `_y`, `_a`).
-- A clock that goes back or an odometry that jumps is a restart, not a motion.
+- A map's cells lie as its origin says; upstream's are half a cell off.
+- Gauss-Newton across the walls refines the search for the best fit.
+- The proposal is the Gaussian of match and odometry. The odometry's error grows with the distance between updates, not
+  with the number of scans.
+- Beams that graze a wall do not erase it within a scan.
+- A scan with another number of beams is used; upstream drops it.
+- A beam without a return (inf) frees the floor if `maxRange` is at least range_max.
+- The entropy is of the weights and comes with each update.
+- A saved map can be continued (`map_file`, `initial_pose_x`, `_y`, `_a`).
+- A clock that goes back or an odometry jump is a restart, not a motion.
 - The parameters llsample* and lasample* are accepted without effect.
 """
 
@@ -48,7 +50,7 @@ class GmappingNode:
     """The topics, the service and the threads of a GmappingCore.
 
     Args:
-        params: of slam_gmapping.
+        params: slam_gmapping's parameters.
 
     Raises:
         MapError: the extent or the saved map is invalid.
@@ -62,8 +64,8 @@ class GmappingNode:
         self._scans = ScanQueue(self._core.feed)
         self._watch = ScanWatch(self._transforms, self._core.feed.check)
         self._map: GridMsg | None = None
-        self._sent_stamp = -math.inf  # of the last transform sent
-        self._lock = threading.Lock()  # of the map's message
+        self._sent_stamp = -math.inf  # stamp of the last transform sent
+        self._lock = threading.Lock()  # protects the map message
         self._health = Health()
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._grid = rospy.Publisher("map", GridMsg, queue_size=1, latch=True)
@@ -75,7 +77,7 @@ class GmappingNode:
         )
 
     def run(self) -> None:
-        """Work until shutdown."""
+        """Run until shutdown."""
         info, p = self._core.slam.maps.info, self._params
         log.info("Mapping %d X %d cells @ %.3f m with %d particles", info.width, info.height, p.delta, p.particles)
         Loop(1.0, self._tell_health, name="health").start()
@@ -118,7 +120,7 @@ class GmappingNode:
     def _send_transform(self, current: float) -> None:
         delay = self._params.tf_delay
         stamp = current + (delay if delay >= 0.0 else self._params.transform_publish_period)
-        if stamp == self._sent_stamp:  # the clock stands still, and tf warns of repeated transforms
+        if stamp == self._sent_stamp:  # the clock stood still, and tf warns of repeated stamps
             return
         self._sent_stamp = stamp
         self._broadcaster.sendTransform(
@@ -150,10 +152,10 @@ class GmappingNode:
 
 
 def body() -> None:
-    """Load, build, run."""
+    """Load, build and run the node."""
     GmappingNode(load_params(GmappingParams)).run()
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     run_node("slam_gmapping", body)

@@ -1,11 +1,11 @@
 """map_saver: waits for one map on `map`, writes it to the disk, and ends.
 
 Matches map_saver of ROS Noetic's navigation 1.17: `map_saver [--occ 65] [--free 25] [-f map]`, `map:=TOPIC`; the
-pgm and the yaml are the same byte for byte.
+pgm and the yaml are equal byte for byte.
 
-Differs: with `-f FOLDER/NAME` the yaml names the picture `NAME.pgm`, as map_server looks for it beside the yaml
-(upstream writes `FOLDER/NAME.pgm`, which then is not found). While no map comes it says so every 10 s. A file is
-written whole or not at all. An unwritable file is an error (exit 1), upstream reports success. Typed by hand, it ends
+Differs: with `-f FOLDER/NAME` the yaml names the picture `NAME.pgm`, because map_server looks for it beside the yaml
+(upstream writes `FOLDER/NAME.pgm`, which is then not found). Until a map comes it logs a line every 10 s. A file is
+written whole or not at all. An unwritable file is an error (exit 1); upstream reports success. Typed by hand, it ends
 after 5 s without a ROS master.
 """
 
@@ -81,7 +81,7 @@ def wait_for_map() -> Grid | None:
 
 
 def body() -> None:
-    """Wait, write, end."""
+    """Wait for the map and write it."""
     wanted = arguments_of(rospy.myargv(sys.argv)[1:])
     grid = wait_for_map()
     if grid is None:
@@ -95,7 +95,7 @@ def body() -> None:
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     if {"-h", "--help"} & set(sys.argv[1:]):
         arguments_of(["--help"])
     run_node("map_saver", body, by_hand=True, anonymous=False)

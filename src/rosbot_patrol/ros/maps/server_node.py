@@ -1,12 +1,12 @@
-"""map_server: publishes a map from the disk on `map` (latched), and on request.
+"""map_server: a map from disk, latched on `map` and served on request.
 
 Matches map_server of ROS Noetic's navigation 1.17: argument `FILE.yaml`, or a picture and its resolution (deprecated);
 latched topics `map` and `map_metadata`; services `static_map` (nav_msgs/GetMap) and `change_map` (nav_msgs/LoadMap);
 parameter `~frame_id`, and for a bare picture `~negate`, `~occupied_thresh` and `~free_thresh`.
 
-Differs: portable grey maps need no picture library; others (png, bmp, ...) are read by OpenCV instead of SDL. The
-alpha of a picture with three channels is not taken from its blue channel. A threshold or an origin that is not finite
-is an error. The health is told on `/diagnostics`.
+Differs: portable grey maps need no picture library; OpenCV reads the others (png, bmp, ...) instead of SDL. The blue
+channel of a three-channel picture is not taken for its alpha. A threshold or an origin that is not finite is an error.
+`/diagnostics` has the node's health.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ class MapServerParams:
 
 
 class MapServer:
-    """Publishes one map and replaces it on request.
+    """Publish one map and replace it on request.
 
     Args:
-        frame: of the map.
+        frame: frame of the map.
         grid: the first map.
-        path: of its file.
+        path: file of the first map.
     """
 
     def __init__(self, frame: str, grid: Grid, path: str) -> None:
@@ -111,7 +111,7 @@ class MapServer:
 
 
 def read_from_arguments(arguments: list[str], params: MapServerParams) -> tuple[Grid, str]:
-    """Read the map named by the command line; returns it and its file.
+    """Read the map that the command line names; returns it with its file.
 
     Raises:
         MapError: the map cannot be used.
@@ -136,7 +136,7 @@ def read_from_arguments(arguments: list[str], params: MapServerParams) -> tuple[
 
 
 def body() -> None:
-    """Read, publish, answer until shutdown."""
+    """Read and publish the map, then answer until shutdown."""
     params = load_params(MapServerParams)
     grid, path = read_from_arguments(rospy.myargv(sys.argv)[1:], params)
     MapServer(params.frame_id, grid, path)
@@ -144,5 +144,5 @@ def body() -> None:
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     run_node("map_server", body)

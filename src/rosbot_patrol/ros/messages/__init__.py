@@ -1,1 +1,1 @@
-"""Conversion between ROS messages and records or arrays."""
+"""Conversion of ROS messages to records and arrays, and back."""

@@ -1,4 +1,4 @@
-"""Conversion between messages and plain records, in pairs, without computation."""
+"""Conversion between messages and plain records, in pairs, without further computation."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rosbot_patrol.scan import LaserScan
 
 
 def time_to_msg(stamp: float) -> rospy.Time:
-    """Seconds as a ROS time."""
+    """Convert seconds to a ROS time."""
     return rospy.Time.from_sec(max(stamp, 0.0))
 
 
@@ -32,7 +32,7 @@ def pose2d_to_pose(pose: Pose2D) -> Pose:
 
 
 def pose2d_from_pose(msg: Pose, what: str = "a pose's orientation") -> Pose2D:
-    """Planar part of a pose; ValueError if a value is not finite. `what` is for the warning of a zero one."""
+    """The planar part of a pose; ValueError if a value is not finite. `what` names it in the warning of a zero one."""
     if not (math.isfinite(msg.position.x) and math.isfinite(msg.position.y)):
         raise ValueError(f"({msg.position.x}, {msg.position.y}) is no position")
     q = msg.orientation
@@ -53,7 +53,7 @@ def pose_from_msg(msg: PoseStamped) -> tuple[Pose2D, str, float]:
 
 
 def initial_pose_from_msg(msg: PoseWithCovarianceStamped) -> PoseRecord:
-    """Pose with its covariance for amcl; ValueError as in `pose2d_from_pose`."""
+    """A pose with its covariance for amcl; ValueError as in `pose2d_from_pose`."""
     pose = pose2d_from_pose(msg.pose.pose, "the orientation of an initial pose")
     covariance = np.array(msg.pose.covariance, dtype=np.float64).reshape(6, 6)
     return PoseRecord(msg.header.frame_id.lstrip("/"), msg.header.stamp.to_sec(), pose, covariance)
@@ -93,12 +93,12 @@ def scan_to_msg(scan: LaserScan) -> LaserScanMsg:
     msg.angle_min, msg.angle_increment = scan.angle_min, scan.angle_increment
     msg.angle_max = scan.angle_min + scan.angle_increment * max(len(scan.ranges) - 1, 0)
     msg.range_min, msg.range_max = scan.range_min, scan.range_max
-    msg.ranges = scan.ranges.astype(np.float32)  # rospy serialises numpy arrays directly
+    msg.ranges = scan.ranges.astype(np.float32)  # rospy packs numpy arrays without conversion
     return msg
 
 
 def scan_from_msg(msg: LaserScanMsg) -> LaserScan:
-    """Record of a scan; a stamp of 0 becomes NaN."""
+    """A scan as a record; a stamp of 0 means none (NaN)."""
     return LaserScan(
         stamp=msg.header.stamp.to_sec() or math.nan,
         frame_id=msg.header.frame_id.lstrip("/"),
@@ -111,7 +111,7 @@ def scan_from_msg(msg: LaserScanMsg) -> LaserScan:
 
 
 def grid_info_to_msg(info: GridInfo, load_time: float = 0.0) -> MapMetaData:
-    """A grid's place and size as nav_msgs/MapMetaData."""
+    """A grid's origin and size as nav_msgs/MapMetaData."""
     msg = MapMetaData()
     msg.map_load_time = time_to_msg(load_time)
     msg.resolution, msg.width, msg.height = info.resolution, info.width, info.height
@@ -120,7 +120,7 @@ def grid_info_to_msg(info: GridInfo, load_time: float = 0.0) -> MapMetaData:
 
 
 def grid_info_from_msg(msg: MapMetaData) -> GridInfo:
-    """A grid's place and size."""
+    """A grid's origin and size."""
     origin = pose2d_from_pose(msg.origin, "the orientation of a map's origin")
     return GridInfo(
         resolution=float(msg.resolution),
@@ -142,7 +142,7 @@ def grid_to_msg(grid: Grid, frame: str, stamp: float, load_time: float = 0.0) ->
 
 
 def grid_from_msg(msg: OccupancyGrid, source: str) -> Grid:
-    """Occupancy grid as int8 cells (-1 unknown, 0 to 100); subscribe with `numpy_msg(OccupancyGrid)`.
+    """An occupancy grid as int8 cells (-1 unknown, 0 to 100); subscribe with `numpy_msg(OccupancyGrid)`.
 
     Args:
         msg: the map.

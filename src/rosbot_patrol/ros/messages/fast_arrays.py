@@ -1,8 +1,7 @@
-"""Fast messages with large arrays: occupancy grids and pose arrays without a Python object per element.
+"""Messages packed by numpy, without a Python object per cell or pose.
 
-A map of 1984 x 1984 cells takes 3 ms this way, against 56 ms through rospy's own lists.
-
-geometry_msgs/PoseArray of thousands of poses, packed by numpy: 0.1 ms instead of 20 for 5,000.
+A map of 1984 x 1984 cells takes 3 ms over a topic or service this way, and 56 ms as rospy's own lists. A
+geometry_msgs/PoseArray of 5,000 poses takes 0.1 ms instead of 20.
 """
 
 from __future__ import annotations
@@ -23,19 +22,19 @@ GridMsg = numpy_msg(OccupancyGrid)
 
 
 class GetMapFast(GetMap):
-    """nav_msgs/GetMap whose answer carries the cells as a numpy array."""
+    """nav_msgs/GetMap with the answer's cells as a numpy array."""
 
     _response_class = numpy_msg(GetMapResponse)
 
 
 class LoadMapFast(LoadMap):
-    """nav_msgs/LoadMap whose answer carries the cells as a numpy array."""
+    """nav_msgs/LoadMap with the answer's cells as a numpy array."""
 
     _response_class = numpy_msg(LoadMapResponse)
 
 
 class SetMapFast(SetMap):
-    """nav_msgs/SetMap whose request carries the cells as a numpy array."""
+    """nav_msgs/SetMap with the request's cells as a numpy array."""
 
     _request_class = numpy_msg(SetMapRequest)
 
@@ -46,7 +45,7 @@ class PoseArrayOfRows(PoseArray):
     __slots__ = ("rows",)
 
     def serialize(self, buff: Any) -> None:
-        """Write the message in its type's format."""
+        """Write the message in the format of its type."""
         frame = self.header.frame_id.encode()
         stamp = self.header.stamp
         head = struct.pack("<3II", self.header.seq, stamp.secs, stamp.nsecs, len(frame))

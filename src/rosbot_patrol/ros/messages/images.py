@@ -9,7 +9,7 @@ from rosbot_patrol.images.encodings import Picture, pack, unpack
 
 
 def picture_from_msg(msg: Image) -> Picture:
-    """Picture of a message; ImageError if encoding or sizes are invalid."""
+    """Convert a message to a picture; ImageError if its encoding or sizes are invalid."""
     return unpack(
         msg.data,
         msg.encoding,

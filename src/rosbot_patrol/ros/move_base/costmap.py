@@ -28,15 +28,15 @@ from rosbot_patrol.ros.runtime.node import Loop
 
 log = logging.getLogger(__name__)
 
-_REPEAT_S = 10.0  # between two log lines about one problem
+_REPEAT_S = 10.0  # between two lines about one problem
 _START_GRACE_S = 3.0  # wall time in which a missing transform is no fault
 
 
 class CostmapNode:
-    """Update loop of a costmap, and its topics: maps and sensors in, `~<name>/` out.
+    """The update loop of a costmap and its topics: maps and sensors in, `~<name>/` out.
 
     Args:
-        costmap: fed and updated from here.
+        costmap: the costmap to feed and update.
     """
 
     def __init__(self, costmap: FedCostmap) -> None:
@@ -94,7 +94,7 @@ class CostmapNode:
 
     @property
     def departed_map(self) -> str:
-        """Topic of a map whose publisher has gone, "" for none."""
+        """Topic of a map that has lost its publisher, "" for none."""
         for layer, subscriber in self._maps:
             if self.costmap.has_map(layer) and subscriber.get_num_connections() == 0:
                 return str(subscriber.resolved_name)
@@ -103,16 +103,16 @@ class CostmapNode:
     # ---- updates
 
     def start(self) -> None:
-        """Start updating."""
+        """Start the updates."""
         self._loop.start()
 
     def configure(self, params: CostmapParams) -> None:
-        """Use other parameters; the caller holds the costmap's lock. Raises ParamError."""
+        """Set new parameters; the caller holds the costmap's lock. Raises ParamError."""
         self.costmap.configure(params)
         self._loop.set_rate(params.update_frequency or 1.0)
 
     def update(self, now: float) -> None:
-        """Update once, and publish."""
+        """Update once, and publish what is due."""
         if self.costmap.params.update_frequency == 0.0:
             return
         found = self.costmap.update(now)

@@ -1,4 +1,4 @@
-"""Action server and simple goal topic of move_base; they only set or clear the goal."""
+"""The action server of move_base and its simple goal topic: they only set or clear the goal."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ log = logging.getLogger(__name__)
 
 
 class GoalRefusedError(Exception):
-    """A goal is refused; the text becomes the action's result text."""
+    """Error: a goal that cannot be pursued; its text becomes the action's result text."""
 
 
 def read_pose(msg: PoseStamped, frame: str, transforms: Frames) -> Pose2D:
-    """Convert a pose for make_plan to a frame; as upstream, with any orientation.
+    """Convert a pose of make_plan to a frame; as upstream, any orientation is accepted.
 
     Raises:
-        GoalRefusedError: a value is not finite, or its frame is unknown.
+        GoalRefusedError: a value is not finite, or the frame is unknown.
     """
     try:
         pose = pose2d_from_pose(msg.pose, "the orientation of a pose for make_plan")
@@ -41,13 +41,13 @@ def read_goal(msg: PoseStamped, frame: str, transforms: Frames) -> Pose2D:
     """Convert a goal message to a frame.
 
     Raises:
-        GoalRefusedError: its quaternion (upstream's text) or position is invalid, or its frame is unknown.
+        GoalRefusedError: its quaternion is invalid (upstream's text), its position is invalid, or its frame is unknown.
     """
     q, p = msg.pose.orientation, msg.pose.position
     length = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w
     if not math.isfinite(length) or length < 1e-6:
         raise GoalRefusedError(BAD_QUATERNION)
-    tilt = 1.0 - 2.0 * (q.x * q.x + q.y * q.y) / length  # upstream wants the z axis up
+    tilt = 1.0 - 2.0 * (q.x * q.x + q.y * q.y) / length  # as upstream, the z axis must point up
     if abs(tilt - 1.0) > 1e-3:
         raise GoalRefusedError(BAD_QUATERNION)
     if not (math.isfinite(p.x) and math.isfinite(p.y)):
@@ -68,10 +68,10 @@ def _in_frame(pose: Pose2D, source: str, frame: str, transforms: Frames) -> Pose
 
 
 class GoalServer:
-    """Accepts goals by the action `move_base` and by `move_base_simple/goal`.
+    """Goals from the action `move_base` and from `move_base_simple/goal`.
 
     Args:
-        frame: target frame of goals.
+        frame: frame of the returned goals.
         transforms: the node's tf listener.
         notify: called, on another thread, when a goal arrives or is cancelled.
     """
@@ -87,7 +87,7 @@ class GoalServer:
         rospy.Subscriber("move_base_simple/goal", PoseStamped, self._on_simple, queue_size=1)
 
     def start(self) -> None:
-        """Start accepting goals."""
+        """Start to accept goals."""
         self._server.start()
 
     def _on_simple(self, msg: PoseStamped) -> None:
@@ -98,16 +98,16 @@ class GoalServer:
 
     @property
     def is_active(self) -> bool:
-        """Whether a goal is active."""
+        """Whether there is an active goal."""
         return bool(self._server.is_active())
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether the active goal was cancelled without a new one."""
+        """Whether the active goal was cancelled and no other follows."""
         return bool(self._server.is_preempt_requested()) and not self._server.is_new_goal_available()
 
     def take(self, now: float) -> Pose2D | None:
-        """Take a new goal in the global frame; None if there is none or it was refused (and the client informed)."""
+        """Take a new goal in the global frame, once; None if there is none or it was refused (and the client told)."""
         if not self._server.is_new_goal_available():
             return None
         goal = self._server.accept_new_goal()
@@ -123,18 +123,18 @@ class GoalServer:
         return pose
 
     def finish(self, outcome: Outcome) -> None:
-        """Send the result to the client."""
+        """Send the client the result."""
         if not self._server.is_active():
             return
         end = self._server.set_succeeded if outcome.succeeded else self._server.set_aborted
         end(MoveBaseResult(), outcome.text)
 
     def preempt(self) -> None:
-        """Confirm the cancelling to the client."""
+        """Send the client the confirmation of its cancel request."""
         if self._server.is_active():
             self._server.set_preempted()
 
     def feedback(self, pose: Pose2D, now: float) -> None:
-        """Send the robot's pose to the client."""
+        """Send the client the robot's pose."""
         if self._server.is_active():
             self._server.publish_feedback(MoveBaseFeedback(base_position=pose_to_msg(pose, self._frame, now)))

@@ -1,17 +1,17 @@
-"""The node move_base (matches move_base 1.17 with costmap_2d, navfn and base_local_planner as their ROS interface).
+"""The node move_base (matches move_base 1.17 with costmap_2d, navfn and base_local_planner in its ROS interface).
 
 Differs:
-    - Planning runs on a copy of the global costmap: neither the control cycle nor the costmap waits for it. The control
-      cycle drives by the local costmap's last update, and does not wait for the one that is under way.
-    - Cancelling works inside recovery behaviours, and at once whatever the controller's frequency.
-    - When a node has died that the pose comes from (amcl, the base), the robot stands at once, not only when its last
-      transform is too old; with `stop_without_map` it also stands while the map server is down.
-    - Scans that say nothing, or of a laser that is tilted, stop the robot as old sensor data do, and are named.
-    - Odometry that is older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
-    - A goal in a frame that tf does not know is aborted at once with the planner's text, instead of after recoveries.
-    - It stands still for somebody whose way it would cross, and goes on when they have passed (`~give_way`).
-    - Topics that nobody listens to are not built.
-    - dynamic_reconfigure: see `tuning`.
+- Planning runs on a copy of the global costmap: neither the control cycle nor the costmap waits for it. The control
+  cycle uses the local costmap's last update, and does not wait for the running one.
+- Cancelling works inside recovery behaviours, and at once whatever the controller's frequency.
+- If a node that the pose depends on (amcl, the base) dies, the robot stops at once, not only when the last transform is
+  too old. With `stop_without_map` it also stops while the map server is down.
+- Scans without information, or from a tilted laser, stop the robot like old sensor data, and are reported.
+- Odometry older than `odom_timeout` stops the robot (upstream drives on with the last velocity).
+- A goal in a frame unknown to tf is aborted at once with the planner's text, instead of after recoveries.
+- The robot gives way to people: it waits until they have passed (`~give_way`).
+- Topics without subscribers are not built.
+- dynamic_reconfigure: see `move_base.tuning`.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ from rosbot_patrol.ros.runtime.transforms import Transforms
 log = logging.getLogger(__name__)
 
 _REPEAT_S = 10.0  # between two lines of one kind
-_NORMAL = {Reason.WAITING, Reason.RECOVERING, Reason.RECOVERED}  # reasons that belong to a drive
-_LOGGED_ELSEWHERE = {Reason.NO_PLAN, Reason.RECOVERY}  # by the navigator
+_NORMAL = {Reason.WAITING, Reason.RECOVERING, Reason.RECOVERED}  # reasons of a normal drive
+_LOGGED_ELSEWHERE = {Reason.NO_PLAN, Reason.RECOVERY}  # the navigator logs them
 _NO_NEWS = {Reason.DRIVING, Reason.PLANNING, *_LOGGED_ELSEWHERE}
-_WITH_FIGURES = {Reason.WAITING, Reason.POSE_UNKNOWN, Reason.SENSORS_OLD}  # whose sentences change all the time
-_CLOCK_NOISE = 1e-4  # of differences of times as floats [s]
+_WITH_FIGURES = {Reason.WAITING, Reason.POSE_UNKNOWN, Reason.SENSORS_OLD}  # their sentences change all the time
+_CLOCK_NOISE = 1e-4  # tolerance for differences of times as floats [s]
 
 
 class MoveBaseNode:
@@ -106,7 +106,7 @@ class MoveBaseNode:
             rospy.Subscriber(topic, LaserScanMsg, self._on_scan, queue_size=1, buff_size=2**18, tcp_nodelay=True)
 
     def run(self) -> None:
-        """Until shutdown."""
+        """Run until shutdown."""
         self._global.start()
         self._local.start()
         self._goals.start()
@@ -116,7 +116,7 @@ class MoveBaseNode:
         rospy.spin()
 
     def _tell_reach(self) -> None:
-        """Say how far goals may be where the global costmap moves with the robot, as with the tutorial's values."""
+        """Log how far goals may be if the global costmap moves with the robot, as with the tutorial's values."""
         shape = self._stack.global_costmap.params
         if shape.rolling_window:
             log.warning(
@@ -184,7 +184,7 @@ class MoveBaseNode:
         if self._navigator.state is State.IDLE:
             self._tell(time)
             return
-        if not self._goals.is_active:  # refused or replaced by one that was refused
+        if not self._goals.is_active:  # refused, or replaced by a refused one
             self._outputs.publish(self._navigator.cancel(), self._controller, time)
             return
         if self._goals.is_cancelled:
@@ -206,7 +206,7 @@ class MoveBaseNode:
         self._tell(time)
 
     def _say(self, cycle: Cycle, outcome: Outcome | None) -> None:
-        """Log why the base does not simply drive; the end of a goal always, another reason once in a while."""
+        """Log why the base does not simply drive; the end of a goal always, other reasons at most once per period."""
         reason = cycle.reason
         kind = reason.value if reason in _WITH_FIGURES else cycle.text
         is_new = reason not in _NO_NEWS and kind != self._said
@@ -217,7 +217,7 @@ class MoveBaseNode:
             log.log(logging.INFO if is_normal else logging.WARNING, "%s%s", cycle.text, more)
 
     def _departed(self) -> str:
-        """Which other node that it cannot drive without has gone, in a sentence; else empty."""
+        """Another necessary node that has died, as a sentence; else empty."""
         gone = self._transforms.departed(self._stack.local_costmap.base_frame)
         if not gone and self._stack.params.stop_without_map:
             topic = self._global.departed_map or self._local.departed_map

@@ -24,13 +24,13 @@ _HEALTH_PERIOD = 1.0
 
 
 class Outputs:
-    """Topics of move_base other than the action's and the costmaps'; without subscribers nothing is built.
+    """The topics of move_base besides the action's and the costmaps'; messages without a subscriber are not built.
 
     Args:
         global_name: namespace of the global planner's plan.
-        local_name: namespace of the local planner's.
-        global_frame: of global plans.
-        local_frame: of what the local planner shows.
+        local_name: namespace of the local planner's plan.
+        global_frame: frame of global plans.
+        local_frame: frame of the local planner's outputs.
     """
 
     def __init__(self, global_name: str, local_name: str, *, global_frame: str, local_frame: str) -> None:
@@ -46,7 +46,7 @@ class Outputs:
         self._cmd.publish(twist_to_msg(twist))
 
     def publish(self, command: Command, controller: LocalPlanner, time: float) -> None:
-        """Publish the results of a navigator's step."""
+        """Publish the results of a navigator step."""
         if command.twist is not None:
             self.send(command.twist)
         if command.recovery is not None:
@@ -73,7 +73,7 @@ class Outputs:
 
 
 class HealthTeller:
-    """Publishes move_base's health on /diagnostics once a second.
+    """Report move_base's health on /diagnostics, once a second.
 
     Args:
         costmaps: the global one and the local one.
@@ -85,7 +85,7 @@ class HealthTeller:
         self._due = float("-inf")
 
     def tell(self, time: float, state: State, reason: str, slow_cycles: int) -> None:
-        """Publish when it is due."""
+        """Publish if it is due."""
         if self._due - _HEALTH_PERIOD <= time < self._due:
             return
         self._due = time + _HEALTH_PERIOD

@@ -15,14 +15,14 @@ log = logging.getLogger(__name__)
 
 
 class PoseUnknownError(PlanningError):
-    """The robot's pose, the start of a plan, is unknown."""
+    """Error: there is no start pose to plan from."""
 
 
 class ThreadedPlans:
     """A PlanSource that plans on a worker thread.
 
     Args:
-        stack: makes the plans.
+        stack: the navigation stack that makes the plans.
     """
 
     def __init__(self, stack: NavigationStack) -> None:
@@ -36,25 +36,25 @@ class ThreadedPlans:
         Worker(self._run, name="planner").start()
 
     def request(self, goal: Pose2D) -> None:
-        """Start planning; the result of an earlier request is dropped."""
+        """Start planning; the result of an earlier request is discarded."""
         with self._wake:
             self._goal, self._result, self._busy = goal, None, True
             self._ticket += 1
             self._wake.notify()
 
     def poll(self) -> PlanResult | None:
-        """Take the result, once."""
+        """Take the result, once; None before it is there."""
         with self._lock:
             result, self._result = self._result, None
             return result
 
     @property
     def is_busy(self) -> bool:
-        """Whether a request is open."""
+        """Whether a request is in progress."""
         return self._busy
 
     def drop(self) -> None:
-        """Drop the open request."""
+        """Discard the request in progress."""
         with self._lock:
             self._ticket += 1
             self._goal, self._result, self._busy = None, None, False

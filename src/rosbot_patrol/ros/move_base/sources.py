@@ -19,7 +19,7 @@ from rosbot_patrol.ros.runtime.node import now
 
 
 def cloud_from_msg(msg: PointCloud2 | PointCloud) -> CloudRecord:
-    """Record of a point cloud; its points are not copied."""
+    """Convert a point cloud to a record; its points are not copied."""
     stamp, frame = msg.header.stamp.to_sec(), msg.header.frame_id.lstrip("/")
     if isinstance(msg, PointCloud):
         return CloudRecord(stamp, frame, msg.points)
@@ -29,7 +29,7 @@ def cloud_from_msg(msg: PointCloud2 | PointCloud) -> CloudRecord:
 
 
 def depth_from_msg(msg: Image) -> DepthRecord:
-    """Record of an image; its bytes are not copied."""
+    """Convert a depth picture to a record; its bytes are not copied."""
     return DepthRecord(
         stamp=msg.header.stamp.to_sec(),
         frame=msg.header.frame_id.lstrip("/"),
@@ -43,7 +43,7 @@ def depth_from_msg(msg: Image) -> DepthRecord:
 
 
 def optics_from_msg(msg: CameraInfo) -> OpticsRecord:
-    """Size and pinhole parameters of a camera."""
+    """The size and pinhole model of a camera."""
     return OpticsRecord(msg.width, msg.height, Optics(msg.K[0], msg.K[4], msg.K[2], msg.K[5]))
 
 
@@ -60,7 +60,7 @@ def range_from_msg(msg: Range) -> RangeRecord:
 
 
 class _DepthTopics:
-    """Topic of a depth camera, and its camera_info until it has arrived."""
+    """The topic of a depth camera, and its camera_info until the first message of it."""
 
     def __init__(self, source: DepthInput) -> None:
         self._input = source
@@ -88,7 +88,7 @@ def _subscribe(topic: str, kind: type, callback: Callable[[Any], None], *, buff_
 
 
 def subscribe_inputs(costmap: FedCostmap) -> None:
-    """Subscribe to the topics of all inputs of a costmap."""
+    """Subscribe to all inputs of a costmap's layers."""
     for each in costmap.inputs:
         if isinstance(each, ScanInput):
             _subscribe(each.topic, LaserScanMsg, _hearer(each, scan_from_msg), buff_size=2**18)

@@ -1,8 +1,8 @@
-"""Parameters of move_base that can change at run time, by dynamic_reconfigure, with upstream's names.
+"""dynamic_reconfigure of move_base: parameters that can be changed at run time, in upstream's namespaces and names.
 
-Differs: `base_global_planner` and `base_local_planner` cannot change (upstream loads another plug-in); the goal
-tolerances of TrajectoryPlannerROS can. Changes of `conservative_reset_dist` and `clearing_rotation_allowed` hold from
-the next recovery on (upstream: from the next start on). A costmap that is resized keeps its map.
+Differs: `base_global_planner` and `base_local_planner` cannot be changed (upstream loads another plug-in); the goal
+tolerances of TrajectoryPlannerROS can. Changes of `conservative_reset_dist` and `clearing_rotation_allowed` apply from
+the next recovery on (upstream: from the next start on). A resized costmap keeps its map.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Tuning:
 
     Args:
         prefix: move_base's name and a slash, for messages.
-        cycle: held while a control cycle runs.
+        cycle: lock held during a control cycle.
     """
 
     def __init__(self, prefix: str, cycle: threading.RLock) -> None:
@@ -83,7 +83,7 @@ class Tuning:
         self._servers: list[ReconfigureServer] = []
 
     def offer_node(self, params: MoveBaseParams, take: Callable[[MoveBaseParams], None]) -> None:
-        """Serve move_base's own parameters; `take` is called with them after a change."""
+        """Offer move_base's own parameters; `take` receives them after a change."""
         now = params
 
         def apply(changes: dict[str, Any]) -> MoveBaseParams:
@@ -97,7 +97,7 @@ class Tuning:
         self._servers.append(ReconfigureServer("", params, MOVE_BASE, apply))
 
     def offer_planner(self, space: str, planner: GlobalPlanner | LocalPlanner) -> None:
-        """Serve a planner's parameters, if it has any; a plan in progress uses the old ones."""
+        """Offer a planner's parameters, if it supports changes; a plan in progress uses the old ones."""
         names, params = getattr(planner, "tunable", ()), getattr(planner, "params", None)
         if not names or params is None:
             return
@@ -109,7 +109,7 @@ class Tuning:
         self._servers.append(ReconfigureServer(space, params, names, apply))
 
     def offer_costmap(self, node: CostmapNode, after: Callable[[], None]) -> None:
-        """Serve the parameters of a costmap and its layers; `after` is called when its own have changed."""
+        """Offer the parameters of a costmap and its layers; `after` is called after a change of its own."""
         costmap = node.costmap
 
         def apply(changes: dict[str, Any]) -> CostmapParams:

@@ -1,4 +1,4 @@
-"""Programs started by hand: they end with a sentence if a required program is missing; under roslaunch they wait."""
+"""Programs typed by hand: without a ROS master they end with one sentence; launched by roslaunch, they wait."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PATIENCE = 5.0  # [s]
 
 
 class NobodyThere(PatrolError):
-    """A required program is not running."""
+    """Error: a program that should answer is not running."""
 
 
 def is_launched() -> bool:
@@ -25,12 +25,12 @@ def is_launched() -> bool:
 
 
 def require_master(program: str, *, patience: float = PATIENCE, status: int = 1) -> None:
-    """End the program with one sentence if no ROS master answers; under roslaunch do nothing.
+    """End the program with one sentence if no ROS master answers; no effect under roslaunch.
 
     Args:
         program: its name.
-        patience: how long to wait for the master [s].
-        status: the exit status.
+        patience: longest wait for the master [s].
+        status: exit status.
     """
     problem = "" if is_launched() else master_problem(patience)
     if problem:
@@ -39,7 +39,7 @@ def require_master(program: str, *, patience: float = PATIENCE, status: int = 1)
 
 
 def master_problem(patience: float = PATIENCE) -> str:
-    """Reason why no ROS master is available, "" if one answers within `patience` [s]."""
+    """Reason why no ROS master can be asked, "" if one answers within `patience` [s]."""
     uri = ""
     try:
         uri = rosgraph.get_master_uri()
@@ -47,7 +47,7 @@ def master_problem(patience: float = PATIENCE) -> str:
     except (ValueError, OSError):
         return f"ROS_MASTER_URI is '{uri}', expected http://HOST:PORT"
     answered = threading.Event()
-    # On a thread: an unresolvable host or a silent port would block for minutes.
+    # On a thread: an unresolvable host or a port that never answers would block for minutes.
     threading.Thread(target=_ask, args=(master, answered, time.monotonic() + patience), daemon=True).start()
     if answered.wait(patience):
         return ""
@@ -63,11 +63,11 @@ def _ask(master: Any, answered: threading.Event, until: float) -> None:
 
 
 def require_publisher(subscriber: rospy.Subscriber, who: str, *, patience: float = PATIENCE) -> None:
-    """Wait until a topic has a publisher.
+    """Wait until somebody publishes the subscriber's topic.
 
     Args:
-        subscriber: of the topic.
-        who: name of the program that should publish it.
+        subscriber: subscriber of the topic.
+        who: the program that should publish it.
         patience: longest wait [s].
 
     Raises:

@@ -20,10 +20,10 @@ OK, WARN, ERROR, STALE = (
 
 
 class Health:
-    """One status for each part of a node, published at 1 Hz, and at once when a level changes.
+    """Keep one status per part of a node; publish all at 1 Hz, and at once if a level changes.
 
     Args:
-        hardware_id: hardware of the node, "" for none.
+        hardware_id: name of the hardware that the node serves, "" for none.
     """
 
     def __init__(self, hardware_id: str = "") -> None:
@@ -51,7 +51,7 @@ class Health:
             self._changed.set()
 
     def drop(self, part: str) -> None:
-        """Remove a part, such as a client that has gone."""
+        """Forget a part, such as a client that has disconnected."""
         with self._lock:
             self._parts.pop(part, None)
 

@@ -1,8 +1,8 @@
-"""Handshakes of new links on threads of their own, so that a silent peer blocks nobody.
+"""Guard against silent connections: each new link to a node is greeted on a thread of its own.
 
-rospy's server reads the header of a new link on the only thread that accepts links, and without a time limit. If a
-node's port belonged to another node a moment ago, the master may still send XML-RPC requests there. The first four
-bytes of such a request stand for a header of 1.4 GB, and the node then accepts no subscriber and no call any more.
+rospy's server reads the header of a new link on its only accepting thread, and waits without a time limit. If another
+node used this port a moment ago, the master may still send that node's XML-RPC request here. rospy takes its first four
+bytes for a header length of 1.4 GB. The node then accepts no more subscribers and no more calls.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from typing import Any
 import rospy
 from rospy.impl.tcpros_base import TCPROSServer
 
-PATIENCE_S = 10.0  # time for a whole header
-LARGEST = 1 << 20  # bytes of a header; the largest part is the text of a message's definition
+PATIENCE_S = 10.0  # for a whole header, however many pieces it comes in
+LARGEST = 1 << 20  # bytes of a header; most of it is the text of the message definition
 
 _read_header_and_serve = TCPROSServer._tcp_server_callback
 
 
 def install() -> None:
-    """Greet each new link of this process on its own thread; call it before `rospy.init_node`."""
+    """Greet each new link of this process on a thread of its own; call before `rospy.init_node`."""
     TCPROSServer._tcp_server_callback = _accept
 
 
@@ -31,7 +31,7 @@ def _accept(server: Any, link: socket.socket, address: tuple[Any, ...]) -> None:
 
 
 def _greet(server: Any, link: socket.socket, address: tuple[Any, ...]) -> None:
-    link.settimeout(PATIENCE_S)  # until rospy takes over the link and makes it blocking
+    link.settimeout(PATIENCE_S)  # until rospy takes the link and makes it blocking
     try:
         first = link.recv(4, socket.MSG_PEEK)
     except OSError as err:

@@ -1,4 +1,4 @@
-"""Exchange of values between callbacks, which store, and steps, which read."""
+"""Inputs that a callback stores and a step reads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class Latest(Generic[T]):
-    """The newest value of an input, with the time it was stored; thread-safe."""
+    """The newest value of an input and the time it was stored; thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -28,31 +28,32 @@ class Latest(Generic[T]):
         return self._value
 
     def take(self) -> T | None:
-        """Remove and return the newest value."""
+        """Take the newest value; the next call returns None until another comes."""
         with self._lock:
             value, self._value = self._value, None
             return value
 
     @property
     def stamp(self) -> float:
-        """When the newest value was stored [s], -inf before the first."""
+        """Time when the newest value was stored [s], -inf before the first."""
         return self._stamp
 
     @property
     def count(self) -> int:
-        """Number of values stored so far."""
+        """Number of values received."""
         return self._count
 
     def fresh(self, now: float, timeout: float) -> bool:
         """Whether the newest value is at most `timeout` [s] old.
 
-        One that came after `now` was read is fresh; a clock that went back by more than the time-out counts as stale.
+        A value that came after `now` was read is fresh. A clock that went back by more than the time-out counts as
+        stale.
         """
         return self._value is not None and abs(now - self._stamp) <= timeout
 
 
 def drain(source: deque[T]) -> list[T]:
-    """Take everything from a queue, while others may append to it."""
+    """Take all values of a queue, while others may append to it."""
     items = []
     while source:
         items.append(source.popleft())

@@ -1,4 +1,4 @@
-"""Log records of the pure modules (`logging.getLogger("rosbot_patrol...")`) on the console and /rosout."""
+"""Log handler that brings the pure modules' records (`getLogger("rosbot_patrol...")`) to the console and /rosout."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _ToRosout(logging.Handler):
 
 
 class LineThrottle:
-    """Limits the rate of each kind of line and counts those held back, so that no line buries the others.
+    """Rate limit per kind of log line, which counts the suppressed lines.
 
     Args:
         period: shortest time between two lines of a kind [s].
@@ -35,7 +35,7 @@ class LineThrottle:
         self._held_back: dict[str, int] = {}
 
     def due(self, kind: str, now: float) -> str | None:
-        """Suffix for a line of that kind (how often it was held back since the last); None: hold it back."""
+        """Text to append to a line of that kind: number suppressed since the last; None: suppress this one too."""
         if 0.0 <= now - self._said.get(kind, -math.inf) < self._period:
             self._held_back[kind] = self._held_back.get(kind, 0) + 1
             return None
@@ -45,7 +45,7 @@ class LineThrottle:
 
 
 def install() -> None:
-    """Send every record of this package to the logger `rosout`; call it once, after `init_node`."""
+    """Pass every record of this package to the logger `rosout`; call once, after `init_node`."""
     package = logging.getLogger("rosbot_patrol")
     if not any(isinstance(h, _ToRosout) for h in package.handlers):
         package.addHandler(_ToRosout())
@@ -55,10 +55,10 @@ def install() -> None:
 
 
 def _answer_rospy() -> None:
-    """Answer in advance what rospy asks the master at each log line: does /rosout omit the node's topics?
+    """Cache the parameter that rospy asks the master for at each log line: whether /rosout lists the node's topics.
 
-    Only a parameter that is set enters rospy's cache. Without an entry each line waits for the master: 2 ms, 100 ms on
-    a busy machine, and for ever if the master hangs. The parameter's value at the start counts.
+    rospy caches only a parameter that is set. Without an entry each line waits for the master: 2 ms, 100 ms on a busy
+    machine, forever if the master hangs. Later changes of the parameter have no effect.
     """
     value = rospy.get_param(_OMIT_TOPICS, False)
     get_param_server_cache().set(rospy.resolve_name(_OMIT_TOPICS), value)

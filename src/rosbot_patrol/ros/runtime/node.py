@@ -1,4 +1,4 @@
-"""Start of all nodes, their failure at start in one sentence, and a loop on wall or ROS time."""
+"""Start and end of a node, and its loop on wall or ROS time."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ def run_node(
     """Start a node and run `body`; a PatrolError or a bad file is logged in one sentence and the program exits 1.
 
     Args:
-        name: name of the node, unless the launch file gives one.
+        name: name of the node if the launch file gives none.
         body: builds and runs it; returns on shutdown.
-        priority: among the processes of the machine, if the system permits it.
-        by_hand: the program is also started by hand: without a ROS master it ends, unless roslaunch started it.
+        priority: among the processes of the machine, as far as the system permits.
+        by_hand: people type this program: it ends if there is no ROS master, unless roslaunch started it.
         init_options: further arguments of `rospy.init_node`.
     """
     if by_hand:
         require_master(name)
-    refused = take(priority)  # before there are other threads: they inherit it
+    refused = take(priority)  # before any thread starts: threads inherit it
     greeting.install()
     rospy.init_node(name, **init_options)
     logs.install()
@@ -61,21 +61,21 @@ def run_node(
         ending.finish()
     except (PatrolError, OSError) as err:
         rospy.logfatal("%s: %s", rospy.get_name(), err)
-        time.sleep(0.3)  # /rosout is sent by another thread
+        time.sleep(0.3)  # another thread sends /rosout
         rospy.signal_shutdown(str(err))
         sys.stdout.flush()
         os._exit(1)
-    except rospy.ROSException:  # sleeping or publishing while the node ends; topics close before is_shutdown is set
+    except rospy.ROSException:  # sleep or publish during shutdown; topics close before is_shutdown is true
         if not is_shutdown_requested():
             raise
         ending.finish()
 
 
 class _Ending:
-    """Ends the node on its own thread when a signal arrives.
+    """End the node on a thread of its own when a signal comes.
 
-    rospy does so within the signal handler, on the main thread. If that thread is just waiting for the master, it holds
-    rospy's lock of the master, and the node never ends. The main thread must not block without checking
+    rospy ends it within the signal handler, on the main thread. If that thread just waits for the master, it holds
+    rospy's lock around the master, and the node never ends. The main thread must not block without checking
     `rospy.is_shutdown`.
     """
 
@@ -89,7 +89,7 @@ class _Ending:
         threading.Thread(target=self._work, name="ending", daemon=True).start()
 
     def finish(self) -> None:
-        """Let a shutdown in progress inform the master."""
+        """Let a running shutdown unregister at the master."""
         if self._has_come:
             self._done.wait(5.0)
 
@@ -109,19 +109,19 @@ class _Ending:
 
 
 def load_params(cls: type[T], *, ignore: Iterable[str] = (), tree: dict[str, Any] | None = None) -> T:
-    """Load the node's private parameters by their declaration (one round trip to the master)."""
+    """Load the node's private parameters through their declaration (one round trip to the master)."""
     if tree is None:
         tree = rospy.get_param("~", {}) or {}
     return params.load(cls, tree, name=rospy.get_name() + "/", ignore=ignore)
 
 
 def ros_home() -> Path:
-    """Folder of a user's ROS files."""
+    """ROS's folder for a user's files."""
     return Path(os.environ.get("ROS_HOME") or "~/.ros").expanduser()
 
 
 def sender_of(message: object) -> str:
-    """Name of the node that published a message, "" if it did not come by a topic."""
+    """Name of the node that published a message, "" if it did not come from a topic."""
     header = getattr(message, "_connection_header", None) or {}
     return str(header.get("callerid", ""))
 
@@ -132,10 +132,10 @@ def now() -> float:
 
 
 class Worker(threading.Thread):
-    """A thread that a node cannot work without: any exception that leaves it is logged and ends the node.
+    """A thread that the node needs: an exception that leaves it is logged and ends the node.
 
-    No node looks alive with a part of it dead; the launch file's respawn restarts it as a whole. `run_node` provides
-    for that.
+    Otherwise the node would look alive with half of it dead; the launch file's respawn restarts it whole. `run_node`
+    ends the process.
     """
 
     def __init__(self, target: Callable[[], None] | None = None, *, name: str) -> None:
@@ -148,15 +148,15 @@ def _end_with_worker(args: threading.ExceptHookArgs) -> None:
             return
         what = (args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback)
         log.critical("%s: '%s' failed, the node ends", rospy.get_name(), args.thread.name, exc_info=what)
-        time.sleep(0.3)  # /rosout is sent by another thread
+        time.sleep(0.3)  # another thread sends /rosout
         os._exit(1)
     threading.__excepthook__(args)
 
 
 class Loop(Worker):
-    """Calls `step(now)` at a rate of ROS time on its own thread; it does not hang when simulated time stops.
+    """Call `step(now)` at a rate of ROS time on its own thread; it does not hang if simulated time stops.
 
-    A step that takes too long is followed by the next one at once; the loop does not catch up.
+    After a step that takes too long the next follows at once; missed steps are not repeated.
     """
 
     def __init__(self, rate: float, step: Callable[[float], None], *, name: str = "loop") -> None:
@@ -166,11 +166,11 @@ class Loop(Worker):
         self._hurried = False
 
     def set_rate(self, rate: float) -> None:
-        """Use another rate from the next step on."""
+        """Change the rate from the next step on."""
         self._period = 1.0 / rate
 
     def hurry(self) -> None:
-        """Run an extra step at once; callable from any thread."""
+        """Request an extra step at once; callable from any thread."""
         self._hurried = True
 
     def run(self) -> None:
@@ -189,5 +189,5 @@ class Loop(Worker):
             self._step(current)
 
     def _wait(self, seconds: float) -> None:
-        # Simulated time may run faster or slower than the wall: check often, never block for ever.
+        # Simulated time may run faster or slower than the wall: check often, never block for long.
         time.sleep(min(max(seconds / 3.0, 0.001), 0.01))

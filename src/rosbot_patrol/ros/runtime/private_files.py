@@ -1,7 +1,7 @@
-"""Private files: pictures of the house and notices are readable only by the robot's user.
+"""Privacy of files: pictures of the house and the owner's addresses are readable by the robot's user only.
 
-A program that writes into a `state_dir` calls `keep_private` first. Other files are not touched: maps, rooms and ROS's
-own logs keep the mode given by the user's umask, unless such a program writes them.
+A program that writes into a `state_dir` calls `keep_private` first. Files outside are not touched: maps, rooms and
+ROS's own logs keep the mode of the user's umask, unless such a program writes them.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ _MAILDIR = ("cur", "new", "tmp")
 
 
 def use_private_umask() -> None:
-    """Make all files written from now on readable by the user only."""
+    """Make all files that this program writes from now on readable by its user only."""
     os.umask(UMASK)
 
 
 def keep_private(state_dir: Path) -> None:
-    """Make all files written from now on, and those already in `state_dir`, readable by the user only.
+    """Make this program's future files, and the patrol's existing files in `state_dir`, readable by its user only.
 
-    Only the patrol's own entries are changed: other things in that folder (a home, /tmp) stay as they are. Entries that
-    cannot be changed are logged; the program continues.
+    Only the patrol's own files are changed: other things in that folder (a home, /tmp) stay as they are. Files that
+    cannot be changed are reported; the program goes on.
     """
     use_private_umask()
     try:
@@ -63,7 +63,7 @@ def _tighten(state_dir: Path, loose: list[Path]) -> None:
 
 
 def _sort(state_dir: Path) -> tuple[list[Path], list[str]]:
-    """The patrol's own entries with everything below, and the names of other entries. Raises OSError."""
+    """The patrol's files with all below, and the names of other things there. Raises OSError."""
     ours: list[Path] = []
     foreign: list[str] = []
     for entry in os.scandir(state_dir):

@@ -1,6 +1,6 @@
-"""Priority and memory of a node's process.
+"""Process settings: the node's priority on its machine, and its memory.
 
-Memory matters for nodes that work on large arrays, or pictures, in several threads.
+The memory part is for nodes that work on large arrays or pictures in several threads.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import os
 from pathlib import Path
 
 _AUTOGROUP = Path("/proc/self/autogroup")
-_RR = 1  # the lowest real-time priority: before all ordinary processes
+_RR = 1  # lowest real-time priority: before all ordinary threads, behind other real-time ones
 
 
 class Priority(enum.Enum):
-    """Priority of a node, with its nice value."""
+    """Priority of a node among other processes: its nice value."""
 
     ORDINARY = 0
     RAISED = -5  # before other ordinary processes
@@ -24,15 +24,15 @@ class Priority(enum.Enum):
 
 
 def take(priority: Priority) -> str:
-    """Set the priority of the calling thread, and of the threads that it starts from now on.
+    """Set the priority of the calling thread and of the threads that it starts later.
 
-    Linux shares the processor between sessions first (sched(7), autogroup), and roslaunch gives each node its own: a
-    nice value then counts only among the node's own threads, and what counts before others is that of the session. A
-    nice value gives a share, too, not promptness: Python's threads wait for each other, and with ten busy processes
-    beside it one cycle of move_base in a thousand took 37 ms at nice -15, and 13 ms with SCHED_RR.
+    Linux shares the processor between sessions first (sched(7), autogroup), and roslaunch gives each node its own. A
+    nice value then counts only among the node's own threads; against other processes the session's value counts. A nice
+    value also gives a share, not promptness: Python's threads wait for each other. With ten busy processes beside it,
+    one cycle of move_base in a thousand took 37 ms at nice -15, and 13 ms with SCHED_RR.
 
     Returns:
-        What was not permitted, in a sentence; empty where all was.
+        What was not permitted, as a sentence; empty if all was.
     """
     if priority is Priority.ORDINARY:
         return ""
@@ -64,20 +64,20 @@ LARGE = 1 << 20  # [bytes]
 
 
 def share_one_heap() -> bool:
-    """Let all threads share one heap; call it before there are any.
+    """Let all threads allocate from one heap; call before any thread starts.
 
-    Otherwise glibc gives threads places of their own, each of which keeps what it has ever used: republish came to 178
-    instead of 172 MB within a quarter of an hour. Python's lock keeps the threads from waiting for one another there.
-    Returns whether the C library knows of it.
+    Otherwise glibc gives threads heaps of their own, and each keeps the most it has ever used: republish grew from 172
+    to 178 MB within a quarter of an hour. Python's lock keeps the threads from waiting for each other there. Returns
+    False if the C library does not support it.
     """
     return _set_option(_M_ARENA_MAX, 1)
 
 
 def give_back_large_blocks(size: int = LARGE) -> bool:
-    """Return freed blocks of at least a size [bytes] to the system at once (mallopt(3) of glibc).
+    """Return freed blocks of at least `size` [bytes] to the system at once (mallopt(3) of glibc).
 
-    Otherwise glibc raises that bound to 32 MB by itself, and each thread keeps what it has ever used: the copies of a
-    costmap of 12 million cells came to 600 MB. Returns whether the C library knows of it.
+    Otherwise glibc raises that bound to 32 MB by itself, and each thread keeps the most it has ever used: the copies of
+    a costmap of 12 million cells took 600 MB. Returns False if the C library does not support it.
     """
     done = _set_option(_M_MMAP_THRESHOLD, size)
     if not done:

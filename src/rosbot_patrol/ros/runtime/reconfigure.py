@@ -1,13 +1,13 @@
-"""dynamic_reconfigure servers for parameters that can change at run time, made from our declarations.
+"""dynamic_reconfigure servers made from our parameter declarations.
 
 Matches dynamic_reconfigure 1.7's servers from outside (`set_parameters`, `parameter_descriptions`,
 `parameter_updates`): `dynparam`, its Python client and rqt_reconfigure work with them.
 
 Differs:
-    - The changeable parameters come from the declarations; there are no .cfg files.
-    - A request with an unknown name or a value of another type is refused as a whole, with a sentence; upstream applies
-      the rest. Values out of bounds are clamped, as upstream, with a warning.
-    - The parameter server receives only changes, not everything at the start.
+- The parameters' declarations say what can be changed; there are no .cfg files.
+- A request with an unknown name or a value of another type is refused as a whole, with a sentence; upstream takes the
+  valid part of it. A value out of bounds is clamped, as upstream, and reported.
+- Only changed values are written to the parameter server, not all of them at the start.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ _GROUP = {"name": "Default", "id": 0, "parent": 0, "type": "", "state": True, "g
 
 
 class ReconfigureServer:
-    """Server for one namespace of parameters.
+    """The server for one namespace of parameters.
 
     Args:
-        namespace: below the node's own, "": the node itself; one with a leading slash is absolute.
-        params: present parameters, a dataclass.
-        names: of the changeable ones.
-        apply: applies changed values and returns all parameters; raises ParamError.
+        namespace: below the node's own, "" for the node itself; absolute if it begins with a slash.
+        params: the current parameters, a dataclass.
+        names: names of the parameters that can be changed.
+        apply: takes the changed values, returns all parameters after the change; raises ParamError.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class ReconfigureServer:
                 rospy.set_param(f"{self._space}/{name}", value)
 
     def _wanted(self, config: Config) -> dict[str, Any]:
-        """Requested values, checked and clamped."""
+        """Values of a request, checked and clamped."""
         given = {item.name: item.value for item in (*config.bools, *config.ints, *config.strs, *config.doubles)}
         if given.pop(RESTORE, False):
             return dict(self._first)

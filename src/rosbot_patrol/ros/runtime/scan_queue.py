@@ -1,4 +1,4 @@
-"""Queue between the scan topic and the thread that waits for scans and tf (tf's MessageFilter, without its locks)."""
+"""Queue of scans with its own waiting for scans and tf (tf's MessageFilter, without its locks)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ POLL_S, IDLE_S = 0.008, 0.2
 
 
 class ScanQueue:
-    """A ScanFeed that is filled by a subscriber and emptied by a worker.
+    """A ScanFeed that a subscriber fills and a worker reads.
 
     Args:
-        feed: judges and places the scans.
+        feed: checks and places the scans.
     """
 
     def __init__(self, feed: ScanFeed) -> None:
@@ -25,12 +25,12 @@ class ScanQueue:
         self._arrived = threading.Event()
 
     def put(self, scan: LaserScan) -> None:
-        """Add a scan; called by the subscriber."""
+        """Add a scan; the subscriber calls it."""
         if self._feed.hear(scan, now(), time.monotonic()):
             self._arrived.set()
 
     def take(self) -> PlacedScan | None:
-        """Take the oldest scan that can be placed, None if there is none; waits for a few milliseconds at most."""
+        """Take the oldest scan that can be placed, None if there is none; waits a few milliseconds at most."""
         if not len(self._feed):
             self._arrived.wait(IDLE_S)
         self._arrived.clear()

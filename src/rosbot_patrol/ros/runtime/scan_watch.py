@@ -1,4 +1,4 @@
-"""Supervision of the scan topic, for amcl and slam_gmapping: silence, unusable scans, and a clock set back."""
+"""Watch of amcl and slam_gmapping over the lidar (silent or invalid scans) and the clock (jumps back)."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from rosbot_patrol.scan_check import ScanCheck
 
 log = logging.getLogger(__name__)
 
-PATIENCE_S = 1.0  # single unusable scans among good ones are only logged
-SILENT_S = 15.0  # silence after which the lidar is reported, as in upstream's amcl
+PATIENCE_S = 1.0  # single bad scans among good ones are only logged
+SILENT_S = 15.0  # silence of the lidar that raises a warning, as in upstream's amcl
 
 
 class ScanWatch:
-    """Supervises the topic `scan` of a node that depends on it.
+    """Watch over the topic `scan`.
 
     Args:
-        transforms: forgotten when time goes back.
-        check: judges the scans.
+        transforms: cleared when time goes back.
+        check: checks the scans.
     """
 
     def __init__(self, transforms: Transforms, check: ScanCheck) -> None:
@@ -29,22 +29,22 @@ class ScanWatch:
         self._last_scan = self._last_time = now()
 
     def hear(self) -> None:
-        """Record a scan."""
+        """Record that a scan came."""
         self._last_scan = now()
 
     def tend(self, current: float) -> str:
-        """Check the clock and the lidar; call it about every second.
+        """Check the clock and the lidar; call about once a second.
 
         Args:
             current: time now [s].
 
         Returns:
-            Problem of the lidar, "" for none.
+            What is wrong with the lidar, "" if it sends valid scans.
         """
         if current < self._last_time - 1.0:
             log.warning("time went back by %.1f s: old transforms are forgotten", self._last_time - current)
             self._transforms.buffer.clear()
-        if abs(current - self._last_time) > SILENT_S:  # the clock was set; this is no silence
+        if abs(current - self._last_time) > SILENT_S:  # the clock was set; that is no silence of the lidar
             self._last_scan = current
         self._last_time = current
         silent = current - self._last_scan

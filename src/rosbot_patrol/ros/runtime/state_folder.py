@@ -1,4 +1,4 @@
-"""State folder of a guard, one for each guard of a machine."""
+"""Folder of a guard's state: one per guard on a machine."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from rosbot_patrol.ros.runtime.node import ros_home
 
 log = logging.getLogger(__name__)
 
-_PATIENCE = 5.0  # [s] for the previous program to end
-_held: list[IO[str]] = []  # the locks last as long as the process
+_PATIENCE = 5.0  # [s] for a program before this one to end
+_held: list[IO[str]] = []  # locks must last as long as the process
 
 
 def state_folder(given: str | Path | None, namespace: str) -> Path:
-    """Folder of a guard's state: the given one, else one in ROS's home for each namespace.
+    """Folder of a guard's state: the given one, else one per namespace below ROS's home.
 
     Args:
-        given: the parameter `state_dir`, empty: the default.
-        namespace: of the guard's nodes; "/": none.
+        given: the parameter `state_dir`, empty for the default.
+        namespace: namespace of the guard's nodes; "/" for none.
     """
     if given:
         return Path(given).expanduser()
@@ -30,16 +30,16 @@ def state_folder(given: str | Path | None, namespace: str) -> Path:
 
 
 def claim_folder(folder: Path, name: str) -> None:
-    """Lock a guard's state folder for this process, so that no second guard uses it.
+    """Lock a guard's state folder for this process, so that a second guard cannot mix its missions with ours.
 
-    A folder that cannot be written is not locked: the programs that write there report it.
+    An unwritable folder is not locked; the program that writes there reports it.
 
     Args:
-        folder: of the state.
-        name: of its parameter, for the error.
+        folder: folder of the state.
+        name: name of its parameter, for the error.
 
     Raises:
-        ParamError: another patrol on this machine uses it.
+        ParamError: another patrol of this machine uses it.
     """
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""tf at the edge: planar look-ups that never wait, and one listener per node."""
+"""tf: planar look-ups that never wait, through one listener per node."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from rosbot_patrol.geometry import Pose2D, Transform
 
 
 class _Listener(tf2_ros.TransformListener):
-    """A listener that also stores which node published each frame."""
+    """A listener that also records which node published each frame."""
 
     def __init__(self, buffer: tf2_ros.Buffer) -> None:
-        self.told: dict[str, tuple[str, str]] = {}  # frame: (its parent, name of the node)
+        self.told: dict[str, tuple[str, str]] = {}  # frame: (its parent, name of the node that publishes it)
         super().__init__(buffer, tcp_nodelay=True)
 
     def callback(self, data: TFMessage) -> None:
-        """Store moving transforms."""
+        """Store dynamic transforms."""
         super().callback(data)
         who = data._connection_header.get("callerid", "")
         for each in data.transforms:
             self.told[each.child_frame_id.lstrip("/")] = (each.header.frame_id.lstrip("/"), who)
 
     def connected(self) -> set[str]:
-        """Names of the nodes with a live connection; rospy drops a connection as soon as its other end dies."""
+        """Names of the nodes that publish transforms; rospy drops a connection as soon as its other end dies."""
         return {getattr(connection, "callerid_pub", "") for connection in self.tf_sub.impl.connections}
 
 
 class Transforms:
-    """Looks up planar transforms; frames may carry tf1's leading slash."""
+    """Look-up of planar transforms; frames may have tf1's leading slash."""
 
     def __init__(self, cache_s: float = 10.0) -> None:
         self.buffer = tf2_ros.Buffer(rospy.Duration.from_sec(cache_s))
         self._listener = _Listener(self.buffer)
 
     def departed(self, frame: str) -> str:
-        """Sentence about a publisher of the frames above this one that has gone; else empty.
+        """Publishers of a frame's position, or of a frame above it, that have died, as a sentence; else empty.
 
-        This is known much sooner than the age of a transform: within milliseconds on one host.
+        This is known much earlier than the age of a transform shows: within milliseconds on one host.
         """
         connected = self._listener.connected()
         frame, seen = frame.lstrip("/"), set[str]()
@@ -63,7 +63,7 @@ class Transforms:
         return self._find(target, source, when)[0]
 
     def lookup(self, target: str, source: str, stamp: float | None = None) -> Pose2D:
-        """Look up the planar part of `transform`; raises as that does."""
+        """Look up the planar part of `transform`; raises TransformError."""
         return self.transform(target, source, stamp).pose
 
     def lookup_matrix(self, target: str, source: str, stamp: float) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Messages of the supervision of sensors: /sensors/states, /sensors/events and /diagnostics."""
+"""Messages of the sensor supervision: /sensors/states, /sensors/events and /diagnostics."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def state_text(status: SensorStatus) -> str:
 
 
 def summary(statuses: list[SensorStatus], watch: Supervisor) -> tuple[int, str]:
-    """Level and sentence for all sensors."""
+    """Level and sentence for all sensors together."""
     expected = [s for s in statuses if s.watched]
     bad = [str(s.sensor_id) for s in statuses if s.problems and watch.sensors.find(s.sensor_id) is not None]
     unknown = [str(s.sensor_id) for s in statuses if s.problems and watch.sensors.find(s.sensor_id) is None]
@@ -54,7 +54,7 @@ def summary(statuses: list[SensorStatus], watch: Supervisor) -> tuple[int, str]:
 
 
 def event_to_msg(event: Event, watch: Supervisor) -> SensorEvent:
-    """Message of an event."""
+    """Convert an event of the supervisor."""
     key = event.problem.key
     message = SensorEvent(
         kind=key.kind_name, active=event.active, id=max(key.sensor_id, 0), room=-1, bridge=event.problem.bridge
@@ -70,7 +70,7 @@ def event_to_msg(event: Event, watch: Supervisor) -> SensorEvent:
 
 
 def look_to_msg(look: Look, watch: Supervisor) -> SensorEvent:
-    """Message of a request to look."""
+    """Convert a request to look into a room."""
     message = SensorEvent(kind=SensorEvent.LOOK, active=True, id=look.sensor_id, room=look.room, text=look.text)
     message.room_name = watch.sensors.room_name(look.room)
     message.header.stamp = message.since = rospy.Time.now()
@@ -78,7 +78,7 @@ def look_to_msg(look: Look, watch: Supervisor) -> SensorEvent:
 
 
 def states_to_msg(statuses: list[SensorStatus], watch: Supervisor) -> SensorStates:
-    """Message with all sensors."""
+    """Convert the states of all sensors."""
     message = SensorStates(sensors=[_state(status, watch) for status in statuses])
     for name, is_there in watch.bridges().items():
         (message.bridges if is_there else message.bridges_gone).append(name)
@@ -113,10 +113,10 @@ def _ago(seconds: float) -> rospy.Time:
 
 
 class Reports:
-    """Entries on /diagnostics: one per sensor, by name, one per bridge, one for all.
+    """The entries of /diagnostics: one per sensor by name, one per bridge, one for all.
 
     Args:
-        health: of the node.
+        health: the node's health.
     """
 
     def __init__(self, health: Health) -> None:
@@ -124,7 +124,7 @@ class Reports:
         self._parts: set[str] = set()
 
     def update(self, statuses: list[SensorStatus], watch: Supervisor) -> None:
-        """Publish the present states."""
+        """Set the entries to the current states."""
         parts = {self._sensor(status, watch) for status in statuses}
         for name, is_there in watch.bridges().items():
             part = f"bridge {name.strip('/')}"

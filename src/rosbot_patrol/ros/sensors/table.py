@@ -1,8 +1,8 @@
-"""sensors: prints a table of all motion sensors, as known to sensor_watch.
+"""sensors: prints a table of all motion sensors from sensor_watch's messages.
 
 rosrun rosbot_patrol sensors [--follow]
 
-Exit status: 0 where all are well, 1 where one is not, 2 where nobody tells.
+Exit status: 0 if all are well, 1 if one is not, 2 if no message comes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ WELL = ("ok", "waiting", "disabled", "unwatched")
 
 
 def table(message: SensorStates) -> str:
-    """One line per sensor, with its problems below, and the sentence about all of them."""
+    """Format one line per sensor, its problems below, and the sentence about all of them."""
     rows = [HEAD, *(_row(sensor) for sensor in message.sensors)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEAD))]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
@@ -52,7 +52,7 @@ def _ago(seconds: float) -> str:
 
 
 def main() -> None:
-    """Print once, or with --follow whenever something changes."""
+    """Print once, or after each change with --follow."""
     parser = argparse.ArgumentParser(prog="sensors", description="Prints all motion sensors and how they are.")
     parser.add_argument("--follow", action="store_true", help="print again whenever something is told")
     parser.add_argument(

@@ -1,11 +1,12 @@
-"""sensor_watch: supervises the motion sensors, and notifies the owner when one fails.
+"""sensor_watch: supervises the motion sensors; reports a faulty one on its topics and to the owner.
 
-Listens to /motion_trigger, whoever publishes there, to the bridges' /sensors/links and to the patrol's /patrol/alive: a
-patrol that is dead or hangs cannot report itself. The patrol's /patrol/arming says which rooms are guarded; until it is
-heard, and after the patrol has gone, all are. Publishes /sensors/states (latched), /sensors/events and /diagnostics.
-Notifies the owner through the outbox in ~state_dir, which it shares with the patrol.
+It subscribes to /motion_trigger from any publisher, to the bridges' /sensors/links and to the patrol's /patrol/alive: a
+dead or hanging patrol cannot report itself. The patrol's /patrol/arming lists the guarded rooms; without that message,
+or without a patrol, all rooms count as guarded. It publishes /sensors/states (latched), /sensors/events and
+/diagnostics. Notices to the owner go through the outbox in ~state_dir. The outbox is shared with the patrol, but needs
+no other node to deliver.
 
-All durations are wall times: sensors send their heartbeats in real time, whatever /clock does.
+All durations are wall time: sensors send their heartbeats in real time, whatever /clock does.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ log = logging.getLogger(__name__)
 
 STEP = 0.25  # [s] of the wall
 REPORT_EVERY = 4  # steps
-STATES_EVERY = 20  # steps without a change
-MAX_WAITING = 20_000  # messages between two steps; more than any flood
+STATES_EVERY = 20  # steps between messages if nothing changes
+MAX_WAITING = 20_000  # messages between two steps; far above the rate of a flood
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +77,7 @@ def load_group(cls: type, tree: Mapping[str, Any]) -> Any:
 
 
 def load_list(params: SensorWatchParams) -> SensorList:
-    """Load the sensors file, checked against rooms and simulator; raises ParamError."""
+    """Load the sensors, checked against rooms and simulator; raises ParamError."""
     rooms = load_rooms(Path(params.path_to_params).expanduser())
     sensors = load_sensors(params.sensors, {room.id: room.name for room in rooms}, rooms_source=rooms.source)
     if sensors.has_file and params.motion_sensors:
@@ -85,7 +86,7 @@ def load_list(params: SensorWatchParams) -> SensorList:
 
 
 class SensorWatch:
-    """Inputs, one thread that steps the supervisor, outputs."""
+    """The node sensor_watch: inputs, one thread that steps the supervisor, outputs."""
 
     def __init__(self) -> None:
         tree = rospy.get_param("~", {}) or {}
@@ -98,7 +99,7 @@ class SensorWatch:
         self._health = Health("motion sensors")
         self._post = OwnerPost(load_group(MailParams, tree), folder, self._health)
         self._watch = Supervisor(sensors, load_group(WatchTimes, tree), time.monotonic())
-        self._guarded: frozenset[int] | None = None  # guarded rooms, None: all
+        self._guarded: frozenset[int] | None = None  # guarded rooms, None for all
         self._notices = Notices(
             load_group(NoticeTimes, tree), time.monotonic(), read_memory(self._memory), is_guarded=self._is_guarded
         )
@@ -138,14 +139,14 @@ class SensorWatch:
         self._guarded = None if message.all_rooms else frozenset(message.rooms)
 
     def _on_links(self, message: SensorLinks) -> None:
-        # under simulated time both stamps are of one clock
+        # in simulated time both stamps come from one clock
         offset = 0.0 if self._simulated else message.header.stamp.to_sec() - rospy.get_time()
         self._links.append((message, offset, time.monotonic()))
 
     # -- step
 
     def _is_guarded(self, room: int | None) -> bool:
-        """Whether a room is guarded, so that motion means something; unknown counts as guarded."""
+        """Whether motion in a room is an alarm; an unknown room counts as guarded."""
         guarded = self._guarded
         is_patrol_gone = any(key.kind is Kind.PATROL_GONE for key in self._watch.problems())
         return guarded is None or room is None or room in guarded or is_patrol_gone
@@ -201,7 +202,7 @@ class SensorWatch:
             self._remember(now)
 
     def _remember(self, now: float) -> None:
-        """Store which notices were sent, after the notices themselves are on the disk."""
+        """Save what was reported, after the notices themselves are on disk."""
         try:
             write_json(self._memory, self._notices.snapshot())
         except OSError as err:
@@ -217,7 +218,7 @@ def to_post(notice: Notice) -> PostNotice:
 
 
 def read_memory(path: Path) -> Mapping[str, Any] | None:
-    """Read which notices were sent before the program ended; None if there is nothing valid."""
+    """Load what was reported before the restart; None if there is nothing valid."""
     try:
         return read_json(path)
     except StateError as err:
