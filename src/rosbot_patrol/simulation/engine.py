@@ -1,7 +1,7 @@
-"""Engine of the simulation: a world with robot, sensors and actors, advanced step by step.
+"""The simulation engine: a world, a robot in it, its sensors and the actors, advanced step by step.
 
-Exact: the same seed and the same calls at the same simulated times give the same data bit for bit. Noise belongs to a
-sample's number, not to who asked before. Nothing here knows of wall time.
+It is deterministic: the same seed and the same calls at the same simulated times give the same data bit for bit. Noise
+depends on the number of a sample, not on earlier readers. The engine does not know wall time.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _BATTERY_EVERY = 20
 
 @dataclass(frozen=True, kw_only=True)
 class EngineParams:
-    """Everything that is simulated, part by part."""
+    """Parameters of everything that is simulated, part by part."""
 
     frames: FrameParams = field(default_factory=FrameParams)
     drive: DriveParams = field(default_factory=DriveParams)
@@ -66,10 +66,10 @@ class Engine:
     """A running world.
 
     Attributes:
-        ways: bodies that stand still, and the free ways between them.
+        ways: static bodies, and the free paths between them.
         population: actors, doors and boxes.
         motion_sensors: the sensors on the walls.
-        faults: the faults in force.
+        faults: the active faults.
 
     Args:
         world: bodies, and the actors and doors at the start.
@@ -138,7 +138,7 @@ class Engine:
             self.motion_sensors.update(self.now, self.population.walkers, self.population.sight)
 
     def reset(self) -> None:
-        """Put the robot back to its start at rest and its odometry to zero; time, actors and battery stay."""
+        """Reset the robot to its start, at rest, with odometry zero; time, actors and battery stay."""
         if self._robot is not None:
             self.carry(self._robot.start)
             self._robot.odometry.reset(float(self._robot.turned[0]), float(self._robot.turned[1]), self.now)
@@ -159,7 +159,7 @@ class Engine:
 
     @property
     def has_robot(self) -> bool:
-        """Whether a robot is there."""
+        """Whether there is a robot."""
         return self._robot is not None
 
     def spawn_robot(self, description: RobotDescription, pose: Pose2D = HOME) -> None:
@@ -174,7 +174,7 @@ class Engine:
 
     @property
     def robot(self) -> Equipment:
-        """Parts of the robot; raises WorldError if there is no robot."""
+        """The robot's parts; raises WorldError if there is no robot."""
         if self._robot is None:
             raise _no_robot()
         return self._robot
@@ -192,7 +192,7 @@ class Engine:
         self._robot = None
 
     def carry(self, pose: Pose2D) -> None:
-        """Carry the robot to another place unnoticed by its odometry; raises WorldError if there is no room for it."""
+        """Move the robot elsewhere without a change of its odometry; raises WorldError if there is no room for it."""
         robot = self.robot
         name = f"robot '{robot.description.name}'"
         if not all(map(math.isfinite, pose)):
@@ -214,13 +214,13 @@ class Engine:
         return self._physics.twist if self._robot is not None else Twist2D()
 
     def touches(self) -> list[Touch]:
-        """Contacts of the robot, without the floor."""
+        """Contacts of the robot, except with the floor."""
         return self._physics.touches()
 
     # Sensors ---------------------------------------------------------------------------------------------------------
 
     def scan(self) -> LaserScan:
-        """One scan of the lidar."""
+        """Take one sweep of the lidar."""
         robot = self.robot
         frame, base_from_laser = robot.laser
         scene = self.ways.cut(robot.lidar_height).plus(self.population.cut(robot.lidar_height))
@@ -230,11 +230,11 @@ class Engine:
         )  # fmt: skip
 
     def level_scan(self) -> LevelScan:
-        """One scan of the lidar, laid level in base_link; raises LaserTilted if that is impossible."""
+        """Take one sweep of the lidar, projected level into base_link; raises LaserTilted if that is impossible."""
         return level_scan(self.scan(), self.robot.laser_transform, "base_link")
 
     def ranges(self) -> dict[str, float]:
-        """Frame and distance [m] of each range sensor."""
+        """Read the distance [m] of each range sensor, by frame."""
         robot = self.robot
         scene = self.ways.cut(robot.range_height).plus(self.population.cut(robot.range_height))
         noise = self._noise("range")
@@ -244,15 +244,15 @@ class Engine:
         }
 
     def imu(self) -> ImuReading:
-        """One sample of the IMU."""
+        """Take one sample of the inertial unit."""
         return self.robot.imu.read(self._noise("imu"))
 
     def picture(self, *, colour: bool = True, depth: bool = True) -> Picture:
-        """One picture of the camera; call it always from the same thread.
+        """Take one picture with the camera; call always from the same thread.
 
         Args:
-            colour: add exposure and noise to the colour; without it the colour may stay as drawn.
-            depth: add limits and noise to the depth; without it the depth may stay as drawn.
+            colour: add exposure and noise to the colour; otherwise it may stay as drawn.
+            depth: add limits and noise to the depth; otherwise it may stay as drawn.
 
         Raises:
             WorldError: the engine has no renderer, or the robot no camera.
@@ -272,7 +272,7 @@ class Engine:
         return self._camera.take(pose, self.population, self._steps, colour=colour, depth=depth, earlier=earlier)
 
     def view_from_above(self, height: float = 9.0) -> NDArray[np.uint8]:
-        """A picture of the house from a height [m] above the robot, north up; same thread as `picture`."""
+        """Draw the house from a height [m] above the robot, north up; call from the thread of `picture`."""
         if self._camera is None:
             raise WorldError("simulation", "has no camera")
         robot = self._robot
@@ -284,7 +284,7 @@ class Engine:
         return self._camera.view(above, self.population, shown)
 
     def warm_up(self) -> None:
-        """Take one of each measurement, so that the first real one is not late."""
+        """Take one of each measurement, so that the first real ones are not late."""
         robot = self.robot
         if robot.base_from_laser is not None:
             self.scan()

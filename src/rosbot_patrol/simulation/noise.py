@@ -1,4 +1,4 @@
-"""Noise that depends only on seed, sensor and sample, not on earlier listeners."""
+"""Noise that depends on seed, sensor and sample only, not on earlier readers."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ import numpy as np
 
 
 def noise_of(seed: int, sensor: str, sample: int = 0) -> np.random.Generator:
-    """Random generator for one sample of one sensor."""
+    """Make the random generator of one sample of one sensor."""
     key = (seed & 0xFFFFFFFF) << 32 | zlib.crc32(sensor.encode())
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, sample]))

@@ -1,4 +1,4 @@
-"""Player of a scenario on an engine, each event at its exact simulated time; on the simulation's thread."""
+"""Player of a scenario on an engine: each step at its exact simulated time, on the simulation's thread."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rosbot_patrol.simulation.scenario.file import ActorEntry, Scenario, Way, po
 
 log = logging.getLogger(__name__)
 
-_CLOSE = 1e-9  # of two times [s]
+_CLOSE = 1e-9  # tolerance for equal times [s]
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ def _act(entry: Timed, text: str, do: Callable[[], object]) -> _Act:
 
 
 class ScenarioPlayer:
-    """Plays a scenario; call `advance` before each step of the engine.
+    """Execute a scenario; call `advance` before each step of the engine.
 
     Args:
-        scenario: what is to happen.
-        engine: where; its doorways and doors are added at once.
+        scenario: the scenario to play.
+        engine: engine to play it on; its doorways and doors are added at once.
         trigger: makes a motion sensor call.
-        tell: is told each thing in a sentence.
+        tell: receives each step as a sentence.
 
     Raises:
-        ParamError: the scenario names what the world does not have; names file and key.
+        ParamError: the scenario names things that the world does not have; the text names file and key.
     """
 
     def __init__(
@@ -62,20 +62,20 @@ class ScenarioPlayer:
 
     @property
     def waiting(self) -> tuple[str, ...]:
-        """Events that have not happened yet."""
+        """Steps that have not been played yet."""
         return tuple(act.text for act in self._waiting)
 
     def event(self, name: str) -> None:
-        """Report an event of the patrol; only the first of its kind counts."""
+        """Record an event of the patrol at the present time; only the first of a name counts."""
         if name not in self._events:
             self._events[name] = self._engine.now
             self._next = -math.inf
 
     def advance(self) -> None:
-        """Play what is due; the first call is the event `start`.
+        """Execute the steps that are due; the first call is the event `start`.
 
         Raises:
-            WorldError: it cannot be done, such as a box where the robot stands.
+            WorldError: a step is impossible, such as a box at the robot's position.
         """
         self.event("start")
         now = self._engine.now
@@ -131,7 +131,7 @@ class ScenarioPlayer:
             self._engine.population.move_actor(name, path, way.speed, way.loop, pause=way.pause, yields=way.yields)
 
     def _check(self) -> None:
-        """Check that the named objects exist."""
+        """Check that all named things exist."""
         s, engine = self._scenario, self._engine
         actors = [*(a.name for a in s.actors), *(a.name for a in engine.population.walkers)]
         for i, walk in enumerate(s.walks):

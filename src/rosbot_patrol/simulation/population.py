@@ -1,4 +1,4 @@
-"""Population of a world: everything that comes, goes or moves except the robot, in step with the physics."""
+"""Population of a world: all moving or removable things except the robot, in step with the physics."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Population:
     """Actors, doors and boxes.
 
     Args:
-        ways: what stands still, and where actors can walk.
-        physics: in which their bodies stand.
-        seed: of looks and of who wanders where.
+        ways: static bodies, and the free paths of actors.
+        physics: physics world that contains their bodies.
+        seed: seed of looks and of wandering.
     """
 
     def __init__(self, ways: Ways, physics: Physics, seed: int) -> None:
@@ -40,7 +40,7 @@ class Population:
 
     @property
     def walkers(self) -> tuple[Walker, ...]:
-        """The actors, in the order of arrival."""
+        """The actors in the order of their arrival."""
         return tuple(self._walkers.values())
 
     @property
@@ -56,7 +56,7 @@ class Population:
         return name in self._walkers or name in self._doors
 
     def begin(self, actors: Iterable[ActorPlace], doors: Iterable[DoorPlace]) -> None:
-        """Place the actors of a world's file; a path through a wall is walked, with a warning."""
+        """Place a world file's actors and doors; a path through a wall is walked, with a warning."""
         for door in doors:
             self.spawn_door(door)
         for actor in actors:
@@ -79,19 +79,19 @@ class Population:
                 self._physics.move(walker.name, walker.matrix)
 
     def cut(self, height: float) -> Slice:
-        """Cut of all of them with a plane at a height [m]."""
+        """Horizontal section of all of them at a height [m]."""
         return together([mover.cut(height) for mover in self])
 
     def sight(self, eye: Sequence[float], points: Sequence[Sequence[float]]) -> float:
-        """Share of some points visible from another, 0 to 1; each x, y, z [m]. Actors hide nothing."""
+        """Share of the points visible from an eye, 0 none to 1 all; each x, y, z [m]. Actors hide nothing."""
         return self._ways.sight.share(eye, points, self._doors.values())
 
     def cut_of_doors(self, height: float) -> Slice:
-        """Cut of the doors with a plane at a height [m]."""
+        """Horizontal section of the doors at a height [m]."""
         return together([door.cut(height) for door in self._doors.values()])
 
     def spawn_actor(self, name: str, model: str, look: str, pose: Pose2D, *, posture: str = "") -> str:
-        """Place an actor; returns its name, generated if it is "".
+        """Place an actor; returns its name, a generated one for "".
 
         Raises:
             WorldError: the name is taken, the model, look or posture unknown, or the robot stands there.
@@ -117,11 +117,12 @@ class Population:
         pause: float = 0.0,
         yields: bool = True,
     ) -> None:
-        """Let an actor walk along points, or place it somewhere (one point, speed 0).
+        """Make an actor walk along points, or put it somewhere (one point, speed 0).
 
         Raises:
-            WorldError: there is none of that name, numbers that make no sense, a wall across the path, or the robot
-                where it was to be put.
+            WorldError: the name is unknown, a number is invalid, a wall crosses the path, or the robot stands at the
+            target of
+                a placement.
         """
         walker = self._actor(name)
         before = walker.pose
@@ -139,7 +140,7 @@ class Population:
             raise _robot_is_there(f"actor '{name}'")
 
     def roam_actor(self, name: str, radius: float, speed: float, *, pause: float = 2.0) -> None:
-        """Let an actor roam within a radius [m], determined by name and seed; raises WorldError."""
+        """Make an actor wander within a radius [m] of its position, by name and seed; raises WorldError."""
         walker = self._actor(name)
 
         def is_free(start: Pose2D, goal: Pose2D) -> bool:
@@ -150,7 +151,7 @@ class Population:
         walker.roam(radius, speed, noise_of(self._seed, f"ways of {name}"), is_free, pause=pause)
 
     def remove(self, name: str) -> None:
-        """Remove an actor or a door; raises WorldError if there is none of that name."""
+        """Remove an actor or a door; raises WorldError if the name is unknown."""
         if self._doors.pop(name, None) is None:
             self._actor(name)
             del self._walkers[name]
@@ -160,7 +161,7 @@ class Population:
         """Add a door, closed.
 
         Raises:
-            WorldError: the name is taken, the leaf is none, or the robot stands there.
+            WorldError: the name is taken, the leaf is invalid, or the robot stands there.
         """
         name = place.body.name
         self._check(f"door '{name}'", name, Pose2D())
@@ -172,7 +173,7 @@ class Population:
         self._doors[name] = door
 
     def set_door(self, name: str, opening: float, speed: float = SPEED) -> None:
-        """Start opening (1) or closing (0) a door at a speed [rad/s], 0: at once; raises WorldError."""
+        """Start to open (1) or close (0) a door at a speed [rad/s], 0 at once; raises WorldError."""
         if name not in self._doors:
             raise WorldError(f"door '{name}'", f"is not there (there: {', '.join(self._doors) or 'none'})")
         door = self._doors[name]
@@ -209,7 +210,7 @@ class Population:
         self._ways.add(body)
 
     def remove_box(self, name: str) -> None:
-        """Remove a box; raises WorldError if there is none of that name."""
+        """Remove a box; raises WorldError if the name is unknown."""
         if name not in self.boxes:
             raise WorldError(f"box '{name}'", f"is not there (there: {', '.join(self.boxes) or 'none'})")
         del self.boxes[name]

@@ -1,1 +1,1 @@
-"""The node simulator, and the programs around it."""
+"""The node simulator and its companion programs."""

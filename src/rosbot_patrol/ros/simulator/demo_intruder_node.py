@@ -1,4 +1,4 @@
-"""Intruder of the demo: once the robot is on guard, a person walks into a room of the simulated house."""
+"""Intruder of the demonstration: once the robot is on guard, a person walks into a room of the simulated house."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class DemoParams:
 
 
 def read_walk(path: Path, room: int) -> WalkParams:
-    """The walk into a room.
+    """Read the walk into a room.
 
     Raises:
         WorldError: the file has no such room.
@@ -94,5 +94,5 @@ def _body() -> None:
 
 
 def main() -> None:
-    """Wait for the guard, let the intruder in, end."""
+    """Wait for the guard, send the intruder, end."""
     run_node("demo_intruder", _body, by_hand=True)

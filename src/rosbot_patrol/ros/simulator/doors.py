@@ -24,11 +24,11 @@ _WIDTH, _HEIGHT = 0.9, 2.0  # default size of a door [m]
 
 
 class DoorServices:
-    """The two services.
+    """The services ~spawn_door and ~set_door.
 
     Args:
-        engine: of the simulation.
-        ask: runs an action on the simulation's thread; returns its result or raises its PatrolError.
+        engine: engine with the doors.
+        ask: runs an action on the simulation's thread, returns its result or raises its PatrolError.
     """
 
     def __init__(self, engine: Engine, ask: Callable[[Callable[[], Any]], Any]) -> None:

@@ -21,13 +21,13 @@ from rosbot_patrol.simulation.render.from_above import WorldPicture, draw_world
 from rosbot_patrol.simulation.sdf.world import load_world
 from rosbot_patrol.simulation.sensors.sensor_places import read_sensors
 
-_FINER = 2  # factor of the drawing's size, for smooth edges
+_FINER = 2  # supersampling factor, for smooth edges
 _ROOM = (20, 60, 160)
 _SENSOR = (190, 40, 30)
 
 
 def main() -> None:
-    """Read the arguments, draw, write the file; errors are printed in a sentence."""
+    """Read the arguments, draw, write the file; errors become one sentence."""
     parser = argparse.ArgumentParser(prog="draw_world", description=__doc__)
     parser.add_argument("world", help="SDF file")
     parser.add_argument("out", type=Path, help="picture: png or jpg")
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def _own_arguments(arguments: list[str]) -> list[str]:
-    """Arguments without the remappings added by roslaunch and rosrun."""
+    """The arguments without the remappings of roslaunch and rosrun."""
     return [argument for argument in arguments if ":=" not in argument]
 
 
@@ -80,7 +80,7 @@ def _mark(image: Image.Image, picture: WorldPicture, rooms: str, sensors: str) -
 
 
 def _write(image: Image.Image, text: str, place: tuple[float, float], height: float) -> None:
-    """Write text of any height; Pillow's own font has only one size."""
+    """Draw text in Pillow's own font, scaled to a height: Pillow has it in one size only."""
     letters = Image.new("L", (6 * len(text), 11))
     ImageDraw.Draw(letters).text((0, 0), text, fill=255)
     factor = height / letters.height

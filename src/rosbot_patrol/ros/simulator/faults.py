@@ -30,11 +30,11 @@ class FaultServices:
     """Services, latched topic, and the poor links of the virtual sensors.
 
     Args:
-        engine: of the simulation.
+        engine: engine that has the faults.
         clients: the sensors' links, by id.
-        ask: runs an action on the simulation's thread; returns its result or raises its PatrolError.
-        health: of the node; shows the active faults.
-        seed: of the poor links.
+        ask: runs an action on the simulation's thread, returns its result or raises its PatrolError.
+        health: receives the active faults.
+        seed: seed of the poor links.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class FaultServices:
         rospy.Service("~list_faults", Trigger, self._list)
 
     def follow(self) -> None:
-        """Publish changes and apply faults to the sensors' links; called on the simulation's thread."""
+        """Publish changes, and apply faults of the sensors' links; the simulation's thread calls it."""
         for sensor in self._engine.motion_sensors.restarted():
             self._clients[sensor].reboot()
         if self._engine.faults.changes == self._told:
@@ -99,7 +99,7 @@ class FaultServices:
 
 
 def _tree(request: SetFaultRequest) -> dict[str, Any]:
-    """Mapping of a request, as in a scenario file."""
+    """The request as the mapping of a scenario file."""
     try:
         values = yaml.safe_load(request.values or "{}")
         target = yaml.safe_load(request.target) if request.target else None

@@ -1,4 +1,4 @@
-"""Messages of the simulator from the engine's values."""
+"""Conversion of the engine's values to the simulator's messages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _KINDS = {"fire_hydrant": "hydrant"}
 
 
 def header(stamp: float, frame: str) -> Header:
-    """Header with time [s] and frame."""
+    """Make a header from time [s] and frame."""
     return Header(stamp=time_to_msg(stamp), frame_id=frame)
 
 
@@ -57,7 +57,7 @@ def odometry_msg(
 
 
 def imu_msg(reading: ImuReading, params: ImuParams, stamp: float, frame: str = "imu_link") -> Imu:
-    """A sample of the IMU; roll and pitch of a base on a level floor are as certain as its heading."""
+    """A sample of the inertial unit; on a level floor roll and pitch have the variance of the heading."""
     msg = Imu(header=header(stamp, frame))
     msg.orientation = Quaternion(*quaternion_from_yaw(reading.yaw))
     msg.angular_velocity = Vector3(*reading.rates)
@@ -72,7 +72,7 @@ def imu_msg(reading: ImuReading, params: ImuParams, stamp: float, frame: str = "
 
 
 def range_msg(distance: float, params: RangeParams, stamp: float, frame: str) -> Range:
-    """A distance of a range sensor."""
+    """A reading of a range sensor."""
     return Range(
         header=header(stamp, frame),
         radiation_type=Range.ULTRASOUND,
@@ -84,7 +84,7 @@ def range_msg(distance: float, params: RangeParams, stamp: float, frame: str) ->
 
 
 def battery_msg(battery: Battery, stamp: float, frame: str = "base_link") -> BatteryState:
-    """Charge and voltage."""
+    """Charge and voltage of the battery."""
     cells = battery.params.cells
     return BatteryState(
         header=header(stamp, frame),
@@ -106,7 +106,7 @@ def battery_msg(battery: Battery, stamp: float, frame: str = "base_link") -> Bat
 def joints_msg(
     robot: RobotDescription, angles: tuple[float, float], speeds: tuple[float, float], stamp: float
 ) -> JointState:
-    """Angles and speeds of every movable joint; joints without a drive (casters) stay at zero."""
+    """Angles and speeds of all moving joints; undriven ones (casters) stay at zero."""
     turns = {joint: i for i, side in enumerate((robot.left, robot.right)) for joint in side}
     driven = [(hinge.forward, turns.get(hinge.joint)) for hinge in robot.hinges]
     return JointState(
@@ -118,7 +118,7 @@ def joints_msg(
 
 
 def contacts_msg(touches: list[Touch], stamp: float, robot_link: str) -> Contacts:
-    """Objects that the robot touches."""
+    """Contacts of the robot."""
     return Contacts(
         header=header(stamp, "map"),
         contacts=[
@@ -136,7 +136,7 @@ def contacts_msg(touches: list[Touch], stamp: float, robot_link: str) -> Contact
 
 
 def camera_info_msg(camera: Intrinsics, stamp: float, frame: str) -> CameraInfo:
-    """Calibration of the pinhole camera."""
+    """The camera's pinhole model."""
     k = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     return CameraInfo(
         header=header(stamp, frame),

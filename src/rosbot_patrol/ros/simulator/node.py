@@ -3,12 +3,15 @@
 Matches what gazebo_ros and rosbot_description publish for the ROSbot: topics, types, frames (see the tables in the
 README), `/clock` and the transform odom -> base_link.
 
-Differs: /clock at 100 Hz of simulated time, not 1 kHz; /odom at 20 Hz from wheel encoders that drift
-(`odometry: ground_truth` gives Gazebo's); the lidar turns at 10 Hz; the base stops 0.5 s after the last command; all
-sensors carry a little noise; ranges below the lidar's minimum are -inf (REP 117). In addition /range, /battery, ground
-truth on /ground_truth/odom and /ground_truth/contacts, services for actors, faults and control, and scenarios. Of
-Gazebo's services /gazebo/pause_physics, unpause_physics, reset_simulation and reset_world are there; a reset puts the
-robot back to its start and leaves the time as it is.
+Differs:
+- /clock comes at 100 Hz of simulated time, not 1 kHz.
+- /odom comes at 20 Hz from wheel encoders that drift (`odometry: ground_truth` gives Gazebo's).
+- The lidar turns at 10 Hz; the base stops 0.5 s after the last command; all sensors have a little noise.
+- Ranges below the lidar's minimum are -inf (REP 117).
+- Additional: /range, /battery, ground truth on /ground_truth/odom and /ground_truth/contacts, services for actors,
+  faults and control, and scenarios.
+- Of Gazebo's services there are /gazebo/pause_physics, unpause_physics, reset_simulation and reset_world. A reset puts
+  the robot back to its start and does not change the time.
 """
 
 from __future__ import annotations
@@ -56,8 +59,8 @@ log = logging.getLogger(__name__)
 
 _HEALTH_PERIOD = 1.0
 _PAUSED_PERIOD = 0.05
-_FOLLOW_PERIOD = 0.002  # time between checks of a clock of 100 Hz [s]
-_BEHIND = 0.5  # longest delay behind the clock without a report [s]
+_FOLLOW_PERIOD = 0.002  # period of checking a clock of 100 Hz [s]
+_BEHIND = 0.5  # messages farther behind the clock are too late for other nodes [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,14 +98,14 @@ class SimulatorParams(EngineParams):
 
     @property
     def engine(self) -> EngineParams:
-        """Parameters of the engine."""
+        """The engine's part of the parameters."""
         return dataclasses.replace(
             self, motion=dataclasses.replace(self.motion, prewarmed=self.prewarmed and self.motion.prewarmed)
         )
 
 
 class Simulator:
-    """Runs the engine on one thread, in step with the wall clock or with the listening nodes."""
+    """Run the engine on one thread, in step with wall time or with the nodes that listen."""
 
     def __init__(self, p: SimulatorParams) -> None:
         scenario = read_scenario(p.scenario) if p.scenario else None
@@ -174,7 +177,7 @@ class Simulator:
         self.close()
 
     def close(self) -> None:
-        """Close the sensors' links and release the engine."""
+        """Close the sensors' links and the engine."""
         for client in self._clients.values():
             client.stop(0.0)
         self._engine.close()
@@ -185,7 +188,7 @@ class Simulator:
             self._shared.restart(self._engine.now)
 
     def _follow(self, shared: SharedClock) -> None:
-        """Advance to the shared clock's time."""
+        """Advance once the shared clock is far enough."""
         if shared.is_due(self._engine.now + TICK):
             self._advance()
         else:
@@ -257,7 +260,7 @@ def _port(place: SensorPlace, p: SimulatorParams) -> int:
 
 
 def _set_by(scenario: Scenario, p: SimulatorParams) -> SimulatorParams:
-    """Parameters with a scenario's settings."""
+    """The parameters, with the scenario's values replacing their own."""
     setting, start = scenario.setting, scenario.robot or Start(x=p.x, y=p.y, yaw=p.yaw)
     return dataclasses.replace(
         p,
@@ -271,7 +274,7 @@ def _set_by(scenario: Scenario, p: SimulatorParams) -> SimulatorParams:
 
 
 def _open_window(engine: Engine) -> Window:
-    from rosbot_patrol.ros.simulator.window import Window  # OpenCV takes 100 MB, and only the window needs it
+    from rosbot_patrol.ros.simulator.window import Window  # OpenCV takes 100 MB; only the window needs it
 
     return Window(engine)
 

@@ -1,4 +1,4 @@
-"""Publishers of the simulator, each at its rate of simulated time and only with subscribers."""
+"""All publishers of the simulator, each at its rate of simulated time and only with a subscriber."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from rosbot_patrol.ros.simulator import messages
 from rosbot_patrol.ros.simulator.pace import SharedClock
 from rosbot_patrol.simulation.engine import STEP, Engine
 
-TICK = 0.01  # of /clock [s]
+TICK = 0.01  # period of /clock [s]
 STEPS_PER_TICK = round(TICK / STEP)
 
-_RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")  # advertised before there is a robot
+_RANGE_FRAMES = ("range_fl", "range_fr", "range_rl", "range_rr")  # advertised before the robot is spawned
 
 
 @dataclass(frozen=True, kw_only=True)
 class RateParams:
-    """Publishing rates in simulated time: on average, each at a whole hundredth of a second."""
+    """Publishing rates in simulated time, as averages: each message falls on a whole hundredth of a second."""
 
     odometry: float = param(20.0, unit="Hz", lo=0.1, hi=100.0, doc="rate of /odom and its transform")
     scan: float = param(10.0, unit="Hz", lo=0.1, hi=50.0, doc="rate of /scan (Gazebo: 40)")
@@ -45,10 +45,10 @@ class Outputs:
     """The publishers; `publish(tick)` sends what is due. Only the simulation's thread calls it.
 
     Args:
-        engine: of the simulation.
-        rates: of the topics.
-        exact_odometry: /odom is ground truth, as Gazebo's.
-        shared: clock of another node; None: publish /clock.
+        engine: the simulated world.
+        rates: publishing rates.
+        exact_odometry: /odom is exact, as in Gazebo.
+        shared: clock of another node; None: this node publishes /clock.
     """
 
     def __init__(
@@ -95,10 +95,10 @@ class Outputs:
         ]
 
     def publish(self, tick: int) -> None:
-        """Publish the time and what is due at a tick; nothing more after the node's shutdown."""
+        """Send the time and the messages due at a tick; nothing after the node has been told to end."""
         try:
             self._publish(tick)
-        except rospy.ROSException:  # a topic is closed
+        except rospy.ROSException:  # a topic has been closed
             if not rospy.is_shutdown():
                 raise
 
@@ -215,6 +215,6 @@ class Outputs:
 
 
 def is_due(tick: int, rate: float) -> bool:
-    """Whether a topic with a rate [Hz] is due at a tick: the first at or after each whole period."""
+    """Whether a message of a rate [Hz] is due at a tick: the first at or after each whole period."""
     per_tick = rate * TICK
     return math.floor(tick * per_tick + 1e-9) > math.floor((tick - 1) * per_tick + 1e-9)

@@ -1,4 +1,4 @@
-"""Pace of the simulated clock: against the wall clock, and against the nodes that have to keep up."""
+"""Pace of the simulated clock: relative to wall time, and to the nodes that must keep up."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from rosbot_patrol.ros.runtime.node import sender_of
 
 log = logging.getLogger(__name__)
 
-_BEHIND = 0.25  # a larger delay is not caught up [s]
-_CATCHING_UP = 1.5  # largest factor of its rate while catching up; it never jumps
-_SET_BACK = 1.0  # a clock that goes back this far has restarted [s]
+_BEHIND = 0.25  # longer lags of the clock are not caught up [s]
+_CATCHING_UP = 1.5  # largest speed-up while catching up; the clock never jumps
+_SET_BACK = 1.0  # a clock that goes back this far counts as restarted [s]
 _REPORT = 10.0
 _TF = "tf:"
 _LOOK = 0.0005
-_PATIENCE = 2.0  # wall time for a node to answer [s]
+_PATIENCE = 2.0  # longest wait for a node's answer [s] of wall time
 
 
 @dataclass(frozen=True, kw_only=True)
 class LockstepParams:
-    """Nodes that the clock waits for at rate 0; a topic that stays silent counts as idle."""
+    """Nodes that the clock waits for at rate 0; a silent topic counts as idle."""
 
     topics: tuple[str, ...] = param(
         (), doc="topics of the nodes to wait for; tf:FRAME for the node that publishes a frame"
@@ -40,7 +40,7 @@ class LockstepParams:
 
 
 class Pace:
-    """Holds a real-time factor; 0 runs as fast as the consumers keep up.
+    """Limit to a real-time factor; 0 runs as fast as the consumers keep up.
 
     Args:
         rate: simulated seconds per second.
@@ -65,7 +65,7 @@ class Pace:
         self._last_wall, self._last_sim = self._wall, sim
 
     def wait(self, sim: float) -> None:
-        """Sleep until the wall clock has reached a simulated time."""
+        """Sleep until wall time reaches a simulated time."""
         if self._rate <= 0.0:
             return
         due = self._wall + (sim - self._sim) / self._rate
@@ -81,7 +81,7 @@ class Pace:
 
 
 class SharedClock:
-    """Follows ROS time from another node's /clock (or the wall clock, without /use_sim_time).
+    """Keep the simulation at ROS time, given by another node's /clock (or the wall, without /use_sim_time).
 
     Args:
         now: function that returns ROS time [s], 0 before it is known.
@@ -98,18 +98,18 @@ class SharedClock:
         self._is_set, self.ahead = now > 0.0, round(now - sim, 2)
 
     def is_due(self, sim: float) -> bool:
-        """Whether ROS time has reached a simulated time; restarts if the clock was set back."""
+        """Whether ROS time has reached a simulated time; a clock that was set back restarts."""
         if not self._is_set or self.behind(sim) < -_SET_BACK:
             self.restart(sim)
         return self._is_set and self.behind(sim) >= 0.0
 
     def behind(self, sim: float) -> float:
-        """Delay of a simulated time behind ROS time [s]."""
+        """Lag of a simulated time behind ROS time [s]."""
         return self._now() - (sim + self.ahead)
 
 
 def refuse_second_clock() -> None:
-    """Raise WorldError if another node publishes /clock: two clocks make time jump for every node."""
+    """Raise WorldError if another node publishes /clock: with two clocks time jumps for every node."""
     own, master = rospy.get_name(), rosgraph.Master(rospy.get_name())
     published, _, _ = master.getSystemState()
     tellers = {node for topic, nodes in published if topic == "/clock" for node in nodes}
@@ -130,13 +130,13 @@ def _answers(uri: str) -> bool:
 
 
 class Lockstep:
-    """Waits for topics with steady messages, so that the clock does not outrun their nodes.
+    """Wait for steadily published topics, so that the clock does not outrun their publishers.
 
-    A topic is waited for after its first message. If it falls silent, the clock stops once for the patience; then the
-    topic is idle until its next message.
+    The clock waits for a topic from its first message on. A topic that stays silent delays the clock once, for the
+    patience; then it is idle until its next message.
 
     Args:
-        params: which topics, and how long.
+        params: the topics and the limits.
         now: simulated time [s].
         clock: wall time [s]; sleep: waits on it.
     """
@@ -160,7 +160,7 @@ class Lockstep:
         self._waited: dict[str, float] = {}
 
     def subscribe(self) -> None:
-        """Listen to the topics."""
+        """Subscribe to the topics."""
         for topic in self._params.topics:
             if topic.startswith(_TF):
                 rospy.Subscriber("/tf", TFMessage, self._hear_frame, callback_args=topic, tcp_nodelay=True)
@@ -174,7 +174,7 @@ class Lockstep:
         self._heard[topic] = self._now()
 
     def wait(self) -> None:
-        """Return when every topic that is not idle has a message within the slack; a silent one becomes idle."""
+        """Wait until every topic that is not idle has a message within the slack; a silent one becomes idle."""
         late = self._late()
         if not late:
             return
@@ -191,11 +191,11 @@ class Lockstep:
 
     @property
     def idle(self) -> tuple[str, ...]:
-        """Idle topics, each with its node."""
+        """Idle topics that have had a message before, each with its node."""
         return tuple(map(self._name, sorted(self._idle)))
 
     def take_waited(self) -> dict[str, float]:
-        """Wall time spent waiting for each topic since the last call [s], by topic and node."""
+        """Wall time that the clock waited for each topic since the last call [s], by topic and node."""
         waited, self._waited = self._waited, {}
         return {self._name(topic): seconds for topic, seconds in waited.items()}
 

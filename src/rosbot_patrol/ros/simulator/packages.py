@@ -12,13 +12,13 @@ from rosbot_patrol.simulation.robot.urdf import FindPackage
 
 
 def model_folders(more: Iterable[str] = ()) -> list[str]:
-    """Folders of Gazebo's models: those given, GAZEBO_MODEL_PATH, Gazebo's own, its resources."""
+    """Folders that Gazebo searches for models: those given here, GAZEBO_MODEL_PATH, its own, its resources."""
     given, resources = (os.environ.get(f"GAZEBO_{what}_PATH", "").split(":") for what in ("MODEL", "RESOURCE"))
     return [*more, *filter(None, given), os.path.expanduser("~/.gazebo/models"), *filter(None, resources)]
 
 
 def package_finder(folders: Sequence[str] = ()) -> FindPackage:
-    """Function that finds a name in folders, then in Gazebo's, then among the packages of ROS_PACKAGE_PATH."""
+    """Make a function that looks a name up in folders, then in Gazebo's, then among ROS_PACKAGE_PATH's packages."""
     packages = rospkg.RosPack()
     places = model_folders(folders)
 

@@ -1,4 +1,4 @@
-"""Services of the simulator: requests of other threads, run by the simulation's thread between two ticks."""
+"""Services of the simulator: the simulation's thread executes requests of other threads between two ticks."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ from rosbot_patrol.srv import (
     StepSimulationResponse,
 )
 
-_PATIENCE = 10.0  # longest wall time that a request waits for the simulation [s]
+_PATIENCE = 10.0  # longest wait of a request for the simulation, in wall time [s]
 _MOST_TICKS = 1000
 
 
 class Requests:
-    """Advertises the services; the simulation's thread calls `serve` between two ticks.
+    """The services; the simulation's thread calls `serve` between two ticks.
 
     Args:
-        engine: of the simulation.
-        set_paused: pauses or continues.
-        advance: runs a paused simulation for some ticks; raises PatrolError if it is not paused.
+        engine: engine that the requests change.
+        set_paused: pauses or resumes.
+        advance: advances a paused simulation by some ticks; raises PatrolError if it is not paused.
     """
 
     def __init__(self, engine: Engine, set_paused: Callable[[bool], None], advance: Callable[[int], None]) -> None:
@@ -72,7 +72,7 @@ class Requests:
         rospy.Service("gazebo/unpause_physics", Empty, lambda _: self._empty(lambda: self._set_paused(False)))
 
     def serve(self) -> None:
-        """Run the waiting requests."""
+        """Execute the waiting requests."""
         while not self._queue.empty():
             action, future = self._queue.get_nowait()
             if not future.set_running_or_notify_cancel():

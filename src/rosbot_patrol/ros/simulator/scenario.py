@@ -1,4 +1,4 @@
-"""Scenario in the running simulator: events of the patrol come from /patrol/state, played events are published."""
+"""A scenario in the running simulator: patrol events come from /patrol/state, the played steps are published."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rosbot_patrol.simulation.scenario.file import PLAYED, Scenario
 
 log = logging.getLogger(__name__)
 
-WATCH_WAIT = 120.0  # wall time
+WATCH_WAIT = 120.0  # [s] of wall time
 
 _EVENTS = {
     PatrolState.DRIVING: "driving",
@@ -28,14 +28,14 @@ _EVENTS = {
 
 
 class ScenarioRunner:
-    """Plays a scenario; every method is called on the simulation's thread.
+    """Play a scenario; only the simulation's thread calls the methods.
 
     Args:
-        scenario: the events.
-        engine: of the simulation.
+        scenario: the scenario to play.
+        engine: engine to play it on.
         clients: the sensors' links, by id.
-        is_watched: begin only when somebody listens to what is played, so that a watch that starts late on a busy
-            machine misses nothing; for so long nothing that happens counts.
+        is_watched: begin only when the played steps have a subscriber, so that a watcher that starts late on a busy
+            machine misses nothing; earlier events of the patrol do not count.
     """
 
     def __init__(
@@ -51,11 +51,11 @@ class ScenarioRunner:
 
     @property
     def waiting(self) -> tuple[str, ...]:
-        """Events that have not happened yet."""
+        """Steps that have not been played yet."""
         return self._player.waiting
 
     def advance(self) -> None:
-        """Play what is due; call it before each step of the engine."""
+        """Play the steps that are due; call before each step of the engine."""
         if self._watch_until is not None and self._waits_for_its_watch(self._watch_until):
             return
         while not self._events.empty():

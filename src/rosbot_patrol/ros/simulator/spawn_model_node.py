@@ -1,9 +1,9 @@
-"""gazebo_ros's spawn_model for our simulator: puts the robot of a URDF into a running world.
+"""gazebo_ros's spawn_model for our simulator: puts a URDF's robot into a running world.
 
 Matches gazebo_ros 2.9 `spawn_model` where the tutorial needs it.
 
-Differs: URDF only (`-urdf`), from a parameter (`-param`) or a file (`-file`); joints, bond and physics options are
-read and have no effect, and say so.
+Differs: URDF only (`-urdf`), from a parameter (`-param`) or a file (`-file`). Joint, bond and physics options have no
+effect, and a log line says so.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def _service() -> str:
 
 
 def main() -> None:
-    """Wait for the simulator, pass it the description, end."""
+    """Wait for the simulator, send it the description, end."""
     options, rest = _parse(rospy.myargv(sys.argv)[1:])
 
     def spawn() -> None:

@@ -18,7 +18,7 @@ _PERIOD = 0.1  # of wall time [s]
 
 
 class Window:
-    """Draws with the camera's renderer, ten times a second of wall time; closing the window only ends the drawing."""
+    """Draw with the camera's renderer, ten times a second of wall time; closing the window only ends the drawing."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine

@@ -1,1 +1,1 @@
-"""Programs for a person at the keyboard or at rviz."""
+"""Programs for a person at the keyboard or in rviz."""

@@ -1,4 +1,4 @@
-"""docs/launch.md, made from the launch files; `scripts/parameter_tables` writes it together with docs/parameters.md."""
+"""Generator of docs/launch.md from the launch files; `scripts/parameter_tables` writes it with docs/parameters.md."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def launch_page(folder: Path) -> str:
 
 
 def _section(path: Path, purpose: str) -> str:
-    """Heading, purpose and table of one launch file; a comment before a group of arguments becomes a row."""
+    """Heading, purpose and table of one launch file; a comment before a group of arguments gets a row of its own."""
     parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     rows, group = [], ""
     for node in ElementTree.parse(path, parser).getroot():

@@ -1,10 +1,10 @@
-"""mark_rooms FILE: writes the patrol's points file from points clicked in rviz ("Publish Point").
+"""mark_rooms FILE: points clicked in rviz ("Publish Point") become the patrol's points file.
 
-The first point is the base, each further one a room; the number of a room is the id of its motion sensor. Each point is
-checked on the map of `map`: can the robot stand, turn and get there? Its name is asked for on the terminal. The file is
-written after each point; if it exists, its rooms stay and more are added. `~markers` shows the points in rviz.
+The first point is the base, each further one a room; a room's number is the id of its motion sensor. Each is checked on
+the map of `map` (whether the robot can stand, turn and get there), and the program asks for its name on the terminal.
+The file is written after each point. If it exists, its rooms stay and more are added. `~markers` shows them in rviz.
 
-Subscribes `clicked_point` (geometry_msgs/PointStamped, of any frame that tf knows) and `map`.
+Subscribes to `clicked_point` (geometry_msgs/PointStamped, in any frame known to tf) and `map`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Terminal:
-    """Lines typed, read by its own thread, so that a shutdown need not wait for one."""
+    """Lines from the terminal, read on a thread of their own, so that a shutdown need not wait for one."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[str | None] = queue.Queue()
@@ -58,7 +58,7 @@ class _Terminal:
         self._lines.put(None)
 
     def ask(self, question: str) -> str | None:
-        """Ask for a line; None at the end of the input or at shutdown."""
+        """Ask a question; returns the answer, None at the end of the input or at shutdown."""
         print(question, end=" ", flush=True)
         while not rospy.is_shutdown():
             try:
@@ -69,11 +69,11 @@ class _Terminal:
 
 
 class MarkRooms:
-    """Handles clicks and writes the file.
+    """Turn clicks into rooms and write the file.
 
     Args:
-        path: of the points file.
-        is_new: start an empty file, whatever it holds.
+        path: path of the points file.
+        is_new: start empty, whatever the file contains.
     """
 
     def __init__(self, path: Path, *, is_new: bool) -> None:
@@ -88,7 +88,7 @@ class MarkRooms:
         rospy.Subscriber("clicked_point", PointStamped, self._clicks.put, queue_size=10)
 
     def run(self) -> None:
-        """Run until the end of the input, or shutdown."""
+        """Run until the end of the input or shutdown."""
         for room in self._marks.rooms:
             print(f"{room.title} at ({room.pose.x:.2f}, {room.pose.y:.2f})")
         self._show()
@@ -115,7 +115,7 @@ class MarkRooms:
         print(f'Click on {what} with "Publish Point" in rviz. Ctrl-C ends.', flush=True)
 
     def _take(self, click: PointStamped) -> bool:
-        """Handle one click; False if no more are to come."""
+        """Process one click; False if no more will come."""
         try:
             x, y = self._place(click)
             problem = self._marks.problem(self._floor(), x, y)
@@ -139,7 +139,7 @@ class MarkRooms:
         return True
 
     def _name(self, x: float, y: float) -> str | None:
-        """Name for a place, "" to skip it, None if no more are to come."""
+        """Ask for the name of a place: "" to skip it, None if no more answers will come."""
         number = len(self._marks.rooms)
         what = f"room {number}" if number else "the base"
         while True:
@@ -150,7 +150,7 @@ class MarkRooms:
             print(f"{problem}; another one?")
 
     def _place(self, click: PointStamped) -> tuple[float, float]:
-        """Position in map [m]. Raises TransformError."""
+        """The click in the map frame [m]. Raises TransformError."""
         frame = click.header.frame_id.lstrip("/")
         if frame in ("", FRAME):
             return click.point.x, click.point.y
@@ -158,7 +158,7 @@ class MarkRooms:
         return pose.x, pose.y
 
     def _floor(self) -> Floor:
-        """Floor of the newest map. Raises MapError."""
+        """The newest map. Raises MapError."""
         message = self._map.get()
         topic = rospy.resolve_name("map")
         if message is None:
@@ -189,7 +189,7 @@ def body() -> None:
 
 
 def main() -> None:
-    """The program."""
+    """Run the program."""
     if {"-h", "--help"} & set(sys.argv[1:]):
         arguments_of(["--help"])
     run_node("mark_rooms", body, by_hand=True)

@@ -1,6 +1,6 @@
-"""Markers of rooms and motion sensors for rviz, on `~markers` (latched); the mission's room is highlighted.
+"""Rooms and motion sensors as markers for rviz, on `~markers` (latched); the patrol's current room is highlighted.
 
-A sensor is red while it reports motion, black when silent, yellow with another problem.
+A sensor is red while it reports motion, black if it is silent, yellow if it has another problem.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Message that a hardware driver is not installed; started by the thin packages in its place."""
+"""Message that a hardware driver is not installed; the stub packages that replace it start this program."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rosbot_patrol.ros.runtime.node import run_node
 
 
 def main() -> None:
-    """Log one sentence (arguments: package, what it is, what will be missing) and end."""
+    """Log one sentence (arguments: package, its purpose, what will be missing) and end."""
     package, what, loss = ([*rospy.myargv(sys.argv)[1:], "?", "?", "?"])[:3]
 
     def say() -> None:

@@ -1,4 +1,4 @@
-"""Observer of a scenario: reports its events, and whether its expectation holds at the end."""
+"""Watch over a scenario from outside: its steps as text, and at the end whether its expectation holds."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from rosbot_patrol.simulation.scenario.file import PLAYED, Expect, Outcome, disa
 
 
 class ScenarioWatch:
-    """Decides when a scenario is over, and which expectations failed.
+    """Decide when a scenario is over, and which expectations failed.
 
     Args:
-        file: of the scenario.
+        file: file of the scenario.
         simulator: name of the node that plays it.
-        tell: called with a sentence for each event.
+        tell: receives each played step as a sentence.
     """
 
     def __init__(self, file: str, simulator: str, tell: Callable[[str], None]) -> None:
@@ -30,11 +30,11 @@ class ScenarioWatch:
         self._topic = f"{simulator}/scenario"
 
     def start(self) -> None:
-        """Listen to the events; the scenario may begin."""
+        """Subscribe to the played steps; this starts the scenario."""
         rospy.Subscriber(self._topic, String, self._on_act, queue_size=100)
 
     def is_over(self, narrator: Narrator) -> bool:
-        """Whether no more events are to come, or the time has passed."""
+        """Whether no more steps will come, or the time is up."""
         if narrator.on_guard_at is None:
             return False
         if self._on_guard_at is None:
@@ -50,7 +50,7 @@ class ScenarioWatch:
         )
 
     def judge(self, narrator: Narrator) -> list[str]:
-        """A sentence for each failed expectation."""
+        """One sentence per failed expectation."""
         outcome = Outcome(
             verdicts={m.room_id: m.verdict for m in narrator.missions if m.verdict},
             missions=narrator.ended,

@@ -1,8 +1,8 @@
 """narrator: prints one plain sentence for each step of the patrol; with ~exit_after_mission it ends with the mission.
 
-Exit status: 0; 3 if the verdict is not ~expect_verdict; 4 after ~time_limit; 5 if a confirmed intruder's mail was not
-delivered within ~delivery_wait; 6 if the robot did not come home. With ~scenario it ends with the scenario instead,
-with 7 if an expectation of the scenario fails.
+Exit status: 0, or 3 if the verdict is not ~expect_verdict, 4 if ~time_limit passed, 5 if a confirmed intruder's mail
+was not delivered within ~delivery_wait, 6 if the robot did not come home. With ~scenario it ends with the scenario
+instead, with 7 if the scenario's expectation does not hold.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ VERDICTS = ("", "confirmed", "clear", "unreachable", "unverified")
 
 @dataclass(frozen=True, kw_only=True)
 class NarratorParams:
-    """What the narrator does beside printing."""
+    """Parameters of the narrator."""
 
     exit_after_mission: bool = param(False, doc="exit after a mission has ended and its mail is delivered")
     missions: int = param(1, lo=1, doc="number of missions to wait for")
@@ -52,7 +52,7 @@ class NarratorParams:
 
 
 class NarratorNode:
-    """Prints to standard output; times are wall time since its start."""
+    """The node narrator: prints to standard output; times are wall time since its start."""
 
     def __init__(self) -> None:
         self.params = load_params(NarratorParams)
@@ -70,7 +70,7 @@ class NarratorNode:
         ]
 
     def run(self) -> int:
-        """Narrate until the end; returns the exit status."""
+        """Print until the end; returns the exit status."""
         p = self.params
         if p.patience and not p.time_limit and not is_launched():
             require_publisher(self._subscribers[1], "patrol_robot", patience=p.patience)
@@ -120,7 +120,7 @@ class NarratorNode:
 
     def _on_alert(self, message: Alert) -> None:
         if message.kind == Alert.VERDICT:
-            return  # the state tells it
+            return  # the state reports it
         told = AlertTelling(
             id=message.id,
             room=f"room {message.room_id} ({message.room_name})",

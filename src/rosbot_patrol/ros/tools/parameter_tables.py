@@ -1,4 +1,4 @@
-"""Generated pages: docs/parameters.md, docs/launch.md, tree of docs/architecture.md; `scripts/parameter_tables`."""
+"""Generator of docs/parameters.md, docs/launch.md and the folder tree of docs/architecture.md."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("demo_intruder", [("", DemoParams)]),
 ]
 
-# The same for the keys of a scenario's file.
+# Title, key and declaration of the sections of a scenario file.
 SCENARIO: list[tuple[str, type]] = [
     ("", scenario.Setting),
     ("robot", scenario.Start),
@@ -137,7 +137,7 @@ SCENARIO: list[tuple[str, type]] = [
 
 
 def _groups(prefix: str, cls: type, group: object = None) -> list[tuple[str, type, object]]:
-    """A declaration and those nested in it, with their namespaces and defaults."""
+    """A declaration and its nested ones, with their namespaces and effective defaults."""
     found = [(prefix, cls, group)]
     hints = typing.get_type_hints(cls)
     for field, (name, _, default, _) in zip(dataclasses.fields(cls), declared(cls, group), strict=True):
@@ -179,7 +179,7 @@ def document() -> str:
 
 
 def pages(root: Path) -> dict[Path, str]:
-    """Generated pages of a checkout, with their contents."""
+    """The generated pages of a checkout, with their expected contents."""
     architecture = root / "docs/architecture.md"
     return {
         root / "docs/parameters.md": document(),

@@ -1,11 +1,11 @@
-"""record: records a bag of a patrol, to replay it as a regression test: the guard's inputs and outputs.
+"""record: a bag of a patrol (the guard's inputs and outputs), to be replayed as a regression test.
 
     rosrun rosbot_patrol record NAME.bag                    # until Ctrl-C
     rosrun rosbot_patrol record NAME.bag --duration 120     # [s] of ROS's time
     rosrun rosbot_patrol record NAME.bag --no-camera --also /my/topic
 
-Recorded by `rosbag record`, compressed by lz4; pictures as JPEG where `/rgb_republish/compressed` is there, which
-rosbot_patrol.launch publishes. Topics that nobody publishes yet are named, and recorded when somebody does.
+`rosbag record` writes it, compressed by lz4; pictures are JPEG if `/rgb_republish/compressed` exists, which
+rosbot_patrol.launch publishes. Topics without a publisher are listed, and recorded as soon as there is one.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ DID = (
     "/cmd_vel", "/cmd_vel/move_base", "/cmd_vel/patrol", "/patrol/state", "/patrol/alerts", "/diagnostics",
 )  # fmt: skip
 SHARED = ("/clock", "/diagnostics")  # shared by all guards of one master
-LEAST_FREE = 500  # [MB] of free disk space needed at the start
+LEAST_FREE = 500  # free space [MB] on the disk needed to start
 
 
 def topics(also: Sequence[str] = (), *, camera: bool = True, namespace: str = "/") -> list[str]:
-    """Topics to record for the guard in a namespace; topics given by hand are resolved there as in ROS."""
+    """Topics to record of the guard in a namespace; ROS resolves names given by hand there."""
     own = [*HEARD, *(CAMERA if camera else ()), *DID]
     inside = [name if name in SHARED else namespace.rstrip("/") + name for name in own]
     return [*inside, *(resolve_name(name, ns_join(namespace, "record")) for name in also)]
@@ -63,7 +63,7 @@ def _options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _problem(file: Path) -> str:
-    """Reason why no bag can be recorded, "" if one can."""
+    """Reason why the bag cannot be written, "" if it can."""
     if file.suffix != ".bag":
         return f"{file}: a bag's name ends in .bag"
     if file.exists():
@@ -88,7 +88,7 @@ def record(given: argparse.Namespace) -> int:
     missing = [name for name in wanted if name not in published]
     if missing:
         print(f"nobody publishes yet: {', '.join(missing)}", flush=True)
-    process = subprocess.Popen(command(file, wanted, duration=given.duration), umask=UMASK)  # it shows a home
+    process = subprocess.Popen(command(file, wanted, duration=given.duration), umask=UMASK)  # a bag shows a home
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: process.send_signal(signal.SIGINT))
     status = process.wait()

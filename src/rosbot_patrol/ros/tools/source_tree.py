@@ -1,4 +1,4 @@
-"""Tree of folders in docs/architecture.md, made from the packages' docstrings by `scripts/parameter_tables`."""
+"""Generator of docs/architecture.md's tree of folders, from the packages' docstrings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ BEGIN, END = "<!-- tree: begin -->\n", "<!-- tree: end -->\n"
 
 
 def with_tree(page: str, source: Path) -> str:
-    """The page with the present tree of folders below `source` between its two markers.
+    """Replace the tree between the page's two markers by the folders below `source`.
 
     Raises:
         ValueError: the page lacks a marker.
@@ -22,7 +22,7 @@ def with_tree(page: str, source: Path) -> str:
 
 
 def tree(source: Path) -> str:
-    """One row per package, with the first line of its docstring."""
+    """One table row per package, with the first line of its docstring."""
     rows = ["| folder | what it is |", "|---|---|"]
     for init in sorted(source.rglob("__init__.py"), key=lambda path: path.parent.parts):
         place = init.parent.relative_to(source)

@@ -1,1 +1,1 @@
-"""Actors of the simulation: people, pets, doors."""
+"""Moving things: people, pets, doors."""

@@ -1,7 +1,7 @@
-"""Doors: leaves on upright hinges that move at a speed and stop in front of the robot and people.
+"""Doors: leaves on vertical hinges that open and close at a speed, and stop before the robot and walkers.
 
-A leaf pushes nothing and cannot be pushed: the robot meets a wall. It opens by an angle about its hinge, between 0 (as
-the world's file has it, closed) and its swing.
+A leaf pushes nothing and cannot be pushed: to the robot it is a wall. Its opening angle about the hinge is between 0
+(as in the world file, closed) and its swing.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from rosbot_patrol.simulation.scene.scene import Body, Collision, Material, Shap
 from rosbot_patrol.simulation.scene.shapes import mesh_of
 from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
 
-SPEED = 0.8  # of a door that is pushed open as usual [rad/s]
+SPEED = 0.8  # usual speed of a door pushed open [rad/s]
 SWING = math.pi / 2.0
 
-_MARGIN = 0.02  # left between a leaf and what is in its way [m]
-_GAP = 0.01  # below a leaf [m]
+_MARGIN = 0.02  # clearance between a leaf and an obstacle [m]
+_GAP = 0.01  # gap below a leaf [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class DoorPlace:
 
     Attributes:
         body: the leaf; its pose is world_from_body of the closed door.
-        axis: where the hinge stands, x, y [m].
+        axis: position of the hinge, x, y [m].
         swing: angle of the open door [rad], counter-clockwise positive.
     """
 
@@ -44,10 +44,10 @@ class DoorPlace:
 def plain_door(
     name: str, hinge: Pose2D, *, width: float = 0.9, height: float = 2.0, thickness: float = 0.04, swing: float = SWING
 ) -> DoorPlace:
-    """A wooden leaf with handles, from the hinge along the hinge's x where it is closed.
+    """Make a wooden leaf with handles; closed, it extends along the hinge's x axis.
 
     Raises:
-        WorldError: a number that makes no sense.
+        WorldError: a number is invalid.
     """
     numbers = (*hinge, width, height, thickness, swing)
     if not all(map(math.isfinite, numbers)) or min(width, height, thickness) <= 0.0:
@@ -72,13 +72,13 @@ def plain_door(
 
 
 class Door:
-    """A movable door.
+    """A moving door.
 
     Args:
         place: leaf and hinge.
 
     Raises:
-        WorldError: the leaf has no collision shape, or the swing is no angle of a door.
+        WorldError: the leaf has no collision shape, or the swing is not a door's angle.
     """
 
     def __init__(self, place: DoorPlace) -> None:
@@ -97,12 +97,12 @@ class Door:
 
     @property
     def angle(self) -> float:
-        """Angle from the closed position [rad]."""
+        """Opening angle from closed [rad]."""
         return self.opening * self.swing
 
     @property
     def is_moving(self) -> bool:
-        """Whether it has not reached its target yet."""
+        """Whether it has not reached its target angle yet."""
         return self.opening != self._target
 
     @property
@@ -111,17 +111,17 @@ class Door:
         return from_pose2d(self._hinge(self.opening)) @ self._axis_from_body
 
     def pose_parts(self) -> Matrix | None:
-        """None: no part of the leaf moves by itself."""
+        """None: the leaf has no moving parts."""
 
     def set(self, opening: float, speed: float = SPEED) -> None:
-        """Start opening or closing.
+        """Start to open or close.
 
         Args:
             opening: 0 closed to 1 open.
-            speed: of the leaf [rad/s]; 0 puts it there at once.
+            speed: speed of the leaf [rad/s]; 0 moves it at once.
 
         Raises:
-            WorldError: a number out of its bounds.
+            WorldError: a number is out of bounds.
         """
         if not 0.0 <= opening <= 1.0:
             raise WorldError(f"door '{self.name}'", f"opens from 0 to 1, not to {opening}")
@@ -136,7 +136,7 @@ class Door:
 
         Args:
             dt: time step [s].
-            in_the_way: where the robot and the walkers are, each with the radius of its cylinder [m].
+            in_the_way: poses of the robot and the walkers, each with the radius of its cylinder [m].
         """
         self.is_held_up = False
         if not self.is_moving:
@@ -152,11 +152,11 @@ class Door:
         return True
 
     def distance_to(self, x: float, y: float) -> float:
-        """Distance from a point to the leaf, in the plane [m]."""
+        """Planar distance from a point to the leaf [m]."""
         return self._distance(x, y, self.opening)
 
     def cut(self, height: float) -> Slice:
-        """Cut of a plane at a height [m] with the present leaf, in the world frame."""
+        """Horizontal section at a height [m] of the leaf in its present position, in the world frame."""
         if height not in self._cuts:
             closed = Body(name=self.name, kind="door", pose=self._axis_from_body, collisions=self.body.collisions)
             self._cuts[height] = slice_bodies([closed], height)
@@ -182,7 +182,7 @@ def _check_swing(name: str, swing: float) -> None:
 
 
 def _extent(body: Body, axis_from_body: Matrix) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Smallest and largest x and y of the collision shapes in the frame of the hinge."""
+    """Smallest and largest x and y of the collision shapes in the hinge's frame."""
     if not body.collisions:
         raise WorldError(f"door '{body.name}'", "has no collision shape")
     corners = []

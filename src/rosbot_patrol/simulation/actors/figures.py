@@ -1,4 +1,4 @@
-"""Figures of actors: body, limbs in motion, and their cuts with a plane."""
+"""Figures of actors: the body, the pose of its limbs while it walks, and its horizontal sections."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
 
 MODELS = ("person", "fire_hydrant", *PETS, "poster")
 
-_PACE_OF_FULL_STEPS = 0.25  # a pet that walks slower takes smaller ones [m/s]
+_PACE_OF_FULL_STEPS = 0.25  # a slower pet takes smaller steps [m/s]
 _CYCLE = 1.3  # length of two steps of a person [m]
-_SWING = 0.22  # how far a person's foot goes before and behind the body [m]
-_HEAD_AND_TAIL = 0.65  # of a pet from its middle, in lengths of the trunk
+_SWING = 0.22  # amplitude of a person's foot before and behind the body [m]
+_HEAD_AND_TAIL = 0.65  # reach of a pet's head and tail from its middle, in lengths of the trunk
 _WARM_SHARES = (0.2, 0.5, 0.75, 0.92)  # shins, hips, chest, head of a person, in heights
-_KNEE = 0.8  # a cut below meets legs that swing [m]
+_KNEE = 0.8  # a section below cuts through swinging legs [m]
 
 
 class Figure(Protocol):
-    """Body of an actor in its own frame: on the floor, x forward.
+    """The body of an actor in its own frame: on the floor, x forward.
 
     Attributes:
-        body: shapes and looks; placed by who owns it.
-        look: name of the look, "" of what has none.
-        warmth: how far a motion sensor notices it, 1 as a person, 0 not at all.
-        warm_heights: of the points that stand for its warm surface, above the floor [m].
-        radius: of the upright cylinder that holds it, limbs apart [m].
-        cycle: way walked while each leg takes one step [m].
-        turn_rate: of a walking one [rad/s].
+        body: shapes and looks; the owner places it.
+        look: name of the look, "" if it has none.
+        warmth: distance at which a motion sensor notices it: 1 as for a person, 0 never.
+        warm_heights: heights above the floor of the points that represent its warm surface [m].
+        radius: radius of its vertical bounding cylinder, without limbs [m].
+        cycle: distance walked while each leg takes one step [m].
+        turn_rate: turning rate while it walks [rad/s].
     """
 
     body: Body
@@ -58,10 +58,10 @@ class Figure(Protocol):
     turn_rate: float
 
     def pose_parts(self, phase: float, speed: float) -> Matrix | None:
-        """body_from_visuals, shape (number of visuals, 4, 4), after `phase` cycles at a speed; None: never moved."""
+        """body_from_visuals, shape (number of visuals, 4, 4), after `phase` cycles at a speed; None if rigid."""
 
     def cut(self, height: float, phase: float, speed: float) -> Slice:
-        """Cut with a plane at a height [m]."""
+        """Horizontal section at a height [m]."""
 
 
 class PersonFigure:
@@ -81,11 +81,11 @@ class PersonFigure:
         self._cuts = _Cuts(self.body)
 
     def pose_parts(self, phase: float, speed: float) -> Matrix | None:
-        """Limbs as they swing."""
+        """Poses of the swinging limbs."""
         return person_pose_parts(self._look, phase, speed > 0.0, self._posture)
 
     def cut(self, height: float, phase: float, speed: float) -> Slice:
-        """Two legs, swung, or the trunk."""
+        """Section of the two swinging legs, or of the trunk."""
         still = self._cuts.at(height)
         if speed <= 0.0 or height >= _KNEE:
             return still
@@ -109,10 +109,10 @@ class HydrantFigure:
         self._cuts = _Cuts(self.body)
 
     def pose_parts(self, phase: float, speed: float) -> Matrix | None:
-        """Nothing of it moves."""
+        """None: no moving parts."""
 
     def cut(self, height: float, phase: float, speed: float) -> Slice:
-        """The pillar."""
+        """Section of the pillar."""
         return self._cuts.at(height)
 
 
@@ -132,18 +132,18 @@ class PetFigure:
         self._cuts = _Cuts(Body(name=name, kind="pet", collisions=self.body.collisions[:2]))  # trunk and head
 
     def pose_parts(self, phase: float, speed: float) -> Matrix | None:
-        """Legs, head and tail as they move."""
+        """Poses of the moving legs, head and tail."""
         return pet_pose_parts(self._look, phase, _gait(speed))
 
     def cut(self, height: float, phase: float, speed: float) -> Slice:
-        """Trunk and head as they are, and the legs where they stand now."""
+        """Section of trunk and head, and of the legs in their present position."""
         still = self._cuts.at(height)
         legs = legs_at(self._look, height, phase, _gait(speed))
         return still.plus(Slice(NO_SEGMENTS, legs))
 
 
 class _Cuts:
-    """The cuts through a body at its own origin, each made once."""
+    """Cached sections of a body at its own origin."""
 
     def __init__(self, body: Body) -> None:
         self._body = Body(name=body.name, kind=body.kind, collisions=body.collisions)
@@ -156,17 +156,17 @@ class _Cuts:
 
 
 def make_figure(name: str, model: str, look: str, posture: str, rng: np.random.Generator) -> Figure:
-    """The figure of an actor.
+    """Make the figure of an actor.
 
     Args:
-        name: of the actor.
+        name: name of the actor.
         model: one of MODELS.
-        look: name of a person's or pet's look, "" for one drawn.
-        posture: how a person holds itself, "" stands; others only stand.
-        rng: draws the look.
+        look: name of a person's or pet's look, "" for a random one.
+        posture: posture of a person, "" for standing; other models only stand.
+        rng: random generator of the look.
 
     Raises:
-        WorldError: the model, the look or the posture is not known.
+        WorldError: the model, look or posture is unknown.
     """
     held = _posture_named(name, posture)
     if model == "person":

@@ -1,7 +1,7 @@
-"""Appearance of people: named looks, random looks, and looks reserved for tests.
+"""Looks of people: named, random, and reserved for tests.
 
-The generator of training pictures draws with `draw_look`, which never gives a reserved height, colour or a mask; the
-system test's intruders have such, so that the network is tested on people whom it has never seen.
+The generator of training pictures uses `draw_look`, which never gives a reserved height, a reserved colour or a mask.
+The system test's intruders have such looks: the network is tested on people that it has never seen.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ HEIGHTS = (1.50, 1.95)
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """Appearance of a person.
+    """The appearance of a person.
 
     Attributes:
-        height [m]; build: 1 is usual, 0.8 slight, 1.3 heavy.
-        hair_style: short, long, bald, hood (of the top's colour), beanie or cap (of the hat's colour).
+        height: [m]; build: 1 is usual, 0.8 slight, 1.3 heavy.
+        hair_style: short, long, bald, hood (in the top's colour), beanie or cap (in the hat's colour).
         mask: colour of a mask over the whole head, or None; reserved for tests.
         legs: trousers, shorts or skirt; sleeves: long or short; loose: 0 tight to 1 wide clothes.
-        coat: the top reaches down over the thighs.
+        coat: the top extends down over the thighs.
     """
 
     name: str = "someone"
@@ -126,10 +126,10 @@ LOOKS: dict[str, Look] = {
 
 
 def look_named(name: str) -> Look:
-    """Look with a name.
+    """Find a look by its name.
 
     Raises:
-        WorldError: there is no such look; names those that there are.
+        WorldError: there is no such look; the text lists the existing ones.
     """
     if name not in LOOKS:
         raise WorldError(name, f"is no look of a person; known are {', '.join(LOOKS)}")
@@ -137,14 +137,14 @@ def look_named(name: str) -> Look:
 
 
 def is_reserved(look: Look) -> bool:
-    """Whether a look is reserved for tests: by height, mask, or a strong colour of a reserved hue."""
+    """Whether a look is reserved for tests: its height, a mask, or a strong colour of a reserved hue."""
     coloured = [look.top, look.bottom, look.hat, look.shoes, *([look.backpack] if look.backpack else [])]
     tall = RESERVED_HEIGHTS[0] <= look.height <= RESERVED_HEIGHTS[1]
     return tall or look.mask is not None or any(_is_reserved_colour(c) for c in coloured)
 
 
 def draw_look(rng: np.random.Generator) -> Look:
-    """Random look, never a reserved one."""
+    """Draw a random look, never a reserved one."""
     height = float(rng.uniform(*HEIGHTS))
     while RESERVED_HEIGHTS[0] <= height <= RESERVED_HEIGHTS[1]:
         height = float(rng.uniform(*HEIGHTS))

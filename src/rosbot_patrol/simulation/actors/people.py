@@ -1,6 +1,6 @@
-"""People and fire hydrants as bodies of the scene, with limb poses for walking, sitting and crouching.
+"""Bodies of people and fire hydrants, and a person's limbs while walking, sitting or crouching.
 
-A person's frame is on the floor between the feet, x forward. One posture is reserved for tests, as some looks are
+A person's frame is on the floor between the feet, x forward. One posture is reserved for tests, as are some looks
 (`looks.py`): the generator of training pictures never uses it.
 """
 
@@ -33,7 +33,7 @@ __all__ = [
 
 
 def person_body(name: str, look: Look | None = None) -> Body:
-    """A person at the world's origin; `person_pose_parts` moves its visuals."""
+    """Make a standing person at the world's origin; `person_pose_parts` moves the visuals."""
     look = look or LOOKS["visitor"]
     poses = person_pose_parts(look)
     visuals = tuple(
@@ -47,10 +47,10 @@ def person_pose_parts(look: Look, phase: float = 0.0, walking: bool = False, pos
     """Poses of the visuals of `person_body`, body_from_visuals, shape (number of visuals, 4, 4).
 
     Args:
-        look: as it was given to `person_body`.
-        phase: cycles walked (two steps each); standing, it sways the arms a little. Only its fraction counts.
-        walking: whether the legs walk; a person who creeps walks stooped.
-        posture: how the person holds itself; "creeping" is reserved for tests.
+        look: the look given to `person_body`.
+        phase: cycles walked (two steps each); it sways the arms a little while standing. Only its fraction counts.
+        walking: whether the legs walk; a creeping person walks stooped.
+        posture: posture of the person; "creeping" is reserved for tests.
     """
     frames = _skeleton(look, _angles(phase % 1.0, walking, posture))
     return np.array([frames[joint] for joint in _joints(look)])
@@ -59,7 +59,7 @@ def person_pose_parts(look: Look, phase: float = 0.0, walking: bool = False, pos
 def hydrant_body(
     name: str, colour: Colour = (0.74, 0.10, 0.08), *, caps: Colour | None = None, height: float = 0.75
 ) -> Body:
-    """A fire hydrant on the floor at the world's origin, its front nozzle along x."""
+    """Make a fire hydrant on the floor at the world's origin, with its front nozzle along x."""
     s, caps = height / 0.75, caps or (0.78, 0.76, 0.70)
     upright = [
         (0.16, 0.05, 0.025, colour),
@@ -81,7 +81,7 @@ def hydrant_body(
 
 @dataclass(frozen=True)
 class _Angles:
-    """How joints are bent [rad]; forward swings are positive, each pair is (left, right)."""
+    """Joint angles [rad]; forward swings are positive, each pair is (left, right)."""
 
     lean: float = 0.03
     nod: float = 0.0
@@ -144,7 +144,7 @@ def _angles(phase: float, walking: bool, posture: Posture) -> _Angles:
 
 
 def _skeleton(look: Look, angles: _Angles) -> dict[str, Matrix]:
-    """body_from_joint for each joint, the lower shoe's sole on the floor."""
+    """body_from_joint for each joint, with the lower shoe's sole on the floor."""
     h = look.height
     pelvis = _at(0, 0, 0.0)
     torso = pelvis @ _at(0, 0, 0.055 * h) @ _pitch(angles.lean)

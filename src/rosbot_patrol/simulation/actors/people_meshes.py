@@ -1,7 +1,7 @@
-"""Meshes of a human figure: limbs and trunk as lofts over elliptic sections.
+"""The parts of a human figure as triangles: limbs and trunk lofted over elliptic sections.
 
-A section is (z, half width along x, half width along y, middle's x), from the top of the part to its bottom, in
-metres, in the frame of the joint that carries the part.
+A section is (z, half width along x, half width along y, x of the centre), from the top of the part to its bottom, in
+metres, in the frame of the part's joint.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _SIDES = 12
 
 
 def loft(sections: Sequence[Section], *, y: float = 0.0, sides: int = _SIDES) -> Shape:
-    """A closed body over elliptic sections, shifted sideways by `y`."""
+    """Make a closed body over elliptic sections, shifted sideways by `y`."""
     rows = np.array(
         [(sections[0][0], 1e-4, 1e-4, sections[0][3]), *sections, (sections[-1][0], 1e-4, 1e-4, sections[-1][3])]
     )
@@ -41,14 +41,14 @@ def _circle(sides: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def ellipsoid(
     x: float, y: float, z: float, *, at: tuple[float, float, float] = (0.0, 0.0, 0.0), rings: int = 8
 ) -> Shape:
-    """An ellipsoid with those half axes."""
+    """An ellipsoid with the given half axes."""
     polar = np.linspace(0.08, np.pi - 0.08, rings)
     sections = [(at[2] + z * float(np.cos(p)), x * float(np.sin(p)), y * float(np.sin(p)), at[0]) for p in polar]
     return loft(sections, y=at[1])
 
 
 def thigh(length: float, build: float) -> Shape:
-    """Hip to knee."""
+    """Thigh, from hip to knee."""
     a, b = 0.088 * build, 0.058 * (0.6 + 0.4 * build)
     return loft(
         [
@@ -63,7 +63,7 @@ def thigh(length: float, build: float) -> Shape:
 
 
 def shin(length: float, build: float, *, loose: float) -> Shape:
-    """Knee to ankle; `loose` widens the trouser leg at the ankle."""
+    """Shin, from knee to ankle; `loose` widens the trouser leg at the ankle."""
     a, b = 0.056 * (0.6 + 0.4 * build), 0.036 + 0.022 * loose
     return loft(
         [
@@ -91,7 +91,7 @@ def shoe(length: float, high: float) -> Shape:
 
 
 def trunk(length: float, shoulder: float, build: float, *, loose: float) -> Shape:
-    """Waist to shoulders; its frame is at the waist."""
+    """Trunk, from waist to shoulders; its frame is at the waist."""
     w, d = shoulder, 0.105 * build
     waist = (0.70 + 0.18 * loose + 0.25 * (build - 1)) * w
     return loft(
@@ -109,7 +109,7 @@ def trunk(length: float, shoulder: float, build: float, *, loose: float) -> Shap
 
 
 def hips(width: float, build: float) -> Shape:
-    """The pelvis about the hip joints' middle."""
+    """The pelvis around the middle of the hip joints."""
     d = 0.105 * build
     return loft(
         [
@@ -135,7 +135,7 @@ def skirt(width: float, length: float, build: float, *, flare: float) -> Shape:
 
 
 def upper_arm(length: float, build: float, *, loose: float) -> Shape:
-    """Shoulder to elbow."""
+    """Upper arm, from shoulder to elbow."""
     a = 0.052 * (0.5 + 0.5 * build) + 0.012 * loose
     return loft(
         [
@@ -149,18 +149,18 @@ def upper_arm(length: float, build: float, *, loose: float) -> Shape:
 
 
 def forearm(length: float, build: float, *, loose: float) -> Shape:
-    """Elbow to wrist."""
+    """Forearm, from elbow to wrist."""
     a = 0.042 * (0.5 + 0.5 * build) + 0.012 * loose
     return loft([(0.02, 0.8 * a, 0.8 * a, 0), (-0.2 * length, a, a, 0), (-length, 0.72 * a, 0.68 * a, 0)])
 
 
 def hand(below: float) -> Shape:
-    """A hand whose wrist is that far below the elbow."""
+    """A hand with its wrist `below` metres below the elbow."""
     return ellipsoid(0.045, 0.022, 0.085, at=(0.008, 0.0, -below - 0.07))
 
 
 def head(size: float) -> Shape:
-    """Neck, face and skull; the frame is at the neck's foot, `size` the head's height."""
+    """Neck, face and skull; the frame is at the base of the neck, `size` is the head's height."""
     r = size / 2
     return loft(
         [
@@ -178,7 +178,7 @@ def head(size: float) -> Shape:
 
 
 def hair(size: float, style: str) -> Shape:
-    """Hair, hood or woollen hat over that head; style short, long, hood or beanie."""
+    """Hair, hood or woollen hat on a head of that size; style short, long, hood or beanie."""
     r = size / 2
     z = 0.075
     if style == "long":
@@ -222,7 +222,7 @@ def brim(size: float) -> Shape:
 
 
 def backpack(height: float) -> Shape:
-    """A rucksack behind the trunk; the frame is at the waist."""
+    """A backpack behind the trunk; the frame is at the waist."""
     return loft(
         [
             (0.95 * height, 0.04, 0.09, -0.19),

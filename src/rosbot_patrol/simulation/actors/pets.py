@@ -1,7 +1,7 @@
-"""Cats and dogs: meshes, warm but no intruders; standing paws stay in place while the pet walks.
+"""Cats and dogs: triangle bodies, warm but no intruders; their standing paws stay in place while they walk.
 
-A pet's frame is on the floor under the middle of its trunk, x forward. Sizes are those of real ones: the lidar's plane
-(0.16 m) meets the lower trunk of a cat and the legs of most dogs; a range sensor meets the legs.
+A pet's frame is on the floor under the middle of its trunk, x forward. Sizes are realistic: the lidar's plane (0.16 m)
+cuts the lower trunk of a cat and the legs of most dogs; a range sensor meets the legs.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from rosbot_patrol.simulation.scene.scene import Body, Collision, Material, Shap
 
 LEGS = ("front_left", "front_right", "hind_left", "hind_right")
 
-_BEFORE = {"hind_left": 0.0, "front_left": 0.25, "hind_right": 0.5, "front_right": 0.75}  # a walk, in cycles
-_DUTY = 0.65  # part of a cycle that a paw stands
+_BEFORE = {"hind_left": 0.0, "front_left": 0.25, "hind_right": 0.5, "front_right": 0.75}  # paw phases of a walk, cycles
+_DUTY = 0.65  # share of a cycle in which a paw stands
 _DARK: Colour = (0.04, 0.03, 0.03)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PetLook:
-    """Appearance of a pet.
+    """The appearance of a pet.
 
     Attributes:
         height: at the shoulder [m]; length: of the trunk, in heights; depth, width: of the trunk, in heights.
@@ -48,12 +48,12 @@ class PetLook:
 
     @property
     def leg_radius(self) -> float:
-        """Thickness of a leg at the lidar's height [m]."""
+        """Radius of a leg at the lidar's height [m]."""
         return 0.062 * self.height
 
     @property
     def cycle(self) -> float:
-        """Distance of one step of each leg [m]."""
+        """Distance walked while each leg takes one step [m]."""
         return 0.75 * self.height
 
 
@@ -90,10 +90,10 @@ PETS: dict[str, dict[str, PetLook]] = {
 
 
 def pet_named(model: str, name: str) -> PetLook:
-    """A pet's look by its name.
+    """Find a pet's look by its name.
 
     Raises:
-        WorldError: there is no such look; names those that there are.
+        WorldError: there is no such look; the text lists the existing ones.
     """
     if name not in PETS[model]:
         raise WorldError(name, f"is no look of a {model}; known are {', '.join(PETS[model])}")
@@ -101,13 +101,13 @@ def pet_named(model: str, name: str) -> PetLook:
 
 
 def draw_pet(model: str, rng: np.random.Generator) -> PetLook:
-    """Random look of a cat or a dog."""
+    """Draw a random look of a cat or a dog."""
     known = list(PETS[model].values())
     return known[int(rng.integers(len(known)))]
 
 
 def pet_body(name: str, look: PetLook) -> Body:
-    """A pet at the world's origin; `pet_pose_parts` moves its visuals."""
+    """Make a standing pet at the world's origin; `pet_pose_parts` moves the visuals."""
     visuals = tuple(
         Visual(shape=shape, pose=pose, material=Material(rgba=(*colour, 1.0)))
         for (_, shape, colour), pose in zip(_figure(look), pet_pose_parts(look), strict=True)
@@ -119,7 +119,7 @@ def pet_pose_parts(look: PetLook, phase: float = 0.0, gait: float = 0.0) -> Matr
     """Poses of the visuals of `pet_body`, body_from_visuals, shape (number of visuals, 4, 4).
 
     Args:
-        look: as it was given to `pet_body`.
+        look: the look given to `pet_body`.
         phase: cycles walked; only its fraction counts.
         gait: 0 stands, 1 takes full steps.
     """
@@ -128,12 +128,12 @@ def pet_pose_parts(look: PetLook, phase: float = 0.0, gait: float = 0.0) -> Matr
 
 
 def paws(look: PetLook, phase: float, gait: float) -> dict[str, tuple[float, float, float]]:
-    """Where the legs' paws are, in the frame of the body [m]; one that stands moves back as fast as the body walks."""
+    """Positions of the paws in the body frame [m]; a standing paw moves back at the body's speed."""
     return {leg: _paw(look, leg, phase, gait) for leg in LEGS}
 
 
 def legs_at(look: PetLook, height: float, phase: float, gait: float) -> Matrix:
-    """Circles (x, y, radius) that a plane at a height [m] meets of the legs, in the frame of the body, shape (C, 3)."""
+    """Circles (x, y, radius) of the legs at a height [m], in the body frame, shape (C, 3)."""
     if not 0.0 <= height < _hip_height(look):
         return np.zeros((0, 3))
     share = height / _hip_height(look)
@@ -167,11 +167,11 @@ def _paw(look: PetLook, leg: str, phase: float, gait: float) -> tuple[float, flo
 
 
 def _skeleton(look: PetLook, phase: float, gait: float) -> dict[str, Matrix]:
-    """body_from_joint of each joint."""
+    """body_from_joint for each joint."""
     h = look.height
     turn = math.tau * phase
     middle = h * (1.0 - 0.5 * look.depth)
-    trunk = from_xyz_rpy((0.0, 0.0, middle), (0.0, math.pi / 2.0, 0.0))  # a loft's z is forward, its x down
+    trunk = from_xyz_rpy((0.0, 0.0, middle), (0.0, math.pi / 2.0, 0.0))  # a loft's z is forward, its x is down
     chest = 0.5 * look.length * h
     raised = 0.5 if look.model == "dog" else 0.95
     nod = 0.05 * gait * math.sin(2.0 * turn)
@@ -193,7 +193,7 @@ def _bones(look: PetLook) -> tuple[float, float]:
 
 
 def _leg(look: PetLook, leg: str, paw: tuple[float, float, float]) -> dict[str, Matrix]:
-    """Two bones from the hip to the paw's ankle; elbows bend back, knees forward."""
+    """Two bones from the hip to the paw's ankle; elbows bend backwards, knees forwards."""
     upper, lower = _bones(look)
     x, y = _hip(look, leg)
     ankle_x, ankle_z = paw[0], paw[2] + 0.05 * look.height
@@ -241,7 +241,7 @@ def _joints(look: PetLook) -> tuple[str, ...]:
 
 
 def _trunk(look: PetLook) -> Shape:
-    """From the chest to the rump along z; x is down."""
+    """Trunk from the chest to the rump along z; x is down."""
     h, half = look.height, 0.5 * look.length * look.height
     deep, wide = 0.5 * look.depth * h, 0.5 * look.width * h
     return loft(
@@ -305,7 +305,7 @@ def _darker(colour: Colour, share: float) -> Colour:
 
 
 def _collisions(look: PetLook) -> tuple[Collision, ...]:
-    """Trunk and head; then the legs, straight."""
+    """Collision shapes of trunk and head, then of the straight legs."""
     h = look.height
     radius = 0.25 * (look.depth + look.width) * h
     along = max(look.length * h - 2.0 * radius, 0.01)

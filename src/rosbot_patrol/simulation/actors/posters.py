@@ -1,6 +1,6 @@
 """Posters: boards on a wall with the picture of a person.
 
-The picture is the person's own body pressed flat, so that colour and outline are a person's and depth is a board's.
+The picture is the person's own body pressed flat: its colour and outline are a person's, its depth is a board's.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from rosbot_patrol.simulation.scene.scene import Body, Collision, Material, Matr
 from rosbot_patrol.simulation.scene.shapes import triangles_of
 from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
 
-BOTTOM, SHARE = 0.45, 0.7  # of a poster: lower edge [m], size of the picture in sizes of the person
-_THICK, _PRESSED = 0.01, 0.01  # of the board [m]; depth of the picture in depths of the person
-_MARGIN = 0.06  # of the board round the picture [m]
+BOTTOM, SHARE = 0.45, 0.7  # lower edge [m]; size of the picture relative to the person
+_THICK, _PRESSED = 0.01, 0.01  # thickness of the board [m]; depth of the picture relative to the person's
+_MARGIN = 0.06  # margin of the board around the picture [m]
 _BOARD = (0.86, 0.84, 0.78, 1.0)
 
 
 def poster_body(name: str, look: Look) -> Body:
-    """A poster that hangs on a wall in the plane x = 0 and faces along x."""
+    """Make a poster that hangs on a wall in the plane x = 0 and faces along x."""
     size = SHARE * look.height
     wide, high = 0.5 * size + 2.0 * _MARGIN, size + 2.0 * _MARGIN
     middle = from_xyz_rpy((0.0, 0.0, BOTTOM + high / 2.0), (0.0, 0.0, 0.0))
@@ -31,7 +31,7 @@ def poster_body(name: str, look: Look) -> Body:
 
 
 def _pressed(look: Look) -> list[Visual]:
-    """The parts of a standing person, flat before the board."""
+    """The parts of a standing person, flattened onto the board."""
     scale = np.array([_PRESSED, SHARE, SHARE])
     shift = np.array([_THICK / 2.0 + 0.005, 0.0, BOTTOM + _MARGIN])
     parts = []
@@ -44,7 +44,7 @@ def _pressed(look: Look) -> list[Visual]:
 
 
 class PosterFigure:
-    """A poster as an actor: it neither moves nor is it warm."""
+    """A poster as an actor: it neither moves nor is warm."""
 
     warmth = 0.0
     warm_heights: tuple[float, ...] = ()
@@ -58,8 +58,8 @@ class PosterFigure:
         self._still = Body(name=name, collisions=self.body.collisions)
 
     def pose_parts(self, phase: float, speed: float) -> Matrix | None:
-        """Nothing of it moves."""
+        """None: no moving parts."""
 
     def cut(self, height: float, phase: float, speed: float) -> Slice:
-        """The board, where the plane is as high as it hangs."""
+        """Section of the board, if the plane is at its height."""
         return slice_bodies([self._still], height)

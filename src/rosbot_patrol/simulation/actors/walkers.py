@@ -1,8 +1,8 @@
 """Walking actors in the plane: people, pets and fire hydrants that stand, walk along points, roam and stop.
 
-A walker gathers speed and loses it as legs can, turns before it sets off, and stops before the robot and before a
-door's leaf until those have gone. It knows nothing of walls: `ways.Ways` refuses a path through one. Who wanders stops
-before others too, and goes elsewhere; those who have a path to follow walk through each other.
+A walker accelerates and brakes like a person, turns before it starts, and stops before the robot and a door's leaf
+until they have gone. It knows nothing of walls: `ways.Ways` refuses a path through one. A wandering actor also stops
+before others and then goes elsewhere; actors with a path walk through each other.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from rosbot_patrol.simulation.scene.slices import Slice
 
 __all__ = ["FASTEST", "MODELS", "Obstacle", "Walker"]
 
-FASTEST = 8.0  # nobody here runs faster [m/s]
+FASTEST = 8.0  # largest speed of an actor [m/s]
 
-_GAIN, _BRAKE = 1.2, 2.0  # change of speed, setting off and stopping [m/s2]
-_LAST_STEP = 0.1  # speed with which a goal is reached [m/s]
+_GAIN, _BRAKE = 1.2, 2.0  # acceleration at the start and deceleration before a stop [m/s2]
+_LAST_STEP = 0.1  # speed of arrival at a goal [m/s]
 _ARRIVED = 0.05
-_ROOM = 0.17  # left between a walker and the robot's middle, beyond the walker's own radius [m]
-_SHARP = 1.2  # a corner of more is turned standing [rad]
-_TRIES = 12  # places that one who wanders thinks of before it waits
-_PATIENCE = 2.0  # who wanders and is held up goes elsewhere after [s]
+_ROOM = 0.17  # distance between a walker and the robot's middle, beyond the walker's own radius [m]
+_SHARP = 1.2  # at a sharper corner the walker stands while it turns [rad]
+_TRIES = 12  # number of places that a wandering actor tries before it waits
+_PATIENCE = 2.0  # a blocked wandering actor goes elsewhere after this time [s]
 
 
 class Obstacle(Protocol):
-    """A moving obstacle that walkers avoid."""
+    """A moving obstacle that stops walkers."""
 
     def distance_to(self, x: float, y: float) -> float:
-        """Distance from a point [m]."""
+        """Distance from a point to the obstacle [m]."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,13 @@ class Walker:
     Args:
         name: unique in the world.
         model: person, fire_hydrant, cat or dog.
-        look: name of a person's or pet's look, "" for one drawn.
-        pose: where it stands.
-        rng: draws the look.
-        posture: how a person holds itself, "" stands.
+        look: name of a person's or pet's look, "" for a random one.
+        pose: initial pose.
+        rng: random generator of the look.
+        posture: posture of a person, "" for standing.
 
     Raises:
-        WorldError: the model, the look or the posture is not known.
+        WorldError: the model, look or posture is unknown.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Walker:
 
     @property
     def is_walking(self) -> bool:
-        """Whether it is moving now."""
+        """Whether it is moving along its path."""
         return self._pace > 0.0
 
     @property
@@ -101,12 +101,12 @@ class Walker:
 
     @property
     def speed(self) -> float:
-        """Present speed [m/s]."""
+        """Present walking speed [m/s]."""
         return self._pace
 
     @property
     def is_roaming(self) -> bool:
-        """Whether it is roaming."""
+        """Whether it wanders."""
         return self._roaming is not None
 
     def distance_to(self, x: float, y: float) -> float:
@@ -120,22 +120,22 @@ class Walker:
 
     @property
     def warmth(self) -> float:
-        """Range at which a motion sensor notices it, relative to a person."""
+        """Range at which a motion sensor notices it, relative to a person's."""
         return self._figure.warmth
 
     @property
     def warm_heights(self) -> tuple[float, ...]:
-        """Heights above the floor of the points on its warm surface [m]."""
+        """Heights above the floor of the points that represent its warm surface [m]."""
         return self._figure.warm_heights
 
     @property
     def radius(self) -> float:
-        """Radius of the upright cylinder around it, without limbs [m]."""
+        """Radius of its vertical bounding cylinder, without limbs [m]."""
         return self._figure.radius
 
     @property
     def look_name(self) -> str:
-        """Name of its look, "" if it has none."""
+        """Name of the look, "" if it has none."""
         return self._figure.look
 
     @property
@@ -152,11 +152,11 @@ class Walker:
             path: points; it turns to the yaw of the last.
             speed: a person strolls at 0.4 and hurries at 1.4 [m/s].
             loop: begin again after the last point.
-            pause: stand that long at each point [s].
-            yields: stop before the robot; else it walks on, over it if need be.
+            pause: time to stand at each point [s].
+            yields: stop before the robot; otherwise it walks on, even over the robot.
 
         Raises:
-            WorldError: no points, a number that is not finite, a path without speed, or one that nobody runs at.
+            WorldError: no points, a number that is not finite, a path without speed, or a speed above the limit.
         """
         numbers = [speed, pause, *(v for p in path for v in p)]
         if not path or not all(map(math.isfinite, numbers)):
@@ -181,17 +181,17 @@ class Walker:
         *,
         pause: float = 2.0,
     ) -> None:
-        """Roam around its place, from one free place to another, until told otherwise.
+        """Wander around its present position, from one free place to another, until the next command.
 
         Args:
-            radius: it stays within [m].
-            speed: that it walks with [m/s].
+            radius: largest distance from that position [m].
+            speed: walking speed [m/s].
             rng: chooses the places.
-            is_free: whether the straight way between two places is.
-            pause: stands that long at each place [s].
+            is_free: whether the straight path between two places is free.
+            pause: time to stand at each place [s].
 
         Raises:
-            WorldError: a number that makes no sense.
+            WorldError: a number is invalid.
         """
         if not (math.isfinite(radius) and radius > 0.0 and speed > 0.0):
             raise WorldError(f"actor '{self.name}'", f"cannot wander within {radius} m at {speed} m/s")
@@ -202,7 +202,7 @@ class Walker:
         self._waits = self._held_up = self._pace = 0.0
 
     def step(self, dt: float, robot: Pose2D | None, obstacles: Sequence[Obstacle] = ()) -> bool:
-        """Advance by `dt` [s]; returns whether it moved. It stops before robot and obstacles until those have gone."""
+        """Advance by `dt` [s]; returns whether it moved. It waits for the robot and obstacles to go."""
         if self._waits > 0.0:
             self._waits -= dt
             self._pace = 0.0
@@ -231,11 +231,11 @@ class Walker:
         return changed
 
     def pose_parts(self) -> Matrix | None:
-        """body_from_visuals of the limbs, None for what has none."""
+        """body_from_visuals of the limbs, None without moving parts."""
         return self._figure.pose_parts(self._phase, self._pace)
 
     def cut(self, height: float) -> Slice:
-        """Cut with a plane at a height [m], in the world frame."""
+        """Its horizontal section at a height [m], in the world frame."""
         return self._figure.cut(height, self._phase, self._pace).placed(self.pose)
 
     def _check(self, speed: float, pause: float) -> None:
@@ -245,7 +245,7 @@ class Walker:
             raise WorldError(f"actor '{self.name}'", f"cannot pause for {pause} s")
 
     def _pace_for(self, error: float, gap: float, dt: float) -> float:
-        """Next speed, limited by obstacles ahead and by the legs [m/s]."""
+        """The next speed, limited by the distance ahead and the acceleration [m/s]."""
         if abs(error) >= _SHARP:
             return max(self._pace - _BRAKE * dt, 0.0) if self._pace > _LAST_STEP else 0.0
         at_goal = self._pace_at_goal()
@@ -267,7 +267,7 @@ class Walker:
         return heading if abs(error) <= most else wrap_angle(self.pose.yaw + math.copysign(most, error))
 
     def _is_in_the_way(self, moved: Pose2D, robot: Pose2D | None, obstacles: Sequence[Obstacle]) -> bool:
-        """Whether a move would bring it closer to something already close; turning is always free."""
+        """Whether a move would bring it closer to something that is already close; turning is always free."""
         if (
             self.yields
             and robot is not None
@@ -286,7 +286,7 @@ class Walker:
             self._path, self._held_up = [], 0.0
 
     def _finds_a_way(self) -> bool:
-        """Whether it has found a place to roam to."""
+        """Whether the wandering actor has found a place to go to."""
         if self._roaming is None:
             return False
         centre, rng = self._roaming.centre, self._roaming.rng

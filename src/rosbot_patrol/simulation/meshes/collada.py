@@ -1,8 +1,8 @@
 """Reader of COLLADA files (pycollada), as in Gazebo classic: <unit> scales, <up_axis> is ignored.
 
-That is gazebo-classic's issue 1305: what stands right in Gazebo stands right here. Only shapes and their colours are
-taken. What is wrong elsewhere in the file (lamps, cameras, animations) does not matter, a material that is missing
-costs a colour, and a file that names no scene shows the first it has.
+Ignoring <up_axis> is gazebo-classic's issue 1305: a mesh that is upright in Gazebo is upright here. Only shapes and
+their colours are read. Errors elsewhere in the file (lamps, cameras, animations) do not matter. A missing material only
+loses its colour, and without a named scene the first one is used.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _BINDING = re.compile(rb"<bind_material\b.*?</bind_material\s*>", re.DOTALL)
 
 
 def read_dae(path: Path) -> list[MeshPart]:
-    """The parts of a COLLADA file.
+    """Read the parts of a COLLADA file.
 
     Raises:
         OSError: it cannot be read.
@@ -44,7 +44,7 @@ def read_dae(path: Path) -> list[MeshPart]:
 
 
 def _parts(data: bytes, folder: Path) -> list[MeshPart]:
-    import collada  # 7 MB and 0.1 s, for the worlds that need it
+    import collada  # 7 MB and 0.1 s: only for worlds that need it
 
     try:
         bearable = [collada.common.DaeUnsupportedError, collada.common.DaeBrokenRefError]  # as a missing texture
@@ -53,13 +53,13 @@ def _parts(data: bytes, folder: Path) -> list[MeshPart]:
         scene = document.scene if b"<scene" in data else next(iter(document.scenes), None)
         bound = [found for node in (scene.nodes if scene is not None else ()) for found in _bound(node, np.eye(4), "")]
         parts = [part for name, geometry in bound for part in _dae_parts(name, geometry, folder)]
-    except Exception as err:  # pycollada lets what it stumbles over through: of lxml, of numpy, its own
+    except Exception as err:  # pycollada passes on errors of lxml, of numpy and its own
         raise ValueError(str(err) or type(err).__name__) from err
     return [MeshPart(part.name, part.vertices * metres, part.faces, part.rgba) for part in parts]
 
 
 def _bound(node: Any, world_from_parent: NDArray[np.float64], name: str) -> Iterator[tuple[str, Any]]:
-    """(name of the node, geometry in the scene) below a node of a COLLADA scene."""
+    """(name of the node, geometry in the scene) for all nodes below one of a COLLADA scene."""
     import collada.scene as scene
 
     if isinstance(node, scene.Node | scene.NodeNode):
@@ -72,7 +72,7 @@ def _bound(node: Any, world_from_parent: NDArray[np.float64], name: str) -> Iter
             yield name, geometry
     elif isinstance(node, scene.ControllerNode):
         for controller in node.objects("controller", world_from_parent):
-            yield name, getattr(controller, "geometry", controller)  # a skin, as it is bound to its bones
+            yield name, getattr(controller, "geometry", controller)  # a skin, in its bind pose
 
 
 def _dae_parts(name: str, geometry: Any, folder: Path) -> Iterator[MeshPart]:
@@ -101,6 +101,6 @@ def _dae_colour(primitive: Any, folder: Path) -> Rgba | None:
 
 
 def _names_colour(effect: Any) -> bool:
-    """Whether a file spells the colour out: else pycollada's is black."""
+    """Whether a file states the colour: otherwise pycollada's is black."""
     diffuse = [element for element in effect.xmlnode.iter() if str(element.tag).endswith("}diffuse")]
     return any(str(child.tag).endswith("}color") for element in diffuse for child in element)

@@ -1,4 +1,4 @@
-"""Mean colours of textures: the camera here shows a texture as one colour."""
+"""Mean colours of textures: this camera shows plain colours instead of a world's textures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Rgba = tuple[float, float, float, float]
 
 
 def picture_near(name: str, base: Path) -> Path | None:
-    """File of a texture: beside the file that names it, or in the folders of Gazebo's models."""
+    """Find a texture's file: beside the file that names it, or in the texture folders of Gazebo's models."""
     plain = Path(name.removeprefix("file://"))
     places = [
         base / plain,
@@ -25,7 +25,7 @@ def picture_near(name: str, base: Path) -> Path | None:
 
 @functools.lru_cache(maxsize=256)
 def mean_colour(path: Path) -> Rgba | None:
-    """Mean colour of an image file without transparent pixels; None, with a warning, if it is no image."""
+    """Mean colour of a picture file without its transparent part; None, with a warning, if it cannot be read."""
     from PIL import Image  # only for worlds with textures
 
     try:
@@ -40,7 +40,7 @@ def mean_colour(path: Path) -> Rgba | None:
 
 
 def worn_colour(names: Iterable[str], base: Path) -> Rgba | None:
-    """Mean colour of the first texture found."""
+    """Mean colour of the first texture that is found."""
     for name in names:
         path = picture_near(name, base)
         if path is not None:

@@ -1,6 +1,6 @@
-"""Reader of mesh files: STL (binary or text), Wavefront OBJ with its colours, and COLLADA (`collada`).
+"""Reader of triangles from mesh files: STL (binary or text), Wavefront OBJ with its colours, and COLLADA (`collada`).
 
-Units and axes are taken as Gazebo classic takes them: metres and z up in STL and OBJ.
+Units and axes are as in Gazebo classic: metres and z up in STL and OBJ.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ log = logging.getLogger(__name__)
 
 
 def load_mesh(path: Path) -> Triangles:
-    """Vertices (V, 3) and triangles (F, 3) of a mesh file, all parts together.
+    """Read the vertices (V, 3) and triangles (F, 3) of a mesh file, with all parts merged.
 
     Raises:
-        WorldError: the file is missing, of another kind, or holds no triangles.
+        WorldError: the file is missing, of another kind, or has no triangles.
     """
     return merged(load_parts(path))
 
 
 def load_parts(path: Path) -> tuple[MeshPart, ...]:
-    """The parts of a mesh file, at least one.
+    """Read the parts of a mesh file, at least one.
 
     Raises:
-        WorldError: the file is missing, of another kind, broken, or holds no triangles.
+        WorldError: the file is missing, of another kind, broken, or has no triangles.
     """
     readers = {".stl": _read_stl, ".obj": _read_obj, ".dae": read_dae}
     reader = readers.get(path.suffix.lower())
@@ -105,7 +105,7 @@ def _read_obj(path: Path) -> list[MeshPart]:
 
 
 def _read_mtl(path: Path) -> dict[str, Rgba]:
-    """Colour by material, of its texture where it has one; where the library is no good only the colours are lost."""
+    """Colours by material, from its texture if it has one; an unusable library only loses the colours."""
     colours: dict[str, Rgba] = {}
     name = ""
     try:

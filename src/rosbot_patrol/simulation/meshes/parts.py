@@ -1,4 +1,4 @@
-"""Parts of a mesh file: triangles with one name and one colour each."""
+"""Parts of a mesh: triangles with one name and one colour each."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class MeshPart:
     """Triangles with one name and one colour.
 
     Attributes:
-        name: of the object or node in the file, "" where it has none.
+        name: name of the object or node in the file, "" if it has none.
         vertices: shape (V, 3) [m].
         faces: shape (F, 3), F > 0.
-        rgba: the file's own colour, None where it has none.
+        rgba: the file's own colour, None if it has none.
     """
 
     name: str
@@ -30,14 +30,14 @@ class MeshPart:
 
 
 def merged(parts: tuple[MeshPart, ...]) -> Triangles:
-    """Vertices and triangles of several parts as one."""
+    """Merge vertices and triangles of several parts."""
     starts = np.cumsum([0] + [len(part.vertices) for part in parts])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
     return np.vstack([part.vertices for part in parts]), np.vstack(faces)
 
 
 def compact(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
-    """Keep only the vertices used by faces; indices out of range stay out of range."""
+    """Keep only the vertices that the faces use; indices out of range stay so."""
     if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
         return vertices, faces
     used, places = np.unique(faces, return_inverse=True)

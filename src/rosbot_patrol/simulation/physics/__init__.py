@@ -1,1 +1,1 @@
-"""Physics of bodies that push and fall: PyBullet."""
+"""Motion and contacts of bodies: PyBullet."""

@@ -1,4 +1,4 @@
-"""pybullet, imported without the build message that it prints on every console."""
+"""Import of pybullet without the line about its build that it writes to every console."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _CHATTER = b"pybullet build time:"
 
 
 def _import_quietly(name: str) -> Any:
-    """Import a module written in C and leave its chatter out; whatever else it writes to stderr is passed on."""
+    """Import a C module and suppress its message; other output to stderr is passed on."""
     try:
         stderr = os.dup(2)
-    except OSError:  # no stderr, as in a daemon: nobody reads the chatter
+    except OSError:  # no stderr, as in a daemon
         return importlib.import_module(name)
     written = os.memfd_create("stderr")
     os.dup2(written, 2)

@@ -1,4 +1,4 @@
-"""Collision shapes for PyBullet: the touchable parts of a body, in portions that PyBullet accepts."""
+"""Collision shapes for PyBullet: the parts of a body within the robot's reach, split for its limits."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from rosbot_patrol.simulation.scene.shapes import triangles_of
 
 Bounds = NDArray[np.float64]
 
-FLOOR = 0.01  # what does not rise higher is floor: the wheels roll on it [m]
-CEILING = 2.0  # what begins higher cannot be touched [m]
+FLOOR = 0.01  # lower parts count as floor: the wheels roll over them [m]
+CEILING = 2.0  # parts that begin higher are out of reach [m]
 
-_MOST_PARTS = 16  # in one compound shape
-_MOST_FACES = 20000  # in one mesh shape
+_MOST_PARTS = 16  # limit for one compound shape
+_MOST_FACES = 20000  # limit for one mesh shape
 _HULL_DIRECTIONS = 500
 _AXES = np.vstack([np.eye(3), -np.eye(3)])
 
@@ -42,7 +42,7 @@ def bounds_of(part: Collision, world_from_body: Matrix) -> Bounds:
 
 
 def touchable(body: Body) -> tuple[list[Collision], Bounds]:
-    """Parts of a body that can stop the robot, and their common bounds, shape (2, 3)."""
+    """Parts of a static body that can stop the robot, and their common bounds, shape (2, 3)."""
     kept, bounds = [], []
     for part in body.collisions:
         if part.shape.kind == "plane":
@@ -58,12 +58,12 @@ def touchable(body: Body) -> tuple[list[Collision], Bounds]:
 
 
 def shapes_of(parts: Sequence[Collision], client: int, world_from_body: Matrix | None = None) -> list[int]:
-    """PyBullet's ids of the shapes of some parts, at least one per part.
+    """Make PyBullet shapes for some parts, at least one per part; returns their numbers.
 
     Args:
         parts: boxes, cylinders, spheres, capsules and meshes about the body's origin.
-        client: of PyBullet.
-        world_from_body: of a body that never moves: triangles of its meshes on the floor or too high are left out.
+        client: number of the PyBullet client.
+        world_from_body: pose of a static body: its mesh triangles on the floor or too high are left out.
     """
     plain = [part for part in parts if part.shape.kind != "mesh"]
     shapes = [_compound(plain[i : i + _MOST_PARTS], client) for i in range(0, len(plain), _MOST_PARTS)]
@@ -77,7 +77,7 @@ def shapes_of(parts: Sequence[Collision], client: int, world_from_body: Matrix |
 
 
 def single_shape(parts: Sequence[Collision], client: int) -> int:
-    """One shape for all parts, as a robot's link needs it; for meshes or many parts their convex hull."""
+    """One shape for all parts, as a robot's link needs; for meshes or many parts it is their hull."""
     if len(parts) <= _MOST_PARTS and all(part.shape.kind != "mesh" for part in parts):
         return _compound(parts, client)
     return _hull(_merged(parts)[0], client)
@@ -135,7 +135,7 @@ def _trimesh(vertices: NDArray[np.float64], faces: NDArray[np.int64], client: in
 
 
 def _hull(vertices: NDArray[np.float64], client: int) -> int:
-    """The convex hull by its outermost points in many directions: of triangles, a moving body feels nothing."""
+    """The convex hull by its outermost points in many directions: moving bodies pass through triangles."""
     i = np.arange(_HULL_DIRECTIONS)
     z, turn = 1.0 - (2.0 * i + 1.0) / _HULL_DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
     across = np.sqrt(1.0 - z * z)
@@ -155,7 +155,7 @@ def _within_reach(
 
 
 def _merged(parts: Sequence[Collision]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Triangles of all parts in the frame of the body."""
+    """Triangles of all parts in the body frame."""
     vertices, faces, count = [], [], 0
     for part in parts:
         points, triangles = triangles_of(part.shape)

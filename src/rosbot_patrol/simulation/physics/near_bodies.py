@@ -1,4 +1,4 @@
-"""Static bodies near the robot: only those need to be in the physics."""
+"""Selection of the static bodies near the robot: only these need to be in the physics."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-_SLACK = 0.5  # the robot may go that far before the set is looked at again [m]
+_SLACK = 0.5  # the robot may move this far before the next selection [m]
 
 
 class NearBodies:
-    """Bodies by name with their bounds, and those close to a moving point."""
+    """Bodies by name with their bounds, and the selection near a moving point."""
 
     def __init__(self) -> None:
         self._reach = 0.5
         self._bounds: dict[str, NDArray[np.float64]] = {}
-        self._table: NDArray[np.float64] | None = None  # all bounds, shape (N, 2, 3)
+        self._table: NDArray[np.float64] | None = None  # bounds of all bodies, shape (N, 2, 3)
         self._near: set[str] = set()
         self._centre: tuple[float, float] | None = None
 
     def set_reach(self, reach: float) -> None:
-        """Set the distance from the point at which a body matters [m]."""
+        """Set the distance from the point within which a body matters [m]."""
         self._reach = reach
         self._centre = None
 
@@ -37,7 +37,7 @@ class NearBodies:
         self._table = self._centre = None
 
     def update(self, x: float, y: float) -> tuple[list[str], list[str]]:
-        """Names that have become near or no longer are, with the point at (x, y)."""
+        """Names that have come near, and names that are no longer near, with the point at (x, y)."""
         if self._centre is not None and math.hypot(x - self._centre[0], y - self._centre[1]) <= _SLACK:
             return [], []
         self._centre = (x, y)

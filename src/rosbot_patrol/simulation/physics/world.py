@@ -1,8 +1,8 @@
 """Motion and contacts of the robot's base among the bodies of a world, by PyBullet.
 
-The base hangs on three joints (x, y, yaw), each driven at a speed with a bounded force: what the tyres can give. So
-it can neither climb, tip over nor tunnel, a wall stops it, and along a wall it slides. The floor is no body here.
-Of what stands still only what is near the robot is in PyBullet's world, whose time grows with all that is in it.
+The base hangs on three joints (x, y, yaw), each driven at a speed with a bounded force, the limit of the tyres. So it
+cannot climb, tip over or tunnel; a wall stops it, and it slides along a wall. The floor is not a body here. PyBullet's
+world has only the static bodies near the robot, because its step time grows with their number.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from rosbot_patrol.simulation.scene.scene import Body, identity
 log = logging.getLogger(__name__)
 
 GRAVITY = 9.8
-_DEEP = 0.02  # a start deeper than this in something is refused [m]
+_DEEP = 0.02  # a start position that penetrates deeper is refused [m]
 _JOINTS = (0, 1, 2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Touch:
-    """A contact of the robot: with which body and of what kind, where, the direction that it pushes the robot, force.
+    """A contact of the robot: the other body and its kind, position, direction of the push on the robot, force.
 
     Attributes:
-        position, normal: in the frame of the world, shape (3,).
+        position, normal: in the world frame, shape (3,).
         force: along the normal [N].
     """
 
@@ -55,7 +55,7 @@ class Physics:
         self._bodies: dict[int, Body] = {}
         self._ids: dict[str, list[int]] = {}
         self._still: dict[str, Body] = {}
-        self._shapes: dict[str, list[int]] = {}  # PyBullet keeps them to its end: made once
+        self._shapes: dict[str, list[int]] = {}  # made once: PyBullet never frees them
         self._near = NearBodies()
         self._stepping_over: set[str] = set()
         self._robot: int | None = None
@@ -66,7 +66,7 @@ class Physics:
         )
 
     def add(self, body: Body) -> None:
-        """Add an immovable body; planes and bodies without shapes are skipped."""
+        """Add an immovable body; planes and bodies without shapes are left out."""
         if body.name in self._ids or body.name in self._still:
             raise WorldError("world", f"the name '{body.name}' is used twice")
         if body.static:
@@ -87,7 +87,7 @@ class Physics:
         self._stepping_over.discard(name)
 
     def move(self, name: str, world_from_body: Matrix) -> None:
-        """Move a body; a static one counts as moving from now on."""
+        """Move a body; from now on a static body counts as a moving one."""
         still = self._still.pop(name, None)
         if still is not None:
             self._near.remove(name)
@@ -100,7 +100,7 @@ class Physics:
             )
 
     def let_step_over(self, name: str, is_so: bool = True) -> None:
-        """Set whether a moving body steps over the robot: both touch, but neither stops or pushes the other."""
+        """Set whether a moved body steps over the robot: both report contacts, but neither stops the other."""
         (self._stepping_over.add if is_so else self._stepping_over.discard)(name)
         self._let_touch(name)
 
@@ -136,7 +136,7 @@ class Physics:
             pybullet.removeBody(number, physicsClientId=self._client)
 
     def _refresh(self) -> None:
-        """Add bodies that have come near the robot, remove those left behind."""
+        """Add the bodies that have come near the robot, remove those no longer near."""
         if self._robot is not None:
             (x, _), (y, _), _ = self._joint_states()
             self._refresh_at(x, y)
@@ -152,7 +152,7 @@ class Physics:
         """Put the robot at a pose.
 
         Raises:
-            WorldError: it would stand in something; names what.
+            WorldError: it would overlap a body; the text names it.
         """
         parts = [c for c in robot.body.collisions if c.shape.kind != "plane"]
         if not parts:
@@ -194,7 +194,7 @@ class Physics:
             raise WorldError(f"robot '{robot.name}'", f"{place} is no place for it, '{stuck}' is there")
 
     def remove_robot(self) -> None:
-        """Take the robot out."""
+        """Remove the robot."""
         if self._robot is not None:
             pybullet.removeBody(self._robot, physicsClientId=self._client)
             self._robot = None
@@ -213,13 +213,13 @@ class Physics:
         return Twist2D(c * vx + s * vy, c * vy - s * vx, wz)
 
     def set_pose(self, pose: Pose2D) -> None:
-        """Place the robot elsewhere, at rest."""
+        """Move the robot elsewhere, at rest."""
         for joint, value in zip(_JOINTS, pose, strict=True):
             pybullet.resetJointState(self._robot, joint, value, 0.0, physicsClientId=self._client)
         self._refresh()
 
     def blocker_at(self, pose: Pose2D) -> str | None:
-        """Name of the body that the robot would overlap at a pose, None if it has room; the robot stays as it is."""
+        """Name of a body that the robot would overlap at a pose, None if there is none; the robot does not move."""
         before = self._joint_states()
         self.set_pose(pose)
         stuck = self.blocker()
@@ -229,7 +229,7 @@ class Physics:
         return stuck
 
     def step(self, wanted: Twist2D) -> None:
-        """Advance by one time step, the base driven at a velocity in its own frame."""
+        """Advance by one time step, with the base driven at a velocity in its own frame."""
         if self._robot is not None:
             (x, _), (y, _), (yaw, _) = self._joint_states()
             self._refresh_at(x, y)
@@ -270,7 +270,7 @@ class Physics:
         return [(s[0], s[1]) for s in states]
 
     def blocker(self) -> str | None:
-        """Name of the body that the robot overlaps, None if it has room (or is absent)."""
+        """Name of a body that the robot overlaps, None if there is none (or no robot)."""
         if self._robot is None:
             return None
         pybullet.performCollisionDetection(physicsClientId=self._client)
