@@ -1,1 +1,1 @@
-"""Replay of recorded bags through the cores of the nodes, offline and repeatable."""
+"""Replay of recorded bags through the nodes' cores, offline and deterministic."""

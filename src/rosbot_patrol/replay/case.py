@@ -2,15 +2,15 @@
 
     bag: house.bag
     node: amcl
-    parameters: amcl.yaml           # a file, or the parameters themselves; left out: the package's config
-    map: house.yaml                 # left out: the bag's /map
-    topics: {scan: /front_scan}     # where the bag's topics differ from the node's
+    parameters: amcl.yaml           # a file, or the parameters themselves; default: the package's config
+    map: house.yaml                 # default: the bag's /map
+    topics: {scan: /front_scan}     # topics with other names in the bag
     transforms: ["0 0 0.1 0 0 0 base_link laser"]
-    rooms: points.yaml              # of patrol_robot
+    rooms: points.yaml              # for patrol_robot
     seed: 0
-    expected: house.expected.npz    # left out: NAME.expected.npz
+    expected: house.expected.npz    # default: NAME.expected.npz
     tolerances: {poses.x: 0.1}
-    optional: false                 # true: the test is skipped where the bag is not there
+    optional: false                 # true: the test is skipped if the bag is missing
 
 Paths are relative to the folder of the yaml.
 """
@@ -59,14 +59,14 @@ class Case:
     """One replay and its expected result.
 
     Attributes:
-        path: of the yaml.
+        path: path of the yaml.
         bag: the bag.
         setup: the replay.
         remaps: topics of the bag by the node's names.
         expected: path of the stored result.
         fields: tolerances of the comparison.
-        is_optional: as a test, skip it if the bag is missing.
-        named: fields with a given tolerance.
+        is_optional: the test is skipped if the bag is missing.
+        named: fields with a tolerance in the yaml.
     """
 
     path: Path
@@ -83,7 +83,7 @@ def read_case(path: Path) -> Case:
     """Read and check a case.
 
     Raises:
-        ParamError: the yaml or the parameters that it names are broken; names file and key.
+        ParamError: the yaml or its parameter file is broken; the text names file and key.
     """
     tree = read_mapping(path, keys="bag, node, ...")
     loaded = params.load_strict(CaseParams, tree, name=f"{path}: ")
@@ -106,10 +106,10 @@ def read_case(path: Path) -> Case:
 
 
 def run_case(case: Case, *, told: Callable[[float], None] = lambda _share: None) -> Result:
-    """Replay a case; the result names its origin.
+    """Replay a case; the result records its origin.
 
     Raises:
-        PatrolError: bag, parameters or map cannot be used, or a tolerance names a field that the result lacks.
+        PatrolError: bag, parameters or map cannot be used, or a tolerance is for a field that the result lacks.
     """
     replay = build_replay(case.setup)
     with Bag(case.bag) as bag:
@@ -129,10 +129,10 @@ def _tree(path: Path, loaded: CaseParams) -> Mapping[str, Any] | None:
 
 
 def with_tolerances(fields: Mapping[str, Field], given: Mapping[str, Any], *, name: str) -> dict[str, Field]:
-    """Fields with other tolerances; the given ones come last, so that their wildcards win.
+    """Replace tolerances of fields; the given ones come last, so that their wildcards take precedence.
 
     Raises:
-        ParamError: a tolerance is not a number, or negative.
+        ParamError: a tolerance is not a number, or less than 0.
     """
     found = dict(fields)
     for key, value in given.items():
@@ -149,7 +149,7 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def _check_names(given: Iterable[str], result: Result) -> None:
-    """Reject tolerances for missing fields; raises ParamError, which names the nearest field."""
+    """Refuse tolerances for fields that a result lacks; raises ParamError, which names the nearest."""
     names = field_names(result)
     for key in given:
         if not any(_fits(each, key) for each in names):

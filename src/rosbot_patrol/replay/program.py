@@ -1,12 +1,12 @@
-"""replay: runs a bag through a node's core, offline, as fast as possible, with the same result each time.
+"""replay: a bag through a node's core, offline, as fast as possible, with the same result each time.
 
-    rosrun rosbot_patrol replay house.bag                          # what is in it, and what can be replayed
+    rosrun rosbot_patrol replay house.bag                          # lists contents, and nodes that can be replayed
     rosrun rosbot_patrol replay house.bag --node amcl --map house.yaml --record amcl.npz
     rosrun rosbot_patrol replay house.bag --node amcl --map house.yaml --check amcl.npz --plots out
     rosrun rosbot_patrol replay house.bag --node slam_gmapping scan:=/front_scan --save-map my_house
     rosrun rosbot_patrol replay house.replay.yaml                  # a test case; --record refreshes it
 
-Exit status: 0 no difference (or nothing to compare with), 1 a difference, 2 an argument cannot be used.
+Exit status: 0 equal (or no comparison), 1 different, 2 unusable input.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from rosbot_patrol.replay.results.tables import Result, load_result, save_result
 from rosbot_patrol.replay.runner import chosen_topics
 
 SAME, DIFFERS, BAD_INPUT = 0, 1, 2
-BAR, EVERY_S = 30, 0.1  # width of the progress bar, and time between updates
+BAR, EVERY_S = 30, 0.1  # width of the progress bar, and its drawing period
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line."""
+    """The command-line parser."""
     found = argparse.ArgumentParser(
         prog="replay",
         description=__doc__,
@@ -70,13 +70,13 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The program."""
+    """Run the program."""
     logging.basicConfig(format="%(levelname)s: %(message)s", level=logging.WARNING)
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run the command line; returns the exit status."""
+    """Execute a command line; returns the exit status."""
     remaps = dict(word.split(":=", 1) for word in arguments if ":=" in word)
     options = parser().parse_args([word for word in arguments if ":=" not in word])
     try:
@@ -94,7 +94,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _case(options: argparse.Namespace, remaps: Mapping[str, str]) -> Case:
-    """Case from the command line, or from the file that it names."""
+    """The case given by the command line, or by the file that it names."""
     given = _tolerances(options.tolerance)
     if options.bag.name.endswith(SUFFIX):
         case = read_case(options.bag)
@@ -143,7 +143,7 @@ def _replayed(case: Case, *, is_quiet: bool) -> Result:
 
 
 def _judge(case: Case, result: Result, options: argparse.Namespace) -> int:
-    """Store or compare the result, and draw plots."""
+    """Store or compare the result, and draw."""
     if options.save_map:
         if "map" not in result.grids:
             raise ParamError("--save-map", f"{result.node} makes no map")
@@ -178,7 +178,7 @@ def _say(options: argparse.Namespace, text: str) -> None:
 
 
 def _list(path: Path) -> int:
-    """Print a bag's contents, and the nodes that can be replayed with it."""
+    """List a bag's contents, and the nodes that can be replayed from it."""
     with Bag(path) as bag:
         sys.stdout.write(f"{path}: {bag.duration:.1f} s\n")
         counts, width = bag.counts(), max(map(len, bag.topics), default=0)
@@ -202,11 +202,11 @@ class _Bar:
 
     @property
     def elapsed(self) -> float:
-        """Time since its creation [s]."""
+        """Time since its start [s]."""
         return time.perf_counter() - self._begin
 
     def show(self, share: float) -> None:
-        """Draw it, if due."""
+        """Draw it, if it is due."""
         if not self._is_shown or time.perf_counter() - self._drawn < EVERY_S:
             return
         self._drawn = time.perf_counter()

@@ -1,8 +1,8 @@
-"""pytest plug-in for bags: each NAME.replay.yaml (see `case`) below the given folders is a test.
+"""Bags as tests: each NAME.replay.yaml (see `case`) below the given folders is one.
 
 pytest -p rosbot_patrol.replay.pytest_plugin FOLDER
-pytest -p rosbot_patrol.replay.pytest_plugin FOLDER --replay-record     # store what comes of each as expected
-pytest -p rosbot_patrol.replay.pytest_plugin FOLDER --replay-plots OUT  # pictures of those that differ
+pytest -p rosbot_patrol.replay.pytest_plugin FOLDER --replay-record     # store the results as expected
+pytest -p rosbot_patrol.replay.pytest_plugin FOLDER --replay-plots OUT  # plots of those that differ
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ class CaseFile(pytest.File):
     """A yaml with one test."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """The test, named after the yaml."""
+        """Collect the test, named after the yaml."""
         yield CaseItem.from_parent(self, name=self.path.name.removesuffix(SUFFIX))
 
 
 class DiffersError(Exception):
-    """The result of a replay differs from the stored one."""
+    """Error: a replay's result differs from the stored one."""
 
     def __init__(self, case: Case, differences: list[Difference], pictures: Path | None) -> None:
         lines = [f"{case.setup.node} over {case.bag} differs from {case.expected}:"]
@@ -80,11 +80,11 @@ class CaseItem(pytest.Item):
         return own
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """Differences, or the reason why it cannot run, without a traceback."""
+        """The differences, or why it cannot be used, without a trace."""
         if isinstance(excinfo.value, (DiffersError, PatrolError)):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)
 
     def reportinfo(self) -> tuple[Path, None, str]:
-        """Its location."""
+        """Location of the test."""
         return self.path, None, f"replay {self.name}"

@@ -1,4 +1,4 @@
-"""Common part of all replays: the inputs of a node, and a bag fed to it on the bag's own clock."""
+"""Common parts of all replays: a node's inputs, and a bag fed to it on the bag's own clock."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Input:
     """One input topic of a node.
 
     Attributes:
-        name: in the node.
-        topic: its default topic in the bag, "": the name.
+        name: the node's name for it.
+        topic: default topic of the bag, "" for the name.
         types: accepted message types, in ROS 1's spelling.
-        is_needed: the replay is impossible without it.
-        instead: what the user can give if it is needed and missing.
+        is_needed: nothing can be replayed without it.
+        instead: hint at an alternative, for the error about a missing needed input.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Input:
 
 
 class Replay(Protocol):
-    """A node's core and its node's own work, over a bag."""
+    """A node's core and the node's code around it."""
 
     @property
     def inputs(self) -> Sequence[Input]:
@@ -42,16 +42,16 @@ class Replay(Protocol):
 
     @property
     def kinds(self) -> Mapping[str, Kind]:
-        """Conversion of the messages, by their types."""
+        """Conversions of its input messages, by their types."""
 
     def begin(self, names: Collection[str]) -> None:
-        """Note which inputs will be heard, before the first record."""
+        """Take the names of the inputs that will be heard, before the first record."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Process a record of the input of that name, recorded at a time [s]."""
+        """Process a record of the named input, recorded at a time [s]."""
 
     def finish(self) -> Result:
-        """Result of the replay."""
+        """The result."""
 
 
 def run_replay(
@@ -61,13 +61,13 @@ def run_replay(
     remaps: Mapping[str, str] | None = None,
     told: Callable[[float], None] = lambda _share: None,
 ) -> Result:
-    """Feed a whole bag.
+    """Feed a whole bag to a replay.
 
     Args:
-        bag: open.
-        replay: of a node.
-        remaps: topics of the bag by the names of the inputs, where they differ.
-        told: called after each record with the share done.
+        bag: an open bag.
+        replay: replay of a node.
+        remaps: topics of the bag by the names of the inputs, if they differ.
+        told: called with the share done, after each record.
 
     Raises:
         BagError: a needed topic is missing or of another type, or the bag is broken.
@@ -81,10 +81,10 @@ def run_replay(
 
 
 def chosen_topics(bag: Bag, inputs: Sequence[Input], remaps: Mapping[str, str]) -> dict[str, str]:
-    """Names of the inputs, by the bag's topics.
+    """Choose the bag's topics for the inputs; returns the inputs' names by topic.
 
     Raises:
-        BagError: a topic is missing or of another type; names likely ones.
+        BagError: a topic is missing or of another type; the text lists the candidates.
     """
     unknown = sorted(set(remaps) - {each.name for each in inputs})
     if unknown:

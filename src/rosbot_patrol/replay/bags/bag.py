@@ -1,7 +1,7 @@
 """Reader of ROS 1 bags (a file) and ROS 2 bags (a folder), in the order of time, without ROS.
 
-rosbags reads them, by the message definitions in the bag itself. One chunk of the bag is in memory at a time, plus some
-hundred bytes for each message's place in the file: many GB of pictures cost nothing.
+rosbags reads them, by the message definitions in the bag itself. One chunk of the bag is in memory at a time, and some
+hundred bytes for each message's place in the file, so that many GB of pictures need little memory.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ NS = 1e-9
 
 
 class Record(NamedTuple):
-    """One message: time of its recording [s], topic, and its record (`records.Kind`)."""
+    """One message: recording time [s], topic, and its record (`records.Kind`)."""
 
     time: float
     topic: str
@@ -54,10 +54,10 @@ class Bag:
     """A bag opened for reading; a context manager.
 
     Args:
-        path: of a ROS 1 bag, or the folder of a ROS 2 one.
+        path: path of a ROS 1 bag, or the folder of a ROS 2 one.
 
     Raises:
-        BagError: it is not there, no bag, cut short, without index, or of a compression that is not known.
+        BagError: it does not exist, is no bag, is truncated, lacks its index, or has an unknown compression.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -74,7 +74,7 @@ class Bag:
             know_headers(self._reader.typestore)
         except BROKEN as err:
             raise BagError(self.path, _open_problem(self.path, err)) from err
-        self.done = 0.0  # share of the bag's time read so far
+        self.done = 0.0  # share of the bag's time that has been read
 
     def __enter__(self) -> Bag:
         return self
@@ -91,7 +91,7 @@ class Bag:
 
     @property
     def start(self) -> float:
-        """Time of the first message [s], 0 if there is none."""
+        """Recording time of the first message [s], 0 if there is none."""
         return self._reader.start_time * NS if self._reader.message_count else 0.0
 
     @property
@@ -109,19 +109,20 @@ class Bag:
         return {topic: info.msgcount for topic, info in self._reader.topics.items()}
 
     def find(self, topic: str) -> str | None:
-        """A topic as spelled in the bag, found with or without the first slash; None if it is missing."""
+        """Find a topic in the bag's spelling, with or without the first slash; None if it does not exist."""
         return next((known for known in self.topics if known.lstrip("/") == topic.lstrip("/")), None)
 
     def records(self, topics: Iterable[str], kinds: Mapping[str, Kind] = KINDS) -> Iterator[Record]:
-        """Messages of some topics in the order of recording.
+        """Read the messages of some topics in the order of their recording.
 
         Args:
-            topics: of the bag.
-            kinds: conversion of messages, by their types.
+            topics: topics of the bag.
+            kinds: conversions of messages, by their types.
 
         Raises:
-            BagError: a topic is not there, of a type that `kinds` has not, its definition lacks a field, or its bytes
-                make no sense.
+            BagError: a topic does not exist or has a type not in `kinds`, its definition lacks a field, or its bytes
+            are
+                invalid.
         """
         wanted = [each for topic in topics for each in self._connections(topic)]
         if not wanted:
@@ -172,7 +173,7 @@ class Bag:
 
 
 def ros1_name(message_type: str) -> str:
-    """Type name in ROS 1 spelling, from sensor_msgs/msg/LaserScan."""
+    """Convert sensor_msgs/msg/LaserScan to ROS 1's spelling."""
     return message_type.replace("/msg/", "/")
 
 
@@ -182,7 +183,7 @@ def _said(err: Exception) -> str:
 
 
 def _open_problem(path: Path, err: Exception) -> str:
-    """Reason why a bag cannot be opened, and what to do."""
+    """Reason why a bag cannot be opened, and a remedy."""
     said = _said(err)
     if isinstance(err, TypesysError):
         return f"its message definitions cannot be used ({said}): record it anew or leave out topics by `rosbag filter`"

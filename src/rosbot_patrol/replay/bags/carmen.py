@@ -4,8 +4,8 @@
     ROBOTLASER1 type start_angle field_of_view resolution range_max accuracy remission_mode n r1 .. rn m s1 .. sm
         laser_x laser_y laser_theta robot_x robot_y robot_theta tv rv forward side turn ipc_time host logger_time
 
-An FLASER covers half a turn, starting at -pi/2; its beams are pi/n or, with n odd, pi/(n - 1) apart. The pose kept is
-the laser's own, which is the reference of a corrected log. Lines of other kinds are skipped.
+An FLASER covers half a turn, from -pi/2 on; its beams are pi/n or, with n odd, pi/(n - 1) apart. The stored pose is the
+laser's own, which is the reference of a corrected log. Lines of other kinds are ignored.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ Array = NDArray[np.float64]
 RANGE_MAX = 40.0  # m; beams beyond are misses
 TURN_PER_TURN, TURN_PER_METRE = 0.02, 0.005
 DRIVE_PER_METRE, DRIVE_PER_TURN = 0.02, 0.005
-STILL = 0.01  # m; a shorter motion has no meaningful direction
+STILL = 0.01  # m; a shorter motion has no reliable direction
 
 
 class LogError(PatrolError):
-    """A lidar log that cannot be read: which file, and why."""
+    """Error: a lidar log cannot be read; names the file and the reason."""
 
 
 class LoggedScan(NamedTuple):
@@ -57,7 +57,7 @@ def read_log(path: Path | str, *, range_max: float = RANGE_MAX) -> CarmenLog:
     """Read all scans of a log, plain or gzipped.
 
     Raises:
-        LogError: the file cannot be read, a line of it is invalid, or it holds no scan.
+        LogError: the file cannot be read, one of its lines is invalid, or it has no scan.
     """
     scans, poses = [], []
     try:
@@ -80,7 +80,7 @@ def _lines(path: Path) -> Iterator[str]:
 
 
 def parse_lines(lines: Iterator[str], *, name: str = "log", range_max: float = RANGE_MAX) -> Iterator[LoggedScan]:
-    """Scans from a log's lines; raises LogError, which names the line."""
+    """The scans in a log's lines; raises LogError, which names the line."""
     for number, line in enumerate(lines, 1):
         words = line.split()
         kind = words[0] if words else ""
@@ -150,11 +150,11 @@ def _scan(ranges: Array, start: float, step: float, range_max: float, stamp: flo
 
 
 def noisy_odometry(poses: Array, rng: np.random.Generator) -> Array:
-    """Simulate wheel odometry along poses: each move is a turn, a translation and a turn, with Gaussian noise.
+    """Make wheel odometry from a path: its motions as rotation, translation and rotation, each with Gaussian noise.
 
-    Standard deviations: each turn `TURN_PER_TURN` of itself + `TURN_PER_METRE` for each metre driven, the drive
-    `DRIVE_PER_METRE` of itself + `DRIVE_PER_TURN` for each radian turned. A drive backwards is one, not two half turns;
-    a way shorter than `STILL` has no direction and begins with no turn.
+    Standard deviations: each rotation `TURN_PER_TURN` of itself + `TURN_PER_METRE` per metre driven; the translation
+    `DRIVE_PER_METRE` of itself + `DRIVE_PER_TURN` per radian turned. A backward motion is one, not two half turns. A
+    motion shorter than `STILL` has no direction and begins without rotation.
 
     Args:
         poses: the reference x, y, yaw, shape (N, 3).

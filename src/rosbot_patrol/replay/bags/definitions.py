@@ -1,4 +1,4 @@
-"""Check of the needed fields of a recorded message against the definition in the bag."""
+"""Check that a bag's message definitions have the fields that a replay needs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ POSE_ESTIMATE = STAMP | _below("pose.pose", _POSE) | {"pose.covariance": "float[
 
 
 def know_headers(store: Typestore) -> None:
-    """Let a plain `Header` stand for that of std_msgs anywhere in a message, as in ROS 1.
+    """Treat a plain `Header` anywhere in a message as std_msgs's, as in ROS 1.
 
     rosbags does so only for a message's first field; darknet_ros_msgs/BoundingBoxes has another one.
     """
@@ -68,7 +68,7 @@ def definition_problem(fielddefs: Mapping[str, Any], message_type: str, needed: 
 
 
 def _kind_of(fielddefs: Mapping[str, Any], message_type: str, path: Sequence[str]) -> str:
-    """Kind of a field, "" if there is none."""
+    """The kind of a field, "" if it does not exist."""
     name, rest = path[0].removesuffix("[]"), path[1:]
     descriptor = dict(fielddefs[message_type][1]).get(name) if message_type in fielddefs else None
     if descriptor is None:

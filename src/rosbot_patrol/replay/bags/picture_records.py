@@ -1,4 +1,4 @@
-"""Records of pictures in a bag, raw or compressed."""
+"""Pictures of a bag, raw or compressed, in the detector's form."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rosbot_patrol.replay.bags.records import Kind, Refused, stamp_of
 
 
 class PictureRecord(NamedTuple):
-    """sensor_msgs/Image or CompressedImage: time of the picture [s], and the picture."""
+    """sensor_msgs/Image or CompressedImage: its time [s], and the picture."""
 
     stamp: float
     picture: Picture
@@ -28,7 +28,7 @@ def _raw(message: Any) -> PictureRecord | Refused:
 
 
 def _compressed(message: Any) -> PictureRecord | Refused:
-    codec = importlib.import_module("rosbot_patrol.images.compressed")  # only if needed, because it loads simplejpeg
+    codec = importlib.import_module("rosbot_patrol.images.compressed")  # loads simplejpeg: only for compressed pictures
     try:
         picture = codec.decompress(message.format, bytes(message.data))
     except ImageError as err:

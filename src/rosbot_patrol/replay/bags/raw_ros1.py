@@ -1,8 +1,8 @@
-"""Fast readers of ROS 1 messages from their bytes, several times faster than a general deserialiser.
+"""Decoding of ROS 1 messages from their bytes, several times faster than with a general deserialiser.
 
-They cover frequent messages, and those of an action, because a deserialiser for its dozen of nested types would be made
-at each opening of a bag. They apply only to definitions with the MD5 sums given here; rosbags reads all other messages,
-and all of ROS 2.
+For message types that come by the thousand, and for those of an action: their dozen nested types would need a new
+deserialiser for each opened bag. Only definitions with the md5 sums below are decoded here; rosbags reads all other
+messages, and all of ROS 2.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _TRANSFORM = struct.Struct("<7d")  # x, y, z and the quaternion
 
 
 def read_scan(raw: bytes) -> LaserScan:
-    """Read a sensor_msgs/LaserScan; a stamp of 0 becomes NaN.
+    """Decode a sensor_msgs/LaserScan; a stamp of 0 means none (NaN).
 
     Raises:
         struct.error, ValueError: the bytes end too early.
@@ -52,7 +52,7 @@ def read_scan(raw: bytes) -> LaserScan:
 
 
 def read_count(raw: bytes) -> tuple[float, int]:
-    """Read a darknet_ros_msgs/ObjectCount: time of the picture [s], and number of objects.
+    """Decode a darknet_ros_msgs/ObjectCount: the picture's time [s], and its number of objects.
 
     Raises:
         struct.error: the bytes end too early.
@@ -62,10 +62,10 @@ def read_count(raw: bytes) -> tuple[float, int]:
 
 
 def read_image(raw: bytes) -> tuple[float, int, int, str, bool, int, memoryview]:
-    """Read a sensor_msgs/Image: time [s], height and width [px], encoding, is big-endian, bytes of a row, all rows.
+    """Decode a sensor_msgs/Image: time [s], height and width [px], encoding, is big-endian, bytes of a row, all rows.
 
     Raises:
-        struct.error, ValueError: the bytes end too early or the encoding is no text.
+        struct.error, ValueError: the bytes end too early or the encoding is not text.
     """
     _, seconds, nanoseconds, length = _HEADER.unpack_from(raw)
     at = _HEADER.size + length
@@ -80,19 +80,19 @@ def read_image(raw: bytes) -> tuple[float, int, int, str, bool, int, memoryview]
 
 
 def read_goal(raw: bytes) -> str:
-    """Read the id of a move_base_msgs/MoveBaseActionGoal.
+    """Decode the id of a move_base_msgs/MoveBaseActionGoal.
 
     Raises:
-        struct.error, ValueError: the bytes end too early or the id is no text.
+        struct.error, ValueError: the bytes end too early or the id is not text.
     """
     return _goal_id(raw)[0]
 
 
 def read_result(raw: bytes) -> tuple[str, int, str]:
-    """Read a move_base_msgs/MoveBaseActionResult: goal id, status (actionlib_msgs/GoalStatus), text.
+    """Decode a move_base_msgs/MoveBaseActionResult: goal id, status (actionlib_msgs/GoalStatus), status text.
 
     Raises:
-        struct.error, ValueError: the bytes end too early or the texts are none.
+        struct.error, ValueError: the bytes end too early or the texts are invalid.
     """
     goal, at = _goal_id(raw)
     (status,) = _UINT8.unpack_from(raw, at)
@@ -101,13 +101,13 @@ def read_result(raw: bytes) -> tuple[str, int, str]:
 
 
 def _goal_id(raw: bytes) -> tuple[str, int]:
-    """Text of the actionlib_msgs/GoalID after the header, and its end."""
+    """Text of the actionlib_msgs/GoalID behind the header, and its end."""
     *_, length = _HEADER.unpack_from(raw)
     return _text(raw, _HEADER.size + length + _TIME.size)
 
 
 def _text(raw: bytes, at: int) -> tuple[str, int]:
-    """String at a position, and its end."""
+    """A string at an offset, and its end."""
     (length,) = _COUNT.unpack_from(raw, at)
     at += _COUNT.size
     if at + length > len(raw):
@@ -116,10 +116,10 @@ def _text(raw: bytes, at: int) -> tuple[str, int]:
 
 
 def read_transforms(raw: bytes) -> list[Edge]:
-    """Read a tf2_msgs/TFMessage.
+    """Decode a tf2_msgs/TFMessage.
 
     Raises:
-        struct.error, ValueError: the bytes end too early or a name is no text.
+        struct.error, ValueError: the bytes end too early or a name is not text.
     """
     edges, at = [], _COUNT.size
     for _ in range(_COUNT.unpack_from(raw)[0]):

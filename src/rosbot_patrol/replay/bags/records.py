@@ -1,6 +1,6 @@
-"""Records of the messages in a bag, independent of ROS.
+"""Conversion of a bag's messages to plain records without ROS.
 
-Messages arrive as bytes or as rosbags' objects with ROS 2 field names (stamp.sec, stamp.nanosec).
+Messages come as bytes and as rosbags' objects, with fields named as in ROS 2 (stamp.sec, stamp.nanosec).
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class Kind:
     """A message type that a replay can use.
 
     Attributes:
-        convert: function that makes the record of a rosbags message.
-        needed: required fields of the definition.
-        fast: function that makes the record of ROS 1 bytes.
-        md5: of the definition that `fast` supports; ANY: the bytes do not matter.
+        convert: makes the record from rosbags' message.
+        needed: fields that the definition must have.
+        fast: makes the same record from ROS 1 bytes.
+        md5: sum of the one definition that `fast` can read; ANY: the bytes do not matter.
     """
 
     convert: Callable[[Any], Any]
@@ -59,7 +59,7 @@ def stamp_of(stamp: Any) -> float:
 
 
 def scan_of(message: Any) -> LaserScan:
-    """Record of sensor_msgs/LaserScan; a stamp of 0 becomes NaN."""
+    """Convert sensor_msgs/LaserScan; a stamp of 0 means none (NaN)."""
     return LaserScan(
         stamp=stamp_of(message.header.stamp) or math.nan,
         frame_id=message.header.frame_id.lstrip("/"),
@@ -72,7 +72,7 @@ def scan_of(message: Any) -> LaserScan:
 
 
 def edges_of(message: Any) -> list[Edge]:
-    """Record of tf2_msgs/TFMessage."""
+    """Convert tf2_msgs/TFMessage."""
     return [_edge(each) for each in message.transforms]
 
 
@@ -83,7 +83,7 @@ def _edge(message: Any) -> Edge:
 
 
 def map_of(message: Any) -> MapRecord | Refused:
-    """Record of nav_msgs/OccupancyGrid; refused if its size or origin is invalid."""
+    """Convert nav_msgs/OccupancyGrid; Refused if its size or origin is invalid."""
     origin = _pose(message.info.origin, "the orientation of a map's origin in the bag")
     if isinstance(origin, Refused):
         return origin
@@ -103,7 +103,7 @@ def map_of(message: Any) -> MapRecord | Refused:
 
 
 def pose_of(message: Any) -> PoseRecord | Refused:
-    """Record of geometry_msgs/PoseWithCovarianceStamped; refused if it is no pose."""
+    """Convert geometry_msgs/PoseWithCovarianceStamped; Refused if the pose is invalid."""
     pose = _pose(message.pose.pose, "the orientation of a pose in the bag")
     if isinstance(pose, Refused):
         return pose

@@ -1,7 +1,7 @@
-"""rosbags' reader of ROS 1 bags, as tolerant of a topic's header as rosbag.
+"""rosbags' reader of ROS 1 bags, with rosbag's tolerance for topics' connection headers.
 
-rosbags expects a number in `latching` and rejects the whole bag otherwise; rosbag accepts any text. An empty message
-definition is replaced by that of ROS noetic if the MD5 sum matches.
+rosbags expects a number for `latching` and otherwise gives up the whole bag; rosbag accepts any text. An empty message
+definition is replaced by ROS noetic's, if the MD5 sum is equal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ LATCHED = ("1", "true")
 
 
 class LenientReader(Reader):
-    """Reads the topics' headers itself, and everything else as rosbags does."""
+    """Read the topics' headers itself, all else as rosbags does."""
 
     def read_connection(self) -> Connection:
         """Read a connection record from the current position; raises ReaderError."""

@@ -1,7 +1,7 @@
 """amcl over a bag: its node's core, fed with the bag's records.
 
-Scans wait for the odometry at their stamp. A pose on /initialpose is moved on by the motion since. The map is the given
-one, else the one on /map (the first, or each if `use_map_topic` is set and `first_map_only` is not).
+Scans wait for the odometry of their stamp; a pose of /initialpose is moved by the motion since its stamp. The map is
+the given one, else the first of /map (each one if `use_map_topic` is set and `first_map_only` is not).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ INPUTS = (
     Input(name="initialpose", types=("geometry_msgs/PoseWithCovarianceStamped",), is_needed=False),
     Input(name="map", types=("nav_msgs/OccupancyGrid",), instead="the map's yaml: --map FILE"),
 )
-HEALTH_S = 1.0  # time between two rows of `health`, as in the node
+HEALTH_S = 1.0  # period of the rows of `health`, as in the node
 
 FIELDS = {
     "poses.x": Field(tolerance=0.05, unit="m"),
@@ -55,10 +55,10 @@ class AmclReplay:
     """An AmclCore on the bag's clock.
 
     Args:
-        params: of amcl.
+        params: amcl's parameters.
         grid: the map; None: the bag's.
-        seed: of all random numbers.
-        static: transforms missing in the bag.
+        seed: seed of all random numbers.
+        static: transforms that the bag lacks.
 
     Raises:
         MapError: the map cannot be used.
@@ -89,10 +89,10 @@ class AmclReplay:
         return (*INPUTS[:-1], replace(INPUTS[-1], is_needed=False)) if self._has_own_map else INPUTS
 
     def begin(self, names: Collection[str]) -> None:
-        """Note which inputs will be heard; not needed here."""
+        """Ignore the list of inputs: the core asks for what it needs."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Process a record of the input of that name, recorded at a time [s]."""
+        """Process a record of the named input, recorded at a time [s]."""
         self._tell_health(now)
         match content:
             case Refused():
@@ -109,7 +109,7 @@ class AmclReplay:
             self._note(self._core.step(placed))
 
     def finish(self) -> Result:
-        """Result: published poses, health each second, counts."""
+        """The published poses, health each second, counts."""
         tables = {"poses": self._poses.table(), "health": self._health.table()}
         feed = self._core.feed
         return Result("amcl", feed.facts(), counts=feed.counts() | self._counts, tables=tables)

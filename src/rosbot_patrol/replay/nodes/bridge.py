@@ -1,8 +1,8 @@
-"""The rosserial bridge over a bag: one Session for each recorded connection, fed with the recorded bytes.
+"""The rosserial bridge over a bag: one Session per recorded connection, fed with the original bytes.
 
-The bag has them if serial_node ran with `~record_bytes` (topic `~bytes`, rosbot_patrol/SerialBytes). Topics and types
-are accepted by the allow-lists alone; whether ROS knows a type is not checked. Proofs with keys cannot be replayed,
-because the challenge was another one.
+The bag has them if serial_node ran with `~record_bytes` (topic `~bytes`, rosbot_patrol/SerialBytes). The lists decide
+about topics and types; whether ROS knows a type is not checked. A device's proof by a key cannot be replayed, because
+the challenge was different.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from rosbot_patrol.rosserial.server.policy import Policy
 from rosbot_patrol.rosserial.server.session import Session
 
 OPENED, DATA, CLOSED = 0, 1, 2  # rosbot_patrol/SerialBytes
-TICK_S = 0.5  # time between two checks for missing frames [s]
+TICK_S = 0.5  # period of checks for missing messages
 
 INPUTS = (Input(name="serial_node/bytes", types=("rosbot_patrol/SerialBytes",)),)
 FIELDS = {
@@ -46,7 +46,7 @@ FIELDS = {
 
 
 class BytesRecord(NamedTuple):
-    """rosbot_patrol/SerialBytes: time [s], event, connection, address, bytes."""
+    """rosbot_patrol/SerialBytes: time [s], event, connection, peer address, bytes."""
 
     stamp: float
     event: int
@@ -71,7 +71,7 @@ class SerialReplay:
     """Sessions of a bridge.
 
     Args:
-        policy: permissions of devices.
+        policy: the devices' permissions.
         silence_timeout: silence after which a device is disconnected [s].
     """
 
@@ -88,7 +88,7 @@ class SerialReplay:
         self._events = Rows(STAMP, "peer", "kind", "text")
 
     def begin(self, names: Collection[str]) -> None:
-        """Note which inputs will be heard; not needed here."""
+        """Ignore the list of inputs: there is only one."""
 
     def hear(self, name: str, now: float, content: BytesRecord) -> None:
         """Process an event of a connection."""
@@ -103,7 +103,7 @@ class SerialReplay:
             self._counts["unopened"] += 1  # it began before the bag, or was closed by us
 
     def finish(self) -> Result:
-        """Result: messages of the devices, other events, and counts."""
+        """Messages of the devices, other events, and counts of received and answered messages."""
         tables = {"messages": self._messages.table(), "events": self._events.table()}
         return Result("serial_node", counts=self._counts, tables=tables)
 
@@ -150,7 +150,7 @@ class SerialReplay:
 
 
 def _said(event: Event) -> str:
-    """Text of an event in one line."""
+    """An event as one line of text."""
     match event:
         case Announced():
             return f"{TopicId(event.kind).name.lower()} {event.info.name} {event.info.message_type}"

@@ -1,4 +1,4 @@
-"""darknet_ros over a bag: its detector processes each picture (the node skips those it is too slow for)."""
+"""darknet_ros over a bag: its detector processes each picture (the node skips those that it is too slow for)."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class DetectorReplay:
     """A detector and its node's processing of a picture.
 
     Args:
-        detector: ready to run.
-        topic: default topic of the pictures in the bag.
+        detector: a detector that is ready to run.
+        topic: default topic of the pictures.
     """
 
     kinds = KINDS
@@ -40,10 +40,10 @@ class DetectorReplay:
         self._refused = 0
 
     def begin(self, names: Collection[str]) -> None:
-        """Note which inputs will be heard; not needed here."""
+        """Ignore the list of inputs: there is only one."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Process a picture; an unusable one is counted and ignored."""
+        """Process a picture; invalid ones are counted and skipped."""
         if not isinstance(content, PictureRecord):
             self._refused += 1
             return
@@ -57,7 +57,7 @@ class DetectorReplay:
             self._boxes.add(content.stamp, one.name, one.probability, one.xmin, one.ymin, one.xmax, one.ymax)
 
     def finish(self) -> Result:
-        """Result: all boxes, and their number in each picture."""
+        """All boxes, and the number of boxes per picture."""
         counts = {"pictures": len(self._pictures), "refused": self._refused, "boxes": len(self._boxes)}
         tables = {"pictures": self._pictures.table(), "boxes": self._boxes.table()}
         return Result("darknet_ros", counts=counts, tables=tables)

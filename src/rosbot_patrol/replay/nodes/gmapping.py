@@ -1,4 +1,4 @@
-"""slam_gmapping over a bag: the core that its node runs, fed with the bag's records."""
+"""slam_gmapping over a bag: its node's core, fed with the bag's records."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class GmappingReplay:
     """A GmappingCore on the bag's clock.
 
     Args:
-        params: of slam_gmapping; with `map_file` a saved map is extended.
-        static: transforms missing in the bag.
+        params: slam_gmapping's parameters; with `map_file` a saved map is continued.
+        static: transforms that the bag lacks.
 
     Raises:
         MapError: the extent or the saved map is invalid.
@@ -65,10 +65,10 @@ class GmappingReplay:
         self._maps = Rows(STAMP, "known", "occupied", "digest")
 
     def begin(self, names: Collection[str]) -> None:
-        """Note which inputs will be heard; not needed here."""
+        """Ignore the list of inputs: the core asks for what it needs."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Process a record of the input of that name, recorded at a time [s]."""
+        """Process a record of the named input, recorded at a time [s]."""
         feed = self._core.feed
         if name != "scan":
             self._tree.add_all(content, is_static=name == "tf_static")
@@ -78,7 +78,7 @@ class GmappingReplay:
             self._note(self._core.step(placed))
 
     def finish(self) -> Result:
-        """Result: the best pose at each update, intermediate maps, the best particle's trajectory and map."""
+        """The best pose at each update, the intermediate maps, the best particle's trajectory and map."""
         tables = {"poses": self._poses.table(), "maps": self._maps.table(), "trajectory": self._trajectory()}
         feed = self._core.feed
         maps = {"map": known_part(self._core.slam.grid())}
@@ -109,7 +109,7 @@ class GmappingReplay:
 
 
 def known_part(grid: Grid) -> Grid:
-    """Known part of a map with a margin of one cell; one cell if nothing is known."""
+    """The known part of a map with a margin of one cell; one cell if nothing is known."""
     rows, columns = (np.flatnonzero((grid.cells >= 0).any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return Grid(_cut(grid, 0, 0, 1, 1), grid.cells[:1, :1].copy())

@@ -1,7 +1,7 @@
-"""move_base over a bag: the stack that its node runs, stepped at the controller's rate on the bag's clock.
+"""move_base over a bag: its node's stack, stepped at the controller's rate on the bag's clock.
 
-The robot goes where the bag's went. So a replay shows what this move_base would command there: near the commands of the
-bag where it drives as that one did. Plans are made at once and come 0.2 s later.
+The robot's motion is the bag's. So a replay shows the commands of this move_base along that motion; they are close to
+the bag's commands if both behave alike. Plans are made at once and delivered 0.2 s later.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rosbot_patrol.replay.runner import TF_TYPES, Input
 from rosbot_patrol.scan import LaserScan, scan_problem
 from rosbot_patrol.tf.tree import Edge, TransformTree
 
-PLAN_S = 0.2  # from a request to its plan
+PLAN_S = 0.2  # time from a request to its plan
 
 INPUTS = (
     Input(name="move_base/goal", types=("move_base_msgs/MoveBaseActionGoal",)),
@@ -47,7 +47,7 @@ FIELDS = {
     **{f"{table}.rows": Field(is_by_order=True) for table in ("plans", "outcomes", "recoveries", "states")},
     **{f"{table}.{STAMP}": Field(tolerance=0.5, unit="s") for table in ("plans", "outcomes", "recoveries", "states")},
     "plans.length": Field(tolerance=0.2, unit="m"),
-    "commands.reason": Field(tolerance=math.inf),  # holds figures; shown where velocities differ
+    "commands.reason": Field(tolerance=math.inf),  # contains figures; shown where velocities differ
 }
 
 
@@ -56,12 +56,12 @@ class MoveBaseReplay:
 
     Args:
         tree: move_base's private namespace.
-        name: of the parameters in messages.
+        name: prefix of the parameters in messages.
         grid: the map, None for the bag's.
         static: transforms that the bag lacks.
 
     Raises:
-        ParamError: a parameter makes no sense.
+        ParamError: a parameter is invalid.
         MapError: the map cannot be used.
     """
 
@@ -95,7 +95,7 @@ class MoveBaseReplay:
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """What it hears: besides scans what the costmaps see by."""
+        """Inputs of the node: scans and the other sensors of the costmaps."""
         return (
             *INPUTS,
             *(
@@ -106,10 +106,10 @@ class MoveBaseReplay:
         )
 
     def begin(self, names: Collection[str]) -> None:
-        """Which of the inputs will be heard: it asks for what it needs itself."""
+        """Ignore the list of inputs: the core asks for what it needs."""
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Take in a record of the input of that name, recorded at a time [s]."""
+        """Process a record of the named input, recorded at a time [s]."""
         self._step_until(now)
         match content:
             case LaserScan():
@@ -134,7 +134,7 @@ class MoveBaseReplay:
                 self._counts["refused"] += 1
 
     def finish(self) -> Result:
-        """Commands of each cycle, plans, how the goals ended."""
+        """Commands of each cycle, plans, results of the goals."""
         rows = {
             "commands": self._commands,
             "plans": self._new_plans,
@@ -145,7 +145,7 @@ class MoveBaseReplay:
         tables = {name: each.table() for name, each in rows.items()}
         return Result("move_base", counts=self._counts, tables=tables)
 
-    # -- what it hears
+    # -- inputs
 
     def _hear_scan(self, scan: LaserScan, now: float) -> None:
         self._counts["refused"] += bool(scan_problem(scan))
@@ -180,7 +180,7 @@ class MoveBaseReplay:
         self._counts["goals"] += 1
         self._goal, self._now = record.goal, now
         self._navigator.set_goal(pose, now)
-        self._step(now)  # the node is waked, too
+        self._step(now)  # the node is woken, too
 
     def _hear_cancel(self, record: heard.CancelRecord, now: float) -> None:
         if self._navigator.state is State.IDLE or record.goal not in ("", self._goal):
@@ -230,7 +230,7 @@ _TYPES: dict[type, str] = {
 
 
 def _topics_of(stack: NavigationStack) -> tuple[dict[str, list[Any]], dict[str, list[DepthInput]]]:
-    """The costmaps' inputs by topic, without those of scans, and the cameras by the topics of their optics."""
+    """The costmaps' inputs by topic, without scans, and the cameras by their camera_info topics."""
     sensors: dict[str, list[Any]] = {}
     cameras: dict[str, list[DepthInput]] = {}
     for each in [each for costmap in stack.costmaps for each in costmap.inputs]:
@@ -242,7 +242,7 @@ def _topics_of(stack: NavigationStack) -> tuple[dict[str, list[Any]], dict[str, 
 
 
 class _Updates:
-    """Updates a costmap as often as its parameters say: what its node's loop does."""
+    """Updates of a costmap at its parameters' rate, as in its node's loop."""
 
     def __init__(self, costmap: FedCostmap) -> None:
         self._costmap = costmap

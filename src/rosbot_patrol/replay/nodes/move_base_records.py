@@ -1,4 +1,4 @@
-"""What the messages that move_base hears become: plain records that know no ROS."""
+"""Conversion of move_base's input messages to plain records without ROS."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rosbot_patrol.replay.bags import records
 from rosbot_patrol.replay.bags.definitions import STAMP
 from rosbot_patrol.replay.bags.records import Kind, Refused
 
-LEVEL = 1e-3  # so far the goal's z axis may lean from the vertical, as a cosine
+LEVEL = 1e-3  # largest deviation of the goal's z axis from vertical, as a cosine
 
 
 class GoalPoseRecord(NamedTuple):
@@ -31,7 +31,7 @@ class CancelRecord(NamedTuple):
 
 
 class VelocityRecord(NamedTuple):
-    """nav_msgs/Odometry: how the robot moves."""
+    """nav_msgs/Odometry: the robot's velocity."""
 
     twist: Twist2D
 
@@ -75,7 +75,7 @@ def _depth(message: Any) -> DepthRecord:
 
 
 def _optics(message: Any) -> OpticsRecord:
-    k = message.K if hasattr(message, "K") else message.k  # as ROS 1 and ROS 2 name it
+    k = message.K if hasattr(message, "K") else message.k  # names in ROS 1 and ROS 2
     return OpticsRecord(int(message.width), int(message.height), Optics(*(float(k[i]) for i in (0, 4, 2, 5))))
 
 

@@ -1,12 +1,12 @@
-"""The patrol over a bag: its manager, stepped at the node's rate on the bag's clock, and at once by a sensor's call.
+"""The patrol over a bag: its manager, stepped at the node's rate on the bag's clock, and at once by a sensor's trigger.
 
-While it rests on guard, only every tenth of those steps is taken, and the next one after what may end the rest: what
-comes of silence alone, as a dead detector, is told up to 0.4 s later than the node tells it.
+While it rests on guard, only every tenth step is taken, and the next one after an event that may end the rest. Effects
+of silence alone, such as a dead detector, are reported up to 0.4 s later than by the node.
 
-The way is the bag's: where the robot was, what its sensors and the detector said, when move_base was done. So a replay
-shows what this patrol decides from the same senses. Where it would have driven elsewhere, the goals differ, and what
-comes after means little. Depth pictures count where the bag has them. Not replayed: whether pictures are black or stand
-still, orders by service and action, rounds, mail, what was kept from before a restart.
+The robot's motion, the sensors' and detector's messages and move_base's results are the bag's. So a replay shows this
+patrol's decisions from the same inputs. If it would have driven elsewhere, the goals differ, and later results mean
+little. Depth pictures are used if the bag has them. Not replayed: checks for black or frozen pictures, orders by
+service and action, rounds, mail, state from before a restart.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ from rosbot_patrol.sensors.sensor_file import SensorList
 from rosbot_patrol.tf.tree import Edge, TransformTree
 
 STOPPED = "the emergency stop was pressed (topic /e_stop)"
-AT_REST = 10  # steps of which one is taken
-CAMERA = "camera"  # the input that only says that pictures come
+AT_REST = 10  # one step in this many is taken
+CAMERA = "camera"  # the input that only tells that pictures come
 DEPTH, DEPTH_LENS = "camera/depth/image_raw", "camera/depth/camera_info"
 
 INPUTS = (
@@ -78,13 +78,13 @@ INPUTS = (
 
 
 class PatrolReplay:
-    """A PatrolManager and what its node does around it.
+    """A PatrolManager and its node's code around it.
 
     Args:
-        node: the node's own parameters; params: the manager's; frames: of tf.
-        rooms: of the points file.
-        sensors: whose id calls to which room.
-        exclusions: what cannot be an intruder.
+        node: the node's own parameters; params: the manager's; frames: tf frames.
+        rooms: rooms of the points file.
+        sensors: rooms by the sensors' ids.
+        judge: rejects detections that cannot be an intruder.
         static: transforms that the bag lacks.
     """
 
@@ -117,7 +117,7 @@ class PatrolReplay:
         self.begin(())
 
     def begin(self, names: Collection[str]) -> None:
-        """Note which inputs will be heard: nobody waits for a camera or for depth that the bag has not."""
+        """Store the list of inputs: nothing waits for a camera or depth that the bag lacks."""
         eyes = self._node.eyes
         self._senses = PatrolSenses(
             self._frames,
@@ -138,7 +138,7 @@ class PatrolReplay:
         )
 
     def hear(self, name: str, now: float, content: Any) -> None:
-        """Take in a record of the input of that name, recorded at a time [s]."""
+        """Process a record of the named input, recorded at a time [s]."""
         self._step_until(now)
         if isinstance(content, TriggerRecord):
             self._hear_call(content, now)
@@ -160,16 +160,16 @@ class PatrolReplay:
             self._hear_state(content, now)
 
     def finish(self) -> Result:
-        """Give what the patrol said and did."""
+        """The patrol's messages and actions."""
         return self._log.result(steps=self._steps)
 
-    # -- what it hears
+    # -- inputs
 
     def _hear_call(self, record: TriggerRecord, now: float) -> None:
         room = self._sensor_rooms.room_of(record.sensor, now) if record.moves else None
         if room is not None:
             self._senses.hear_call(room)
-            self._step(now)  # the node is waked, too
+            self._step(now)  # the node is woken, too
 
     def _hear_depth(self, content: Any) -> None:
         """Take a depth picture or its lens; neither ends the manager's rest."""
@@ -225,12 +225,12 @@ class PatrolReplay:
 
 
 def _moment(now: float) -> Moment:
-    """A bag has one clock."""
+    """The moment of a bag's only clock."""
     return Moment(now=now, steady=now, wall=now)
 
 
 def _guarded(record: heard.ModeRecord, now: float) -> Guarded:
-    """What a mode that came at a time [s] guards."""
+    """The rooms guarded in a mode that was set at a time [s]."""
     return Guarded(
         mode=record.mode,
         rooms=record.rooms,

@@ -1,4 +1,4 @@
-"""move_base as recorded in a patrol's bag: its answers, matched to goals by their number."""
+"""move_base's recorded answers to the patrol, matched to the goals by their number."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rosbot_patrol.replay.nodes.patrol_records import GoalRecord, OutcomeRecord
 
 
 class BagLink:
-    """Answers to goals: the n-th goal of the replay gets the answer of the bag's n-th goal, at its time."""
+    """Answers to goals: the replay's n-th goal is matched to the bag's n-th, and ends when that one ended."""
 
     def __init__(self) -> None:
         self._heard = -math.inf
@@ -18,7 +18,7 @@ class BagLink:
         self._tag, self._sent = "", 0
 
     def hear_status(self, now: float) -> None:
-        """The server is alive."""
+        """Record that the server is alive."""
         self._heard = now
 
     def hear_goal(self, record: GoalRecord) -> None:
@@ -27,7 +27,7 @@ class BagLink:
             self._goals.append(record.goal)
 
     def hear_outcome(self, record: OutcomeRecord) -> None:
-        """Record the end of a goal in the bag."""
+        """Record the result of a goal of the bag."""
         self._outcomes[record.goal] = record
 
     def send(self, goal: Goal) -> None:

@@ -1,4 +1,4 @@
-"""Result of a patrol's replay, as tables; events are compared in order, each with its time."""
+"""Log of a patrol in a replay, as tables; events are compared in their order, each with its time."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ FIELDS = {
 
 
 class PatrolLog:
-    """Collects the tables."""
+    """Collector of the tables."""
 
     def __init__(self) -> None:
         self._rows = {name: Rows(STAMP, *columns) for name, columns in TABLES.items()}
         self._is_turning = False
 
     def note(self, now: float, commands: Commands, mission: Mission | None) -> None:
-        """Record the results of a step at a time [s]."""
+        """Record the commands of a step at a time [s]."""
         out = commands
         if out.report is not None:
             self._note_report(now, out)
@@ -82,6 +82,6 @@ class PatrolLog:
             self._rows["words"].add(now, word.kind, word.text)
 
     def result(self, *, steps: int) -> Result:
-        """The whole result."""
+        """The complete result."""
         counts = {"steps": steps, **{name: len(rows) for name, rows in self._rows.items()}}
         return Result("patrol_robot", counts=counts, tables={name: rows.table() for name, rows in self._rows.items()})

@@ -1,4 +1,4 @@
-"""Records of the messages that the patrol receives, independent of ROS."""
+"""Conversion of the patrol's input messages to plain records without ROS."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class GoalRecord(NamedTuple):
 
 
 class OutcomeRecord(NamedTuple):
-    """move_base_msgs/MoveBaseActionResult: goal id, status (actionlib_msgs/GoalStatus), text."""
+    """move_base_msgs/MoveBaseActionResult: goal id, status (actionlib_msgs/GoalStatus), status text."""
 
     goal: str
     status: int
@@ -39,7 +39,7 @@ class OutcomeRecord(NamedTuple):
 
 
 class ModeRecord(NamedTuple):
-    """rosbot_patrol/Arming: mode, guarded rooms (None: all), quiet hours, entry delay [s], reason."""
+    """rosbot_patrol/Arming: mode, guarded rooms (None: all), quiet hours, entry delay in seconds, reason."""
 
     mode: str
     rooms: frozenset[int] | None
@@ -55,7 +55,7 @@ class StopRecord(NamedTuple):
 
 
 class AliveRecord(NamedTuple):
-    """Arrival of a message, without its contents."""
+    """The arrival of a message, without its contents."""
 
 
 def _boxes(message: Any) -> BoxesRecord:

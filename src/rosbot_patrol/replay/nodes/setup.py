@@ -1,4 +1,4 @@
-"""What a replay is made of (node, parameters, map, missing transforms), and the replays by their nodes' names."""
+"""Setup of a replay (node, parameters, map, missing transforms), and the replays by their nodes' names."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ POINTS = "params/room_points.yaml"
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """What a replay is made of.
+    """The setup of a replay.
 
     Attributes:
-        node: whose.
+        node: name of the node.
         tree: its parameters; None: those of the package's config.
-        name: of the parameters in messages.
+        name: prefix of the parameters in messages.
         map: yaml of the map, None for the bag's.
         static: transforms that the bag lacks.
-        seed: of all chance.
+        seed: seed of all random numbers.
         rooms: points file of the patrol, None for the parameter path_to_params or the package's.
     """
 
@@ -66,10 +66,10 @@ class Node:
     """A node that can be replayed.
 
     Attributes:
-        config: its parameters in the package, "" where there are none.
-        build: makes its replay of a setup; raises ParamError or MapError.
-        fields: how its result is compared.
-        inputs: what it hears, where nothing is given instead.
+        config: file of its parameters in the package, "" for none.
+        build: makes its replay from a setup; raises ParamError or MapError.
+        fields: tolerances of its result.
+        inputs: its default inputs.
     """
 
     config: str
@@ -79,24 +79,24 @@ class Node:
 
 
 def build_replay(setup: Setup) -> Replay:
-    """The replay of a setup.
+    """Make the replay of a setup.
 
     Raises:
-        ParamError: the node or a parameter is not known or makes no sense.
+        ParamError: the node or a parameter is unknown or invalid.
         MapError: the map cannot be used.
     """
     return node_of(setup.node).build(setup)
 
 
 def node_of(name: str) -> Node:
-    """A node by its name; raises ParamError, which names the nearest."""
+    """Find a node by its name; raises ParamError, which names the nearest."""
     if name not in NODES:
         raise ParamError("node", params.unknown_name(name, NODES))
     return NODES[name]
 
 
 def read_parameters(path: Path, node: str) -> Mapping[str, Any]:
-    """The parameters of a node from a yaml, as it stands or under the node's name (as of `rosparam dump`).
+    """Read the parameters of a node from a yaml, at the top level or under the node's name (as in `rosparam dump`).
 
     Raises:
         ParamError: the file cannot be read.
@@ -107,10 +107,11 @@ def read_parameters(path: Path, node: str) -> Mapping[str, Any]:
 
 
 def parse_transform(text: str) -> Edge:
-    """A static transform as static_transform_publisher takes it: x y z yaw pitch roll (or a quaternion) PARENT CHILD.
+    """Parse a static transform in static_transform_publisher's form: x y z yaw pitch roll (or a quaternion) PARENT
+    CHILD.
 
     Raises:
-        ParamError: it makes no sense.
+        ParamError: it is invalid.
     """
     words = text.split()
     try:
@@ -125,7 +126,7 @@ def parse_transform(text: str) -> Edge:
 
 
 def _quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
-    """Of turns about z, then y, then x of the turned axes [rad]."""
+    """Quaternion of rotations about z, then the rotated y, then the rotated x axis [rad]."""
     (sr, sp, sy), (cr, cp, cy) = ((f(roll / 2), f(pitch / 2), f(yaw / 2)) for f in (math.sin, math.cos))
     return (
         sr * cp * cy - cr * sp * sy,

@@ -1,4 +1,4 @@
-"""A result against a stored one, field by field, each with its tolerance."""
+"""Comparison of a result with a stored one, field by field, each with its tolerance."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from rosbot_patrol.geometry import wrap_angles
 from rosbot_patrol.grid import Grid
 from rosbot_patrol.replay.results.tables import STAMP, Result, Table
 
-SAME_TIME_S = 1e-6  # rows whose stamps are closer are of one time
-SHOWN = 3  # times of missing rows that are named
+SAME_TIME_S = 1e-6  # rows with closer stamps count as simultaneous
+SHOWN = 3  # number of missing rows listed by time
 
 Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """How a value of a result is compared.
+    """The comparison of one value of a result.
 
     Attributes:
-        tolerance: by how much it may differ, absolutely; of a map the share of known cells, 0 to 1.
-        unit: for the report.
+        tolerance: largest absolute difference; for a map the share of known cells, 0 to 1.
+        unit: unit for the report.
         is_angle: differences are wrapped.
-        is_by_order: of TABLE.rows: the n-th row is held against the n-th, not the one of the same time.
+        is_by_order: for TABLE.rows: rows are matched by index, not by time.
     """
 
     tolerance: float = 0.0
@@ -41,11 +41,11 @@ class Field:
 
 @dataclass(frozen=True)
 class Difference:
-    """One field that differs by more than it may.
+    """One field that differs by more than its tolerance.
 
     Attributes:
-        name: of the field: table.column, counts.name, or a map's name.
-        text: what differs, in a sentence.
+        name: name of the field: table.column, counts.name, or a map's name.
+        text: the difference, as a sentence.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Pairing:
-    """Which rows of two tables are of one time, and which have no other."""
+    """Matching rows of two tables, and the unmatched ones."""
 
     stored: Indices
     found: Indices
@@ -66,13 +66,13 @@ class Pairing:
 
 
 def compare(stored: Result, found: Result, fields: Mapping[str, Field]) -> list[Difference]:
-    """All that differs by more than its tolerance; empty where the two are the same.
+    """Find all fields that differ by more than their tolerance; empty if the results are equal.
 
     Args:
-        stored: what it should be.
-        found: what it is.
-        fields: tolerances by name; a name may hold wildcards (poses.*), `TABLE.rows` is for rows that only one of the
-            two has. What is not named must be the same.
+        stored: the expected result.
+        found: the new result.
+        fields: tolerances by name; a name may contain wildcards (poses.*), `TABLE.rows` is for unmatched rows. Fields
+            without a tolerance must be equal.
     """
     differences: list[Difference] = []
     if stored.node != found.node:
@@ -88,7 +88,7 @@ def compare(stored: Result, found: Result, fields: Mapping[str, Field]) -> list[
 
 
 def field_of(name: str, fields: Mapping[str, Field]) -> Field:
-    """How a field is compared: by its own name, else by the last wildcard that fits, else exactly."""
+    """Comparison of a field: by its own name, else by the last matching wildcard, else exact."""
     if name in fields:
         return fields[name]
     fitting = [field for pattern, field in fields.items() if fnmatch.fnmatchcase(name, pattern)]
@@ -96,18 +96,18 @@ def field_of(name: str, fields: Mapping[str, Field]) -> Field:
 
 
 def field_names(result: Result) -> list[str]:
-    """All names that a tolerance can be given for."""
+    """All names that can have a tolerance."""
     columns = [f"{table}.{name}" for table, rows in result.tables.items() for name in (*rows, "rows")]
     return [*(f"counts.{name}" for name in result.counts), *columns, *result.grids]
 
 
 def paired(stored: Table, found: Table, *, is_by_order: bool) -> Pairing:
-    """Which rows of two tables belong together: those of one time, or the n-th and the n-th."""
+    """Match the rows of two tables, by time or by index."""
     return (pair_by_order if is_by_order else pair_rows)(stored[STAMP], found[STAMP])
 
 
 def pair_rows(stored: NDArray[Any], found: NDArray[Any]) -> Pairing:
-    """Rows of one time, by their stamps [s]; of several of one time the first belongs to the first."""
+    """Match rows of one time, by their stamps [s]; simultaneous rows are matched in their order."""
     left, right = _keys(stored), _keys(found)
     places = {key: i for i, key in enumerate(right)}
     pairs = [(i, places[key]) for i, key in enumerate(left) if key in places]
@@ -118,30 +118,30 @@ def pair_rows(stored: NDArray[Any], found: NDArray[Any]) -> Pairing:
 
 
 def pair_by_order(stored: NDArray[Any], found: NDArray[Any]) -> Pairing:
-    """The first row with the first, and so on; what is left over has no other."""
+    """Match rows by index; surplus rows stay unmatched."""
     both = np.arange(min(len(stored), len(found)))
     return Pairing(both, both, np.arange(len(both), len(stored)), np.arange(len(both), len(found)))
 
 
 def column_errors(stored: NDArray[Any], found: NDArray[Any], field: Field) -> NDArray[np.float64]:
-    """By how much two columns of one length differ, row by row; inf for texts, and for numbers of which one is nan."""
+    """Differences of two columns of equal length, row by row; inf for texts, and for numbers if one is nan."""
     if stored.dtype.kind in "US" or found.dtype.kind in "US":
         return np.where(stored.astype(str) == found.astype(str), 0.0, np.inf)
     a, b = stored.astype(np.float64), found.astype(np.float64)
     with np.errstate(invalid="ignore"):
         errors = np.abs(wrap_angles(b - a)) if field.is_angle else np.abs(b - a)
-    errors[a == b] = 0.0  # inf is inf
+    errors[a == b] = 0.0  # equal infinities
     errors[np.isnan(a) & np.isnan(b)] = 0.0
     errors[np.isnan(errors)] = np.inf
     return np.asarray(errors)
 
 
 def map_difference(stored: Grid, found: Grid) -> tuple[NDArray[np.int8], float]:
-    """Where two maps differ, on a grid that holds both, and the share of the known cells that do.
+    """Difference of two maps on a grid that covers both, and the share of the known cells that differ.
 
     Returns:
-        Cells 0 unknown in both, 1 the same, 2 different, and the share, 0 to 1; all is different where the cells are
-        not of one size.
+        Cells 0 unknown in both, 1 equal, 2 different, and the share, 0 to 1; everything is different if the
+        resolutions differ.
     """
     a, b = stored.info, found.info
     if abs(a.resolution - b.resolution) > 1e-9 or abs(a.yaw - b.yaw) > 1e-9:
@@ -243,7 +243,7 @@ def _compare_maps(name: str, stored: Grid | None, found: Grid | None, fields: Ma
 
 
 def _keys(stamps: NDArray[Any]) -> list[tuple[int, int]]:
-    """Each stamp in ticks, with how many of the same came before."""
+    """Each stamp in ticks, with the number of equal ones before it."""
     seen: dict[int, int] = {}
     keys = []
     for stamp in np.round(np.asarray(stamps, dtype=np.float64) / SAME_TIME_S).astype(np.int64).tolist():

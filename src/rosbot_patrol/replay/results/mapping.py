@@ -1,4 +1,4 @@
-"""slam_gmapping offline, over scans and odometry in memory."""
+"""Offline run of slam_gmapping over scans and odometry in memory."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mapping:
-    """Result for a log.
+    """The result of a log.
 
     Attributes:
-        slam: its final state.
-        poses: of the best particle at each scan, from the odometry without an update, shape (N, 3).
+        slam: its state at the end.
+        poses: poses of the best particle at each scan, by odometry for scans without an update, shape (N, 3).
         updates: number of updates.
         resamplings: number of resamplings.
     """
@@ -44,10 +44,10 @@ def map_log(
     """Map a whole log.
 
     Args:
-        scans: in order.
-        odometry: of the robot at each scan, shape (N, 3).
-        params: of slam_gmapping.
-        base_from_laser: of the level scans, None for the robot's own pose.
+        scans: scans in their order.
+        odometry: odometry of the robot at each scan, shape (N, 3).
+        params: slam_gmapping's parameters.
+        base_from_laser: pose of the level laser, None for the robot's own pose.
         heard: called with each scan's number and outcome.
     """
     slam, resamplings = Slam(params), 0
@@ -63,10 +63,10 @@ def map_log(
 
 
 def _poses(odometry: Array, last_update: NDArray[np.int64], trajectory: Array) -> Array:
-    """Poses of the trajectory, extended by the odometry between updates, shape (N, 3)."""
+    """The trajectory's poses, extended by the odometry between updates, shape (N, 3)."""
     rows, numbers = [], {int(scan): k for k, scan in enumerate(np.unique(last_update[last_update >= 0]))}
     for row, update in zip(odometry, last_update, strict=True):
-        if update < 0:  # nothing was seen yet
+        if update < 0:  # no update so far
             rows.append(Pose2D(*row))
             continue
         since = compose(invert(Pose2D(*odometry[update])), Pose2D(*row))

@@ -1,4 +1,4 @@
-"""Pictures of a result over the stored one: a drawing (svg) of each table, a picture (png) of each map."""
+"""Plots of a result over the stored one: a drawing (svg) per table, a picture (png) per map."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from rosbot_patrol.grid import Grid
 from rosbot_patrol.replay.results.comparison import Field, column_errors, field_of, map_difference, paired
 from rosbot_patrol.replay.results.tables import STAMP, Result, Table
 
-WIDTH, HEIGHT, LEFT, TOP, GAP = 900.0, 110.0, 80.0, 24.0, 34.0  # of a panel, and round it [px]
-MOST = 4000  # points of a line
+WIDTH, HEIGHT, LEFT, TOP, GAP = 900.0, 110.0, 80.0, 24.0, 34.0  # size of a panel, and its margins [px]
+MOST = 4000  # most points of a line
 STORED, FOUND, WRONG = "#9aa5b1", "#1f6feb", "#d1242f"
 DIFFERENCE = np.array([[205, 205, 205], [235, 245, 235], [209, 36, 47]], dtype=np.uint8)  # unknown, same, different
 
@@ -26,16 +26,16 @@ Array = NDArray[np.float64]
 
 
 def write_plots(folder: Path, found: Result, stored: Result | None, fields: Mapping[str, Field]) -> list[Path]:
-    """Write all pictures; returns their paths.
+    """Write all plots; returns their paths.
 
     Args:
-        folder: is made where it is missing.
+        folder: output folder; created if missing.
         found: the new result.
-        stored: what it should be, None where there is none.
-        fields: rows that differ by more than these allow are marked.
+        stored: the expected result, None if there is none.
+        fields: rows that differ by more than these tolerances are marked.
 
     Raises:
-        ResultError: a picture cannot be written.
+        ResultError: a plot cannot be written.
     """
     pictures: dict[str, bytes] = {}
     for name, table in found.tables.items():
@@ -56,14 +56,14 @@ def write_plots(folder: Path, found: Result, stored: Result | None, fields: Mapp
 
 
 def map_picture(grid: Grid) -> NDArray[np.uint8]:
-    """A map as map_saver shows it: walls black, floor white, the unknown grey; shape (rows, columns, 3)."""
+    """A map in map_saver's colours: walls black, floor white, unknown grey; shape (rows, columns, 3)."""
     cells = grid.cells[::-1]
     grey = np.where(cells < 0, 205, np.where(cells >= 65, 0, 254)).astype(np.uint8)
     return np.repeat(grey[:, :, None], 3, axis=2)
 
 
 def png_bytes(picture: NDArray[np.uint8]) -> bytes:
-    """A colour picture, RGB, shape (rows, columns, 3), as a png; small ones are enlarged to 400 pixels or more."""
+    """Encode a colour picture, RGB, shape (rows, columns, 3), as png; small ones are enlarged to 400 pixels or more."""
     scale = max(1, -(-400 // max(picture.shape[:2])))
     large = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
     encoded: bytes = cv2.imencode(".png", large[:, :, ::-1])[1].tobytes()
@@ -71,7 +71,7 @@ def png_bytes(picture: NDArray[np.uint8]) -> bytes:
 
 
 def table_drawing(name: str, found: Table, stored: Table | None, fields: Mapping[str, Field]) -> str:
-    """A panel for each column of numbers, one below the other."""
+    """Draw a panel per column of numbers, one below the other."""
     columns = [key for key, values in found.items() if key != STAMP and values.dtype.kind in "fiub"]
     height = TOP + len(columns) * (HEIGHT + GAP) + 10.0
     width = LEFT + WIDTH + 20.0
@@ -96,7 +96,7 @@ def _panel(
     span: tuple[float, float],
     fields: Mapping[str, Field],
 ) -> list[str]:
-    """One column: its name, bounds, and lines."""
+    """Draw one column: its name, bounds, and lines."""
     title = f"{name}.{column}"
     field = field_of(title, fields)
     lines = [(found[STAMP], found[column].astype(np.float64), FOUND, 1.2)]
@@ -126,7 +126,7 @@ def _panel(
 
 
 def _wrong_points(column: str, found: Table, stored: Table, field: Field, *, is_by_order: bool) -> tuple[Array, Array]:
-    """Times and new values of the rows that differ by more than they may."""
+    """Times and new values of the rows that differ by more than the tolerance."""
     pairs = paired(stored, found, is_by_order=is_by_order)
     new = found[column][pairs.found]
     wrong = column_errors(stored[column][pairs.stored], new, field) > field.tolerance
@@ -134,7 +134,7 @@ def _wrong_points(column: str, found: Table, stored: Table, field: Field, *, is_
 
 
 class _Frame:
-    """Places values in a panel."""
+    """Coordinates of values in a panel."""
 
     def __init__(self, top: float, span: tuple[float, float], bounds: tuple[float, float]) -> None:
         self._top, self._begin, self._low = top, span[0], bounds[0]

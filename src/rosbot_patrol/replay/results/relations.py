@@ -1,8 +1,8 @@
-"""Quality of a trajectory by the relations between its poses.
+"""Quality of a trajectory, measured by the relations between its poses.
 
 Kuemmerle, Steder, Dornhege, Ruhnke, Grisetti, Stachniss, Kleiner: On measuring the accuracy of SLAM algorithms (2009).
-Moves between pairs of poses are compared instead of the poses themselves, so that a small early turn does not affect
-everything after it.
+The motions between pairs of poses are compared, not the poses themselves: so a small early rotation does not affect all
+later errors.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Pairs = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class RelationErrors:
-    """Mean and standard deviation of the relations' errors: in length [m] and in turn [rad]; their number."""
+    """Mean and standard deviation of the relations' errors, in length [m] and rotation [rad], and their number."""
 
     shift: float
     shift_std: float
@@ -31,7 +31,7 @@ class RelationErrors:
 
 
 def consecutive_pairs(count: int) -> Pairs:
-    """Pairs of successive poses, shape (count - 1, 2)."""
+    """Pairs of each pose and the next, shape (count - 1, 2)."""
     first = np.arange(max(count - 1, 0))
     return np.column_stack((first, first + 1))
 
@@ -47,7 +47,7 @@ def revisit_pairs(reference: Array, *, radius: float = 3.0, gap: int = 100) -> P
 
 
 def moves_between(poses: Array, pairs: Pairs) -> Array:
-    """Second pose of each pair relative to the first, shape (M, 3)."""
+    """The second pose of each pair, relative to the first, shape (M, 3)."""
     first, second = poses[pairs[:, 0]], poses[pairs[:, 1]]
     c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
     dx, dy = (second - first)[:, :2].T
@@ -55,17 +55,17 @@ def moves_between(poses: Array, pairs: Pairs) -> Array:
 
 
 def relation_errors(estimate: Array, reference: Array, pairs: Pairs) -> RelationErrors:
-    """Compare the moves of an estimate with those of a reference, both of shape (N, 3).
+    """Compare the motions of an estimate with those of a reference, both of shape (N, 3).
 
     Raises:
-        ValueError: the two have not the same number of poses, or there are no pairs.
+        ValueError: the numbers of poses differ, or there are no pairs.
     """
     if estimate.shape != reference.shape:
         raise ValueError(f"{count_of(len(estimate), 'pose')} against {len(reference)} of the reference")
     if not len(pairs):
         raise ValueError("there are no pairs to compare")
     ours, theirs = moves_between(estimate, pairs), moves_between(reference, pairs)
-    shifts = np.hypot(*(ours - theirs)[:, :2].T)  # the turn of the frame in between changes no length
+    shifts = np.hypot(*(ours - theirs)[:, :2].T)  # a rotation of the frame changes no length
     turns = np.abs(wrap_angles(ours[:, 2] - theirs[:, 2]))
     return RelationErrors(
         shift=float(shifts.mean()),

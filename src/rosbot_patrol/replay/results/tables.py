@@ -1,4 +1,4 @@
-"""What a replay found, as tables of named columns over time, and the one file that it is stored in."""
+"""Results of a replay as tables of named columns over time, and their file format."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from rosbot_patrol.files import write_atomic
 from rosbot_patrol.grid import Grid, GridInfo
 
 FORMAT = "rosbot_patrol replay 1"
-STAMP = "stamp"  # the column [s] that a table's rows are known by
+STAMP = "stamp"  # the column [s] that identifies a table's rows
 
 Table = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class Result:
-    """All that came of one replay.
+    """The result of one replay.
 
     Attributes:
-        node: which node's.
-        facts: where it comes from: bag, parameters; shown, not compared.
-        counts: how many of what.
-        tables: columns of one length by name; one of them is `stamp` [s].
+        node: name of the node.
+        facts: its origin: bag, parameters; shown, not compared.
+        counts: numbers by name.
+        tables: columns of equal length by name; one of them is `stamp` [s].
         grids: maps, int8 cells (-1 unknown, 0 free to 100 occupied).
     """
 
@@ -45,7 +45,7 @@ class Result:
 
     @property
     def digest(self) -> str:
-        """The same for two results that are the same bit for bit, whatever their facts."""
+        """Digest of the result without its facts: equal for results that are equal bit for bit."""
         found = hashlib.sha256(json.dumps([self.node, dict(self.counts)], sort_keys=True).encode())
         for name, values in sorted(self.arrays().items()):
             found.update(f"{name} {values.dtype} {values.shape}\n".encode())
@@ -61,10 +61,10 @@ class Result:
 
 
 class Rows:
-    """Gathers a table, row by row.
+    """A table under construction, row by row.
 
     Args:
-        names: of its columns, the first of them `stamp`.
+        names: names of its columns, the first of them `stamp`.
     """
 
     def __init__(self, *names: str) -> None:
@@ -89,7 +89,7 @@ class Rows:
 
 
 def save_result(path: Path | str, result: Result) -> None:
-    """Write a result as one file, an npz (`numpy.load`) whose `header` is a text in JSON; the same bytes each time.
+    """Write a result as one file, an npz (`numpy.load`) with a JSON text in `header`; the bytes are the same each time.
 
     Raises:
         ResultError: it cannot be written.
@@ -114,7 +114,7 @@ def load_result(path: Path | str) -> Result:
     """Read a stored result.
 
     Raises:
-        ResultError: it is not there, or no stored result, or of another version.
+        ResultError: it does not exist, is no stored result, or has another version.
     """
     try:
         with np.load(Path(path), allow_pickle=False) as held:

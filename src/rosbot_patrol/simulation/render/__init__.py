@@ -1,1 +1,1 @@
-"""Rendering of pictures: OpenGL, a small software renderer, and a view from above."""
+"""Renderers of a world: OpenGL, a small software renderer, and a view from above."""

@@ -1,7 +1,7 @@
 """The camera's picture in colour and depth, drawn by OpenGL without a display: EGL, on Mesa's software driver or a GPU.
 
-Everything that stands still is one array of triangles; a body that has moved has its own, with a matrix for each of
-its visuals. Colours are taken as the display's own (as Gazebo classic takes them): a white face in full light is 255.
+All static bodies share one array of triangles; a body that has moved has its own, with a matrix per visual. As in
+Gazebo classic, colours are in the display's colour space: a white face in full light is 255.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ _VERTEX = np.dtype(
 
 @dataclass(frozen=True, kw_only=True)
 class Light:
-    """What lights a scene; each colour is added in, so that about 1 in all is full light.
+    """Lights of a scene; their colours add up, and a sum of about 1 is full light.
 
     Attributes:
         sun_direction: towards the sun, of any length.
-        above, below: light on faces that look up and down, the rest in between.
-        lamp_place: a lamp [m]; its light falls to a half at `lamp_reach` [m].
-        sky: colour where nothing stands.
+        above, below: light on faces that look up and down, interpolated between.
+        lamp_place: position of a lamp [m]; its light falls to a half at `lamp_reach` [m].
+        sky: background colour.
     """
 
     sun_direction: Vec3 = (-0.55, -0.35, 0.75)
@@ -62,7 +62,7 @@ _Arrays = tuple[NDArray[np.void], NDArray[np.int64]]
 
 @dataclass
 class _Drawn:
-    """What OpenGL holds of some triangles: corners, their order, and an array for each program that has drawn them."""
+    """OpenGL's buffers of some triangles: vertices, indices, and a vertex array per program that has drawn them."""
 
     corners: Any = None
     order: Any = None
@@ -87,14 +87,14 @@ class _Item:
 
 
 class EglRenderer(SceneRenderer):
-    """Draws bodies by OpenGL; one per process and thread, used by the thread that made it.
+    """OpenGL renderer of bodies; one per process and thread, used by the thread that made it.
 
     Args:
-        light: what lights the scene; may be changed between pictures (`light` is an attribute).
-        textures: by the names that materials use; by default those of `textures.py`.
+        light: lights of the scene; may be changed between pictures (`light` is an attribute).
+        textures: textures by name, as materials use them; by default those of `textures.py`.
 
     Raises:
-        WorldError: there is no EGL, or no driver that offers OpenGL 3.3.
+        WorldError: there is no EGL, or no driver with OpenGL 3.3.
     """
 
     def __init__(self, light: Light | None = None, textures: dict[str, Texture] | None = None) -> None:
@@ -115,15 +115,15 @@ class EglRenderer(SceneRenderer):
 
     @property
     def driver(self) -> str:
-        """The name of what draws, as OpenGL says it."""
+        """Name of the OpenGL driver."""
         return str(self._context.info["GL_RENDERER"])
 
     def add(self, body: Body, *, label: int = 0) -> None:
-        """Put a body into the scene; its name must be new.
+        """Add a body to the scene; its name must be new.
 
         Args:
-            body: what to draw.
-            label: 1 to 255, found again in `labels()` where the body is seen; 0 for none.
+            body: the body to draw.
+            label: 1 to 255, the value of `labels()` where the body is visible; 0 for none.
 
         Raises:
             WorldError: the name is taken, or a shape cannot be drawn.
@@ -137,7 +137,7 @@ class EglRenderer(SceneRenderer):
             self._forget_still()
 
     def remove(self, name: str) -> None:
-        """Take a body out of the scene."""
+        """Remove a body from the scene."""
         item = self._item(name)
         self._release(item)
         if not item.moving:
@@ -145,16 +145,16 @@ class EglRenderer(SceneRenderer):
         del self._items[name]
 
     def clear(self) -> None:
-        """Take everything out of the scene."""
+        """Remove everything from the scene."""
         for name in list(self._items):
             self.remove(name)
 
     def move(self, name: str, world_from_body: Matrix) -> None:
-        """Put a body elsewhere."""
+        """Move a body."""
         self._moving(name).pose = world_from_body
 
     def pose_visuals(self, name: str, body_from_visuals: Matrix) -> None:
-        """Move the visuals of a body against it, shape (number of visuals, 4, 4)."""
+        """Set the poses of a body's visuals relative to it, shape (number of visuals, 4, 4)."""
         item = self._moving(name)
         if body_from_visuals.shape != item.visuals.shape:
             raise WorldError(name, f"has visuals {item.visuals.shape}, was given poses {body_from_visuals.shape}")
@@ -163,7 +163,7 @@ class EglRenderer(SceneRenderer):
     def render(
         self, world_from_optical: Matrix, intrinsics: Intrinsics
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """The picture in colour (height, width, 3) and depth [m] (height, width), inf where nothing was hit."""
+        """Draw a picture: colour (height, width, 3) and depth [m] (height, width), inf where nothing was hit."""
         size = (intrinsics.width, intrinsics.height)
         buffer = self._draw(world_from_optical, intrinsics, size)
         colour = np.empty((size[1], size[0], 3), np.uint8)
@@ -173,25 +173,25 @@ class EglRenderer(SceneRenderer):
         return colour, _metres(raw, intrinsics)
 
     def labels(self) -> NDArray[np.uint8]:
-        """The label of what the last picture shows in each pixel, shape (height, width)."""
+        """Labels of the last picture's pixels, shape (height, width)."""
         assert self._target is not None, "labels() comes after render()"
         return self._read(self._target[1], self._target[0])[:, :, 3]
 
     def render_labelled(self, world_from_optical: Matrix, intrinsics: Intrinsics) -> NDArray[np.uint8]:
-        """The picture in colour and, as a fourth of them, its `labels()`, shape (height, width, 4).
+        """Draw a picture in colour with its `labels()` as the fourth channel, shape (height, width, 4).
 
-        It is read in one piece, without the depth: faster than `render` and `labels` in turn.
+        One read without the depth is faster than `render` and then `labels`.
         """
         size = (intrinsics.width, intrinsics.height)
         return self._read(self._draw(world_from_optical, intrinsics, size), size)
 
     @staticmethod
     def _read(buffer: Any, size: tuple[int, int]) -> NDArray[np.uint8]:
-        """Colour and label of each pixel, shape (height, width, 4)."""
+        """Read colour and label of each pixel, shape (height, width, 4)."""
         return np.frombuffer(buffer.read(components=4), np.uint8).reshape(size[1], size[0], 4)
 
     def close(self) -> None:
-        """Give the context and all its memory back."""
+        """Release the context and all its memory."""
         self._items.clear()
         self._context.gc_mode = "context_gc"
         self._context.gc()
@@ -210,8 +210,8 @@ class EglRenderer(SceneRenderer):
             _set(program, "projection", _projection(intrinsics).T)
             _set(program, "eye", world_from_optical[:3, 3])
             self._set_light(program, lamp)
-        # What moves stands before what does not, as a rule: drawn first, it spares the fragments behind it. A pass for
-        # depth alone, to shade only what is seen, cost more than it saved.
+        # Moving bodies are usually in front of static ones: drawn first, they save the fragments behind them. A pass
+        # for depth alone, to shade only visible fragments, cost more than it saved.
         for item in self._items.values():
             if item.moving:
                 self._draw_item(item, shading)
@@ -274,7 +274,7 @@ class EglRenderer(SceneRenderer):
         )
 
     def _array(self, program: Any, drawn: _Drawn) -> Any:
-        """Corners as one program takes them: what it does not use is skipped."""
+        """Vertex array for one program: unused attributes are skipped."""
         names = [name for name in _VERTEX.names or () if name in program]
         layout = " ".join(
             f"{_VERTEX[name].shape[0]}f" if name in names else f"{_VERTEX[name].itemsize}x"
@@ -331,7 +331,7 @@ class EglRenderer(SceneRenderer):
 
 
 def make_renderer(prefer: str = "egl") -> SceneRenderer:
-    """The fastest renderer that this machine has: OpenGL on EGL, else PyBullet's own, with a warning that says why."""
+    """Make the machine's fastest renderer: OpenGL on EGL, else PyBullet's own, with a warning that says why."""
     if prefer == "egl":
         try:
             renderer = EglRenderer()
@@ -368,7 +368,7 @@ def _placed(item: _Item) -> list[_Arrays]:
 
 
 def _projection(camera: Intrinsics) -> NDArray[np.float64]:
-    """Clip space from the optical frame; the picture's first row comes first in memory (OpenGL's last)."""
+    """Clip space from the optical frame; the picture's first row is first in memory (in OpenGL it is last)."""
     near, far, width, height = camera.near, camera.far, camera.width, camera.height
     return np.array(
         [

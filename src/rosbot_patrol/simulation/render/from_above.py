@@ -1,4 +1,4 @@
-"""Picture of a whole world from above, north up, without anything above the rooms."""
+"""A picture of a whole world from high above, north up, without ceilings and lintels."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rosbot_patrol.simulation.scene.matrices import from_pose2d
 from rosbot_patrol.simulation.scene.scene import Body, Collision, Intrinsics, SceneRenderer, Visual
 from rosbot_patrol.simulation.sdf.world import World
 
-_CUT = 1.9  # what begins higher (ceilings, lintels, lamps) is left out [m]
-_MARGIN = 0.5  # around the walls [m]
-_FAR = 4.0  # heights of the camera in widths of the world: nearly a plan
+_CUT = 1.9  # parts that begin higher (ceilings, lintels, lamps) are left out [m]
+_MARGIN = 0.5  # margin around the walls [m]
+_FAR = 4.0  # height of the camera in widths of the world: nearly a plan view
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class WorldPicture:
 
 
 def draw_world(world: World, renderer: SceneRenderer, *, width: int = 1200) -> WorldPicture:
-    """Draw a world, and the actors in it, `width` pixels wide.
+    """Draw a world, with its actors, `width` pixels wide.
 
     Raises:
-        WorldError: the world has nothing to look at but its floor.
+        WorldError: the world has nothing but its floor.
     """
     low, high = _extent(world)
     for body in (*world.bodies, *(door.body for door in world.doors)):

@@ -1,6 +1,6 @@
-"""Shader programs in GLSL: transform vertices by their visual's matrix, light and shade them.
+"""The renderer's programs in GLSL: place a vertex by its visual's matrix, light it, and shade the fragments.
 
-Sun and room light a corner; a lamp, where there is one, lights each fragment, since a wall has only four corners.
+Sun and room light the vertices; a lamp, if there is one, lights each fragment, because a wall has only four vertices.
 """
 
 _VERTEX = """
@@ -79,6 +79,6 @@ void main() {
 
 
 def sources(*, lamp: bool, textured: bool) -> tuple[str, str]:
-    """Vertex and fragment program that light by a lamp or not, with textures or plain."""
+    """Vertex and fragment program with or without a lamp, with textures or plain."""
     head = "#version 330\n" + ("#define LAMP\n" if lamp else "") + ("#define TEXTURED\n" if textured else "")
     return head + _VERTEX, head + _FRAGMENT

@@ -1,6 +1,6 @@
 """Camera's picture by PyBullet's TinyRenderer, for machines without EGL: the same content, some 20 times slower.
 
-Differs from `renderer.EglRenderer`: plain colours instead of textures, and a light of PyBullet's own.
+Differs from `egl.EglRenderer`: plain colours instead of textures, and PyBullet's own light.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ class _Item:
 
 
 class TinyRenderer(SceneRenderer):
-    """Draws bodies in a PyBullet world of its own, a multi-body for each visual."""
+    """PyBullet renderer with a world of its own and a multi-body per visual."""
 
     def __init__(self) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._items: dict[str, _Item] = {}
 
     def add(self, body: Body) -> None:
-        """Put a body into the scene; its name must be new.
+        """Add a body to the scene; its name must be new.
 
         Raises:
             WorldError: the name is taken, or a shape cannot be drawn.
@@ -48,19 +48,19 @@ class TinyRenderer(SceneRenderer):
         self._place(item)
 
     def remove(self, name: str) -> None:
-        """Take a body out of the scene."""
+        """Remove a body from the scene."""
         for number in self._item(name).numbers:
             pybullet.removeBody(number, physicsClientId=self._client)
         del self._items[name]
 
     def move(self, name: str, world_from_body: Matrix) -> None:
-        """Put a body elsewhere."""
+        """Move a body."""
         item = self._item(name)
         item.pose = world_from_body
         self._place(item)
 
     def pose_visuals(self, name: str, body_from_visuals: Matrix) -> None:
-        """Move the visuals of a body against it, shape (number of visuals, 4, 4)."""
+        """Set the poses of a body's visuals relative to it, shape (number of visuals, 4, 4)."""
         item = self._item(name)
         if body_from_visuals.shape != item.visuals.shape:
             raise WorldError(name, f"has visuals {item.visuals.shape}, was given poses {body_from_visuals.shape}")
@@ -70,7 +70,7 @@ class TinyRenderer(SceneRenderer):
     def render(
         self, world_from_optical: Matrix, intrinsics: Intrinsics
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """The picture in colour (height, width, 3) and depth [m] (height, width), inf where nothing was hit."""
+        """Draw a picture: colour (height, width, 3) and depth [m] (height, width), inf where nothing was hit."""
         view = _GL_FROM_OPTICAL @ np.linalg.inv(world_from_optical)
         drawn = pybullet.getCameraImage(
             intrinsics.width,
@@ -91,11 +91,11 @@ class TinyRenderer(SceneRenderer):
         raw = np.asarray(drawn[3], np.float32).reshape(shape)
         near, far = np.float32(intrinsics.near), np.float32(intrinsics.far)
         depth = near * far / (far - raw * (far - near))
-        depth[depth > 0.999 * far] = np.inf  # its empty pixels are a little nearer than the far clip
+        depth[depth > 0.999 * far] = np.inf  # empty pixels are a little nearer than the far clip
         return colour, depth
 
     def close(self) -> None:
-        """Give PyBullet's world back."""
+        """Release PyBullet's world."""
         self._items.clear()
         pybullet.disconnect(self._client)
 
@@ -127,7 +127,7 @@ class TinyRenderer(SceneRenderer):
 
 
 def _projection(camera: Intrinsics) -> NDArray[np.float64]:
-    # TinyRenderer samples a pixel at its left lower corner, not in its middle.
+    # TinyRenderer samples a pixel at its lower left corner, not at its centre.
     near, far, width, height = camera.near, camera.far, camera.width, camera.height
     return np.array(
         [

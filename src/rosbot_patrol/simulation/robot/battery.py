@@ -1,4 +1,4 @@
-"""Battery of three lithium-ion cells: charge, and voltage under load."""
+"""A battery of three lithium-ion cells: charge and voltage under load."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 
 from rosbot_patrol.params import param
 
-# Resting voltage of a cell against its charge.
+# Open-circuit voltage of a cell by its charge.
 _CHARGE = (0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
 _VOLTS = (3.00, 3.30, 3.45, 3.58, 3.68, 3.80, 3.97, 4.06, 4.18)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BatteryParams:
-    """Size of the battery, and the current that the robot draws."""
+    """Capacity of the battery, and the current that the robot draws."""
 
     capacity: float = param(3.5, unit="Ah", lo=0.01, doc="charge of a full battery")
     cells: int = param(3, lo=1, doc="number of cells in series")
@@ -26,7 +26,7 @@ class BatteryParams:
 
 
 class Battery:
-    """Charge that is drawn down."""
+    """The battery's charge and its discharge."""
 
     def __init__(self, params: BatteryParams) -> None:
         self.params = params
@@ -34,7 +34,7 @@ class Battery:
         self.current = params.idle_current
 
     def step(self, load: float, dt: float) -> None:
-        """Draw for `dt` [s] at a load of 0 to 1."""
+        """Discharge for `dt` [s] at a load of 0 to 1."""
         self.current = self.params.idle_current + self.params.drive_current * min(max(load, 0.0), 1.0)
         self.charge = max(self.charge - self.current * dt / 3600.0 / self.params.capacity, 0.0)
 

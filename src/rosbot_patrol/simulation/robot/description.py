@@ -1,9 +1,9 @@
-"""Robot description from a URDF: shapes, wheels, mass, and the places of frames and sensors on the base.
+"""The robot from its URDF: shapes, wheels, mass, and the poses of frames and sensors on the base.
 
-The base is the link that no joint carries. Driven wheels are named by their joints, by parameter or by the plug-in of a
-drive in the file, or else found: continuous joints whose axis lies across the robot, left and right of its middle,
-carried by no other moving joint (so the swivel and the wheel of a caster are none). Places are taken with all joints at
-zero.
+The base is the link without a parent joint. Driven wheels are named by their joints, by a parameter or by the drive
+plug-in in the file. Otherwise they are the continuous joints with an axis across the robot, left or right of its
+middle, and without another moving joint above them; this excludes the swivel and the wheel of a caster. Poses are for
+all joints at zero.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from rosbot_patrol.simulation.scene.shapes import triangles_of
 
 log = logging.getLogger(__name__)
 
-_ACROSS = 0.7  # of an axle's direction to the side
-_MIDDLE = 1e-3  # a wheel nearer to the middle is on no side [m]
+_ACROSS = 0.7  # smallest sideways component of an axle's direction
+_MIDDLE = 1e-3  # a wheel closer to the middle is on no side [m]
 _LASER = ("laser", "lidar", "scan")
 _CAMERA = ("camera", "kinect", "realsense", "astra")
 _COLOUR = ("rgb", "color", "colour")
-# Rows: the camera's x right, y down, z ahead, of a frame with x ahead, y left, z up.
+# Rows: the camera's axes (x right, y down, z forward) in a frame with x forward, y left, z up.
 _BODY_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrameParams:
-    """Links of the sensors; needed if their names do not tell."""
+    """Links of the sensors; needed if their names do not identify them."""
 
     laser: str = param("", doc="link of the lidar; empty: found by its name")
     camera: str = param("", doc="link of the camera; empty: found by its name")
@@ -44,14 +44,14 @@ class FrameParams:
 
 @dataclass(frozen=True, kw_only=True)
 class Hinge:
-    """A joint that moves, with the wheel that it may carry.
+    """A moving joint, with its wheel if it has one.
 
     Attributes:
         joint: its name.
-        radius: of the wheel [m], 0 where no shape tells it.
-        x, y, z: where the joint sits on the base [m].
-        contact_y: where the middle of the wheel is [m].
-        forward: 1 where a positive turn drives ahead, -1 where back.
+        radius: radius of the wheel [m], 0 if no shape gives it.
+        x, y, z: position of the joint on the base [m].
+        contact_y: y of the wheel's middle [m].
+        forward: 1 if a positive turn drives forward, -1 if backward.
     """
 
     joint: str
@@ -65,7 +65,7 @@ class Hinge:
 
 @dataclass(frozen=True, kw_only=True)
 class Mount:
-    """A sensor: the frame that its messages name, and base_from_sensor."""
+    """A sensor's mounting: the frame of its messages, and base_from_sensor."""
 
     frame: str
     pose: Matrix
@@ -73,17 +73,17 @@ class Mount:
 
 @dataclass(frozen=True, kw_only=True)
 class RobotDescription:
-    """What the simulator needs of a URDF.
+    """The parts of a URDF that the simulator needs.
 
     Attributes:
-        source: where it comes from, for messages.
+        source: origin of the description, for messages.
         base: the base's link.
         frames: base_from_frame of every link, shape (4, 4) each.
-        hinges: every joint that moves, in the order of the file.
+        hinges: every moving joint, in the order of the file.
         left, right: joints of the driven wheels, on each side.
-        body: visuals and collisions in the frame of the base.
-        mass: of everything [kg].
-        laser, camera, imu: where each sensor sits, None where the robot has none. The camera looks along z.
+        body: visuals and collisions in the base frame.
+        mass: total mass [kg].
+        laser, camera, imu: mounting of each sensor, None if the robot has none. The camera looks along z.
         ranges: the range sensors.
     """
 
@@ -108,12 +108,12 @@ class RobotDescription:
 
     @property
     def base_height(self) -> float:
-        """Height of the base's frame above the floor [m], with the driven wheels on it."""
+        """Height of the base frame above the floor [m], with the driven wheels on it."""
         return max((w.radius - w.z for w in self.wheels), default=0.0)
 
     @property
     def wheel_radius(self) -> float:
-        """Radius of the driven wheels [m], 0 where no shape tells it."""
+        """Radius of the driven wheels [m], 0 if no shape gives it."""
         return max((w.radius for w in self.wheels), default=0.0)
 
     @property
@@ -125,14 +125,14 @@ class RobotDescription:
 
     @property
     def is_skid_steered(self) -> bool:
-        """Whether a side has several wheels, which turning drags sideways."""
+        """Whether a side has several wheels, so that turning drags them sideways."""
         return max(len(self.left), len(self.right)) > 1
 
     def fitted(self, left: Sequence[str], right: Sequence[str], frames: FrameParams) -> RobotDescription:
-        """The same robot with wheels and sensors as named; what is not named stays as it was found.
+        """The same robot with the named wheels and sensors; others stay as found.
 
         Raises:
-            WorldError: a name is not there, or no wheels are left to drive by on a side.
+            WorldError: a name does not exist, or a side has no driven wheels left.
         """
         self._check_joints(left, right)
         chosen = replace(self, left=tuple(left) or self.left, right=tuple(right) or self.right)
@@ -181,15 +181,15 @@ def load_robot(path: str | Path, find_package: FindPackage = lambda _: None) -> 
 def parse_robot(
     text: str, *, source: str = "robot_description", find_package: FindPackage = lambda _: None
 ) -> RobotDescription:
-    """Read a URDF text.
+    """Parse a URDF text.
 
     Args:
         text: the URDF (expanded, no xacro).
-        source: where it comes from, for messages.
-        find_package: folder of a package or model by name, None where it is not known.
+        source: origin of the text, for messages.
+        find_package: folder of a package or model by name, None if it is unknown.
 
     Raises:
-        WorldError: it is no URDF, its joints form no tree, a number is none, or a mesh is missing.
+        WorldError: it is not URDF, its joints form no tree, a number is invalid, or a mesh is missing.
     """
     urdf = read_urdf(text, source, find_package)
     frames = urdf.frames()
@@ -309,7 +309,7 @@ def _camera(urdf: Urdf, frames: dict[str, Matrix]) -> Mount | None:
 
 
 def _looking(mount: Mount | None) -> Mount | None:
-    """The camera with z ahead: a frame whose z axis points up is one that looks along x."""
+    """The camera with z forward: a frame with its z axis up looks along x."""
     if mount is None or abs(float(mount.pose[2, 2])) < _ACROSS:
         return mount
     return replace(mount, pose=mount.pose @ _BODY_FROM_OPTICAL)

@@ -1,10 +1,10 @@
-"""Drive of the base: commands to wheel speeds, wheel speeds to a motion of the base, with slip.
+"""Motion of the base: commands become wheel speeds, wheel speeds become a motion of the base, with slip.
 
 A skid-steered base turns by dragging its wheels sideways. Bullet's contact model turns a four-wheeled body badly (the
-result depends on the time step more than on the friction), so the base is driven as a planar body whose velocity
-follows the wheels with the force that the tyres can give; contacts with walls stop it while the wheels go on turning.
-The effective track is a figure of the real thing: the distance between the wheels' contact lines, made longer by the
-scrub of turning where a side has several wheels. Geometry comes from the URDF unless it is given.
+result depends more on the time step than on the friction). So the base is driven as a planar body: its velocity follows
+the wheels with the force limit of the tyres, and contacts with walls stop it while the wheels go on turning. The
+effective track is that of a real robot: the distance between the wheels' contact lines, increased by the scrub of
+turning if a side has several wheels. Geometry comes from the URDF unless it is given.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rosbot_patrol.simulation.robot.description import RobotDescription
 
 @dataclass(frozen=True, kw_only=True)
 class DriveParams:
-    """The base: geometry, limits, slip. `legacy_wheel_separation` 0.1 gives the turning rate of the 2019 model."""
+    """Geometry, limits and slip of the base. `legacy_wheel_separation` 0.1 gives the turning rate of the 2019 model."""
 
     left_joints: tuple[str, ...] = param(
         (), doc="joints of the left wheels; empty: the URDF's continuous joints on the left"
@@ -59,11 +59,11 @@ class DriveParams:
 
     @property
     def wheel_separation(self) -> float:
-        """Wheel distance that the controller assumes [m]."""
+        """Wheel separation that the controller assumes [m]."""
         return self.legacy_wheel_separation or self.effective_track
 
     def fitted(self, robot: RobotDescription) -> DriveParams:
-        """The same with a robot's own geometry where none was given; raises WorldError where the URDF tells none."""
+        """Complete missing geometry from a robot's URDF; raises WorldError if the URDF does not give it."""
         radius = self.wheel_radius or robot.wheel_radius
         if radius <= 0.0:
             raise WorldError(robot.source, "no shape tells the radius of the wheels: give drive.wheel_radius")
@@ -72,7 +72,7 @@ class DriveParams:
 
 
 class Drive:
-    """Wheel speeds of the left and right side, and the twist of the base that they ask for; `params` fitted."""
+    """Wheel speeds of both sides, and the resulting twist of the base; `params` must be fitted."""
 
     def __init__(self, params: DriveParams, rng: np.random.Generator) -> None:
         self._params = params
@@ -80,18 +80,18 @@ class Drive:
         self._command = STOP
         self._command_time = -math.inf
         self._slip = np.zeros(3)
-        self.stuck: frozenset[str] = frozenset()  # sides whose wheels do not turn: left, right
+        self.stuck: frozenset[str] = frozenset()  # sides with blocked wheels: left, right
         self.left = 0.0
         self.right = 0.0
 
     def command(self, twist: Twist2D, now: float) -> None:
-        """Take a command at a time [s]; what is not finite stops the base."""
+        """Set a command at a time [s]; values that are not finite stop the base."""
         usable = math.isfinite(twist.vx) and math.isfinite(twist.wz)
         self._command = twist if usable else STOP
         self._command_time = now
 
     def step(self, now: float, dt: float) -> Twist2D:
-        """Let the wheels follow the command for `dt` [s]; returns what the base is driven at."""
+        """Let the wheels follow the command for `dt` [s]; returns the twist that drives the base."""
         p = self._params
         if p.command_timeout and now - self._command_time > p.command_timeout:
             self._command = STOP
@@ -99,7 +99,7 @@ class Drive:
         wanted_left = (self._command.vx - half) / p.wheel_radius
         wanted_right = (self._command.vx + half) / p.wheel_radius
         fastest = max(abs(wanted_left), abs(wanted_right))
-        if fastest > p.max_wheel_speed:  # slower, along the same curve
+        if fastest > p.max_wheel_speed:  # slow down along the same curve
             wanted_left *= p.max_wheel_speed / fastest
             wanted_right *= p.max_wheel_speed / fastest
         change = p.wheel_acceleration * dt
@@ -111,12 +111,12 @@ class Drive:
         return self._driven(dt)
 
     def stop(self) -> None:
-        """Stand still at once, and forget the command."""
+        """Stop at once, and clear the command."""
         self._command, self.left, self.right = STOP, 0.0, 0.0
 
     @property
     def load(self) -> float:
-        """How hard the wheels work, 0 to 1."""
+        """Load of the wheels, 0 to 1."""
         return (abs(self.left) + abs(self.right)) / (2.0 * self._params.max_wheel_speed)
 
     def _driven(self, dt: float) -> Twist2D:

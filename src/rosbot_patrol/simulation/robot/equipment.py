@@ -1,4 +1,4 @@
-"""Equipment of a robot in a world: drive, odometry, battery, IMU, and the places of its sensors."""
+"""The parts of a spawned robot: drive, odometry, battery, inertial unit, and the mounting of its sensors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 
 class EquipmentParams(Protocol):
-    """What of the engine's parameters concerns the robot."""
+    """The engine's parameters that concern the robot."""
 
     @property
     def frames(self) -> FrameParams:
@@ -40,7 +40,7 @@ class EquipmentParams(Protocol):
 
     @property
     def lidar(self) -> LidarParams:
-        """The scanner."""
+        """The lidar."""
 
     @property
     def imu(self) -> ImuParams:
@@ -52,19 +52,19 @@ class EquipmentParams(Protocol):
 
     @property
     def seed(self) -> int:
-        """Of all noise."""
+        """Seed of all noise."""
 
 
 class Equipment:
-    """The robot's own parts, there once a robot has been spawned.
+    """The robot's own parts, once a robot has been spawned.
 
     Args:
-        params: of the parts.
+        params: parameters of the parts.
         description: the robot.
-        pose: where it starts.
+        pose: initial pose.
 
     Raises:
-        WorldError: a wheel or sensor that the parameters name is not there, or no wheel tells its radius.
+        WorldError: a wheel or sensor named by the parameters does not exist, or no wheel gives its radius.
     """
 
     def __init__(self, params: EquipmentParams, description: RobotDescription, pose: Pose2D) -> None:
@@ -78,7 +78,7 @@ class Equipment:
         self.odometry = EncoderOdometry(p.encoder, fitted.wheel_radius, fitted.effective_track)
         self.imu = Imu(p.imu, noise_of(p.seed, "imu walk"))
         self.battery = Battery(p.battery)
-        self.turned = np.zeros(2)  # wheels, left and right [rad]
+        self.turned = np.zeros(2)  # angles of the wheels, left and right [rad]
         self.base_from_laser: Pose2D | None = None
         self.is_laser_flipped = False
         self.lidar_height = 0.0
@@ -103,14 +103,14 @@ class Equipment:
 
     @property
     def laser(self) -> tuple[str, Pose2D]:
-        """The lidar's frame and base_from_laser; raises WorldError where the robot has none."""
+        """The lidar's frame and base_from_laser; raises WorldError if the robot has none."""
         if self.description.laser is None or self.base_from_laser is None:
             raise WorldError(f"robot '{self.description.name}'", "has no lidar")
         return self.description.laser.frame, self.base_from_laser
 
     @property
     def laser_transform(self) -> Transform:
-        """base_from_laser in space; raises WorldError where the robot has no lidar."""
+        """base_from_laser in space; raises WorldError if the robot has no lidar."""
         if self.description.laser is None:
             raise WorldError(f"robot '{self.description.name}'", "has no lidar")
         matrix = self.description.laser.pose
@@ -118,7 +118,7 @@ class Equipment:
         return Transform(x, y, z, *to_quaternion(matrix))
 
     def laser_twist(self, twist: Twist2D) -> Twist2D:
-        """Velocity of the lidar in its own plane, from that of the base."""
+        """Velocity of the lidar in its own plane, from the base's velocity."""
         place = self.laser[1]
         vx, vy = twist.vx - twist.wz * place.y, twist.vy + twist.wz * place.x
         c, s = math.cos(place.yaw), math.sin(place.yaw)

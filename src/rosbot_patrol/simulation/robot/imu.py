@@ -1,4 +1,4 @@
-"""IMU: turning rate and acceleration with bias and noise, and the integrated heading."""
+"""An inertial unit: turning rate and acceleration with bias and noise, and the heading that it integrates."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class ImuReading:
 
 
 class Imu:
-    """Follows the motion step by step; `read` adds the noise."""
+    """Integrate the motion step by step; `read` adds the noise."""
 
     def __init__(self, params: ImuParams, walk: np.random.Generator | None = None) -> None:
         self._params = params
@@ -52,7 +52,7 @@ class Imu:
         self._rate = 0.0
 
     def step(self, twist: Twist2D, dt: float) -> None:
-        """Take the base's velocity in its own frame after `dt` [s]."""
+        """Update with the base's velocity in its own frame after `dt` [s]."""
         if self._walk is not None:
             self._bias += self._params.gyro_walk * math.sqrt(dt) * float(self._walk.standard_normal())
         self._rate = twist.wz + self._bias
@@ -64,11 +64,11 @@ class Imu:
         self._before = twist
 
     def reset(self, yaw: float) -> None:
-        """Begin anew with a heading."""
+        """Restart with a heading."""
         self._yaw, self._before, self._acceleration, self._rate = yaw, Twist2D(), (0.0, 0.0), 0.0
 
     def read(self, rng: np.random.Generator) -> ImuReading:
-        """One sample."""
+        """Read one sample."""
         p = self._params
         g = rng.standard_normal(7) * ([p.gyro_noise] * 3 + [p.accel_noise] * 3 + [p.heading_noise])
         return ImuReading(

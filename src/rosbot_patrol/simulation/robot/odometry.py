@@ -1,4 +1,4 @@
-"""Wheel-encoder odometry: counts ticks, with slightly wrong wheel radius and track width."""
+"""Wheel-encoder odometry: counts ticks, with small errors of the assumed wheel radius and track."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class OdometryParams:
 
 
 class EncoderOdometry:
-    """Dead reckoning from the turns of the left and right wheels."""
+    """Dead reckoning from the angles of the left and right wheels."""
 
     def __init__(self, params: OdometryParams, wheel_radius: float, track: float) -> None:
         self._tick = math.tau / params.ticks_per_turn
         radius = wheel_radius * (1.0 + params.radius_error)
-        # What odometry believes of each side against the truth: a right wheel that is larger is believed too small.
+        # Odometry's assumed radii against the true ones: a larger right wheel is assumed too small.
         self._radii = radius * (1.0 + params.radius_difference / 2.0), radius * (1.0 - params.radius_difference / 2.0)
         self._track = track * (1.0 + params.track_error)
         self._ticks = (0, 0)
@@ -36,7 +36,7 @@ class EncoderOdometry:
         self.twist = Twist2D()
 
     def update(self, left: float, right: float, now: float) -> None:
-        """Take the angles of the wheels [rad] at a time [s]."""
+        """Update with the angles of the wheels [rad] at a time [s]."""
         ticks = (math.floor(left / self._tick), math.floor(right / self._tick))
         travel_left = (ticks[0] - self._ticks[0]) * self._tick * self._radii[0]
         travel_right = (ticks[1] - self._ticks[1]) * self._tick * self._radii[1]
@@ -53,6 +53,6 @@ class EncoderOdometry:
         self._ticks, self._time = ticks, now
 
     def reset(self, left: float, right: float, now: float) -> None:
-        """Begin anew at the origin."""
+        """Restart at the origin."""
         self._ticks = (math.floor(left / self._tick), math.floor(right / self._tick))
         self._time, self.pose, self.twist = now, Pose2D(), Twist2D()

@@ -1,7 +1,7 @@
-"""Reader of a URDF: links with shapes, joints with axes, and their tree.
+"""Reader of URDF: links with their shapes, joints with their axes, and the tree that they form.
 
-Meshes are looked up as ROS and Gazebo name them (package://, model://, file://, or a path beside the file). Of the
-<gazebo> extensions only the places of the sensors and the joints of a differential or skid-steer drive are read.
+Meshes are found by ROS's and Gazebo's names (package://, model://, file://, or a path beside the file). Of the <gazebo>
+extensions only the places of the sensors and the joints of a differential or skid-steer drive are read.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _GREY: Rgba = (0.5, 0.5, 0.5, 1.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """A link: what it shows and what it feels, in its own frame, and its mass [kg]."""
+    """A link: its visuals and collisions, in its own frame, and its mass [kg]."""
 
     name: str
     visuals: tuple[Visual, ...]
@@ -38,11 +38,11 @@ class Link:
 
 @dataclass(frozen=True, kw_only=True)
 class Joint:
-    """A joint: where its child sits on its parent with the joint at zero, and its axis in the child's frame.
+    """A joint: the pose of its child on its parent with the joint at zero, and its axis in the child's frame.
 
     Attributes:
         kind: fixed, continuous, revolute, prismatic, floating or planar.
-        axis: shape (3,), None where the file gives none.
+        axis: shape (3,), None if the file gives none.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Joint:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorTag:
-    """A <sensor> of a <gazebo> extension: its type, the link that it is on, its place there, the frame it speaks of."""
+    """A <sensor> of a <gazebo> extension: its type, its link, its place there, the frame of its messages."""
 
     kind: str
     link: str
@@ -65,7 +65,7 @@ class SensorTag:
 
 @dataclass(frozen=True, kw_only=True)
 class Urdf:
-    """A robot's links and joints; `root` is the link that no joint carries, `drive` the joints of a drive plug-in."""
+    """A robot's links and joints; `root` is the link without a parent joint, `drive` the joints of a drive plug-in."""
 
     name: str
     root: str
@@ -89,15 +89,15 @@ class Urdf:
 
 
 def read_urdf(text: str, source: str, find_package: FindPackage) -> Urdf:
-    """Links and joints of a URDF text.
+    """Read the links and joints of a URDF text.
 
     Args:
         text: the URDF (expanded, no xacro).
-        source: where it comes from, for messages; a mesh's relative path begins in its folder.
-        find_package: folder of a package or model by name, None where it is not known.
+        source: origin of the text, for messages; a mesh's relative path starts in its folder.
+        find_package: folder of a package or model by name, None if it is unknown.
 
     Raises:
-        WorldError: it is no URDF, its joints form no tree, a number is none, or a mesh is missing.
+        WorldError: it is not URDF, its joints form no tree, a number is invalid, or a mesh is missing.
     """
     try:
         root = ET.fromstring(text)
@@ -270,7 +270,7 @@ class _Reader:
         return found
 
     def _driven(self, side: str, joints: tuple[Joint, ...]) -> tuple[str, ...]:
-        """Joints that the plug-in of a drive names for a side (leftJoint, leftFrontJoint, left_joint, ...)."""
+        """Joints that the drive plug-in names for a side (leftJoint, leftFrontJoint, left_joint, ...)."""
         known = {joint.name for joint in joints}
         named = [
             (e.text or "").strip()
@@ -281,7 +281,7 @@ class _Reader:
 
 
 def lateral(frame: Matrix, axis: tuple[float, ...] | None) -> float:
-    """How far an axis, given in a frame, points to the left of the robot: 1 left, -1 right; 1 where it is not given."""
+    """Leftward component of an axis given in a frame: 1 left, -1 right; 1 if it is not given."""
     if axis is None:
         return 1.0
     direction = frame[:3, :3] @ np.asarray(axis, float)
@@ -289,5 +289,5 @@ def lateral(frame: Matrix, axis: tuple[float, ...] | None) -> float:
 
 
 def _enclosing(path: Path, package: str) -> Path | None:
-    """The folder of that name which a file lies in."""
+    """The folder of that name above a file."""
     return next((folder for folder in path.resolve().parents if folder.name == package), None)

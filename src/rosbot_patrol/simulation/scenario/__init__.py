@@ -1,1 +1,1 @@
-"""Scenario files: people's comings and goings, and faults."""
+"""Scenario files: the timed events of a simulation, from actors to faults."""

@@ -1,4 +1,4 @@
-"""The faults in force, and what they do to the readings that pass through; one thread, that of the simulation."""
+"""The active faults and their effects on readings; used by the simulation's thread only."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ log = logging.getLogger(__name__)
 F = TypeVar("F", bound=Fault)
 
 _SILENT = {"camera": CameraSilent, "lidar": LidarSilent}
-_CLOSE = 1e-9  # of two times [s]
+_CLOSE = 1e-9  # tolerance for equal times [s]
 
 
 class Site(Protocol):
-    """What a fault may change beyond readings: the engine."""
+    """The engine's parts that a fault may change, besides readings."""
 
     @property
     def population(self) -> Population:
-        """What comes and goes there."""
+        """The world's actors, doors and boxes."""
 
     @property
     def motion_sensors(self) -> SensorNet:
         """The motion sensors."""
 
     def carry(self, pose: Pose2D) -> None:
-        """Put the robot elsewhere; raises WorldError."""
+        """Move the robot elsewhere; raises WorldError."""
 
 
 @dataclass
@@ -69,10 +69,10 @@ class _InForce:
 
 
 class FaultBoard:
-    """Begins and ends faults.
+    """Start and end of faults, and their effects.
 
     Args:
-        site: where they are.
+        site: engine that has the faults.
         doorways: places that a fault may name.
     """
 
@@ -81,18 +81,18 @@ class FaultBoard:
         self._site = site
         self._in_force: dict[str, _InForce] = {}
         self._next = math.inf
-        self.changes = 0  # how often one began or ended
+        self.changes = 0  # number of starts and ends
 
     @property
     def active(self) -> tuple[tuple[Fault, float], ...]:
-        """Those in force, each with the time when it began [s]."""
+        """Active faults, each with its start time [s]."""
         return tuple((entry.fault, entry.began) for entry in self._in_force.values())
 
     def begin(self, fault: Fault, now: float) -> None:
-        """Let a fault begin; one of the same kind and target ends.
+        """Start a fault; one of the same kind and target ends.
 
         Raises:
-            WorldError: its target is not there, or there is no room for what it does.
+            WorldError: its target does not exist, or there is no room for it.
         """
         fault = self._located(fault)
         if isinstance(fault, (SensorFault, LinkPoor)):
@@ -113,7 +113,7 @@ class FaultBoard:
         log.info("fault begins at %.2f s: %s%s", now, fault, lasts)
 
     def clear(self, now: float, kind: str = "", target: str = "") -> list[Fault]:
-        """End those of a kind and target ("": any); returns them."""
+        """End the faults of a kind and target ("": any); returns them."""
         chosen = [
             e.fault for e in self._in_force.values() if kind in ("", e.fault.kind) and target in ("", e.fault.where)
         ]
@@ -122,7 +122,7 @@ class FaultBoard:
         return chosen
 
     def advance(self, now: float) -> None:
-        """End what is over; before each step."""
+        """End the faults that are over; call before each step."""
         if now < self._next - _CLOSE:
             return
         for name, entry in list(self._in_force.items()):
@@ -133,10 +133,10 @@ class FaultBoard:
                 self._site.motion_sensors.restart(entry.fault.target, now)
         self._plan()
 
-    # What they do ----------------------------------------------------------------------------------------------------
+    # Effects ---------------------------------------------------------------------------------------------------------
 
     def is_silent(self, what: str) -> bool:
-        """Whether "camera" or "lidar" says nothing."""
+        """Whether "camera" or "lidar" is silent."""
         return bool(self._in_force) and any(self._of(_SILENT[what]))
 
     def driven(self, twist: Twist2D) -> Twist2D:
@@ -149,11 +149,11 @@ class FaultBoard:
 
     @property
     def stuck_wheels(self) -> frozenset[str]:
-        """Sides whose wheels do not turn: left, right."""
+        """Sides with blocked wheels: left, right."""
         return frozenset(entry.fault.where for entry in self._of(WheelStuck))
 
     def level(self, sensor: int, is_high: bool, now: float) -> bool:
-        """The output of a motion sensor whose electronics say `is_high`."""
+        """Output of a motion sensor for the state `is_high` of its electronics."""
         for entry in self._in_force.values():
             fault = entry.fault
             if isinstance(fault, MotionStuck) and fault.target == sensor:
@@ -163,7 +163,7 @@ class FaultBoard:
         return is_high
 
     def link(self, sensor: int) -> LinkPoor | None:
-        """What is wrong with the link of a sensor, None for nothing; a silent one loses every frame."""
+        """Fault of a sensor's link, None for none; a silent one loses every frame."""
         poor = None
         for entry in self._in_force.values():
             fault = entry.fault
@@ -174,7 +174,7 @@ class FaultBoard:
         return poor
 
     def seen(self, take: Callable[[], Picture]) -> Picture:
-        """What the camera shows where `take` would take a picture."""
+        """The camera's picture with the faults; `take` takes the true one."""
         for entry in self._of(CameraBlack):
             if entry.picture is None:
                 real = take()

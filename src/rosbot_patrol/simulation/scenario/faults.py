@@ -1,9 +1,9 @@
-"""Faults that can be caused on command: one declaration per kind, checked as parameters are.
+"""Kinds of faults: one declaration per kind, checked like parameters.
 
     fault = read_fault({"kind": "odometry_slip", "factor": 0.3, "duration": 5.0}, source="a service")
 
-A fault says what it does to the readings that pass through it; `fault_board.py` keeps those in force, and the engine
-asks it. Times are of simulated time, but for the delays and drops of a sensor's link, which are real ones.
+A fault defines its effect on readings; `fault_board.py` keeps the active ones for the engine. Times are simulated time,
+except the delays and drops of a sensor's link, which are real time.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ ALL_SENSORS = -1
 
 
 def finite(value: float) -> str | None:
-    """What is wrong with a number that is not finite, for `param(check=...)`."""
+    """Problem of a number that is not finite, for `param(check=...)`."""
     return None if math.isfinite(value) else f"is {value}, expected a finite number"
 
 
@@ -34,7 +34,7 @@ def _finite_or_none(value: float | None) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class Timed:
-    """Something that happens at a time, counted from an event."""
+    """An event at a time relative to another event."""
 
     at: float = param(0.0, unit="s", lo=0.0, check=finite, doc="time, counted from the event `after`")
     after: str = param("", choices=("", *EVENTS), doc="event of the patrol; empty: the scenario's own beginning")
@@ -42,7 +42,7 @@ class Timed:
 
 @dataclass(frozen=True, kw_only=True)
 class Fault(Timed):
-    """What all faults have in common."""
+    """Common part of all faults."""
 
     kind: ClassVar[str] = ""
     is_instant: ClassVar[bool] = False
@@ -51,13 +51,13 @@ class Fault(Timed):
 
     @property
     def where(self) -> str:
-        """What it befalls, "" where the kind says it."""
+        """Target of the fault, "" if the kind implies it."""
         target = getattr(self, "target", "")
         return "" if target == ALL_SENSORS else str(target)
 
     @property
     def name(self) -> str:
-        """Kind and target; two faults of one name are not in force together."""
+        """Kind and target; of two faults with one name only one can be active."""
         return f"{self.kind} {self.where}".strip()
 
     def __str__(self) -> str:
@@ -122,7 +122,7 @@ class SensorFault(Fault):
 
 @dataclass(frozen=True, kw_only=True)
 class MotionStuck(SensorFault):
-    """The output stays high: the sensor calls once and never again."""
+    """The output stays high: the sensor triggers once and never again."""
 
     kind: ClassVar[str] = "motion_stuck"
 
@@ -142,7 +142,7 @@ class MotionFlapping(SensorFault):
     period: float = param(4.0, unit="s", lo=0.2, check=finite, doc="time from one rise to the next")
 
     def is_high(self, since: float) -> bool:
-        """The output, so long [s] after the beginning: high in the first half of each period."""
+        """The output `since` seconds after the start: high in the first half of each period."""
         return math.fmod(since, self.period) < self.period / 2.0
 
 
@@ -198,7 +198,7 @@ class RobotCarried(Fault):
 
     @property
     def pose(self) -> Pose2D:
-        """Where it is put."""
+        """Pose after the move."""
         return Pose2D(self.x, self.y, self.yaw)
 
 
@@ -231,14 +231,14 @@ KINDS: dict[str, type[Fault]] = {cls.kind: cls for cls in _CLASSES}
 
 
 def read_fault(tree: Mapping[str, Any], *, source: str) -> Fault:
-    """The fault that a mapping with the key `kind` describes.
+    """Read the fault that a mapping with the key `kind` describes.
 
     Args:
         tree: kind, target, duration and the kind's own keys.
         source: prefix of the names in messages, "FILE: faults[0]/".
 
     Raises:
-        ParamError: the kind or a key is not known, or a value is wrong; names it.
+        ParamError: the kind or a key is unknown, or a value is wrong; the text names it.
     """
     if not isinstance(tree, Mapping):
         raise ParamError(source.rstrip("/ "), f"expected the keys of a fault, got {tree!r}")

@@ -1,10 +1,10 @@
-"""A scenario: one yaml file that says world, seed, actors and their ways, doors, faults and when, and what is expected.
+"""Scenario file: one yaml with world, seed, actors and their paths, doors, timed faults, and the expected outcome.
 
     scenario = read_scenario("scenarios/intruder.yaml")
 
-Times count in simulated seconds from an event of the patrol: `start` of the simulation, `on_guard` (unless the file's
-`begin` says otherwise), `driving`, `looking`, `returning`, `home`, the first time that each of them comes.
-`scenario_player.py` plays it.
+Times are simulated seconds after an event of the patrol: `start` of the simulation, `on_guard` (unless the file's
+`begin` says otherwise), `driving`, `looking`, `returning`, `home`; the first occurrence of each counts.
+`simulation/player.py` plays it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bound="DataclassInstance")
 
-PLAYED = "Everything in the scenario has happened."  # the last thing that the simulator tells of it
+PLAYED = "Everything in the scenario has happened."  # the simulator's last message about it
 VERDICTS = ("confirmed", "clear", "unreachable", "unverified")
 
 
@@ -46,13 +46,13 @@ def _point(point: Sequence[float]) -> str | None:
 
 
 def pose_of(point: Sequence[float]) -> Pose2D:
-    """[x, y] or [x, y, yaw] as a pose."""
+    """Convert [x, y] or [x, y, yaw] to a pose."""
     return Pose2D(point[0], point[1], point[2] if len(point) == 3 else 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Way(Timed):
-    """Where an actor walks, from a time on."""
+    """Path of an actor, from a start time."""
 
     path: list[list[float]] = param([], check=_points, doc="points [x, y] or [x, y, yaw] in the map frame")
     speed: float = param(0.8, unit="m/s", lo=0.05, hi=8.0, doc="walking speed")
@@ -83,7 +83,7 @@ class WalkEntry(Way):
 
 @dataclass(frozen=True, kw_only=True)
 class DoorEntry:
-    """A door that is in place from the beginning."""
+    """A door that exists from the beginning."""
 
     name: str = param(doc="unique name")
     hinge: list[float] = param(check=_point, doc="[x, y, yaw]: place of the hinge; the closed leaf lies along yaw")
@@ -93,7 +93,7 @@ class DoorEntry:
 
     @property
     def place(self) -> DoorPlace:
-        """The door as the engine takes it."""
+        """The door in the engine's form."""
         return plain_door(self.name, pose_of(self.hinge), width=self.width, swing=self.swing)
 
 
@@ -108,7 +108,7 @@ class DoorMove(Timed):
 
 @dataclass(frozen=True, kw_only=True)
 class Trigger(Timed):
-    """A call of a motion sensor, whatever it sees."""
+    """A trigger of a motion sensor, whatever it sees."""
 
     sensor: int = param(lo=0, hi=255, doc="id of the sensor")
 
@@ -129,7 +129,7 @@ class Expect:
 
     @property
     def least_missions(self) -> int:
-        """How many missions to wait for."""
+        """Number of missions to wait for."""
         return max(len(self.verdicts), 1) if self.missions is None else self.missions
 
 
@@ -144,7 +144,7 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """World and settings; an empty name keeps the launch file's. Paths are relative to the scenario's file."""
+    """World and settings; an empty name keeps the launch file's. Paths are relative to the scenario file."""
 
     title: str = param("", doc="subject of the scenario, in one line")
     world: str = param("", doc="SDF file of the world")
@@ -157,7 +157,7 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """What a file says, checked; `after` of every entry is filled in."""
+    """Checked contents of a file; `after` of every entry is filled in."""
 
     file: str
     setting: Setting
@@ -173,7 +173,7 @@ class Scenario:
 
     @property
     def launch_arguments(self) -> dict[str, str]:
-        """Arguments of rosbot_patrol.launch that the file decides."""
+        """Arguments of rosbot_patrol.launch that the file sets."""
         s = self.setting
         named = {
             "world": s.world,
@@ -198,7 +198,7 @@ def read_scenario(path: str | Path) -> Scenario:
     """Read and check a file.
 
     Raises:
-        ParamError: it cannot be read, a key is not known or a value is wrong; names file and key.
+        ParamError: it cannot be read, a key is unknown or a value is wrong; the text names file and key.
     """
     path = Path(path)
     setting_keys = [key for key, *_ in params.declared(Setting)]
@@ -222,7 +222,7 @@ def read_scenario(path: str | Path) -> Scenario:
 
 
 def _listed(tree: Mapping[str, Any], key: str, path: Path) -> list[tuple[str, Any]]:
-    """Each entry of a list with its name for messages."""
+    """The entries of a list, each with its name for messages."""
     entries = tree.get(key, [])
     if not isinstance(entries, list):
         raise ParamError(f"{path}: {key}", f"expected a list, got {entries!r}")
@@ -285,7 +285,7 @@ def _check_names(scenario: Scenario) -> None:
 
 
 def _timed(scenario: Scenario) -> Scenario:
-    """With the event that each entry counts from filled in."""
+    """The scenario with the reference event of each entry filled in."""
     begin = scenario.setting.begin
 
     def fill(entries: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -298,7 +298,7 @@ def _timed(scenario: Scenario) -> Scenario:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What came of it: verdict of the last mission to each room, missions that ended, mails, is the robot home."""
+    """Outcome: verdict of the last mission to each room, missions that ended, mails, whether the robot is home."""
 
     verdicts: dict[int, str]
     missions: int
@@ -307,7 +307,7 @@ class Outcome:
 
 
 def disappointments(expect: Expect, outcome: Outcome) -> list[str]:
-    """A sentence for each thing that came otherwise than expected."""
+    """One sentence for each failed expectation."""
     found = []
     for room, verdict in expect.verdicts.items():
         told = outcome.verdicts.get(room)

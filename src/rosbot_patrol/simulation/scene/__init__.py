@@ -1,1 +1,1 @@
-"""Scene of a world: bodies, shapes, lines of sight, floor plan."""
+"""Contents of a world: bodies, shapes, lines of sight, floor plan."""

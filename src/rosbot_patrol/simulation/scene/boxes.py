@@ -1,4 +1,4 @@
-"""Boxes placed in a running world."""
+"""Boxes that can be added to a running world."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _CARDBOARD = Material(rgba=(0.62, 0.47, 0.31, 1.0))
 
 
 def box_body(name: str, pose: Pose2D, size: tuple[float, float, float]) -> Body:
-    """A cardboard box on the floor: its middle and direction, its length, depth and height [m]."""
+    """Make a cardboard box on the floor from its middle and direction, its length, depth and height [m]."""
     shape = Shape(kind="box", size=size)
     return Body(
         name=name,

@@ -1,4 +1,4 @@
-"""The floor plan of a world: what a lidar at a given height would have mapped, made from the collision shapes."""
+"""The floor plan of a world: the ideal map of a lidar at a given height, made from the collision shapes."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _TURNS = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 
 
 def floor_plan(bodies: Iterable[Body], info: GridInfo, *, height: float, start: tuple[float, float]) -> Grid:
-    """The map of all that stands still in a world.
+    """Make the map of a world's static bodies.
 
     Args:
-        bodies: the world; what moves is left out.
-        info: place and size of the map.
-        height: of the lidar's plane over the floor [m].
-        start: a point of the inside [m]; what cannot be reached from it stays unknown.
+        bodies: the world; moving bodies are left out.
+        info: origin and size of the map.
+        height: height of the lidar's plane above the floor [m].
+        start: a point inside [m]; cells that cannot be reached from it stay unknown.
 
     Raises:
         MapError: the start is off the map or in a wall.
@@ -59,7 +59,7 @@ def _slices(body: Body, height: float) -> list[NDArray[np.float64]]:
 
 
 def _hull_points(shape: Shape) -> NDArray[np.float64] | None:
-    """Points whose convex hull is the shape (round ones nearly), shape (N, 3)."""
+    """Points with the shape as their convex hull (approximate for round ones), shape (N, 3)."""
     if shape.kind == "box":
         half = np.array(shape.size) / 2.0
         corners: NDArray[np.float64] = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T * half

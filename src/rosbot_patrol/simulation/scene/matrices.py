@@ -1,4 +1,4 @@
-"""Homogeneous matrices of shape (4, 4) from and to the forms that files and planar code use."""
+"""Conversion of homogeneous matrices, shape (4, 4), from and to the forms of files and planar code."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Matrix = NDArray[np.float64]
 
 
 def from_xyz_rpy(xyz: Sequence[float], rpy: Sequence[float] = (0.0, 0.0, 0.0)) -> Matrix:
-    """The pose of SDF's <pose> and URDF's <origin>: turns about the fixed axes x, then y, then z."""
+    """The pose of SDF's <pose> and URDF's <origin>: rotations about the fixed axes x, then y, then z."""
     cr, sr = math.cos(rpy[0]), math.sin(rpy[0])
     cp, sp = math.cos(rpy[1]), math.sin(rpy[1])
     cy, sy = math.cos(rpy[2]), math.sin(rpy[2])
@@ -40,7 +40,7 @@ def to_pose2d(matrix: Matrix) -> Pose2D:
 
 
 def to_quaternion(matrix: Matrix) -> tuple[float, float, float, float]:
-    """(x, y, z, w) of the turn, of length one."""
+    """Unit quaternion (x, y, z, w) of the rotation."""
     r = matrix[:3, :3]
     trace = float(np.trace(r))
     if trace > 0.0:
@@ -58,5 +58,5 @@ def to_quaternion(matrix: Matrix) -> tuple[float, float, float, float]:
 
 
 def is_upright(matrix: Matrix) -> bool:
-    """Whether the z axis points up or down."""
+    """Whether the z axis is vertical, up or down."""
     return abs(abs(float(matrix[2, 2])) - 1.0) < 1e-9

@@ -1,4 +1,4 @@
-"""Inner loops of ray casting in the plane against segments and circles: exact, only for beams that can hit."""
+"""Planar ray casting against segments and circles: exact, and only for the beams that an obstacle can cover."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ def cast_fan(
     """Shorten each beam of a fan to the nearest obstacle.
 
     Args:
-        px: where the beams start [m].
-        py: where the beams start [m].
+        px: x of the beams' origin [m].
+        py: y of the beams' origin [m].
         first: bearing of beam 0 [rad].
-        step: from beam to beam [rad], positive; at most one turn in all.
+        step: angle between beams [rad], positive; at most one turn in all.
         segments: x0, y0, x1, y1, shape (S, 4).
         circles: x, y, radius, shape (C, 3).
-        groups: circles around runs of segments that follow each other from segment 0 on: x, y, radius, number of
-            segments, shape (G, 4); segments after the last run are in none. The nearest are cast first, and those
-            behind what was hit are left out.
+        groups: circles around runs of consecutive segments, starting with segment 0: x, y, radius, number of segments,
+            shape (G, 4); segments after the last run are in no group. The nearest groups are cast first, and those
+            behind a hit are skipped.
         ranges: longest length on entry, length to the nearest obstacle on return [m], shape (N,).
     """
     turn = 2.0 * math.pi
@@ -86,7 +86,7 @@ def cast_fan(
                     below = cosines[k] * dy - sines[k] * dx
                     if abs(below) > 1e-9 * long:
                         length = cross / below
-                    elif abs(cross) <= 1e-9 * long:  # seen from its end
+                    elif abs(cross) <= 1e-9 * long:  # seen end-on
                         length = min(math.hypot(ax, ay), math.hypot(ax + dx, ay + dy))
                     else:
                         continue
@@ -114,7 +114,7 @@ def cast_fan(
 
 @kernel("boolean(float64, float64, float64, float64, float64[:, ::1], float64[:, ::1], float64[:, ::1])")
 def is_blocked(x0: float, y0: float, x1: float, y1: float, segments: Array, circles: Array, groups: Array) -> bool:
-    """Whether a segment or a circle lies between two points; the groups are those of `cast_fan`."""
+    """Whether a segment or a circle lies between two points; groups as in `cast_fan`."""
     dx, dy = x1 - x0, y1 - y0
     reach = math.hypot(dx, dy)
     end = 0

@@ -1,4 +1,4 @@
-"""Bodies of a simulated world, for physics and camera alike: shapes, poses and materials.
+"""The simulated world's model for physics and camera: bodies with shapes, poses and looks.
 
 Poses are homogeneous matrices of shape (4, 4), `world_from_body`, `body_from_visual` (metres, x forward, z up).
 """
@@ -18,7 +18,7 @@ BodyKind = Literal["floor", "wall", "furniture", "person", "fire_hydrant", "robo
 
 
 def identity() -> Matrix:
-    """The pose that changes nothing, shape (4, 4)."""
+    """The identity pose, shape (4, 4)."""
     return np.eye(4)
 
 
@@ -28,9 +28,9 @@ class Shape:
 
     Attributes:
         kind: box (size = x, y, z), cylinder (radius, length along z), sphere (radius,), capsule (radius, length of
-            the cylindric part along z), plane (x, y; normal +z), mesh (scale x, y, z).
+            the cylindrical part along z), plane (x, y; normal +z), mesh (scale x, y, z).
         mesh: file of a mesh (stl, obj, dae), or None.
-        vertices, faces: the triangles of a mesh, shapes (V, 3) and (F, 3), or None: they are read from the file.
+        vertices, faces: the triangles of a mesh, shapes (V, 3) and (F, 3), or None to read them from the file.
     """
 
     kind: ShapeKind
@@ -50,7 +50,7 @@ class Material:
 
 @dataclass(frozen=True, kw_only=True)
 class Visual:
-    """A shape that the camera sees."""
+    """A shape that is visible to the camera."""
 
     shape: Shape
     pose: Matrix = field(default_factory=identity)
@@ -59,7 +59,7 @@ class Visual:
 
 @dataclass(frozen=True, kw_only=True)
 class Collision:
-    """A shape that the lidar and the robot's wheels feel."""
+    """A shape that lidar, range sensors and the robot's base meet."""
 
     shape: Shape
     pose: Matrix = field(default_factory=identity)
@@ -67,7 +67,7 @@ class Collision:
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """A named thing. `pose` is world_from_body at the start; `static` things never move."""
+    """A named body. `pose` is world_from_body at the start; `static` bodies never move."""
 
     name: str
     kind: BodyKind = "object"
@@ -81,7 +81,7 @@ class Body:
 class Intrinsics:
     """A pinhole camera without distortion: size [px], focal lengths and principal point [px], clip distances [m].
 
-    As in camera_info, the middle of the first pixel is at 0, so that of the picture at (width - 1) / 2.
+    As in camera_info, the centre of the first pixel is at 0, so the picture's centre is at (width - 1) / 2.
     """
 
     width: int = 640
@@ -95,7 +95,7 @@ class Intrinsics:
 
 
 class Mover(Protocol):
-    """A body that moves by itself: an actor, a door."""
+    """A body that moves on its own: an actor, a door."""
 
     @property
     def name(self) -> str:
@@ -110,28 +110,28 @@ class Mover(Protocol):
         """world_from_body."""
 
     def pose_parts(self) -> Matrix | None:
-        """body_from_visuals, shape (number of visuals, 4, 4); None where nothing of it moves against it."""
+        """body_from_visuals, shape (number of visuals, 4, 4); None without moving parts."""
 
 
 class SceneRenderer(Protocol):
-    """Draws a scene of bodies; one per process and thread."""
+    """Renderer of a scene of bodies; one per process and thread."""
 
     def add(self, body: Body) -> None:
-        """Put a body into the scene; its name must be new."""
+        """Add a body to the scene; its name must be new."""
 
     def remove(self, name: str) -> None:
-        """Take a body out of the scene."""
+        """Remove a body from the scene."""
 
     def move(self, name: str, world_from_body: Matrix) -> None:
-        """Put a body elsewhere."""
+        """Move a body."""
 
     def pose_visuals(self, name: str, body_from_visuals: Matrix) -> None:
-        """Move the visuals of a body against it (limbs, wheels), shape (number of visuals, 4, 4)."""
+        """Set the poses of a body's visuals (limbs, wheels) relative to it, shape (number of visuals, 4, 4)."""
 
     def render(
         self, world_from_optical: Matrix, intrinsics: Intrinsics
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """The picture of a camera whose optical frame (x right, y down, z forward) has that pose.
+        """Draw the picture of a camera with the given pose of its optical frame (x right, y down, z forward).
 
         Returns:
             Colour, RGB, shape (height, width, 3), and depth along the optical axis [m], shape (height, width),
@@ -139,4 +139,4 @@ class SceneRenderer(Protocol):
         """
 
     def close(self) -> None:
-        """Give the renderer's resources back."""
+        """Release the renderer's resources."""

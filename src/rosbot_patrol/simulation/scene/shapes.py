@@ -1,8 +1,7 @@
-"""Triangles of the shapes of a scene, for the camera: positions, normals and texture coordinates in metres.
+"""Triangles of a scene's shapes, for the camera: positions, normals and texture coordinates in metres.
 
-The texture coordinate of a vertex is its place on its face in metres, from the shape's own middle, so that a texture
-keeps its size on a box of any size; `span` says how many metres a face is wide and high, for pictures that are to
-fill it once.
+The texture coordinate of a vertex is its place on its face in metres from the shape's middle. So a texture keeps its
+size on a box of any size. `span` is the face's width and height in metres, for pictures that should fill it once.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from rosbot_patrol.simulation.scene.scene import Body, Shape
 _SIDES = 20
 _RINGS = 12
 _SHARP = 0.643  # cosine
-_MOST_MEETING = 64  # corners at one place; where more meet, as at the tip of a cone, each stays flat
+_MOST_MEETING = 64  # corners at one place; with more, as at the tip of a cone, each stays flat
 
 
 @dataclass(frozen=True)
@@ -44,10 +43,10 @@ class Mesh:
 
 
 def mesh_of(shape: Shape) -> Mesh:
-    """The triangles of any shape.
+    """Make the triangles of any shape.
 
     Raises:
-        WorldError: a mesh that has neither file nor triangles, or a size with too few numbers.
+        WorldError: a mesh without file and triangles, or a size with too few numbers.
     """
     needed = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "plane": 2, "mesh": 0}[shape.kind]
     if len(shape.size) < needed:
@@ -102,14 +101,14 @@ def _protect(*arrays: NDArray[Any]) -> None:
 
 
 def plane(x: float, y: float) -> Mesh:
-    """A rectangle in z = 0 that faces up."""
+    """An upward rectangle in z = 0."""
     corners = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]]) / 2
     normals = np.tile([0.0, 0.0, 1.0], (4, 1))
     return Mesh(corners, normals, corners[:, :2].copy(), np.tile([x, y], (4, 1)), _split(np.arange(4).reshape(1, 4)))
 
 
 def cylinder(radius: float, length: float, *, sides: int = _SIDES) -> Mesh:
-    """A cylinder about its middle, along z, with its two lids."""
+    """A cylinder about its middle, along z, with its two caps."""
     angle, ring, normals, faces = _unit_cylinder(sides)
     low, high = ring * radius - [0, 0, length / 2], ring * radius + [0, 0, length / 2]
     around, n = 2 * np.pi * radius, sides + 1
@@ -123,7 +122,7 @@ def cylinder(radius: float, length: float, *, sides: int = _SIDES) -> Mesh:
 
 @functools.lru_cache(maxsize=8)
 def _unit_cylinder(sides: int) -> Any:
-    """Angles and ring of radius 1, shape (sides + 1, 3); normals and triangles of the whole."""
+    """Angles and ring of radius 1, shape (sides + 1, 3); normals and triangles of the whole cylinder."""
     angle = np.linspace(0, 2 * np.pi, sides + 1)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(sides + 1)], axis=1)
     down, up = np.tile([0.0, 0, -1], (sides + 1, 1)), np.tile([0.0, 0, 1], (sides + 1, 1))
@@ -139,7 +138,7 @@ def _unit_cylinder(sides: int) -> Any:
 
 
 def sphere(radius: float, length: float, *, sides: int = _SIDES, rings: int = _RINGS) -> Mesh:
-    """A sphere, or, with a length, a capsule along z whose cylindric part has that length."""
+    """A sphere, or, with a length, a capsule along z with a cylindrical part of that length."""
     polar = np.linspace(0, np.pi, rings + 1)
     polar = np.insert(polar, rings // 2, np.pi / 2)
     offset = np.where(np.arange(len(polar)) <= rings // 2, length / 2, -length / 2)
@@ -157,7 +156,7 @@ def sphere(radius: float, length: float, *, sides: int = _SIDES, rings: int = _R
 def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
     """Triangles between neighbours of a (rows, columns) grid of vertices, rows downwards, columns to the left.
 
-    The array is kept and given again: it cannot be written into.
+    The array is cached and read-only.
     """
     i = np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]
     quads = np.stack([i, i + columns, i + columns + 1, i + 1], axis=-1)
@@ -167,7 +166,7 @@ def grid_faces(rows: int, columns: int) -> NDArray[np.int64]:
 
 
 def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Normals of the vertices: the mean of their triangles' by area, vertices at one place taken together."""
+    """Normals of the vertices: area-weighted mean of their triangles' normals, with coincident vertices merged."""
     weighted = _cross(vertices, faces)
     place = _places(vertices)
     at = place[faces].T.ravel()
@@ -180,7 +179,7 @@ def smooth_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
 
 
 def _cross(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Normals of triangles, as long as twice their area."""
+    """Normals of triangles, with twice their area as length."""
     corners = vertices[faces]
     (ax, ay, az), (bx, by, bz) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
@@ -193,7 +192,7 @@ def _lengths(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _places(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
-    """A number for each vertex, the same for those at one place (to 10 um)."""
+    """A number for each vertex, equal for coincident ones (to 10 um)."""
     rounded = np.round(vertices, 5)
     order = np.lexsort(rounded.T)
     ranked = rounded[order]
@@ -206,7 +205,7 @@ def _places(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
 def sharp_normals(
     vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners of the triangles, shape (3 F, 3), and their normals: smooth but across edges sharper than 50 deg."""
+    """Corners of the triangles, shape (3 F, 3), and their normals: smooth except across edges sharper than 50 deg."""
     weighted = _cross(vertices, faces)
     flat = weighted / np.maximum(_lengths(weighted), 1e-12)[:, None]
     sums = np.repeat(weighted, 3, axis=0)
@@ -215,12 +214,12 @@ def sharp_normals(
         is_near = np.einsum("gik,gjk->gij", own, own) >= _SHARP
         sums[meeting] = np.einsum("gij,gjk->gik", is_near, theirs)
     lengths = _lengths(sums)[:, None]
-    up = np.array([0.0, 0.0, 1.0])  # of a triangle without area
+    up = np.array([0.0, 0.0, 1.0])  # normal of a triangle without area
     return vertices[faces.ravel()], np.where(lengths > 0.0, sums / np.maximum(lengths, 1e-300), up)
 
 
 def _meetings(place: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
-    """Indices of the corners that are at one place, all places of N corners at once: shapes (places, N)."""
+    """Indices of coincident corners, all places with N corners at once: shapes (places, N)."""
     order = np.argsort(place, kind="stable")
     begins = np.flatnonzero(np.diff(place[order], prepend=-1))
     counts = np.diff(begins, append=len(order))
@@ -230,7 +229,7 @@ def _meetings(place: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
 
 
 def triangles_of(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices (V, 3) and triangles (F, 3) of any shape, without what only a camera needs. Raises WorldError."""
+    """Vertices (V, 3) and triangles (F, 3) of any shape, without the camera's extras. Raises WorldError."""
     if shape.kind == "mesh":
         return _triangles(shape)
     mesh = mesh_of(shape)
@@ -247,7 +246,7 @@ def _triangles(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if len(shape.size) >= 3:
         vertices = vertices * np.array(shape.size[:3])
         if np.prod(shape.size[:3]) < 0.0:
-            faces = faces[:, ::-1]  # mirrored: keep them facing outwards
+            faces = faces[:, ::-1]  # mirrored: keep the faces outward
     return vertices, faces
 
 
@@ -274,7 +273,7 @@ def _split(quads: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def planar_radius(body: Body) -> float:
-    """Radius of the upright cylinder about a body's origin that holds its collision shapes [m]."""
+    """Radius of the vertical cylinder about a body's origin that contains its collision shapes [m]."""
     radius = 0.0
     for collision in body.collisions:
         corners = mesh_of(collision.shape).positions @ collision.pose[:3, :3].T + collision.pose[:3, 3]

@@ -1,4 +1,4 @@
-"""Lines of sight in space, exact against the collision shapes: a person is seen over a table, no cat behind a sofa."""
+"""Lines of sight in space, exact against the collision shapes: a sofa hides a cat, a table does not hide a person."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Point = NDArray[np.float64]
 
 
 class Obstruction:
-    """What some bodies hide, where they stand; their shapes are taken when it is first asked.
+    """Occlusion by some bodies in their poses; their triangles are made at the first query.
 
     Args:
-        bodies: planes are left out: nobody looks from below the floor.
+        bodies: the bodies; planes are left out, because nobody looks from below the floor.
     """
 
     def __init__(self, bodies: Sequence[Body]) -> None:
@@ -27,17 +27,17 @@ class Obstruction:
         self._parts: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]] | None = None
 
     def hides(self, eye: Point, point: Point) -> bool:
-        """Whether one of them lies between two points, each of shape (3,), in the frame of the world [m]."""
+        """Whether a body lies between two points, each of shape (3,), in the world frame [m]."""
         if self._parts is None:
             self._parts = _parts_of(self._bodies)
         return bool(meets(eye, point, *self._parts))
 
 
 class Sight:
-    """Lines of sight through a house whose doors open and close.
+    """Lines of sight through a house with moving doors.
 
     Args:
-        bodies: what stands still.
+        bodies: static bodies.
     """
 
     def __init__(self, bodies: Sequence[Body]) -> None:
@@ -45,12 +45,12 @@ class Sight:
         self._leaves: dict[str, tuple[Body, Obstruction]] = {}
 
     def share(self, eye: Sequence[float], points: Sequence[Sequence[float]], doors: Iterable[Mover]) -> float:
-        """How many of some points are seen, 0 none to 1 all of them.
+        """Share of the points that are visible, 0 none to 1 all of them.
 
         Args:
-            eye: where it is looked from, in the frame of the world [m].
-            points: what is looked at.
-            doors: as they stand.
+            eye: the viewpoint, in the world frame [m].
+            points: the points to see.
+            doors: doors in their present positions.
         """
         doors = tuple(doors)
         seen = 0

@@ -1,4 +1,4 @@
-"""Inner loop: does a straight line meet triangles? Bounds first, then each triangle (Moeller and Trumbore 1997)."""
+"""Intersection of a line segment with triangles: bounds first, then each triangle (Moeller and Trumbore 1997)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def meets(start: Array, end: Array, bounds: Array, triangles: Array, begins: NDA
 
     Args:
         start: one point, shape (3,) [m].
-        end: the other.
+        end: the other point.
         bounds: lowest and highest x, y, z of each part, shape (P, 2, 3) [m].
         triangles: corners, shape (T, 3, 3) [m].
-        begins: first triangle of each part, and their number at the end, shape (P + 1,).
+        begins: index of each part's first triangle, then their total number, shape (P + 1,).
     """
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     for p in range(bounds.shape[0]):

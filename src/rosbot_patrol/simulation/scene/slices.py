@@ -1,6 +1,6 @@
-"""The horizontal cut through a scene at one height: what a planar lidar, a range sensor or a look at eye level meets.
+"""Horizontal section through a scene at one height, for a planar lidar, a range sensor or a view at eye level.
 
-The cut of a convex shape is a polygon or a circle, and exact; a lying cylinder or capsule is cut as a prism of 24
+The section of a convex shape is a polygon or a circle, and exact. A lying cylinder or capsule is cut as a prism of 24
 sides, a mesh triangle by triangle.
 """
 
@@ -22,7 +22,7 @@ from rosbot_patrol.simulation.scene.shapes import triangles_of
 Array = NDArray[np.float64]
 
 _SIDES = 24
-_GROUP = 16  # segments
+_GROUP = 16  # segments per group
 _SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 _CUBE = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _CUBE_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1])
@@ -30,9 +30,9 @@ _CUBE_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if bin
 
 @dataclass(frozen=True)
 class Slice:
-    """Segments (x0, y0, x1, y1), shape (S, 4), and circles (x, y, radius), shape (C, 3), in the frame of the world.
+    """Segments (x0, y0, x1, y1), shape (S, 4), and circles (x, y, radius), shape (C, 3), in the world frame.
 
-    `groups` are circles around runs of the segments, shape (G, 4), so that not every ray has to meet every segment.
+    `groups` are circles around runs of the segments, shape (G, 4), so that a ray need not test every segment.
     """
 
     segments: Array
@@ -40,7 +40,7 @@ class Slice:
     groups: Array = field(default_factory=lambda: kernels.NO_GROUPS)
 
     def plus(self, other: Slice) -> Slice:
-        """Both cuts together."""
+        """Combine both sections."""
         if not len(other.segments) and not len(other.circles):
             return self
         segments = np.vstack((self.segments, other.segments)) if len(other.segments) else self.segments
@@ -48,7 +48,7 @@ class Slice:
         return Slice(np.ascontiguousarray(segments), np.ascontiguousarray(circles), self.groups)
 
     def placed(self, pose: Pose2D) -> Slice:
-        """The cut through a body that stands at a pose, where this one is in the frame of the body."""
+        """Transform the section from the body frame to the body's pose."""
         c, s = math.cos(pose.yaw), math.sin(pose.yaw)
         turn, shift = np.array([[c, s], [-s, c]]), np.array([pose.x, pose.y])
         circles = self.circles.copy()
@@ -73,7 +73,7 @@ EMPTY = Slice(kernels.NO_SEGMENTS, kernels.NO_CIRCLES)
 
 
 def slice_bodies(bodies: Iterable[Body], height: float) -> Slice:
-    """The cut through the collision shapes of bodies at a height [m]."""
+    """Section through the collision shapes of bodies at a height [m]."""
     segments: list[Array] = []
     circles: list[Array] = []
     boxes: list[tuple[tuple[float, ...], Matrix]] = []
@@ -92,7 +92,7 @@ def slice_bodies(bodies: Iterable[Body], height: float) -> Slice:
 
 
 def _cut_upright_boxes(boxes: Sequence[tuple[tuple[float, ...], Matrix]], height: float) -> Array:
-    """Outlines of boxes of a size and pose whose z axis is that of the world, shape (S, 4)."""
+    """Outlines of boxes with a vertical z axis, from their sizes and poses, shape (S, 4)."""
     if not boxes:
         return kernels.NO_SEGMENTS
     sizes, poses = np.array([size for size, _ in boxes]), np.array([pose for _, pose in boxes])
@@ -105,7 +105,7 @@ def _cut_upright_boxes(boxes: Sequence[tuple[tuple[float, ...], Matrix]], height
 
 
 def _grouped(segments: Array) -> tuple[Array, Array]:
-    """The segments in an order in which neighbours follow each other, and the groups of them."""
+    """The segments sorted so that neighbours are consecutive, and their groups."""
     if len(segments) < 2 * _GROUP:
         return np.ascontiguousarray(segments), kernels.NO_GROUPS
     middles = (segments[:, :2] + segments[:, 2:]) / 2.0
@@ -132,7 +132,7 @@ def _halves(middles: Array, run: NDArray[np.int64]) -> list[NDArray[np.int64]]:
 
 
 def slice_shape(shape: Shape, world_from_shape: Matrix, height: float) -> Slice:
-    """The cut through one shape."""
+    """Section through one shape."""
     if shape.kind == "plane":
         return EMPTY
     if shape.kind == "box":
@@ -172,7 +172,7 @@ def _cut_lying(shape: Shape, pose: Matrix, height: float) -> Array:
 
 
 def _cut_convex(corners: Array, edges: NDArray[np.int64], height: float) -> Array:
-    """Outline of the cut through a convex body given by corners and edges, shape (S, 4)."""
+    """Outline of the section through a convex body with given corners and edges, shape (S, 4)."""
     a, b = corners[edges[:, 0]], corners[edges[:, 1]]
     crosses = (a[:, 2] - height) * (b[:, 2] - height) < 0.0
     if not crosses.any():
@@ -186,12 +186,12 @@ def _cut_convex(corners: Array, edges: NDArray[np.int64], height: float) -> Arra
 
 
 def _cut_triangles(vertices: Array, faces: NDArray[np.int64], height: float) -> Array:
-    """Cuts of triangles, each a segment, shape (S, 4)."""
+    """Sections of triangles, each a segment, shape (S, 4)."""
     above = vertices[:, 2] > height
     hit = faces[above[faces].any(axis=1) & ~above[faces].all(axis=1)]
     if not len(hit):
         return kernels.NO_SEGMENTS
-    # The corner that lies alone on its side, then the two others.
+    # The corner that is alone on its side, then the two others.
     alone = above[hit] == (above[hit].sum(axis=1) == 1)[:, None]
     first = np.argmax(alone, axis=1)
     rows = np.arange(len(hit))

@@ -1,6 +1,6 @@
-"""Procedural textures: small seeded images that a material's colour is multiplied by.
+"""Procedural textures: small pictures that multiply a material's colour, made from a seed, without files.
 
-A texture repeats every `metres`, or, with `metres` 0, fills the face that it lies on once.
+A texture repeats every `metres`, or, with `metres` 0, fills its face once.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ Field = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Texture:
-    """A picture of shape (SIDE, SIDE, 3), uint8, white where the material's colour shall show as it is."""
+    """A picture of shape (SIDE, SIDE, 3), uint8; white leaves the material's colour unchanged."""
 
     pixels: NDArray[np.uint8]
     metres: float = 1.0
 
 
 def smooth_noise(rng: np.random.Generator, cells_x: int, cells_y: int) -> Field:
-    """Noise between 0 and 1 that repeats at its edges, with that many bumps across and down, shape (SIDE, SIDE)."""
+    """Noise between 0 and 1 that repeats at its edges, with `cells_x` by `cells_y` bumps, shape (SIDE, SIDE)."""
     grid = rng.random((cells_y, cells_x))
     y, x = np.arange(SIDE) * cells_y / SIDE, np.arange(SIDE) * cells_x / SIDE
     y0, x0 = y.astype(int), x.astype(int)

@@ -1,4 +1,4 @@
-"""Paths of actors: walkable floor from cuts through the world at a few heights."""
+"""Free paths of actors: sections through the world at a few heights show the obstacles."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from rosbot_patrol.simulation.scene.scene import Body
 from rosbot_patrol.simulation.scene.sight import Sight
 from rosbot_patrol.simulation.scene.slices import EMPTY, Slice, slice_bodies
 
-EYE_LEVEL = 1.3  # a wall is what is as high as this [m]
-LEVELS = (0.15, 0.75, EYE_LEVEL)  # who wanders meets nothing at these heights [m]
+EYE_LEVEL = 1.3  # obstacles as high as this count as walls [m]
+LEVELS = (0.15, 0.75, EYE_LEVEL)  # a wandering actor avoids obstacles at these heights [m]
 
 
 class Ways:
-    """The ways through a world of things that stand still.
+    """The free paths through a world of static bodies.
 
     Args:
-        bodies: what stands there.
+        bodies: the static bodies.
     """
 
     def __init__(self, bodies: Sequence[Body]) -> None:
@@ -30,15 +30,15 @@ class Ways:
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """What stands there."""
+        """The static bodies."""
         return self._bodies
 
     def add(self, body: Body) -> None:
-        """Let a further body stand there."""
+        """Add a static body."""
         self._set((*self._bodies, body))
 
     def remove(self, name: str) -> None:
-        """Take the body of that name away."""
+        """Remove the body of that name."""
         self._set([body for body in self._bodies if body.name != name])
 
     def _set(self, bodies: Sequence[Body]) -> None:
@@ -48,20 +48,20 @@ class Ways:
 
     @property
     def names(self) -> set[str]:
-        """Names of what stands there."""
+        """Names of the static bodies."""
         return {body.name for body in self._bodies}
 
     def cut(self, height: float) -> Slice:
-        """What a plane at a height [m] meets; made once."""
+        """Section at a height [m]; cached."""
         if height not in self._cuts:
             self._cuts[height] = slice_bodies(self._bodies, height)
         return self._cuts[height]
 
     def check(self, actor: str, points: Sequence[Pose2D]) -> None:
-        """Refuse a path through a wall; furniture below eye level is not looked at.
+        """Refuse a path through a wall; furniture below eye level is ignored.
 
         Raises:
-            WorldError: names the wall, and between which points.
+            WorldError: a wall crosses the path; the text names it, and the points around it.
         """
         for a, b in pairwise(points):
             if self.cut(EYE_LEVEL).is_blocked((a.x, a.y), (b.x, b.y)):
@@ -69,13 +69,13 @@ class Ways:
                 raise WorldError(f"actor '{actor}'", f"cannot walk {line}: '{self._first_between(a, b)}' is there")
 
     def is_free(self, start: Pose2D, goal: Pose2D, radius: float, doors: Sequence[Slice] = ()) -> bool:
-        """Whether an upright cylinder can go straight from one place to another and stand there.
+        """Whether a vertical cylinder can go straight from one place to another and stand there.
 
         Args:
-            start: where it is.
-            goal: where it goes.
-            radius: of the cylinder [m].
-            doors: cuts through what moves, one for each of LEVELS.
+            start: its present place.
+            goal: its next place.
+            radius: radius of the cylinder [m].
+            doors: sections through moving bodies, one for each of LEVELS.
         """
         away = distance(start, goal)
         if away == 0.0:
@@ -97,7 +97,7 @@ class Ways:
 
 
 def together(cuts: Sequence[Slice]) -> Slice:
-    """Several cuts as one."""
+    """Combine several sections."""
     segments = [cut.segments for cut in cuts if len(cut.segments)]
     circles = [cut.circles for cut in cuts if len(cut.circles)]
     return Slice(

@@ -1,10 +1,9 @@
-"""Who walks or stands in a world: its <actor>s, and the models that are a person or a fire hydrant.
+"""Actors and populations of a world: its <actor>s, models of a person or a fire hydrant, and <population>s.
 
-The <population> of a world: many copies of one model, spread over a box or a cylinder.
+A <population> is many copies of one model, spread over a box or a cylinder.
 
-Written as SDF 1.5 has it (<box>, <cylinder>, <distribution><type>) or as 1.4 had it (<region>). Where Gazebo draws
-places by chance, here the same ones are drawn each time: the name is the seed. "uniform" is an even, but not a
-regular spread.
+It is read in the form of SDF 1.5 (<box>, <cylinder>, <distribution><type>) or 1.4 (<region>). Gazebo draws random
+places; here the name is the seed, so the places are the same each time. "uniform" is an even, but not a regular spread.
 """
 
 from __future__ import annotations
@@ -30,20 +29,20 @@ from rosbot_patrol.simulation.sdf.values import Place, floats, is_true, pose_of,
 log = logging.getLogger(__name__)
 
 _WORDS = {"person": "person", "pedestrian": "person", "hydrant": "fire_hydrant"}
-_WALK_SPEED = 0.8  # of an actor whose waypoints tell no time [m/s]
+_WALK_SPEED = 0.8  # speed of an actor with waypoints without times [m/s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ActorPlace:
-    """An actor that the world's file puts somewhere.
+    """An actor of a world file.
 
     Attributes:
         name: unique in the world.
         model: person or fire_hydrant.
-        pose: where it stands at first.
-        path: where it walks, () stays.
-        speed: of the walk [m/s].
-        loop: whether it walks round and round.
+        pose: initial pose.
+        path: points of its walk, () if it stands.
+        speed: walking speed [m/s].
+        loop: whether it repeats the walk.
     """
 
     name: str
@@ -55,22 +54,22 @@ class ActorPlace:
 
 
 def actor_kind(words: Iterable[str]) -> str | None:
-    """The actor that a model's names speak of, None where it is a thing."""
+    """The actor that a model's names indicate, None for a thing."""
     text = set(re.split(r"[^a-z]+", " ".join(words).lower()))
     return next((kind for word, kind in _WORDS.items() if word in text), None)
 
 
 def read_actor(element: ET.Element, place: Place, name: str, pose: Matrix) -> ActorPlace:
-    """An <actor> of Gazebo's: the trajectories of its script one after the other, at their mean speed.
+    """Read one of Gazebo's <actor>s: the trajectories of its script in sequence, at their mean speed.
 
     Args:
         element: the <actor>.
-        place: of the element.
-        name: that it bears here.
-        pose: world_from_actor, where it stands if it has no trajectory; waypoints are against the world.
+        place: position of the element in the file.
+        name: its name here.
+        pose: world_from_actor, used without a trajectory; waypoints are in the world frame.
 
     Raises:
-        WorldError: numbers that make no sense.
+        WorldError: a number is invalid.
     """
     points: list[Pose2D] = []
     lasts = 0.0
@@ -95,16 +94,16 @@ def read_actor(element: ET.Element, place: Place, name: str, pose: Matrix) -> Ac
     )
 
 
-_MOST = 5000  # copies
-_STEPS = np.array([0.7548776662466927, 0.5698402909980532])  # of the plastic number: points that avoid each other
+_MOST = 5000  # limit of copies
+_STEPS = np.array([0.7548776662466927, 0.5698402909980532])  # from the plastic number: a low-discrepancy sequence
 _AXES = {"linear-x": 0, "linear-y": 1, "linear-z": 2}
 
 
 def places_of(element: ET.Element, place: Place) -> list[Matrix]:
-    """Where the copies stand, shapes (4, 4).
+    """Poses of the copies, shapes (4, 4).
 
     Raises:
-        WorldError: no region, a distribution that is not known, or numbers that make no sense.
+        WorldError: there is no region, the distribution is unknown, or a number is invalid.
     """
     outer = pose_of(element, place)
     spread = element.find("distribution")
@@ -116,7 +115,7 @@ def places_of(element: ET.Element, place: Place) -> list[Matrix]:
         if not 0 <= count <= _MOST:
             raise place.inside("<model_count>").error(f"expected 0 to {_MOST}, got {count:g}")
         offsets = _spread(element, place, kind, int(count))
-    return [from_xyz_rpy((outer @ (*offset, 1.0))[:3].tolist()) for offset in offsets]  # none of them is turned
+    return [from_xyz_rpy((outer @ (*offset, 1.0))[:3].tolist()) for offset in offsets]  # without rotation
 
 
 def _grid(element: ET.Element, place: Place) -> NDArray[np.float64]:
@@ -157,7 +156,7 @@ def _spread(element: ET.Element, place: Place, kind: str, count: int) -> NDArray
 
 
 def _region(element: ET.Element, place: Place) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Middle and size of the region [m], and the radius of a cylinder, 0 of a box."""
+    """Centre and size of the region [m], and the radius of a cylinder, 0 for a box."""
     old = element.find("region/cuboid")
     if old is not None:
         low, high = (floats(old.findtext(tag) or "0 0 0", 3, place.inside(f"<{tag}>")) for tag in ("min", "max"))

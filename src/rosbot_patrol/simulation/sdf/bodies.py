@@ -1,9 +1,7 @@
-"""Bodies of an SDF world: joined, uniquely named, and placed on the floor.
+"""Bodies of an SDF world: assembly, kinds by name, stand-in visuals, and raised floors.
 
-Some houses have a floor slab of a few centimetres, on which everything stands.
-
-In Gazebo the robot drives on top of it; here the floor is at height 0. Therefore such a world is lowered until the top
-of its slab is at height 0.
+In some houses the floor is a slab of some centimetres, and everything stands on it. In Gazebo the robot drives on top
+of it; here the floor is at height 0. So such a world is lowered until the top of its slab is at height 0.
 """
 
 from __future__ import annotations
@@ -21,14 +19,14 @@ from rosbot_patrol.simulation.sdf.shapes import PLANE
 
 
 def instead(part: Collision) -> Visual:
-    """Visual for a collision shape without one: floors are darker than things on them."""
+    """Visual of a collision shape without visuals: floors are darker than the things on them."""
     is_floor = part.shape.kind == "box" and min(part.shape.size[:2]) > 2.0 > part.shape.size[2]
     shade = (0.50, 0.48, 0.45, 1.0) if is_floor else (0.74, 0.71, 0.66, 1.0)
     return Visual(shape=part.shape, pose=part.pose, material=Material(rgba=shade))
 
 
 def together(body: Body, parts: Iterable[Body]) -> Body:
-    """A body joined with the parts fixed to it."""
+    """Merge a body with the parts attached to it."""
     for part in parts:
         pose = inverse(body.pose) @ part.pose
         body = replace(
@@ -40,7 +38,7 @@ def together(body: Body, parts: Iterable[Body]) -> Body:
 
 
 def inverse(pose: Matrix) -> Matrix:
-    """The pose that undoes another one."""
+    """The inverse of a pose."""
     turn = pose[:3, :3].T
     inverse = identity()
     inverse[:3, :3], inverse[:3, 3] = turn, -turn @ pose[:3, 3]
@@ -48,7 +46,7 @@ def inverse(pose: Matrix) -> Matrix:
 
 
 def kind_of(model: str, link: str, collisions: Iterable[Collision]) -> BodyKind:
-    """What a link is, by what it and its model are called."""
+    """Kind of a link, from its name and its model's."""
     text = f"{model} {link}".lower()
     if "ground_plane" in text or any(c.shape.kind == "plane" for c in collisions):
         return "floor"
@@ -60,7 +58,7 @@ def kind_of(model: str, link: str, collisions: Iterable[Collision]) -> BodyKind:
 
 
 def floor(name: str) -> Body:
-    """The ground plane, for those who have no model of it."""
+    """The ground plane, for worlds without a model of it."""
     shape = Shape(kind="plane", size=PLANE)
     look = Material(rgba=(0.55, 0.55, 0.55, 1.0))
     return Body(
@@ -68,15 +66,15 @@ def floor(name: str) -> Body:
     )
 
 
-_THICK = 0.35  # that a slab rises at most [m]
-_WIDE = 4.0  # that its smaller side is at least [m]
-_LOW = 0.05  # a slab begins at most that high [m]
-_NO_RISE = 0.01  # what the wheels roll over anyway [m]
-_SHARE = 0.5  # of all things that a floor has on it
+_THICK = 0.35  # largest thickness of a slab [m]
+_WIDE = 4.0  # smallest length of its shorter side [m]
+_LOW = 0.05  # largest height of its bottom [m]
+_NO_RISE = 0.01  # the wheels roll over lower steps [m]
+_SHARE = 0.5  # smallest share of all things that stand on the floor
 
 
 def raised_floor(bodies: Sequence[Body]) -> float:
-    """Height of the slab on which most of the things of a world stand [m], 0 where there is none."""
+    """Height of the slab under most of a world's things [m], 0 if there is none."""
     slabs = [(body, part.pose, part.shape.size) for body in bodies for part in body.collisions
              if part.shape.kind == "box" and min(part.shape.size[:2]) >= _WIDE]  # fmt: skip
     heights = []
@@ -91,7 +89,7 @@ def raised_floor(bodies: Sequence[Body]) -> float:
 def let_down(
     bodies: Iterable[Body], doors: Iterable[DoorPlace], height: float
 ) -> tuple[tuple[Body, ...], tuple[DoorPlace, ...]]:
-    """Bodies and doors that much lower [m]."""
+    """Lower bodies and doors by a height [m]."""
     return (
         tuple(replace(body, pose=_lower(body.pose, height)) for body in bodies),
         tuple(replace(door, body=replace(door.body, pose=_lower(door.body.pose, height))) for door in doors),
@@ -105,7 +103,7 @@ def _lower(pose: Matrix, height: float) -> Matrix:
 
 
 def _carries(slab: Matrix, size: tuple[float, ...], bodies: Iterable[Body]) -> bool:
-    """Whether most of the shapes of a world are within the outline of a slab, and none of them is the slab again."""
+    """Whether most shapes of a world lie within a slab's outline, and none of them is the same slab again."""
     places = [body.pose @ part.pose for body in bodies for part in body.collisions if part.shape.kind != "plane"]
     middles = np.array([place[:3, 3] for place in places]) - slab[:3, 3]
     others = middles[np.linalg.norm(middles, axis=1) > 1e-6]

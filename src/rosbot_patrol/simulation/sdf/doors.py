@@ -1,4 +1,4 @@
-"""Doors of an SDF model: a link named like a door, on a revolute joint with an upright axis."""
+"""Doors of an SDF model: a link with a door's name, on a revolute joint about a vertical axis."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from rosbot_patrol.simulation.sdf.values import Place, floats, is_true
 
 @dataclass(frozen=True)
 class Hinge:
-    """Where a door's axis stands, x, y [m], and by what angle it opens [rad], counter-clockwise positive."""
+    """Position of a door's axis, x, y [m], and its opening angle [rad], counter-clockwise positive."""
 
     axis: tuple[float, float]
     swing: float
 
 
 def read_hinge(model: ET.Element, link: str, frames: Frames, world_from_model: Matrix, place: Place) -> Hinge | None:
-    """The hinge of a link, None where the link is no door or hangs on no such joint.
+    """Read the hinge of a link, None if the link is no door or has no such joint.
 
     Args:
         model: the <model>.
         link: name of the link.
-        frames: of the model.
-        world_from_model: such that the link is where it stands in the world.
-        place: of the link, for messages.
+        frames: frames of the model.
+        world_from_model: pose of the model that puts the link at its place in the world.
+        place: position of the link in the file, for messages.
 
     Raises:
-        WorldError: numbers of the joint that make no sense.
+        WorldError: a number of the joint is invalid.
     """
     if "door" not in f"{place.where} {link}".lower():
         return None
@@ -48,14 +48,14 @@ def read_hinge(model: ET.Element, link: str, frames: Frames, world_from_model: M
         upright = float((world_from_axis[:3, :3] @ np.array(axis))[2]) / max(math.hypot(*axis), 1e-12)
         widest = _widest(joint, here)
         if abs(upright) < 0.99 or widest == 0.0:
-            continue  # a flap, or locked: it stays as it is
+            continue  # a flap, or locked: it stays closed
         swing = math.copysign(1.0, upright) * widest
         return Hinge((float(world_from_joint[0, 3]), float(world_from_joint[1, 3])), swing)
     return None
 
 
 def carried_by(model: ET.Element, link: str) -> list[str]:
-    """The links that hang on another one by joints of any kind, as handles hang on a door's leaf."""
+    """Links attached to another one by joints of any kind, such as handles to a door's leaf."""
     carried: list[str] = []
     waiting = [link]
     while waiting:
@@ -69,7 +69,7 @@ def carried_by(model: ET.Element, link: str) -> list[str]:
 
 
 def _frame_of_axis(joint: ET.Element, frames: Frames, place: Place) -> Matrix:
-    """model_from_axis: of the joint, or, as SDF 1.5 or 1.7 can say, of the model or another frame."""
+    """model_from_axis: the frame of the joint, or, in SDF 1.5 or 1.7, of the model or another frame."""
     axis = joint.find("axis")
     if axis is not None and is_true(axis.findtext("use_parent_model_frame")):
         return identity()
@@ -79,7 +79,7 @@ def _frame_of_axis(joint: ET.Element, frames: Frames, place: Place) -> Matrix:
 
 
 def _widest(joint: ET.Element, place: Place) -> float:
-    """The limit that is farther from closed, a right angle where there is none, 0 where it cannot move."""
+    """The limit that is farther from closed, a right angle without limits, 0 if it cannot move."""
     texts = {tag: joint.findtext(f"axis/limit/{tag}") for tag in ("lower", "upper")}
     limits = [floats(text, 1, place.inside(f"<{tag}>"))[0] if text else 0.0 for tag, text in texts.items()]
     widest = max(limits, key=lambda limit: (abs(limit), limit))

@@ -1,4 +1,4 @@
-"""Files of a world's models and meshes: `model://NAME` on a path, and the right file by model.config."""
+"""Search for a world's models and meshes: `model://NAME` on a path, and the right file by model.config."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.sdf.values import VERSIONS, Place
 
-_SCHEMES = ("model://", "package://")  # gazebo_ros writes the one for the other
+_SCHEMES = ("model://", "package://")  # gazebo_ros converts one to the other
 
 
 @dataclass(frozen=True)
 class ModelPath:
-    """Where `model://NAME/...` is looked up.
+    """Search path of `model://NAME/...`.
 
     Attributes:
-        folders: in this order.
-        find_package: the folder of a ROS package, looked in last.
+        folders: searched in this order.
+        find_package: finds the folder of a ROS package, searched last.
     """
 
     folders: tuple[Path, ...] = ()
     find_package: Callable[[str], Path | None] | None = None
 
     def find(self, uri: str, base: Path, place: Place) -> Path:
-        """The file or folder that a uri means.
+        """Find the file or folder of a URI.
 
         Args:
             uri: model://..., package://..., file://... or a path.
-            base: folder that a relative path starts from.
-            place: for messages.
+            base: start folder of a relative path.
+            place: position in the world file, for messages.
 
         Raises:
-            WorldError: it is nowhere; names where it was looked for, and what helps.
+            WorldError: it was not found; the text names the searched places and what helps.
         """
         found = self.look(uri, base)
         if found is None:
@@ -49,8 +49,8 @@ class ModelPath:
         return found
 
     def look(self, uri: str, base: Path) -> Path | None:
-        """As `find`, None where it is nowhere."""
-        # os.path: a name that is too long or a folder that is closed to us is nowhere, and no error
+        """Find as in `find`, None if it was not found."""
+        # os.path: a name that is too long or an unreadable folder means "not found", and no error
         return next((path for path in self._candidates(uri, base) if os.path.exists(path)), None)
 
     def _candidates(self, uri: str, base: Path) -> Iterator[Path]:
@@ -65,10 +65,10 @@ class ModelPath:
                 return
         plain = Path(uri.removeprefix("file://"))
         yield base / plain
-        if not plain.is_absolute():  # Gazebo starts from each folder of models and of media
+        if not plain.is_absolute():  # as in Gazebo, relative to each folder of models and of media
             yield from (place / plain for folder in self.folders for place in (folder, folder.parent))
             return
-        # of another's home: whatever of it is here
+        # a path in somebody else's home: try its tail in the folders here
         tails = (plain.relative_to(plain.parents[-1 - i]) for i in range(1, len(plain.parts) - 2))
         yield from (folder / tail for tail in tails for folder in self.folders)
 
@@ -79,20 +79,20 @@ _EFFECT: dict[Part, str] = {"model": "left out", "collision": "left out", "visua
 
 @dataclass
 class LostFiles:
-    """Files that a world names and that cannot be used: Gazebo reports them and goes on, and so does the reader."""
+    """Missing or broken files that a world names: like Gazebo, the reader reports them and goes on."""
 
     _sentences: dict[str, str] = field(default_factory=dict)
     _wanted: Counter[str] = field(default_factory=Counter)
     _parts: Counter[Part] = field(default_factory=Counter)
 
     def add(self, uri: str, part: Part, place: Place, error: WorldError) -> None:
-        """Note that a part of the world does without a file.
+        """Record that a part of the world lacks a file.
 
         Args:
-            uri: the file, as the world writes it.
-            part: what does without it.
-            place: who named it.
-            error: what is wrong with it.
+            uri: the file, as written in the world.
+            part: the part without the file.
+            place: position of the reference in the world file.
+            error: what is wrong with the file.
         """
         is_the_same_everywhere = uri.startswith((*_SCHEMES, "http", "/", "file:///"))
         file = uri if is_the_same_everywhere else f"{place.path.parent}/{uri}"
@@ -105,7 +105,7 @@ class LostFiles:
         return len(self._sentences)
 
     def sentences(self) -> tuple[str, ...]:
-        """One for each file: who wanted it first, what is wrong, and how many more want it."""
+        """One sentence per file: its first user, the problem, and the number of further users."""
         more = {file: self._wanted[file] - 1 for file in self._sentences}
         return tuple(
             told + (f" (wanted in {count_of(more[file], 'more place')})" if more[file] else "")
@@ -113,7 +113,7 @@ class LostFiles:
         )
 
     def summary(self) -> str:
-        """How many files are lost and what that costs, "" if none is."""
+        """Number of lost files and the consequence, "" if there are none."""
         if not self._sentences:
             return ""
         costs = ", ".join(f"{count_of(self._parts[p], p)} {_EFFECT[p]}" for p in _EFFECT if self._parts[p])
@@ -121,7 +121,7 @@ class LostFiles:
 
 
 def advice(uri: str) -> str:
-    """What helps where a uri means nothing, to follow a sentence that says so."""
+    """Remedy for a URI that was not found, to follow the sentence about it."""
     if uri.startswith("http"):
         return "; models of the web are not fetched: download it, and name its folder's folder in GAZEBO_MODEL_PATH"
     if uri.startswith(_SCHEMES):
@@ -133,10 +133,10 @@ def advice(uri: str) -> str:
 
 
 def model_file(found: Path, place: Place) -> Path:
-    """The SDF file of a model's folder: the one of the highest version that is read here; a file is itself.
+    """SDF file of a model's folder: the one of the highest version supported here; a file stands for itself.
 
     Raises:
-        WorldError: the folder has no SDF file, or its model.config is broken or names one that is missing.
+        WorldError: the folder has no SDF file, or its model.config is broken or names a missing one.
     """
     if os.path.isfile(found):
         return found

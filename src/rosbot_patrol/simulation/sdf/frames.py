@@ -1,4 +1,4 @@
-"""Which pose is relative to what: the frames of a model or world, by SDF 1.7 (1.5 has the attribute `frame`)."""
+"""Frames of a model or world, by which poses are relative to each other (SDF 1.7; attribute `frame` in 1.5)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _HERE = ("", "__model__", "world")
 
 
 class Frames:
-    """The named things of one model or world, each with its pose in that model or world.
+    """The named elements of one model or world, each with its pose in that model or world.
 
     Args:
         element: the <model> or <world>.
-        place: of the element.
+        place: position of the element in the file.
     """
 
     def __init__(self, element: ET.Element, place: Place) -> None:
@@ -34,10 +34,10 @@ class Frames:
         self._pending: list[str] = []
 
     def pose(self, child: ET.Element, place: Place, default: str = "") -> Matrix:
-        """Pose of an element that is relative to `default`, "" for this model, unless its <pose> names another frame.
+        """Pose of an element relative to `default`, "" for this model, unless its <pose> names another frame.
 
         Raises:
-            WorldError: no pose, or the frames hang on each other in a circle.
+            WorldError: the pose is invalid, or the frames form a cycle.
         """
         own = pose_of(child, place)
         element = child.find("pose")
@@ -56,7 +56,7 @@ class Frames:
         return self.frame(other, place) @ own if other not in _HERE else own
 
     def frame(self, name: str, place: Place) -> Matrix:
-        """Pose of a named frame; raises WorldError where there is none of that name, or frames form a circle."""
+        """Pose of a named frame; raises WorldError if the name is unknown, or frames form a cycle."""
         if name in _HERE:
             return identity()
         if not self.knows(name):
@@ -78,7 +78,7 @@ class Frames:
     def _inner(self, model: str) -> Frames:
         element = self._named.get(model)
         if element is None or element.tag != "model":
-            element = ET.Element("model")  # an included one is not looked into
+            element = ET.Element("model")  # the frames of an included model are not read
         return Frames(element, self._place.inside(f"model '{model}'"))
 
     def _resolve(self, name: str, place: Place) -> Matrix:

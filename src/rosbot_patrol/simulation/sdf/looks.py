@@ -14,7 +14,7 @@ from rosbot_patrol.simulation.sdf.values import Place
 
 GREY: Rgba = (0.7, 0.7, 0.7, 1.0)
 
-# Gazebo's own scripts by name (gazebo.material): the colour that each shows.
+# Gazebo's own scripts by name (gazebo.material), with their colours.
 _PLAIN = {
     "White": (1.0, 1.0, 1.0), "Black": (0.0, 0.0, 0.0), "FlatBlack": (0.1, 0.1, 0.1),
     "Grey": (0.7, 0.7, 0.7), "Gray": (0.7, 0.7, 0.7), "LightGrey": (0.8, 0.8, 0.8), "DarkGrey": (0.175, 0.175, 0.175),
@@ -36,7 +36,7 @@ _PLAIN = {
     "Aluminium": (0.65, 0.66, 0.68),
 }  # fmt: skip
 
-# Those that wear a picture: about its mean colour, and the texture of ours that is most like it, "" for none.
+# Gazebo's scripts with a picture: its approximate mean colour, and our most similar texture, "" for none.
 _PICTURED = {
     "Bricks": ((0.60, 0.33, 0.26), "bricks"), "Wood": ((0.57, 0.41, 0.26), "wood"),
     "WoodFloor": ((0.60, 0.45, 0.30), "wood"), "WoodPallet": ((0.62, 0.50, 0.35), "wood"),
@@ -53,17 +53,17 @@ _PICTURED = {
     ),
 }  # fmt: skip
 
-_UNSEEN = 0.7  # what is more transparent is left out: the camera here draws everything opaque
+_UNSEEN = 0.7  # more transparent visuals are left out: the camera here draws everything opaque
 _NO_SCRIPT = ("", "__default__")
 
 
 @dataclass
 class Looks:
-    """Reads materials.
+    """Reader of materials.
 
     Attributes:
-        model_path: where the scripts of models are.
-        skipped: takes the names of scripts that are not known.
+        model_path: search path of the models' scripts.
+        skipped: collects the names of unknown scripts.
     """
 
     model_path: ModelPath
@@ -71,10 +71,10 @@ class Looks:
     _scripts: MaterialScripts = field(default_factory=MaterialScripts)
 
     def material(self, visual: ET.Element, own: Rgba | None, place: Place) -> Material:
-        """The material of a <visual>; `own` is the colour that its mesh brings, taken where the element names none.
+        """Read the material of a <visual>; `own` is the mesh's colour, used if the element names none.
 
         Raises:
-            WorldError: a colour is no colour.
+            WorldError: a colour is invalid.
         """
         material = visual.find("material")
         if material is None:
@@ -110,7 +110,7 @@ class Looks:
 
 
 def is_unseen(visual: ET.Element, place: Place) -> bool:
-    """Whether a <visual> is so transparent that it is left out; raises WorldError where <transparency> is no number."""
+    """Whether a <visual> is too transparent to draw; raises WorldError if <transparency> is not a number."""
     text = visual.findtext("transparency")
     if text is None or not text.strip():
         return False
@@ -121,7 +121,7 @@ def is_unseen(visual: ET.Element, place: Place) -> bool:
 
 
 def _written(material: ET.Element, place: Place) -> Rgba | None:
-    """The colour that a <material> spells out: diffuse before ambient, but what glows in the dark before both."""
+    """The colour given in a <material>: emissive first, then diffuse, then ambient."""
     found: dict[str, Rgba] = {}
     for tag in ("diffuse", "ambient", "emissive"):
         text = material.findtext(tag)
@@ -135,7 +135,7 @@ def _written(material: ET.Element, place: Place) -> Rgba | None:
 
 
 def _tinted(picture: Rgba, colour: Rgba | None) -> Rgba:
-    """A picture's colour in the light that a written colour lets through."""
+    """A picture's colour, multiplied by a given colour."""
     if colour is None:
         return picture
     r, g, b = (a * c for a, c in zip(picture[:3], colour[:3], strict=True))

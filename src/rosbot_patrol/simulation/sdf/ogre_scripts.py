@@ -1,4 +1,4 @@
-"""Ogre material scripts of Gazebo's models: only the colour, or the mean of the texture, is used."""
+"""Ogre material scripts of Gazebo's models: only the colour, or the texture's mean colour, is used."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ log = logging.getLogger(__name__)
 
 @dataclass
 class MaterialScripts:
-    """Reads each script file once."""
+    """Reader of script files; it reads each file once."""
 
     _files: dict[Path, dict[str, list[list[str]]]] = field(default_factory=dict)
 
     def look(self, name: str, places: list[Path]) -> tuple[Rgba, bool] | None:
-        """Colour of a named material, and whether that is of a picture, None where it is in none of the places.
+        """Colour of a named material, and whether it comes from a picture; None if the material was not found.
 
         Args:
-            name: of the material.
+            name: name of the material.
             places: folders or files of scripts.
         """
         for place in places:
@@ -35,7 +35,7 @@ class MaterialScripts:
 
 
 def _read(file: Path) -> dict[str, list[list[str]]]:
-    """The lines of each material by its name, in words."""
+    """The lines of each material by its name, split into words."""
     try:
         text = file.read_text(encoding="utf-8", errors="replace")
     except OSError as err:

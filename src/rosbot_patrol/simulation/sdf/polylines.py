@@ -1,4 +1,4 @@
-"""<polyline> geometry, as from Gazebo's model editor: outlines extruded to a height; one inside another is a hole."""
+"""<polyline> geometry, as from Gazebo's model editor: outlines extruded to a height; an inner outline is a hole."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _ring(element: ET.Element, place: Place) -> Ring:
 
 
 def _walls(rings: Sequence[Ring], height: float) -> list[NDArray[np.float64]]:
-    """Two triangles for each side, each of shape (3, 3)."""
+    """Two triangles for each wall, each of shape (3, 3)."""
     walls = []
     for i, ring in enumerate(rings):
         is_hole = sum(_holds(other, ring[0]) for k, other in enumerate(rings) if k != i) % 2 == 1
@@ -52,7 +52,7 @@ def _walls(rings: Sequence[Ring], height: float) -> list[NDArray[np.float64]]:
 
 
 def _lids(rings: Sequence[Ring], height: float) -> list[NDArray[np.float64]]:
-    """Top and bottom, cut into strips between the heights (in y) of the corners, inside being even and odd."""
+    """Top and bottom, cut into strips between the y values of the corners; the even-odd rule decides what is inside."""
     begins = np.concatenate(rings)
     ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
     lids = []

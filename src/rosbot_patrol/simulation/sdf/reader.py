@@ -1,4 +1,4 @@
-"""Reads the models of an SDF world: links, what is nested and included, who walks, and where the state puts them."""
+"""Reader of an SDF world's models: links, nested and included models, actors, and the poses of the saved state."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _KNOWN = {
     "include": {"uri", "name", "pose", "static", "placement_frame"},
     "actor": {"pose", "skin", "animation", "script", "link", "joint", "static"},
 }
-# Of Gazebo's own running, or of what moves: skipped without a word.
+# Gazebo's own settings, or parts that move: skipped without a message.
 _WITHOUT_MEANING = {
     "gravity", "physics", "scene", "gui", "audio", "wind", "magnetic_field", "atmosphere", "spherical_coordinates",
     "inertial", "self_collide", "kinematic", "enable_wind", "allow_auto_disable", "velocity_decay", "must_be_base_link",
@@ -45,17 +45,17 @@ _ONES: Scale = (1.0, 1.0, 1.0)
 
 @dataclass
 class Reader:
-    """Reads one world.
+    """Reader of one world.
 
     Attributes:
         path: the world's file.
-        model_path: where models are.
-        skipped: what was met and is not read.
+        model_path: search path of models.
+        skipped: elements that are not supported.
         lost: files of models and meshes that cannot be used.
-        renamed: "name_1" for what shares its name with another.
-        versions: of SDF that are read as if they were others, and a file of each.
-        lights: how many there are.
-        bodies, actors, doors: what was found.
+        renamed: new names ("name_1") of things with a name in use.
+        versions: SDF versions read as if they were others, with one file of each.
+        lights: number of lights.
+        bodies, actors, doors: the contents of the world.
     """
 
     path: Path
@@ -145,7 +145,7 @@ class Reader:
         self._included(file, found, element, world_from_model, outer=outer, name=given or found.get("name") or short)
 
     def _find_included(self, uri: str, place: Place) -> tuple[Path, ET.Element]:
-        """The file that an <include> means, and the model, actor or light in it. Raises WorldError."""
+        """Find the file of an <include>, and the model, actor or light in it. Raises WorldError."""
         if not uri:
             raise place.error("has no <uri>")
         file = model_file(self.model_path.find(uri, place.path.parent, place), place)
@@ -213,7 +213,7 @@ class Reader:
             self._child(child, place, frames, world_from_model, f"{name}::")
 
     def _links(self, model: ET.Element, place: Place, frames: Frames, world_from_model: Matrix, name: str) -> None:
-        """The bodies of a model, one for each link, but that a door's leaf takes along what hangs on it."""
+        """The bodies of a model, one per link; but a door's leaf includes the links attached to it."""
         links = model.findall("link")
         built: list[tuple[str, Body, Hinge | None]] = []
         for link in links:
@@ -238,7 +238,7 @@ class Reader:
         self.bodies += [body for label, body, hinge in built if hinge is None and label not in carried]
 
     def _link(self, element: ET.Element, place: Place, frames: Frames, link_from_model: Matrix, scale: Scale) -> Body:
-        """What a link shows and what of it stops the robot; where all that it shows is lost, it shows the latter."""
+        """Visuals and collisions of a link; if all its visuals are lost, its collisions are shown."""
         self._note_skipped(element)
         visuals: list[Visual] = []
         collisions: list[Collision] = []
@@ -259,7 +259,7 @@ class Reader:
         return Body(name="", visuals=tuple(visuals), collisions=tuple(collisions))
 
     def _fresh(self, name: str) -> str:
-        """The name, or one like it where it is taken."""
+        """The name, or a similar one if it is taken."""
         if name in self._taken:
             number = 1
             while f"{name}_{number}" in self._taken:

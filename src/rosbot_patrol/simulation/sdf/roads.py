@@ -1,4 +1,4 @@
-"""<road>s of a world: visible strips on the ground that the robot can drive over."""
+"""<road>s of a world: visible strips on the ground that the robot drives over."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _GREY = Material(rgba=(0.30, 0.30, 0.31, 1.0))
 
 
 def read_road(element: ET.Element, place: Place, name: str, material: Material | None) -> Body:
-    """A road along its points, round at its corners.
+    """Make a road along its points, with round corners.
 
     Args:
         element: the <road>.
-        place: of the element.
-        name: of the body.
-        material: that it names, None for asphalt.
+        place: position of the element in the file.
+        name: name of the body.
+        material: its material, None for asphalt.
 
     Raises:
-        WorldError: fewer than two points, or numbers that make no sense.
+        WorldError: fewer than two points, or an invalid number.
     """
     width = floats(element.findtext("width") or "1", 1, place.inside("<width>"))[0]
     points = [np.array(floats(p.text or "", 3, place.inside("<point>"))) for p in element.findall("point")]

@@ -1,4 +1,4 @@
-"""Shapes of SDF: <geometry> of a <collision> or <visual>, with meshes read from their files."""
+"""Shapes of SDF: <geometry> of a <collision> or <visual>, with meshes from their files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rosbot_patrol.simulation.sdf.values import Place, box_sizes, floats, is_tru
 
 log = logging.getLogger(__name__)
 
-PLANE = (100.0, 100.0)  # size of a plane that names none [m]
+PLANE = (100.0, 100.0)  # default size of a plane [m]
 
 _READ = {"box", "cylinder", "sphere", "capsule", "ellipsoid", "plane", "polyline", "mesh"}
 _KNOWN = {
@@ -39,12 +39,12 @@ _Found = tuple[Shape, Rgba | None, Matrix]
 
 @dataclass
 class ShapeReader:
-    """Reads shapes; each mesh file once.
+    """Reader of shapes; it reads each mesh file once.
 
     Attributes:
-        model_path: where model:// is.
-        skipped: takes the names of what is not read.
-        lost: takes the meshes that cannot be used.
+        model_path: search path of model://.
+        skipped: collects the names of unsupported elements.
+        lost: collects the meshes that cannot be used.
     """
 
     model_path: ModelPath
@@ -58,13 +58,13 @@ class ShapeReader:
         self._looks = Looks(self.model_path, self.skipped)
 
     def visuals(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Visual] | None:
-        """What a <visual> shows: one for each colour of its mesh, none where it is transparent or of no known shape.
+        """Read the visuals of a <visual>: one per colour of its mesh, none if it is transparent or of an unknown shape.
 
         Returns:
-            None where its mesh is missing or broken, which is noted in `lost`.
+            None if its mesh is missing or broken, which is recorded in `lost`.
 
         Raises:
-            WorldError: an element makes no sense.
+            WorldError: an element is invalid.
         """
         self._note(element)
         if is_unseen(element, place):
@@ -78,17 +78,17 @@ class ShapeReader:
         ]
 
     def collisions(self, element: ET.Element, pose: Matrix, place: Place, scale: Scale) -> list[Collision]:
-        """The shape of a <collision>, none where it is of no known shape, or its mesh is missing or broken.
+        """Read the shape of a <collision>, none if it is of an unknown shape, or its mesh is missing or broken.
 
         Raises:
-            WorldError: an element makes no sense.
+            WorldError: an element is invalid.
         """
         self._note(element)
         found = self._found(element, place, scale, "collision") or []
         return [Collision(shape=shape, pose=pose @ turn) for shape, _, turn in found]
 
     def road(self, element: ET.Element, place: Place, name: str) -> Body:
-        """A <road> in the look that it names. Raises WorldError."""
+        """Read a <road> with its material. Raises WorldError."""
         named = element.find("material") is not None
         return read_road(element, place, name, self._looks.material(element, None, place) if named else None)
 
@@ -96,7 +96,7 @@ class ShapeReader:
         self.skipped.update(f"<{c.tag}> of a {element.tag}" for c in element if c.tag not in _KNOWN[element.tag])
 
     def _found(self, element: ET.Element, place: Place, scale: Scale, part: Part) -> list[_Found] | None:
-        """The shapes of an element, None where its mesh cannot be used: that is noted in `lost`."""
+        """The shapes of an element, None if its mesh cannot be used; this is recorded in `lost`."""
         mesh = element.find("geometry/mesh")
         try:
             return self._shapes(element, place, scale, apart=part == "visual")
@@ -107,7 +107,7 @@ class ShapeReader:
             return None
 
     def _shapes(self, element: ET.Element, place: Place, scale: Scale, *, apart: bool) -> list[_Found]:
-        """(shape, colour of its file, turn) of an element; the parts of a mesh apart or as one."""
+        """(shape, colour from its file, rotation) of an element, with a mesh's parts separate or merged."""
         geometry = element.find("geometry")
         children = list(geometry) if geometry is not None else []
         if not children:
@@ -175,7 +175,7 @@ class ShapeReader:
         return chosen
 
     def _load(self, file: Path) -> tuple[MeshPart, ...]:
-        """The parts of a mesh file, read once, also where it is broken. Raises WorldError."""
+        """The parts of a mesh file, read once, even if it is broken. Raises WorldError."""
         if file not in self._meshes:
             try:
                 self._meshes[file] = load_parts(file)
@@ -202,12 +202,12 @@ def _primitive(element: ET.Element, place: Place) -> Shape:
 
 
 def _free(vertices: NDArray[np.float64], faces: NDArray[np.int64], scale: Scale, place: Place) -> Shape:
-    """Triangles as a mesh of the file that spells them out, so with sharp edges."""
+    """Triangles as a mesh with sharp edges, because the file lists them."""
     return Shape(kind="mesh", size=scale, mesh=place.path, vertices=vertices, faces=faces)
 
 
 def _scaled(shape: Shape, scale: Scale) -> Shape:
-    """A primitive made larger as Gazebo's <state> does it: round ones by the larger of x and y."""
+    """Scale a primitive as Gazebo's <state> does: round ones by the larger of x and y."""
     if scale == (1.0, 1.0, 1.0):
         return shape
     if shape.kind == "box":

@@ -1,4 +1,4 @@
-"""<state> of a world: poses and scales of models and links when Gazebo saved it, and insertions and deletions."""
+"""The <state> of a world: poses and sizes of models and links when Gazebo saved it, and insertions and deletions."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Scale = tuple[float, float, float]
 
 @dataclass
 class State:
-    """Poses and scales by "model", "model::inner" and "model/link", all against the world.
+    """Poses and scales by "model", "model::inner" and "model/link", all in the world frame.
 
     Attributes:
-        poses: of models and links.
-        scales: of models.
-        inserted: elements of models that came while Gazebo ran.
-        deleted: names of models that went.
+        poses: poses of models and links.
+        scales: scales of models.
+        inserted: elements of models that were added while Gazebo ran.
+        deleted: names of models that were removed.
     """
 
     poses: dict[str, Matrix] = field(default_factory=dict)
@@ -28,7 +28,7 @@ class State:
     deleted: set[str] = field(default_factory=set)
 
     def read(self, element: ET.Element, place: Place) -> None:
-        """Take in a <state>; raises WorldError where numbers make no sense."""
+        """Read a <state>; raises WorldError if a number is invalid."""
         for model in element.findall("model"):
             self._model(model, "", place)
         for inserted in element.findall("insertions"):
@@ -49,7 +49,7 @@ class State:
         for link in element.findall("link"):
             if link.find("pose") is not None:
                 label = link.get("name", "")
-                label = label.removeprefix(f"{element.get('name')}::")  # so in the files of Gazebo before 3
+                label = label.removeprefix(f"{element.get('name')}::")  # in files of Gazebo before version 3
                 pose = pose_of(link, here.inside(f"link '{label}'"))
                 inner, _, last = label.rpartition("::")
                 self.poses[f"{name}/{label}"] = pose

@@ -1,4 +1,4 @@
-"""Numbers, sizes and poses in SDF, checked; every error names file and element."""
+"""Numbers, sizes and poses in SDF's form, checked; every error names file and element."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from rosbot_patrol.simulation.scene.scene import Matrix, identity
 VERSIONS = ("1.4", "1.5", "1.6", "1.7")
 TRUE = ("true", "1")
 
-_THIN = 1e-3  # of a box that names 0, as pictures on walls do [m]
+_THIN = 1e-3  # thickness of a box with size 0, such as a picture on a wall [m]
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where in which file one is, for messages."""
+    """A position in a file, for messages."""
 
     path: Path
     where: str = ""
 
     def inside(self, what: str) -> Place:
-        """A part of it."""
+        """The position of a part of it."""
         return replace(self, where=f"{self.where}, {what}" if self.where else what)
 
     def error(self, problem: str) -> WorldError:
-        """The error that names it."""
+        """Make the error for a problem here."""
         return WorldError(self.path, f"{self.where}: {problem}" if self.where else problem)
 
 
 def is_true(text: str | None) -> bool:
-    """Whether an element's text or an attribute says yes."""
+    """Whether the text of an element or attribute is true."""
     return (text or "").strip().lower() in TRUE
 
 
 def floats(text: str, count: int, place: Place) -> tuple[float, ...]:
-    """That many finite numbers; raises WorldError."""
+    """Parse `count` finite numbers; raises WorldError."""
     try:
         values = tuple(float(word) for word in text.split())
     except ValueError:
@@ -53,7 +53,7 @@ def floats(text: str, count: int, place: Place) -> tuple[float, ...]:
 
 
 def sizes(shape: ET.Element, tag: str, count: int, place: Place) -> tuple[float, ...]:
-    """The positive numbers in the element `tag` of a shape; raises WorldError."""
+    """Read the positive numbers in the element `tag` of a shape; raises WorldError."""
     text = shape.findtext(tag)
     if text is None:
         raise place.error(f"<{shape.tag}> has no <{tag}>")
@@ -64,7 +64,7 @@ def sizes(shape: ET.Element, tag: str, count: int, place: Place) -> tuple[float,
 
 
 def box_sizes(box: ET.Element, place: Place) -> tuple[float, ...]:
-    """x, y, z of a box, of which one may be 0: a sheet. Raises WorldError."""
+    """Read x, y, z of a box; one of them may be 0, for a sheet. Raises WorldError."""
     values = floats(box.findtext("size") or "", 3, place.inside("<size>")) if box.find("size") is not None else ()
     if sum(value == 0.0 for value in values) == 1 and min(values) == 0.0:
         return tuple(max(value, _THIN) for value in values)
@@ -72,9 +72,9 @@ def box_sizes(box: ET.Element, place: Place) -> tuple[float, ...]:
 
 
 def pose_of(element: ET.Element, place: Place) -> Matrix:
-    """The element's <pose> against what it is relative to; no pose is the identity. Raises WorldError.
+    """Read the element's <pose> in its reference frame; without one it is the identity. Raises WorldError.
 
-    Three numbers are a position; `degrees` and a quaternion (`rotation_format`) are read as later SDF has them.
+    Three numbers are a position; `degrees` and a quaternion (`rotation_format`) are read as in later SDF.
     """
     pose = element.find("pose")
     if pose is None or not (pose.text or "").strip():
@@ -90,7 +90,7 @@ def pose_of(element: ET.Element, place: Place) -> Matrix:
 
 
 def turned_to(normal: tuple[float, ...]) -> Matrix:
-    """The turn that takes the z axis to a normal of any length, shape (4, 4)."""
+    """Rotation of the z axis to a normal of any length, shape (4, 4)."""
     z = np.array(normal) / max(math.hypot(*normal), 1e-12)
     side = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     y = np.cross(z, side)

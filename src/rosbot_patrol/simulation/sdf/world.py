@@ -1,14 +1,16 @@
-"""A simulated world: bodies and actors of an SDF file (1.4 to 1.7, as written by Gazebo classic).
+"""A simulated world: the bodies of an SDF file (1.4 to 1.7, as Gazebo classic writes them), and its actors.
 
-Read: models, nested ones too, links, poses and the frames they are relative to, <include> on a search path, the
-<state> that overrides poses and sizes, populations, box, cylinder, sphere, capsule, ellipsoid, plane, polyline and mesh
-geometry, materials as colours. A model whose name, uri or mesh speaks of a person or a fire hydrant becomes an actor,
-and so does an <actor>.
+Read: models (also nested), links, poses and their frames, <include> on a search path, the <state> that overrides poses
+and sizes, populations, box, cylinder, sphere, capsule, ellipsoid, plane, polyline and mesh geometry, materials as
+colours. An <actor> becomes an actor, and so does a model if its name, uri or mesh indicates a person or a fire hydrant.
 
-Differs: every model is static (what Gazebo would push aside stands fast here); joints hold, but for a door's hinge
-(`sdf_doors`), which a service moves; lights, plugins, sensors and physics settings are skipped. What is not read is
-named once in a warning. As in Gazebo, a model or mesh that is missing or broken is reported and left out; a visual
-without its mesh is shown as its collision shapes. A world on a raised floor is let down onto the ground (`sdf_floors`).
+Differs:
+- Every model is static; Gazebo would push some aside.
+- Joints are fixed, except a door's hinge (`sdf.doors`), which a service moves.
+- Lights, plugins, sensors and physics settings are skipped. A warning names each unsupported element once.
+- As in Gazebo, a missing or broken model or mesh is reported and left out; a visual without its mesh shows its
+  collision shapes.
+- A world on a raised floor is lowered onto the ground (`sdf.bodies`).
 """
 
 from __future__ import annotations
@@ -34,10 +36,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """Everything that stands in a world, the actors it begins with, and its doors on hinges.
+    """The contents of a world: its bodies, its initial actors, and its doors on hinges.
 
     Attributes:
-        lost: a sentence for each file that the world names and that cannot be used.
+        lost: one sentence per missing or broken file that the world names.
     """
 
     name: str = "empty"
@@ -56,11 +58,11 @@ def load_world(
 
     Args:
         path: the file.
-        model_path: folders in which `model://NAME` is looked up, before `models` beside the file or its folders.
-        find_package: the folder of a ROS package by name, where no folder has it.
+        model_path: folders searched for `model://NAME`, before `models` beside the file or its folders.
+        find_package: folder of a ROS package by name, used last.
 
     Raises:
-        WorldError: the file cannot be read, is not SDF, or an element makes no sense; names file and element.
+        WorldError: the file cannot be read, is not SDF, or an element is invalid; the text names file and element.
     """
     path = Path(path)
     beside = [folder / "models" for folder in list(path.resolve().parents)[:3]]
@@ -76,7 +78,7 @@ def load_world(
 
 
 def _tell(reader: Reader) -> None:
-    """What was left out, in one line of each kind."""
+    """Log what was left out, one line per kind."""
     if reader.lights:
         lights = count_of(reader.lights, "light is", "lights are")
         log.info("%s: %s not simulated, the camera has its own", reader.path, lights)

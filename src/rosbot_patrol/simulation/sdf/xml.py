@@ -1,7 +1,7 @@
-"""Tolerant XML reader for SDF files, because Gazebo's own reader accepts more than the standard allows.
+"""Lenient XML reader for SDF files: like Gazebo's own reader, it accepts more than the standard does.
 
-Forgiven: something before the XML declaration, "--" in comments, prefixes that nothing declares, the root <gazebo> of
-SDF before 1.4. Told, with what to do about it: templates that nobody expanded, and poses as SDF 1.0 wrote them.
+Accepted: text before the XML declaration, "--" in comments, undeclared prefixes, the root <gazebo> of SDF before 1.4.
+Refused with a remedy: unexpanded templates, and poses in the form of SDF 1.0.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from rosbot_patrol.errors import WorldError
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _DECLARATION = re.compile(rb"<\?xml\s.*?\?>", re.DOTALL)
 _ROOTS = ("sdf", "gazebo")
-_OLD_POSES = (("world/", ""), ("world/", "link/"), ("", ""), ("", "link/"))  # of <origin>, in and below a model
+_OLD_POSES = (("world/", ""), ("world/", "link/"), ("", ""), ("", "link/"))  # of <origin>, in a model and below
 
 
 def read_sdf(path: Path) -> ET.Element:
-    """The root of an SDF file.
+    """Read the root of an SDF file.
 
     Raises:
-        WorldError: the file cannot be read, is not XML, a template or no SDF.
+        WorldError: the file cannot be read, is not XML, a template or not SDF.
     """
     try:
         data = path.read_bytes()
@@ -46,7 +46,7 @@ def read_sdf(path: Path) -> ET.Element:
 
 
 def _forgiven(path: Path, data: bytes, error: Exception) -> ET.Element:
-    """The root of what is XML but for the faults that Gazebo does not mind; else the sentence for the first fault."""
+    """The root of XML with faults that Gazebo accepts; otherwise raises with the sentence for the first fault."""
     if re.search(rb"<%[^>]*%>", data):
         raise WorldError(path, "is an ERB template, expand it first: erb FILE > WORLD") from error
     declaration = _DECLARATION.search(data)
@@ -55,7 +55,7 @@ def _forgiven(path: Path, data: bytes, error: Exception) -> ET.Element:
         data = declaration[0] + data.replace(declaration[0], b"", 1)
     builder = ET.TreeBuilder()
     try:
-        parser = expat.ParserCreate()  # knows nothing of prefixes
+        parser = expat.ParserCreate()  # without namespaces
         parser.StartElementHandler = builder.start
         parser.EndElementHandler = builder.end
         parser.CharacterDataHandler = builder.data
@@ -71,7 +71,7 @@ def _number(version: str) -> tuple[int, ...]:
 
 
 def _turn_axes(root: ET.Element) -> None:
-    """Before SDF 1.5 a joint's axis was that of the model's frame, which later has to be said."""
+    """Mark joint axes as in the model frame, which was the rule before SDF 1.5."""
     for axis in root.iterfind(".//joint/axis"):
         if axis.find("use_parent_model_frame") is None:
             ET.SubElement(axis, "use_parent_model_frame").text = "1"

@@ -1,4 +1,4 @@
-"""RGB-D camera: a renderer's pictures with the limits and the noise of a real one."""
+"""The RGB-D camera: a renderer's pictures with the real camera's limits and noise."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, Mover
 from rosbot_patrol.simulation.sensors import picture_kernels as kernels
 
 _BANK = 8
-_BLUR_VIEWS = 4, 16  # pictures that a blurred one is the mean of: least, most
-_BLUR_TURN = 0.006  # between two of them where the camera turns [rad]
-_BRIGHT = 115.0  # mean colour that the automatic exposure aims at, of 255
+_BLUR_VIEWS = 4, 16  # number of pictures averaged for motion blur: least, most
+_BLUR_TURN = 0.006  # rotation between two of them [rad]
+_BRIGHT = 115.0  # target mean colour of the automatic exposure, of 255
 _GAINS = (0.4, 2.5)
 _NO_DEPTH_NOISE = np.zeros(0, np.float32)
 _ROBOT = "the robot, in the window"
@@ -26,7 +26,7 @@ _ROBOT = "the robot, in the window"
 
 @dataclass(frozen=True, kw_only=True)
 class CameraParams:
-    """The camera; defaults as Gazebo's openni_kinect plug-in for the ROSbot, with a little noise."""
+    """Parameters of the camera; defaults as Gazebo's openni_kinect plug-in for the ROSbot, with a little noise."""
 
     width: int = param(640, unit="px", lo=16, hi=4096, doc="width of the image")
     height: int = param(480, unit="px", lo=16, hi=4096, doc="height of the image")
@@ -44,7 +44,7 @@ class CameraParams:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """The pinhole that the optics amount to."""
+        """The pinhole model of the optics."""
         focal = self.width / 2.0 / np.tan(self.horizontal_fov / 2.0)
         return Intrinsics(
             width=self.width,
@@ -58,7 +58,7 @@ class CameraParams:
 
 @dataclass(frozen=True)
 class Picture:
-    """Colour (height, width, 3) and depth [m] (height, width), NaN where the sensor sees none."""
+    """Colour (height, width, 3) and depth [m] (height, width), NaN where the sensor measures none."""
 
     colour: NDArray[np.uint8]
     depth: NDArray[np.float32]
@@ -66,14 +66,14 @@ class Picture:
 
 @dataclass
 class Camera:
-    """Keeps a renderer's scene in step with the world; the renderer is made with the first picture.
+    """Keep a renderer's scene in step with the world; the first picture makes the renderer.
 
     Args:
         params: optics and noise.
-        make_renderer: builds the renderer, in the thread that takes pictures.
-        bodies: what always stands there.
-        boxes: further bodies by name, as they come and go in the simulation's thread.
-        seed: of the noise.
+        make_renderer: makes the renderer, in the thread that takes pictures.
+        bodies: the static bodies.
+        boxes: further bodies by name, which the simulation's thread adds and removes.
+        seed: seed of the noise.
     """
 
     params: CameraParams
@@ -89,7 +89,7 @@ class Camera:
 
     @property
     def renderer(self) -> SceneRenderer:
-        """What draws; made here the first time."""
+        """The renderer; made at the first access."""
         if self._renderer is None:
             self._renderer = self.make_renderer()
             for body in self.bodies:
@@ -107,15 +107,15 @@ class Camera:
         depth: bool = True,
         earlier: Sequence[Matrix] = (),
     ) -> Picture:
-        """One picture; `sample` is its number and chooses the noise. What is not asked for stays as it was drawn.
+        """Take one picture; its number `sample` selects the noise. Unrequested channels stay as drawn.
 
         Args:
-            world_from_optical: where the camera is, shape (4, 4).
-            walkers: who is there.
+            world_from_optical: pose of the camera, shape (4, 4).
+            walkers: actors and doors.
             sample: number of the picture.
-            colour: whether the colour is wanted with exposure and noise.
-            depth: whether the depth is wanted with its limits and noise.
-            earlier: where the camera was while the shutter was open.
+            colour: whether to add exposure and noise to the colour.
+            depth: whether to add limits and noise to the depth.
+            earlier: poses of the camera while the shutter was open.
         """
         self._show(list(walkers))
         optics = self.params.intrinsics
@@ -129,7 +129,7 @@ class Camera:
         )
 
     def view(self, world_from_optical: Matrix, walkers: Iterable[Mover], robot: Body | None) -> NDArray[np.uint8]:
-        """A picture from elsewhere without noise, shape (height, width, 3), with the robot in it."""
+        """Draw a view from another pose without noise, shape (height, width, 3), with the robot in it."""
         self._show(list(walkers))
         if robot is not None:
             self.renderer.add(replace(robot, name=_ROBOT))
@@ -140,7 +140,7 @@ class Camera:
                 self.renderer.remove(_ROBOT)
 
     def close(self) -> None:
-        """Give the renderer back."""
+        """Release the renderer."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
@@ -196,7 +196,7 @@ class Camera:
             return colour
         noise = self._bank[sample % _BANK].ravel()
         drawn, seen = colour.ravel(), np.empty(colour.size, np.uint8)
-        start = sample // _BANK * 37 % colour.shape[0] * colour.shape[1] * 3  # a bank's rows, rolled down
+        start = sample // _BANK * 37 % colour.shape[0] * colour.shape[1] * 3  # rows of a noise bank, shifted down
         kernels.add_noise(drawn[:start], noise[colour.size - start :], seen[:start])
         kernels.add_noise(drawn[start:], noise[: colour.size - start], seen[start:])
         return seen.reshape(colour.shape)
@@ -211,7 +211,7 @@ class Camera:
 
 
 def poses_before(pose: Pose2D, twist: Twist2D, seconds: float) -> list[Pose2D]:
-    """Where a base that moves at a velocity [in its own frame] was while a shutter was open, its end left out."""
+    """Poses of a moving base while the shutter was open, without the last; the velocity is in its own frame."""
     if seconds <= 0.0 or (twist.vx == twist.vy == twist.wz == 0.0):
         return []
     views = min(max(math.ceil(abs(twist.wz) * seconds / _BLUR_TURN), _BLUR_VIEWS[0]), _BLUR_VIEWS[1])

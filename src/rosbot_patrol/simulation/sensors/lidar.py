@@ -1,4 +1,4 @@
-"""A planar laser scanner that turns about its own axis, in the plane of the world."""
+"""A planar laser scanner that rotates about its own axis, in the plane of the world."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from rosbot_patrol.params import param
 from rosbot_patrol.scan import LaserScan
 from rosbot_patrol.simulation.scene.slices import Slice
 
-_SECTORS = 36  # in which a sweep that takes time is cast
-_BEYOND = 1.0  # what a beam without return is told at, over the range, where it is to be a number [m]
+_SECTORS = 36  # number of parts in which a sweep with duration is cast
+_BEYOND = 1.0  # range of a beam without return beyond the maximum, if it must be a number [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LidarParams:
-    """The lidar; defaults as in the ros1 branch of the robot's description."""
+    """Parameters of the lidar; defaults as in the ros1 branch of the robot's description."""
 
     samples: int = param(720, lo=2, hi=10000, doc="number of beams in a scan")
     angle_min: float = param(-math.pi, unit="rad", lo=-math.pi, hi=math.pi, doc="direction of the first beam")
@@ -50,17 +50,17 @@ def measure_scan(
     twist: Twist2D = STOP,
     flipped: bool = False,
 ) -> LaserScan:
-    """One sweep.
+    """Take one sweep.
 
     Args:
         params: the scanner.
-        scene: the cut through the world at the height of the beams.
-        world_from_laser: where the scanner is at the end of the sweep.
+        scene: section through the world at the height of the beams.
+        world_from_laser: pose of the scanner at the end of the sweep.
         stamp: time of the end of the sweep [s].
         rng: for noise and dropped beams, None for none.
-        frame: that the scan names.
-        twist: velocity of the scanner in its own frame, for a sweep that takes time.
-        flipped: whether it hangs upside down.
+        frame: frame of the scan.
+        twist: velocity of the scanner in its own frame, for a sweep with duration.
+        flipped: whether it is mounted upside down.
     """
     p = params
     step = (p.angle_max - p.angle_min) / (p.samples - 1)
@@ -89,7 +89,7 @@ def measure_scan(
 def _lengths(
     p: LidarParams, scene: Slice, pose: Pose2D, step: float, *, twist: Twist2D, flipped: bool
 ) -> NDArray[np.float64]:
-    """Lengths of the beams, without limits [m], shape (samples,)."""
+    """Lengths of the beams, before limits [m], shape (samples,)."""
     sectors = _SECTORS if p.sweep_time > 0.0 and twist != STOP else 1
     edges = np.linspace(0, p.samples, sectors + 1).round().astype(int)
     ranges = np.empty(p.samples)

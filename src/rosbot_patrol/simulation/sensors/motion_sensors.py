@@ -1,7 +1,7 @@
-"""HC-SR501 passive infrared sensor: zones of its lens, and the chip's hold, lock-out and warm-up.
+"""The HC-SR501 passive infrared sensor: a lens with zones, and the chip's hold, lock-out and warm-up.
 
-A warm body is noticed when it crosses zones, that is, when its bearing changes. A person who stands still, or walks
-straight towards the sensor, is not seen. Glass and walls are opaque to it. Times are simulated.
+The sensor detects a warm body that crosses zones, so its bearing must change: it misses somebody who stands still or
+comes straight at it. Glass and walls are opaque to it. Times are simulated time.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class SensorPlace:
 
 
 class MotionSensor:
-    """Electronics of the sensor; call `update` at a steady rate with the bodies that its lens sees."""
+    """The sensor's electronics; call `update` at a steady rate with the bodies that its lens sees."""
 
     def __init__(self, params: MotionSensorParams, started: float = 0.0) -> None:
         self._params = params
@@ -93,7 +93,7 @@ class MotionSensor:
 
 
 def bearing_in_cone(params: MotionSensorParams, place: SensorPlace, body: Pose2D, warmth: float = 1.0) -> float | None:
-    """Bearing of a body from the sensor [rad], None outside the lens; `warmth` 1 is a person's."""
+    """Bearing of a body from the sensor [rad], None outside the lens's reach; `warmth` 1 is a person's."""
     dx, dy = body.x - place.x, body.y - place.y
     if math.hypot(dx, dy) > params.reach * warmth:
         return None

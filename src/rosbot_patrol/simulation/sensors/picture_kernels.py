@@ -1,4 +1,4 @@
-"""Inner loops over the camera's pixels: depth from OpenGL's values, noise and limits of the real sensor."""
+"""Pixel kernels of the camera: depth from OpenGL's depth buffer, and the real sensor's noise and limits."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Floats = NDArray[np.float32]
 
 @kernel("void(float32[::1], float32, float32, float32[::1])")
 def depth_from_clip(raw: Floats, near: float, far: float, metres: Floats) -> None:
-    """Depth along the optical axis of each pixel.
+    """Compute the depth of each pixel along the optical axis.
 
     Args:
-        raw: what the depth buffer holds, 0 at the near clip, 1 at the far one, shape (N,).
+        raw: values of the depth buffer, 0 at the near clip, 1 at the far one, shape (N,).
         near: near clip [m].
         far: far clip [m].
         metres: depth on return [m], shape (N,), inf at the far clip.
@@ -29,11 +29,11 @@ def depth_from_clip(raw: Floats, near: float, far: float, metres: Floats) -> Non
 
 @kernel("void(uint8[::1], int8[::1], uint8[::1])")
 def add_noise(drawn: Bytes, noise: NDArray[np.int8], seen: Bytes) -> None:
-    """Colours with noise, within 0 to 255.
+    """Add noise to colours, clipped to 0 to 255.
 
     Args:
         drawn: colours without noise, shape (N,).
-        noise: of each colour, shape (N,).
+        noise: noise of each colour, shape (N,).
         seen: colours on return, shape (N,); may be `drawn` itself.
     """
     for i in range(drawn.shape[0]):
@@ -43,13 +43,13 @@ def add_noise(drawn: Bytes, noise: NDArray[np.int8], seen: Bytes) -> None:
 
 @kernel("void(float32[::1], float32[::1], float32, float32, float32[::1])")
 def sense_depth(depth: Floats, noise: Floats, nearest: float, farthest: float, sensed: Floats) -> None:
-    """Depth as the sensor gives it: NaN outside its limits, noise that grows with the square.
+    """Compute the sensor's depth: NaN outside its limits, with noise that grows with the square of the depth.
 
     Args:
-        depth: exact, inf where nothing is [m], shape (N,).
-        noise: of a depth of 1 m [m], shape (N,) or (0,) for none.
-        nearest: shortest depth that is told [m].
-        farthest: longest depth that is told [m].
+        depth: exact depth, inf without a hit [m], shape (N,).
+        noise: noise at a depth of 1 m [m], shape (N,) or (0,) for none.
+        nearest: shortest measurable depth [m].
+        farthest: longest measurable depth [m].
         sensed: depth on return [m], shape (N,).
     """
     noisy = noise.shape[0] > 0

@@ -15,7 +15,7 @@ _BEAMS = 5
 
 @dataclass(frozen=True, kw_only=True)
 class RangeParams:
-    """The four range sensors at the robot's corners."""
+    """Parameters of the four range sensors at the robot's corners."""
 
     range_min: float = param(0.01, unit="m", lo=0.0, doc="minimum range; the sensor reports it for anything nearer")
     range_max: float = param(0.9, unit="m", lo=0.01, doc="maximum range; the sensor reports it if nothing is nearer")
@@ -26,7 +26,7 @@ class RangeParams:
 def measure_range(
     params: RangeParams, scene: Slice, world_from_sensor: Pose2D, rng: np.random.Generator | None
 ) -> float:
-    """Distance to the nearest thing in the cone [m], within the sensor's limits."""
+    """Distance to the nearest obstacle in the cone [m], within the sensor's limits."""
     x, y, yaw = world_from_sensor
     step = params.field_of_view / (_BEAMS - 1)
     beams = scene.cast(x, y, yaw - params.field_of_view / 2.0, step, _BEAMS, longest=params.range_max)

@@ -1,4 +1,4 @@
-"""Motion sensors of a house: what each lens sees, and the output with the active faults."""
+"""The motion sensors of a house: the bodies that each lens sees, and the outputs with the active faults."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from rosbot_patrol.simulation.sensors.motion_sensors import (
 Point = Sequence[float]
 Sight = Callable[[Point, Sequence[Point]], float]
 
-_OFF_THE_WALL = 0.1  # [m]
+_OFF_THE_WALL = 0.1  # start of the line of sight before the wall [m]
 
 
 class WarmBody(Protocol):
-    """Somebody whom a motion sensor may notice."""
+    """A body that a motion sensor may detect."""
 
     @property
     def name(self) -> str:
@@ -30,28 +30,28 @@ class WarmBody(Protocol):
 
     @property
     def pose(self) -> Pose2D:
-        """Where it stands."""
+        """Present pose."""
 
     @property
     def is_warm(self) -> bool:
-        """Whether a motion sensor can notice it at all."""
+        """Whether a motion sensor can detect it at all."""
 
     @property
     def warmth(self) -> float:
-        """Reach of a sensor for it, as a share of the reach for a person."""
+        """Range of a sensor for it, relative to the range for a person."""
 
     @property
     def warm_heights(self) -> Sequence[float]:
-        """Heights of the points that stand for its warm surface [m]."""
+        """Heights of the points that represent its warm surface [m]."""
 
 
 class SensorNet:
     """All motion sensors of a house.
 
     Args:
-        params: of each sensor.
-        places: where they hang.
-        level: the output of a sensor with its faults, from its id, its own output and the time [s].
+        params: parameters of each sensor.
+        places: their mounting places.
+        level: output of a sensor with its faults, from its id, its own output and the time [s].
     """
 
     def __init__(
@@ -65,29 +65,29 @@ class SensorNet:
         self._restarted: list[int] = []
 
     def update(self, now: float, bodies: Iterable[WarmBody], sight: Sight) -> None:
-        """Let each of them look; `sight` tells what share of some points (x, y, z) is seen from another [m]."""
+        """Update every sensor; `sight` gives the share of points (x, y, z) visible from another [m]."""
         warm = [body for body in bodies if body.is_warm]
         for place in self.places:
             self._sensors[place.id].update(now, self._seen_by(place, warm, sight))
 
     def levels(self, now: float) -> dict[int, bool]:
-        """Whether each one's output is high, by id."""
+        """Whether each sensor's output is high, by id."""
         return {n: self._level(n, s.is_high, now) for n, s in self._sensors.items()}
 
     def changes(self, now: float) -> list[tuple[int, bool]]:
-        """Id and level of each one whose output has changed since this was last asked."""
+        """Id and level of each sensor with a changed output since the last call."""
         changed = [(n, is_high) for n, is_high in self.levels(now).items() if is_high != self._told.get(n, False)]
         self._told.update(changed)
         return changed
 
     def restart(self, sensor: int, now: float) -> None:
-        """Switch one off and on: it warms up anew."""
+        """Restart a sensor: it warms up anew."""
         self._sensors[sensor] = MotionSensor(replace(self._params, prewarmed=False), now)
         self._told.pop(sensor, None)
         self._restarted.append(sensor)
 
     def restarted(self) -> list[int]:
-        """Ids of those that were switched off and on since this was last asked."""
+        """Ids of the sensors restarted since the last call."""
         restarted, self._restarted = self._restarted, []
         return restarted
 
@@ -100,7 +100,7 @@ class SensorNet:
                 continue
             eye = (place.x + _OFF_THE_WALL * math.cos(bearing), place.y + _OFF_THE_WALL * math.sin(bearing), place.z)
             share = sight(eye, [(x, y, height) for height in body.warm_heights])
-            # What reaches the lens goes with the surface in sight over the square of the distance.
+            # The radiation at the lens is proportional to the visible surface over the square of the distance.
             part = body.warmth * math.sqrt(share)
             if share > 0.0 and bearing_in_cone(self._params, place, body.pose, part) is not None:
                 seen.append((body.name, bearing))

@@ -1,4 +1,4 @@
-"""Reader of the file with the motion sensors' positions; `sensors.sensor_file` reads their identities from it, too."""
+"""Reader of the file with the motion sensors' places; `sensors.sensor_file` reads it too, for their names."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _OF_THE_WATCH = ("name", "enabled", "heartbeat", "peers")  # keys of rosbot_patr
 
 
 def read_sensors(file: str) -> list[SensorPlace]:
-    """The motion sensors of a file, none where the name is empty.
+    """Read the motion sensors of a file; an empty name means none.
 
     Raises:
-        ParamError: the file cannot be read, or a key is wrong; names file and key.
+        ParamError: the file cannot be read, or a key is wrong; the text names file and key.
     """
     if not file:
         return []
