@@ -84,7 +84,7 @@ class PatrolReplay:
         node: the node's own parameters; params: the manager's; frames: tf frames.
         rooms: rooms of the points file.
         sensors: rooms by the sensors' ids.
-        judge: rejects detections that cannot be an intruder.
+        exclusions: rejects detections that cannot be an intruder.
         static: transforms that the bag lacks.
     """
 
