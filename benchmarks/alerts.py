@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
-"""Alerts and incidents: how fast they are kept, found and sent.
+"""Alerts and incidents: time to store, find and send them.
 
     benchmarks/alerts.py [--only PART ...] [--json FILE]
 
-Parts: search (100,000 incidents: lists, searches, one record, verification), keeping (what it costs the patrol),
-chain (sensor to goal, person to disk
-and mail server, with the real nodes).
+Parts: search (100,000 incidents: lists, searches, one record, verification), keeping (cost to the patrol), chain
+(sensor to goal, person to disk and mail server, with the real nodes).
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""From a sensor's edge to the goal, and from a person in view to the notice on disk and the mail at the server.
+"""Delays from a sensor's edge to the goal, and from a visible person to the notice on disk and the mail at the server.
 
-patrol_robot, the rosserial bridge, a virtual ESP32 over TCP, an action server `move_base`, and a real SMTP server
-(aiosmtpd), all before a roscore of their own. This program is camera and detector: pictures of 640 x 480 at 10 Hz, and
-for each, so much later as our network takes on two cores, its boxes. The patrol's parameters are the shipped ones, but
-for those that make it drive and turn fast and `mail_interval`, which would hold the next mail back.
+It runs patrol_robot, the rosserial bridge, a virtual ESP32 over TCP, an action server `move_base` and a real SMTP
+server (aiosmtpd) with a roscore of their own. This program is camera and detector. It sends pictures of 640 x 480 at 10
+Hz, and the boxes of each after the time that our network takes on two cores. The patrol's parameters are the shipped
+ones, except those that make it drive and turn fast, and `mail_interval`, which would delay the next mail.
 
-- edge_to_goal_s: the sensor's output rises -> the goal is on move_base/goal, as the action server gets it.
-- seen_to_disk_s: the first picture with the person leaves the camera -> the patrol says that the notice is on disk.
-- seen_to_mail_s: the same -> the server has the whole mail and says 250.
+- edge_to_goal_s: from the rise of the sensor's output to the goal at the action server (move_base/goal).
+- seen_to_disk_s: from the first picture with the person to the patrol's report that the notice is on disk.
+- seen_to_mail_s: from the same picture to the server's 250 after the whole mail.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT / "test" / "unit" / "alerts"))
 
 MISSIONS = 15
 PICTURES = 10.0  # [Hz]
-DETECTION = 0.06  # [s] from a picture to its boxes
+DETECTION = 0.06  # from a picture to its boxes [s]
 PATROL = {
     "path_to_params": ROOT / "params" / "room_points.yaml",
     "transport": "smtp",
@@ -44,7 +44,7 @@ PATROL = {
 
 
 class Senses:
-    """Camera and detector, and what is heard of patrol and action server."""
+    """Camera and detector, and the messages of patrol and action server."""
 
     def __init__(self) -> None:
         import rospy

@@ -1,9 +1,10 @@
-"""What state and incident keeping cost the patrol's process: its own objects, fed with a minute's patrol at full rates.
+"""Cost of state and incident keeping in the patrol's process: its own objects, fed with a minute's patrol at full
+rates.
 
-A minute of a patrol (20 s driving, 30 looking, 10 returning): 25 steps a second, 10 pictures of 640 x 480 a second,
-sensors that call, and in every other patrol somebody who is seen. As fast as it goes; the CPU time of all of it, with
-writing, encoding, map and report, is told as a share of the minute. What the patrol did before (receiving pictures) is
-not in it.
+A minute of a patrol has 20 s of driving, 30 s of looking and 10 s of return. There are 25 steps and 10 pictures of
+640 x 480 per second, sensor triggers, and a person in every second patrol. It runs as fast as possible. The result is
+the total CPU time, with writing, encoding, map and report, as a share of the minute. The patrol's earlier work
+(receiving pictures) is not included.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class _Health:
 
 def measure() -> dict[str, float]:
     noise = np.random.default_rng(1).integers(60, 200, (8, 480, 640, 3), dtype=np.uint8)
-    noise[:, 40:440, 80:560] = 128  # as much detail as a room has
+    noise[:, 40:440, 80:560] = 128  # about as much detail as a room
     frames = [picture.tobytes() for picture in noise]
     shares: dict[bool, list[float]] = {False: [], True: []}
     with tempfile.TemporaryDirectory() as folder:
@@ -66,7 +67,7 @@ def measure() -> dict[str, float]:
 
 
 def patrol(keeper: IncidentKeeper, number: int, frames: list[bytes], *, is_seen: bool) -> float:
-    """The share of a core that a patrol costs."""
+    """Share of a core that a patrol takes."""
     chronicle, start = MissionLog(), 1000.0 * (number + 1)
     mission = Mission(id=f"m{number}", room=Room(id=3, name="hall", pose=Pose2D(4.0, 0.0, 0.0)), wall=WALL + start)
     spent = 0.0

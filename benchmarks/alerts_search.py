@@ -1,7 +1,7 @@
-"""100,000 incidents, as a guarded house leaves them in years: how soon a list or a search shows the newest fifty.
+"""100,000 incidents, as after years in a guarded house: time until a list or a search shows the newest fifty.
 
-Each record has a dozen events and ten files, so that a body takes 4 kB. The figure search_100k_ms is the slowest of the
-medians; the files themselves are not made.
+Each record has a dozen events and ten files, so that a body takes 4 kB. search_100k_ms is the slowest of the medians;
+the files themselves are not made.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rosbot_patrol.alerts.records.verify import verify
 COUNT = 100_000
 ROOMS = ("Küche", "hall", "square room behind the door", "west alcove", "台所", "corridor", "library", "bathroom")
 START = 1_600_000_000.0
-STEP = 1500.0  # [s] from one to the next
+STEP = 1500.0  # time between incidents [s]
 REPEATS = 31
 
 
@@ -105,7 +105,7 @@ def find(store: IncidentStore, **given: object) -> Callable[[], object]:
 
 
 def timed(call: Callable[[], object]) -> tuple[list[float], int]:
-    result = call()  # warms the cache, as the second question of a person does
+    result = call()  # warms the cache, like a person's first question
     times = []
     for _ in range(REPEATS):
         began = time.perf_counter()
@@ -115,7 +115,7 @@ def timed(call: Callable[[], object]) -> tuple[list[float], int]:
 
 
 def write_one(store: IncidentStore) -> float:
-    """Seconds that one write of a record takes, on this disk."""
+    """Seconds of one write of a record on this disk."""
     began = time.perf_counter()
     store.begin(Incident(id="timed", wall=START, room_id=1, room_name="hall"))
     for i in range(10):

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Each node of the house killed, and hung and then restarted, in mid-patrol: what the owner is told, when all is well.
+"""Each node of the house killed, or hung and restarted, during a patrol: notices to the owner, and time to recovery.
 
     python3 benchmarks/broken_nodes.py [--json FILE] [--nodes amcl ...] [--hung 15]
 
-Somebody stands in the room; a call starts a mission. In mid-drive (the detector, the camera's republish and the
-sensors' bridge: as the robot begins to look) the node gets SIGKILL, or SIGSTOP and `--hung` seconds later, by the
-wall's clock, SIGKILL; roslaunch starts it again after `--respawn-delay` (not the keyboard's node). Told: what
-/diagnostics warned of that it did not before, mails, the mission's sentence. Well: on guard again, and /diagnostics as
-before. Times are simulated seconds from the fault on.
+Somebody stands in the room; a trigger starts a mission. The node gets SIGKILL, or SIGSTOP and then SIGKILL after
+`--hung` seconds of wall time, during the drive. For the detector, the camera's republish and the sensors' bridge it
+comes when the robot begins to look. roslaunch restarts the node after `--respawn-delay` (except the keyboard's node).
+Told: new warnings of /diagnostics, mails, the mission's sentence. Well: on guard again, and /diagnostics as before.
+Times are simulated seconds from the fault on.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ NOT_ROS = ("house_watch",)
 
 @dataclass
 class Row:
-    """What came of one fault.
+    """The result of one fault.
 
     Attributes:
-        node: which; how: "killed" or "hung".
-        verdict: of the mission, "" where it did not end; sentence: its last.
-        told: parts of /diagnostics that got worse, with what they said first, and after how many seconds.
+        node: name of the node; how: "killed" or "hung".
+        verdict: of the mission, "" if it did not end; sentence: its last one.
+        told: parts of /diagnostics that got worse, with their first message, and after how many seconds.
         mails: their subjects.
         over: the mission's end [s]; well: on guard and all parts as before [s]; None: not within the time.
-        touched: what the robot met.
+        touched: contacts of the robot.
     """
 
     node: str
@@ -71,7 +71,7 @@ class Diagnostics:
         self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._hear, queue_size=100)
 
     def bad(self) -> dict[str, tuple[int, str]]:
-        """Parts that are not well, but for the world, which says that it is slower than was asked."""
+        """Parts with problems, except the world's report that it is slower than requested."""
         parts = list(self.parts.items())
         return {name: value for name, value in parts if value[0] > 0 and not name.startswith("simulator")}
 
@@ -80,7 +80,7 @@ class Diagnostics:
 
 
 def subjects(house: House) -> list[str]:
-    """Of the mails so far."""
+    """Subjects of the mails so far."""
     messages = [email.message_from_bytes(p.read_bytes(), policy=email.policy.default) for p in house.mails()]
     return [f"{m['Subject']}: {(m.get_body(('plain',)).get_content().splitlines() or [''])[0]}" for m in messages]
 
@@ -96,7 +96,7 @@ def until(condition, seconds: float, each=lambda: None) -> bool:
 
 
 def break_node(house: House, diagnostics: Diagnostics, node: str, how: str, hung: float) -> Row:
-    """One mission with one fault."""
+    """Run one mission with one fault."""
     row = Row(node, how)
     before, mails, met = set(diagnostics.bad()), len(subjects(house)), len(house.contacts)
     house.spawn("burglar", *INTRUDER)
@@ -131,7 +131,7 @@ def break_node(house: House, diagnostics: Diagnostics, node: str, how: str, hung
 
 
 def table(rows: list[Row]) -> str:
-    """Markdown."""
+    """Markdown table of the results."""
     lines = [
         "| node | | verdict | told | mails | mission over [s] | well [s] | met |",
         "|---|---|---|---|---|---|---|---|",

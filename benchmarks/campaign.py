@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""A campaign of 100 patrols in three houses, something broken in every other one: how many are as they should be.
+"""A campaign of 100 patrols in three houses, with a fault in every second one: share of correct results.
 
     python3 benchmarks/campaign.py [FOLDER] [--patrols N] [--seed N] [--json FILE]
 
-Runs `rosrun rosbot_patrol campaign` and goes on where FOLDER has results already; the page is FOLDER/index.html.
-Minutes are those of the patrols, wherever they were played: the sum of their real times by those at once.
+It runs `rosrun rosbot_patrol campaign` and continues if FOLDER already has results; the page is FOLDER/index.html.
+Minutes are the sum of the patrols' real times divided by the number of parallel ones, on whatever machine they ran.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ AIMS = {
 
 
 def figures_of(folder: Path, jobs: int) -> dict[str, float]:
-    """What the campaign wrote, and how long its patrols took."""
+    """Figures from the campaign's files, with the duration of its patrols."""
     figures: dict[str, float] = json.loads((folder / "results.json").read_text(encoding="utf-8"))
     walls = [json.loads(path.read_text(encoding="utf-8"))["wall_s"] for path in folder.glob("*/result.json")]
     return {**figures, "minutes": sum(walls) / jobs / 60.0}
@@ -49,7 +49,7 @@ def main() -> None:
     print(f"{folder}: {given.patrols} patrols, {jobs} at once on {os.cpu_count()} cores")
     numbers = ["--patrols", str(given.patrols), "--seed", str(given.seed), "--jobs", str(jobs)]
     status = subprocess.run(["rosrun", "rosbot_patrol", "campaign", str(folder), "--faults", *numbers]).returncode
-    if status not in (0, 1):  # 1: some patrol was not as it should be, which the figures say
+    if status not in (0, 1):  # 1: some patrol failed, which the figures show
         sys.exit(status)
     figures = figures_of(folder, jobs)
     in_workspace.require_figures(figures)

@@ -1,20 +1,21 @@
 #!/usr/bin/env python3
-"""The detector: how long a picture takes, against Debian's darknet, in what memory; and what republish costs.
+"""The detector: time per picture compared with Debian's darknet, memory, quality; and the cost of republish.
 
     python3 benchmarks/detection.py [--json FILE] [--repeats N]
 
-yolov2_tiny_ms: bytes of a sensor_msgs/Image (640x480 rgb8) to bytes of a BoundingBoxes message, yolov2-tiny at 416 with
-random weights, pinned to two cores; everything that the node does, transport apart. yolov2_tiny_vs_darknet: the forward
-pass of Debian's own library (package `darknet`) on the same cfg, weights and picture, over that. house_net_fps: as the
-first, for the network in models/, on one core. house_net_mb: the resident memory of a process that has done so and
-drawn boxes, with rospy loaded. recall, precision, house_net_ap: on the 2,000 test pictures (drawn first), as
-`training/scoring.py` counts them, at the shipped threshold; with a table by distance, visibility and light.
-republish_vs_imencode: message bytes in to message bytes out, over `cv2.imencode` of the picture alone.
+- yolov2_tiny_ms: from the bytes of a sensor_msgs/Image (640x480 rgb8) to the bytes of a BoundingBoxes message, with
+  yolov2-tiny at 416 and random weights, pinned to two cores: all of the node's work except transport.
+- yolov2_tiny_vs_darknet: forward pass of Debian's own library (package `darknet`) on the same cfg, weights and picture,
+  divided by yolov2_tiny_ms.
+- house_net_fps: the same as a rate, for the network in models/, on one core.
+- house_net_mb: resident memory of a process that has done so and drawn boxes, with rospy loaded.
+- recall, precision, house_net_ap: on the 2,000 test pictures (drawn first), counted as in `training/scoring.py`, at the
+  shipped threshold; with a table by distance, visibility and light.
+- republish_vs_imencode: message bytes in to message bytes out, divided by `cv2.imencode` of the picture alone.
 
-The figures are times by the wall, and want a machine that does nothing else. Those that end in `_cpu` are processor
-time: what can be said on a busy one (of yolov2-tiny's two threads the sum).
-
-A figure that cannot be had here (no weights, no darknet) is left out, and the table says why.
+The figures are wall times and need an idle machine. Those that end in `_cpu` are processor time, for a busy machine
+(for yolov2-tiny the sum of both threads). A figure that cannot be measured here (no weights, no darknet) is left out,
+and the table gives the reason.
 """
 
 from __future__ import annotations
@@ -54,21 +55,21 @@ CFG = ROOT / "drop_in/darknet_ros/yolo_network_config/cfg/yolov2-tiny.cfg"
 
 
 def make_picture() -> np.ndarray:
-    """Soft colours with some noise, shape (480, 640, 3)."""
+    """Make a picture of soft colours with some noise, shape (480, 640, 3)."""
     rng = np.random.default_rng(1)
     blocks = np.kron(rng.integers(0, 255, (24, 32, 3)), np.ones((20, 20, 1)))
     return np.clip(blocks + rng.normal(0.0, 4.0, blocks.shape), 0, 255).astype(np.uint8)
 
 
 class Times(NamedTuple):
-    """Median milliseconds by the wall, and of the processor."""
+    """Median milliseconds of wall time and of processor time."""
 
     wall: float
     cpu: float
 
 
 def medians(repeats: int, *actions: Callable[[], object]) -> list[Times]:
-    """How long each action takes, turn by turn so that they share the machine's moods, after a warm-up."""
+    """Time each action after a warm-up, interleaved so that all get the same machine load."""
     times: list[list[tuple[float, float]]] = [[] for _ in actions]
     for turn in range(repeats + 3):
         for action, seen in zip(actions, times, strict=True):
@@ -80,7 +81,7 @@ def medians(repeats: int, *actions: Callable[[], object]) -> list[Times]:
 
 
 def message_bytes() -> bytes:
-    """A picture message as it comes over the wire."""
+    """A picture message as received."""
     from std_msgs.msg import Header
 
     from rosbot_patrol.images.encodings import Picture
@@ -92,7 +93,7 @@ def message_bytes() -> bytes:
 
 
 def detection_ms(cfg: str, weights: str, names: list[str], threads: int, repeats: int) -> Times:
-    """Message bytes to message bytes."""
+    """Time from message bytes to message bytes."""
     from sensor_msgs.msg import Image
 
     from rosbot_patrol.detection.detector import load_detector
@@ -111,7 +112,7 @@ def detection_ms(cfg: str, weights: str, names: list[str], threads: int, repeats
 
 
 def draw_one() -> None:
-    """What the node does while somebody listens to `detection_image`; what it needs for that stays in memory."""
+    """Draw as the node does for a subscriber of `detection_image`; the memory for it stays allocated."""
     from rosbot_patrol.detection.detector import Detection
     from rosbot_patrol.detection.draw import draw_boxes
     from rosbot_patrol.images.encodings import Picture
@@ -140,7 +141,7 @@ def republish_times(repeats: int) -> list[Times]:
 
 
 def darknet_ms(folder: Path, classes: int) -> Times:
-    """A forward pass of Debian's darknet."""
+    """Time a forward pass of Debian's darknet."""
     files = [str(CFG), str(folder / "tiny.weights"), str(folder / "picture.png")]
     command = [sys.executable, str(REFERENCE), *files, str(classes), "0.3", "0.4", "5"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -149,7 +150,7 @@ def darknet_ms(folder: Path, classes: int) -> Times:
 
 
 def write_tiny(folder: Path) -> int:
-    """yolov2-tiny with random weights and the picture; how many classes it has."""
+    """Write yolov2-tiny with random weights and the picture; returns the number of classes."""
     import cv2
 
     from rosbot_patrol.detection.darknet.cfg import read_cfg
@@ -164,10 +165,10 @@ def write_tiny(folder: Path) -> int:
 
 
 def quality(folder: Path) -> tuple[dict[str, float], str]:
-    """How well our network does on pictures that its training never saw, and the whole table."""
+    """Quality of our network on pictures that its training never saw, with the whole table."""
     import yaml
 
-    sys.path.insert(0, str(ROOT))  # training/ is no part of the installed package
+    sys.path.insert(0, str(ROOT))  # training/ is not part of the installed package
     from training.judging.report import find_all, load_forward
     from training.judging.scoring import average_precision, figures, groups, say
     from training.learning.dataset import Pictures
@@ -195,7 +196,7 @@ def resident_mb() -> float:
 
 
 def part(name: str, repeats: int, folder: Path) -> dict[str, float]:
-    """One part of the measurement, in a process of its own."""
+    """Run one part of the measurement, in a process of its own."""
     if name == "tiny":
         pin(2)
         classes = write_tiny(folder)
@@ -228,7 +229,7 @@ def part(name: str, repeats: int, folder: Path) -> dict[str, float]:
 
 
 def pin(cores: int) -> None:
-    """Use so many of this machine's cores."""
+    """Pin this process to `cores` cores."""
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
 
 

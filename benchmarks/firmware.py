@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""The firmware's host build before serial_node.py and a real master: from the motion interrupt to the topic.
+"""The firmware's host build with serial_node.py and a real master: delay from the motion interrupt to the topic.
 
     python3 benchmarks/firmware.py [--json FILE] [--motions 200]
 
-The time runs from the call of the sketch's interrupt handler to the callback of a rospy subscriber: the 5 ms that an
-output must stay high, the loop's turn, TCP over loopback, the bridge, and rospy. Wi-Fi is not in it. The sketch is
-built without sanitizers. Its CPU is of one core while it sends heartbeats only; on the host its loop turns every 2 ms.
+The time runs from the call of the sketch's interrupt handler to the callback of a rospy subscriber. It includes the 5
+ms that an output must stay high, the loop's cycle, TCP over loopback, the bridge, and rospy, but no Wi-Fi. The sketch
+is built without sanitizers. Its CPU is the share of one core while it only sends heartbeats; on the host its loop runs
+every 2 ms.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Millions of inputs for the rosserial protocol: no crash, no hang, memory bounded, nothing through that is forbidden.
+"""Fuzzing of the rosserial protocol with millions of inputs: no crash, no hang, bounded memory, nothing forbidden
+passes.
 
     benchmarks/fuzz_rosserial.py [--inputs 10000000] [--engine atheris|mutations] [--seconds S] [--state FILE]
 
-The targets and what must hold are in test/unit/rosserial/fuzz_targets.py: parser, server session, device session, and
-both with noise between them. `atheris` (pip install atheris, in an environment of its own) is guided by
-coverage; `mutations` needs nothing: it changes what is in the corpus and what went well. An input of 5 s, or a process
-of more than 300 MB, counts as a fault. With `--state` a run goes on where the last one stopped, its corpus beside it.
-What is found lies in the current folder; put it into test/unit/rosserial/corpus/ as NAME.hex, and the tests run it.
+The targets and their checks are in test/unit/rosserial/fuzz_targets.py: parser, server session, device session, and
+both with noise between them. `atheris` (pip install atheris, in an environment of its own) is guided by coverage.
+`mutations` has no dependency: it changes the corpus and inputs that passed. An input of 5 s, or a process of more than
+300 MB, is a fault. With `--state` a run continues the last one, with its corpus beside the file. Faulty inputs are
+written to the current folder; put them into test/unit/rosserial/corpus/ as NAME.hex, and the tests run them.
 """
 
 from __future__ import annotations
@@ -30,19 +31,19 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "test/unit/rosserial"
 CORPUS = TESTS / "corpus"
-MAX_LENGTH = 96  # of an input [bytes]
+MAX_LENGTH = 96  # largest input [bytes]
 MAX_SECONDS, MAX_MB = 5, 300
 sys.path[:0] = [str(TESTS), str(ROOT / "src")]
 
 
 def known() -> list[bytes]:
-    """The inputs of the corpus, and a few beginnings for each target."""
+    """The inputs of the corpus, and some start inputs for each target."""
     found = [bytes.fromhex(re.sub(r"#.*", "", path.read_text())) for path in sorted(CORPUS.glob("*.hex"))]
     return [*found, *(bytes((target, kind, 2, 30, *range(20))) for target in range(4) for kind in range(14))]
 
 
 def fuzz_by_coverage(options: argparse.Namespace) -> int:
-    """Run atheris in a process of its own, as it ends that; return how many inputs it took."""
+    """Run atheris in a process of its own, because it ends the process; returns its number of inputs."""
     folder = options.state.with_suffix(".corpus") if options.state else Path("rosserial.corpus")
     folder.mkdir(exist_ok=True)
     for number, data in enumerate(known()):
@@ -61,7 +62,7 @@ def fuzz_by_coverage(options: argparse.Namespace) -> int:
 
 
 def child(arguments: list[str]) -> None:
-    """The process that atheris ends."""
+    """Main function of the process that atheris ends."""
     import atheris
 
     with atheris.instrument_imports(include=["rosbot_patrol.rosserial"]):
@@ -71,7 +72,7 @@ def child(arguments: list[str]) -> None:
 
 
 def mutate(data: bytearray, other: bytes, rng: random.Random) -> None:
-    """One small change of an input, or a part of another one."""
+    """Change an input slightly, or insert a part of another one."""
     at, kind = rng.randrange(len(data)), rng.randrange(6)
     if kind == 0:
         data[at] ^= 1 << rng.randrange(8)
@@ -89,7 +90,7 @@ def mutate(data: bytearray, other: bytes, rng: random.Random) -> None:
 
 
 def fuzz_by_mutation(options: argparse.Namespace) -> int:
-    """Change what is known, by chance."""
+    """Change known inputs at random."""
     from fuzz_targets import run_one
 
     rng, pool = random.Random(options.seed), known()

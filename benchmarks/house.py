@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""The whole house: how soon it is on guard, how fast it runs, and what each node costs.
+"""The whole house: time until on guard, speed, and the cost of each node.
 
     python3 benchmarks/house.py [--json FILE] [--runs 3] [--room 7] [--setup]
 
-ready_s: from `roslaunch` to on guard, at real time, medians of the runs; the first run warms the caches and does not
-count. realtime_factor: simulated over wall time of a whole mission with a person in the room, rate:=0, colour and depth
-taken. The table of nodes is taken over that mission: CPU as a share of one core per wall second and per simulated
-second, resident memory at the end. setup_min (--setup): `scripts/bootstrap` in a fresh clone, with what apt has
-installed already.
+- ready_s: from `roslaunch` to on guard, in real time, median of the runs; the first run warms the caches and is not
+  counted.
+- realtime_factor: simulated over wall time of a whole mission with a person in the room, rate:=0, with subscribers of
+  colour and depth.
+- table of nodes, over that mission: CPU as a share of one core per wall second and per simulated second, resident
+  memory at the end.
+- setup_min (--setup): `scripts/bootstrap` in a fresh clone, with the apt packages already installed.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ class Cost:
 
 
 def cost_of(pid: int) -> Cost | None:
-    """Read /proc; None where the process has gone."""
+    """Read /proc; None if the process has gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
@@ -71,7 +73,7 @@ def mission_run(folder: Path, room: int) -> tuple[float, list[tuple[str, float, 
     with House(folder / "mission", rate=0) as house:
         house.wait_ready(120.0)
         house.spawn("intruder", *walk[-1])
-        # the second camera stream; the first is taken by the detector and by rgb_compress
+        # the second camera stream; detector and rgb_compress subscribe to the first
         rospy.Subscriber("/camera/depth/image_raw", rospy.AnyMsg, lambda _: None, queue_size=1, buff_size=1 << 23)
         before = {name: cost_of(pid) for name, pid in house.pids().items()}
         mission = house.mission(room, timeout=900.0)

@@ -1,21 +1,22 @@
 #!/usr/bin/env python3
-"""amcl: how long an update takes, and how well it knows where the robot is.
+"""amcl: time per update, and quality of its localisation.
 
     python3 benchmarks/localization.py [--json FILE] [--quick] [--parts NAME ...]
         [--seeds 3] [--starts 100] [--carried 30] [--seconds 120]
 
-update: amcl_update_NxK_ms: motion, sensor model and resampling together for N particles and K beams of the likelihood
-field on the house map, with upstream's other defaults, pinned to one core; median of the repeats after a warm-up. KLD
-sampling would change the number of particles, so its bounds are set to N. The particles are spread as after a patrol,
-and for the column `spread` over the whole house, where every look-up misses the cache; `least` is the fastest update,
-which other work on the machine disturbs least.
+update: amcl_update_NxK_ms is the time of motion, sensor model and resampling together, for N particles and K beams of
+the likelihood field on the house map, with upstream's other defaults. It is pinned to one core; the figure is the
+median of the repeats after a warm-up. KLD sampling would change the number of particles, so its bounds are set to N.
+The particles are spread as after a patrol; for the column `spread` they cover the whole house, where every look-up
+misses the cache. `least` is the fastest update, which other work on the machine affects least.
 
 accuracy: patrols of the three houses (each room, a full turn in each) with encoder odometry, both profiles, by seeds.
-starts: global localisation at random places, driving to random places for 60 s; right is within 0.3 m and 15 degrees,
-and until the end. carried: a robot that drives is put down elsewhere, and has 60 s. Drives: `localization_drives.py`.
+starts: global localisation at random places, driving to random places for 60 s. A result within 0.3 m and 15 degrees
+that stays so until the end is right. carried: a driving robot is moved elsewhere, and has 60 s. Drives:
+`localization_drives.py`.
 
-node: what amcl takes of a core while the robot patrols the whole house at real time, and its memory. Where the package
-path has the original amcl, it is the one that is measured, and said so.
+node: amcl's share of a core while the robot patrols the whole house in real time, and its memory. If the package path
+has the original amcl, that one is measured, and the output says so.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ STEP = Pose2D(0.12, 0.0, 0.0)
 
 
 def room_scan(beams: int) -> LaserScan:
-    """A made-up scan in which each beam hits."""
+    """A synthetic scan in which each beam hits."""
     angles = np.linspace(-math.pi, math.pi, beams)
     return LaserScan(
         stamp=0.0,
@@ -81,18 +82,18 @@ def update_times(particles: int, beams: int, repeats: int, *, spread: bool) -> l
         laser_max_beams=beams,
         update_min_d=0.1,
         resample_interval=1,
-        seek="never",  # the made-up scan fits nowhere
+        seek="never",  # the synthetic scan fits nowhere
     )
     localizer = Localizer(params, np.random.default_rng(1))
     localizer.set_map(read_map(ROOT / "maps" / "rosbot_map.yaml"))
     scan, mount, times = room_scan(beams), Pose2D(), []
-    scans = [replace(scan, stamp=0.3 * i) for i in range(repeats + 5)]  # so that each is compared with the map, too
+    scans = [replace(scan, stamp=0.3 * i) for i in range(repeats + 5)]  # so that each is also matched with the map
     localizer.update(scan, Pose2D(), mount)
     for i in range(repeats + 5):
         if spread:
             localizer.localize_globally()
             localizer.update(scans[i], Pose2D(), mount)
-        else:  # keep the cloud of a patrol: the made-up scan would move it
+        else:  # keep the cloud of a patrol: the synthetic scan would move it
             localizer.filter.spread_about(Pose2D(), np.diag([0.01, 0.01, 0.005]))
         odometry = STEP if spread else Pose2D(0.12 * (i + 1), 0.0, 0.0)
         before = time.perf_counter()
@@ -104,7 +105,7 @@ def update_times(particles: int, beams: int, repeats: int, *, spread: bool) -> l
 
 
 def update_figures(repeats: int) -> dict[str, float]:
-    """The times of an update, printed as a table."""
+    """Measure the times of an update and print them as a table."""
     figures = {}
     print(f"medians of {repeats} updates")
     print(f"{'figure':32s} {'ms':>8s} {'least':>8s} {'aim':>8s} {'spread, ms':>11s}")
@@ -118,7 +119,7 @@ def update_figures(repeats: int) -> dict[str, float]:
 
 
 def node_figures(seconds: float) -> dict[str, float]:
-    """What the node costs in patrols with either profile."""
+    """Measure the node's cost in patrols with either profile."""
     print(
         f"measured: {original('amcl') or 'amcl of rosbot_patrol; the original is not on the package path'}", flush=True
     )
@@ -142,7 +143,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=120.0, help="of driving, for each profile")
     wanted = parser.parse_args()
     figures: dict[str, float] = {}
-    if "node" in wanted.parts:  # first: it has all cores
+    if "node" in wanted.parts:  # first: it uses all cores
         figures |= node_figures(20.0 if wanted.quick else wanted.seconds)
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     print(f"1 core of {os.cpu_count()}")

@@ -1,7 +1,7 @@
 """Drives through the three houses, recorded for amcl: truth, encoder odometry and lidar, without ROS.
 
-The robot follows navfn's plan between places by its true pose, so that a drive does not depend on how well it
-is localised, and one record serves any number of parameters and seeds.
+The robot follows navfn's plan between places by its true pose. So a drive does not depend on the localisation, and one
+record serves any number of parameters and seeds.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from rosbot_patrol.simulation.sdf.world import load_world
 ROOT = Path(__file__).resolve().parents[1]
 HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}
 ROOMS = {"house": "room_points", "flat": "flat_room_points", "office": "office_room_points"}
-HEIGHTS = (0.02, 0.07, 0.12, 0.2)  # of the robot [m]
+HEIGHTS = (0.02, 0.07, 0.12, 0.2)  # heights at which the robot is checked for contact [m]
 SCAN_STEPS = 20  # of the engine between scans: 10 Hz
-CLEAR_M, WIDE_M = 0.25, 0.6  # from walls: nearer no way leads, farther all ways are alike
+CLEAR_M, WIDE_M = 0.25, 0.6  # distance from walls [m]: no path is closer; farther all paths cost the same
 SPEED, TURN = 0.36, 1.0  # [m/s, rad/s]
 AHEAD_M, THERE_M = 0.35, 0.1
 
 
 @dataclass(frozen=True)
 class Moment:
-    """Truth, odometry and scan of one instant."""
+    """Truth, odometry and scan at one time."""
 
     truth: Pose2D
     odometry: Pose2D
@@ -49,7 +49,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Record:
-    """A drive, with how the laser sat on the robot."""
+    """A drive, with the laser's pose on the robot."""
 
     house: str
     moments: list[Moment]
@@ -58,18 +58,18 @@ class Record:
 
 @lru_cache
 def map_of(house: str) -> Grid:
-    """The map that we ship of a house."""
+    """The shipped map of a house."""
     return read_map(ROOT / "maps" / f"{HOUSES[house]}.yaml")
 
 
 @lru_cache
 def _costs(house: str) -> Grid:
-    """What a way costs, for the planner: dear near walls."""
+    """Costs for the planner: high near walls."""
     known = map_of(house)
     reach = math.ceil(WIDE_M / known.info.resolution)
     bodies = load_world(ROOT / "worlds" / f"{house}.world").bodies
     blocked = known.cells != FREE
-    for height in HEIGHTS:  # the lidar does not see what is low
+    for height in HEIGHTS:  # the lidar does not see low obstacles
         blocked |= floor_plan(bodies, known.info, height=height, start=(0.0, 0.0)).cells != FREE
     away = bounded_distances(np.ascontiguousarray(blocked), reach) * known.info.resolution
     fade = np.clip((WIDE_M - away) / (WIDE_M - CLEAR_M), 0.0, 1.0)
@@ -77,13 +77,13 @@ def _costs(house: str) -> Grid:
 
 
 def plan(house: str, start: Pose2D, goal: Pose2D) -> np.ndarray:
-    """The way between two places, shape (N, 2); raises PlanningError."""
+    """Plan the path between two places, shape (N, 2); raises PlanningError."""
     planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
     return np.asarray(planner.plan(_costs(house), start, goal))[:, :2]
 
 
 def random_pose(house: str, rng: np.random.Generator) -> Pose2D:
-    """A place with room about it, any heading, that can be reached from the base."""
+    """Draw a free place with any heading that can be reached from the base."""
     costs = _costs(house)
     free = np.argwhere(costs.cells < 150)
     while True:
@@ -98,18 +98,18 @@ def random_pose(house: str, rng: np.random.Generator) -> Pose2D:
 
 
 def room_goals(house: str) -> list[Pose2D]:
-    """The room points in their order, and the base again."""
+    """The room points in their order, and then the base."""
     poses = [room.pose for room in load_rooms(ROOT / "params" / f"{ROOMS[house]}.yaml")]
     return [*poses[1:], poses[0]]
 
 
 class Driver:
-    """Drives a simulated robot from place to place.
+    """Driver of a simulated robot from place to place.
 
     Args:
-        house: by name.
-        start: where it stands.
-        seed: of all noise.
+        house: name of the house.
+        start: initial pose.
+        seed: seed of all noise.
     """
 
     def __init__(self, house: str, start: Pose2D, seed: int) -> None:
@@ -119,7 +119,7 @@ class Driver:
         self.touched = 0
 
     def go(self, goal: Pose2D) -> Iterator[Moment]:
-        """Drive to a goal and turn as it asks; a moment for each scan."""
+        """Drive to a goal and turn to its heading; yields a moment for each scan."""
         way = plan(self.house, self.engine.pose, goal)
         nearest = 0
         while math.dist(self.engine.pose[:2], way[-1]) > THERE_M:
@@ -134,7 +134,7 @@ class Driver:
             yield self._act(0.0, 2.0 * turn)
 
     def spin(self) -> Iterator[Moment]:
-        """A full turn, as a patrol makes in each room."""
+        """Make a full turn, as a patrol does in each room."""
         for _ in range(round(math.tau / TURN / (SCAN_STEPS * STEP))):
             yield self._act(0.0, TURN)
 
@@ -146,12 +146,12 @@ class Driver:
         return Moment(self.engine.pose, self.engine.robot.odometry.pose, self.engine.level_scan().scan)
 
     def record(self, moments: list[Moment]) -> Record:
-        """What was driven."""
+        """Make the record of a drive."""
         return Record(self.house, moments, self.engine.level_scan().pose)
 
 
 def patrol(house: str, seed: int, rooms: int | None = None) -> Record:
-    """From the base to the rooms, a full turn in each, and home."""
+    """Drive from the base to the rooms, with a full turn in each, and home."""
     driver = Driver(house, Pose2D(), seed)
     goals = room_goals(house)
     if rooms is not None:
@@ -162,12 +162,12 @@ def patrol(house: str, seed: int, rooms: int | None = None) -> Record:
 
 
 def wandering(house: str, seed: int, seconds: float) -> Record:
-    """From a random place to random places, for a time."""
+    """Drive from a random place to random places, for a time."""
     rng = np.random.default_rng([seed, sum(map(ord, house))])
     while True:
         try:
             driver = Driver(house, random_pose(house, rng), seed)
-        except WorldError:  # something stands there that the lidar does not see
+        except WorldError:  # an obstacle that the lidar does not see
             continue
         break
     moments: list[Moment] = []
@@ -179,7 +179,7 @@ def wandering(house: str, seed: int, seconds: float) -> Record:
 
 
 def carried(before: Record, after: Record) -> Record:
-    """One drive after another as if the robot had been lifted in between: clock and odometry notice nothing."""
+    """Join two drives as if the robot had been lifted in between: clock and odometry do not show it."""
     last, first = before.moments[-1], after.moments[0]
     shift = compose(last.odometry, invert(first.odometry))
     later = last.scan.stamp + 0.1 - first.scan.stamp

@@ -1,4 +1,4 @@
-"""How well amcl knows where the robot is, on recorded drives: in patrols, from anywhere, and after it was carried."""
+"""Quality of amcl's localisation on recorded drives: in patrols, from unknown starts, and after a kidnapping."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from rosbot_patrol.geometry import Pose2D, compose, invert
 from rosbot_patrol.params import load
 
 ROOT = Path(__file__).resolve().parents[1]
-SETTLE_S = 5.0  # after the start, which does not count for the accuracy
+SETTLE_S = 5.0  # time after the start that does not count for the accuracy
 RIGHT_M, RIGHT_RAD = 0.3, math.radians(15.0)
-START_S, CARRIED_S = 60.0, 60.0  # time to be found in
-BEFORE_S = 20.0  # that a robot drives before it is carried away
+START_S, CARRIED_S = 60.0, 60.0  # time limits for finding the pose
+BEFORE_S = 20.0  # time that a robot drives before it is carried away
 PLACED = np.diag([0.01, 0.01, 0.005])
 
 
 @cache
 def parameters(profile: str) -> AmclParams:
-    """Of a profile, as the launch files give them in the simulation."""
+    """Parameters of a profile, as the launch files set them in the simulation."""
     if profile == "tutorial":
         return AmclParams(odom_model_type="diff-corrected", update_min_d=0.5, update_min_a=1.0)
     tree = yaml.safe_load((ROOT / "config" / "tuned" / "amcl.yaml").read_text(encoding="utf-8"))
@@ -38,14 +38,14 @@ def parameters(profile: str) -> AmclParams:
 
 @dataclass(frozen=True)
 class Trace:
-    """amcl on one record.
+    """amcl's results on one record.
 
     Attributes:
-        seconds: since the start, of each scan, shape (N,).
+        seconds: time of each scan since the start, shape (N,).
         off: distance from the truth [m], shape (N,).
-        turned: turn from the truth [rad], shape (N,).
-        believed: whether amcl called itself localised, shape (N,).
-        searches: how often a search found a place.
+        turned: rotation from the truth [rad], shape (N,).
+        believed: whether amcl reported itself localised, shape (N,).
+        searches: number of searches that found a place.
     """
 
     seconds: np.ndarray
@@ -61,11 +61,11 @@ class Trace:
 
     @property
     def is_right(self) -> np.ndarray:
-        """Which moments were right, shape (N,)."""
+        """Whether each estimate was right, shape (N,)."""
         return (self.off < RIGHT_M) & (self.turned < RIGHT_RAD)
 
     def found_after(self, begin: float = 0.0) -> float:
-        """Time from `begin` on until it was right and remained so [s], inf where it never was."""
+        """Time from `begin` until the estimate was right and stayed so [s], inf if it never was."""
         wrong = np.flatnonzero(~self.is_right)
         if not len(wrong):
             return 0.0
@@ -94,7 +94,7 @@ def follow(record: Record, profile: str, seed: int, *, start: Pose2D | None) -> 
 
 
 def accuracy(seeds: int, *, rooms: int | None, profiles: tuple[str, ...] = ("tuned", "tutorial")) -> dict[str, float]:
-    """Patrols of each house; tells of each."""
+    """Measure patrols of each house; prints each."""
     traces: dict[str, list[Trace]] = {profile: [] for profile in profiles}
     for house in HOUSES:
         for seed in range(seeds):
@@ -126,7 +126,7 @@ def _houses(count: int) -> Iterator[tuple[str, int]]:
 
 
 def global_starts(count: int, profile: str = "tuned") -> dict[str, float]:
-    """Starts anywhere, with nothing known; tells of each."""
+    """Measure global localisation from random starts; prints each."""
     times, wrongly = [], 0
     for house, seed in _houses(count):
         trace = follow(wandering(house, 1000 + seed, START_S), profile, seed, start=None)
@@ -136,7 +136,7 @@ def global_starts(count: int, profile: str = "tuned") -> dict[str, float]:
 
 
 def kidnappings(count: int, profile: str = "tuned") -> dict[str, float]:
-    """Carried from one place to any other in mid-drive; tells of each."""
+    """Measure kidnappings from one place to another during a drive; prints each."""
     times, wrongly = [], 0
     for house, seed in _houses(count):
         before, after = wandering(house, 2000 + seed, BEFORE_S), wandering(house, 3000 + seed, CARRIED_S)
@@ -149,7 +149,7 @@ def kidnappings(count: int, profile: str = "tuned") -> dict[str, float]:
 
 
 def _tell(what: str, house: str, seed: int, trace: Trace, after: float) -> int:
-    """Print a line; 1 where at the end it believed what was wrong."""
+    """Print a line; returns 1 if amcl trusted a wrong estimate at the end."""
     wrong = int(trace.believed[-1] and not trace.is_right[-1])
     end = "never right" if math.isinf(after) else f"right after {after:.1f} s"
     doubtful = 0.1 * float((trace.believed & ~trace.is_right).sum())

@@ -1,10 +1,10 @@
-"""A map against the true walls of its world.
+"""A map compared with the true walls of its world.
 
-A wall cell of the map is right where a true one is at most one cell off, and a true one is found where the map has one
-so near: `f1` from both. True ones that the lidar sees from nowhere that the robot can stand, such as the wall behind a
-cupboard, need not be found. `error_m` is the mean distance of the map's wall cells, taken at their centres, from the
-true walls, `floor` the share of the true floor that the map knows as free. The centres of a perfect map lie 1.1 to
-1.8 cm off: a wall runs anywhere through its cells, or along their edges.
+A wall cell of the map is right if a true one is at most one cell away. A true one is found if the map has one as close;
+`f1` combines both. True walls that the lidar cannot see from any place that the robot reaches, such as the wall behind
+a cupboard, need not be found. `error_m` is the mean distance of the centres of the map's wall cells from the true
+walls. `floor` is the share of the true floor that the map knows as free. The centres of a perfect map are 1.1 to 1.8 cm
+off: a wall runs anywhere through its cells, or along their edges.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from rosbot_patrol.maps.occupancy import FREE, OCCUPIED
 from rosbot_patrol.simulation.scene.floor_plan import floor_plan
 from rosbot_patrol.simulation.sdf.world import load_world
 
-HEIGHT = 0.158  # of the lidar's plane [m]
-FINE = 0.01  # cells of the plan that the error is measured on [m]
-RADIUS = 0.2  # of the robot, which must have room where it looks from [m]
-EACH, BEAMS, REACH = 0.2, 720, 12.0  # it looks from places so far apart [m], with so many beams, so far [m]
-FAR = 1.0  # what is farther from all walls counts so far [m]
+HEIGHT = 0.158  # height of the lidar's plane [m]
+FINE = 0.01  # cell size of the plan that the error is measured on [m]
+RADIUS = 0.2  # radius of the robot, which must have room at a viewpoint [m]
+EACH, BEAMS, REACH = 0.2, 720, 12.0  # spacing of the viewpoints [m], number of beams, their range [m]
+FAR = 1.0  # larger distances from all walls count as this [m]
 
 Bounds = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class MapFigures:
-    """How good a map is; see the module."""
+    """Quality figures of a map; see the module."""
 
     f1: float
     precision: float
@@ -53,7 +53,7 @@ def plan(world: Path, bounds: Bounds, resolution: float) -> Grid:
 
 
 def bounds_of(found: Grid, around: float = 1.0) -> Bounds:
-    """Of the known part of a map, with so much around it [m], on whole cells."""
+    """Bounds of a map's known part with `around` metres of margin, on whole cells."""
     info, margin = found.info, round(around / found.info.resolution)
     ys, xs = np.nonzero(found.cells >= 0)
     low = int(xs.min()) - margin, int(ys.min()) - margin
@@ -63,7 +63,7 @@ def bounds_of(found: Grid, around: float = 1.0) -> Bounds:
 
 
 def known_part(grid: Grid) -> Grid:
-    """The known part of a map, with a metre around it."""
+    """The known part of a map with a margin of one metre."""
     (x, y), (x1, y1) = bounds_of(grid)
     info = grid.info
     ix, iy = round((x - info.origin_x) / info.resolution), round((y - info.origin_y) / info.resolution)
@@ -74,7 +74,7 @@ def known_part(grid: Grid) -> Grid:
 
 
 def map_figures(found: Grid, world: Path, bounds: Bounds | None = None) -> MapFigures:
-    """How far a map's walls are the true ones."""
+    """Compare a map's walls with the true ones."""
     bounds = bounds or bounds_of(found)
     low, cell = bounds[0], found.info.resolution
     fine, coarse = plan(world, bounds, FINE), plan(world, bounds, cell)
@@ -104,7 +104,7 @@ def map_figures(found: Grid, world: Path, bounds: Bounds | None = None) -> MapFi
 
 
 def _seen_walls(fine: Grid, info: GridInfo) -> np.ndarray:
-    """Which cells of a coarser grid lie on what a lidar sees from where the robot can get to from (0, 0)."""
+    """Cells of a coarser grid on surfaces that a lidar sees from places reachable from (0, 0)."""
     room = (bounded_distances(fine.cells != FREE, round(RADIUS / FINE) + 1) * FINE > RADIUS).astype(np.uint8)
     _, parts = cv2.connectedComponents(room, connectivity=4)
     ix, iy = fine.info.cell_of(0.0, 0.0)

@@ -4,21 +4,20 @@
     python3 benchmarks/mapping.py [--json FILE] [--only logs|house|nodes] [--seeds 5]
         [--quick] [--datasets FOLDER] [--log FILE ...] [--pictures FOLDER] [--keep FILE] [--anew]
 
-The logs run with the tutorial's parameters (config/gmapping.yaml), odometry made from the reference's increments with
-noise by seed; errors are those of relations (Kuemmerle et al. 2009), between consecutive scans and between revisits
-(within 3 m and more than 100 scans apart), their mean over the seeds. The references are not the truth: walls_deg and
-walls_reference_deg are the mean errors of the headings against the right angles of the building (right_angles.py), the
-reference's beside ours. A run that is done is kept in `--keep` and not done again while the sources of gmapping, the
-parameters and the log are the same. `x C++` is how many times smaller the error is than that of the C++ original (one
-seed).
+The logs run with the tutorial's parameters (config/gmapping.yaml). Their odometry is made from the reference's
+increments with noise by seed. Errors are those of relations (Kuemmerle et al. 2009), between consecutive scans and
+between revisits (within 3 m and more than 100 scans apart), their mean over the seeds. The references are not the
+truth: walls_deg and walls_reference_deg are the mean errors of our and the reference's headings against the right
+angles of the building (right_angles.py). A finished run is stored in `--keep` and not repeated while the sources of
+gmapping, the parameters and the log are the same. `x C++` is the C++ original's error divided by ours (one seed).
 
-The house is driven through at 0.3 m/s with 720 beams at 10 Hz (mapping_house.py): gmapping_update_ms is the median of
-the updates on one core, gmapping_rtf the drive's seconds by those of the mapping, gmapping_mb the most memory that the
-program took in all.
+In the house the robot drives at 0.3 m/s with 720 beams at 10 Hz (mapping_house.py). gmapping_update_ms is the median of
+the updates on one core. gmapping_rtf is the duration of the drive over that of the mapping. gmapping_mb is the
+program's peak memory.
 
-Where the package path has the C++ original, the logs go by topics through it and through our node, one seed each
-(mapping_node.py); NAME_node_* are our errors and costs, NAME_original_* the original's. `--only nodes` does so with
-ours alone where there is no original.
+If the package path has the C++ original, the logs go by topics through it and through our node, one seed each
+(mapping_node.py). NAME_node_* are our errors and costs, NAME_original_* the original's. `--only nodes` measures ours
+alone if there is no original.
 """
 
 from __future__ import annotations
@@ -100,7 +99,7 @@ def tutorial(seed: int) -> GmappingParams:
 
 
 def digest_of(path: Path) -> str:
-    """Of all that a run of a log depends on."""
+    """Digest of everything that a run of a log depends on."""
     found = hashlib.sha256(path.read_bytes())
     code = ROOT / "src" / "rosbot_patrol"
     for source in (*sorted((code / "gmapping").glob("*.py")), code / "replay" / "carmen.py", code / "scan.py"):
@@ -110,7 +109,7 @@ def digest_of(path: Path) -> str:
 
 
 class Kept:
-    """Runs that are done, in a file."""
+    """Finished runs, stored in a file."""
 
     def __init__(self, path: Path, *, anew: bool) -> None:
         self._path = path
@@ -118,17 +117,17 @@ class Kept:
         self._runs: dict[str, dict[str, float]] = json.loads(path.read_text(encoding="utf-8")) if has_some else {}
 
     def get(self, key: str) -> dict[str, float] | None:
-        """A run's errors, None where it is not done."""
+        """A run's errors, None if it is not finished."""
         return self._runs.get(key)
 
     def put(self, key: str, run: dict[str, float]) -> None:
-        """Keep a run that is done."""
+        """Store a finished run."""
         self._runs[key] = run
         write_atomic(self._path, (json.dumps(self._runs, indent=1) + "\n").encode())
 
 
 def picture(grid: Grid, folder: Path | None, name: str, found: Poses, reference: Poses) -> None:
-    """The known part of a map with both ways on it, green the reference, red what was found; and pgm and yaml."""
+    """Draw the known part of a map with both trajectories (green: reference, red: result); write pgm and yaml."""
     if folder is None:
         return
     folder.mkdir(parents=True, exist_ok=True)
@@ -144,7 +143,7 @@ def picture(grid: Grid, folder: Path | None, name: str, found: Poses, reference:
 
 
 def errors_of(found: Poses, reference: Poses) -> dict[str, float]:
-    """Of the relations between consecutive scans and, where there are any, between revisits."""
+    """Errors of the relations between consecutive scans and, if there are any, between revisits."""
     consecutive = relation_errors(found, reference, consecutive_pairs(len(reference)))
     errors = {"consecutive_m": consecutive.shift, "consecutive_deg": math.degrees(consecutive.turn)}
     pairs = revisit_pairs(reference)
@@ -168,7 +167,7 @@ def run_log(log: CarmenLog, seed: int, folder: Path | None, name: str) -> dict[s
 
 
 def logs_of(options: argparse.Namespace) -> dict[str, Path]:
-    """The logs that are there."""
+    """The available logs."""
     logs = {name: options.datasets / f"{file}.log.gz" for name, file in LOGS.items()}
     logs |= {path.name.split(".")[0]: path for path in options.log}
     for name, path in logs.items():
@@ -178,7 +177,7 @@ def logs_of(options: argparse.Namespace) -> dict[str, Path]:
 
 
 def measure_logs(options: argparse.Namespace) -> dict[str, float]:
-    """Means over the seeds, each run printed as it comes."""
+    """Measure means over the seeds; prints each run."""
     kept, figures = Kept(options.keep, anew=options.anew), {}
     for name, path in logs_of(options).items():
         log, digest, runs = read_log(path), digest_of(path), []
@@ -195,7 +194,7 @@ def measure_logs(options: argparse.Namespace) -> dict[str, float]:
 
 
 def measure_nodes(options: argparse.Namespace) -> dict[str, float]:
-    """The logs through our node and the original."""
+    """Measure the logs through our node and the original."""
     from mapping_node import through_node
 
     from rosbot_patrol.ros.campaign.house import Master

@@ -1,7 +1,7 @@
 """The house mapped by slam_gmapping, without ROS: a drive through all its rooms, and the map against the true walls.
 
-The robot follows the shortest ways from room to room at 0.3 m/s with 1 cm of noise on 720 beams of 12 m at 10 Hz, and
-wheels that lie as in the logs. The figures of the walls are those of `map_truth.py`.
+The robot follows the shortest paths from room to room at 0.3 m/s, with 1 cm of noise on 720 beams of 12 m at 10 Hz, and
+with odometry errors as in the logs. The wall figures are from `map_truth.py`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MOUNT = Pose2D(0.02, 0.0, math.pi)
 BEAMS, REACH, NOISE = 720, 12.0, 0.01
 SPEED, TURNING, RATE = 0.3, 0.8, 10.0
-CLEARANCE = 0.4  # m from walls that the ways keep
+CLEARANCE = 0.4  # m, smallest distance of the paths from walls
 BOUNDS = (-9.0, -4.0), (19.0, 17.0)
 WORLD = ROOT / "worlds" / "house.world"
 
@@ -43,7 +43,7 @@ Poses = NDArray[np.float64]
 
 
 def way_between(clear: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]) -> list[tuple[int, int]]:
-    """The shortest way over clear cells (Dijkstra, eight neighbours)."""
+    """Find the shortest path over clear cells (Dijkstra, eight neighbours)."""
     costs, came, queue = {start: 0.0}, {start: start}, [(0.0, start)]
     while queue:
         cost, at = heapq.heappop(queue)
@@ -63,7 +63,7 @@ def way_between(clear: NDArray[np.bool_], start: tuple[int, int], goal: tuple[in
 
 
 def waypoints(rooms: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """From room to room, a point at each 0.4 m."""
+    """Points of the path from room to room, one every 0.4 m."""
     grid = plan(WORLD, BOUNDS, 0.1)
     clear = bounded_distances(grid.cells != FREE, 10) * 0.1 > CLEARANCE
     points: list[tuple[float, float]] = []
@@ -86,7 +86,7 @@ def drive(points: list[tuple[float, float]]) -> Poses:
 
 
 def scans(poses: Poses, field: Field, rng: np.random.Generator) -> Iterator[LaserScan]:
-    """What the lidar sees at each pose."""
+    """The lidar's scan at each pose."""
     angles = np.linspace(-math.pi, math.pi, BEAMS)
     for i, row in enumerate(poses):
         laser = compose(Pose2D(*row), MOUNT)
@@ -105,7 +105,7 @@ def scans(poses: Poses, field: Field, rng: np.random.Generator) -> Iterator[Lase
 
 
 def wall_figures(found: Grid) -> dict[str, float]:
-    """How far the map's walls are the true ones."""
+    """Compare the map's walls with the true ones."""
     figures = map_figures(found, WORLD, BOUNDS)
     return {
         "house_wall_f1": round(figures.f1, 4),
@@ -116,7 +116,7 @@ def wall_figures(found: Grid) -> dict[str, float]:
 
 
 def measure_house(params: GmappingParams, *, quick: bool) -> tuple[dict[str, float], Grid, Poses, Poses]:
-    """The figures of the drive, the map that came of it, the way as found at each update and as it was."""
+    """Figures of the drive, its map, the trajectory as estimated at each update, and the true one."""
     rooms = [(room.pose.x, room.pose.y) for room in load_rooms(ROOT / "params" / "room_points.yaml")]
     poses = drive(waypoints([rooms[0], *([rooms[1]] if quick else rooms[1:]), rooms[0]]))
     field = blocked_distances(plan(WORLD, BOUNDS, 0.02), 3.0)

@@ -1,7 +1,7 @@
-"""CARMEN logs through the node slam_gmapping, by topics: ours, and the C++ original where the package path has it.
+"""CARMEN logs through the node slam_gmapping, by topics: ours, and the C++ original if the package path has it.
 
-Each scan waits until the node is done with the one before, so that neither loses any, however fast it is. A pose is
-what the node's map -> odom said right after its scan: that of the best particle by then, not of the way in the end.
+Each scan waits until the node has processed the one before, so that neither node loses any, however fast it is. A pose
+is the node's map -> odom right after its scan: the best particle's pose at that time, not on the final trajectory.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from rosbot_patrol.scan import LaserScan
 Poses = NDArray[np.float64]
 
 EPOCH = 100.0  # the first scan's time [s]
-QUIET_S, BUSY_NS = 0.03, 5_000_000  # a node that takes less of a core in so long is done
-STEP_S, STEPS = 0.06, 3  # of the clock after a scan, so that the node tells its transform
-PATIENCE_S = 120.0  # for the node to begin, and for one scan
+QUIET_S, BUSY_NS = 0.03, 5_000_000  # a node that takes less CPU time [ns] in this period [s] is idle
+STEP_S, STEPS = 0.06, 3  # clock steps after a scan, so that the node sends its transform
+PATIENCE_S = 120.0  # time limit for the node's start, and for one scan
 
 
 @dataclass(frozen=True)
 class Run:
-    """A log through a node: the poses, shape (N, 3), seconds of a core, most memory [MB]."""
+    """Result of a log through a node: poses, shape (N, 3), seconds of a core, peak memory [MB]."""
 
     poses: Poses
     cpu_s: float
@@ -45,13 +45,13 @@ class Run:
 
 
 def cpu_ns(pid: int) -> int:
-    """What all threads of a process took of a core."""
+    """CPU time of all threads of a process."""
     tasks = Path(f"/proc/{pid}/task").glob("*/schedstat")
     return sum(int(task.read_text().split()[0]) for task in tasks)
 
 
 class Feeder:
-    """Clock, odometry and scans for one node, and an ear for its transform."""
+    """Clock, odometry and scans for one node, and a listener for its transform."""
 
     def __init__(self, frame: str) -> None:
         self._frame = frame
@@ -64,12 +64,12 @@ class Feeder:
         self._static.publish([transform_to_msg(Pose2D(), "base_link", frame, 0.0)])
 
     def close(self) -> None:
-        """Leave all topics."""
+        """Close all topics."""
         for each in (self._listener, self._clock, self._tf, self._static, self._scan):
             each.unregister()
 
     def is_heard(self) -> bool:
-        """Whether the node is there."""
+        """Whether the node has subscribed."""
         return self._scan.get_num_connections() > 0 and self._tf.get_num_connections() > 1
 
     def _hear(self, message: Any) -> None:
@@ -79,7 +79,7 @@ class Feeder:
                 self.correction = Pose2D(t.x, t.y, yaw_from_quaternion(q.x, q.y, q.z, q.w))
 
     def send(self, scan: LaserScan, odometry: Pose2D, stamp: float, pid: int) -> None:
-        """One scan, until the node is done with it and has told its transform."""
+        """Send one scan, and wait until the node has processed it and sent its transform."""
         self._clock.publish(time_to_msg(stamp))
         self._tf.publish([transform_to_msg(odometry, "odom", "base_link", stamp)])
         self._scan.publish(scan_to_msg(replace(scan, stamp=stamp, frame_id=self._frame)))
@@ -90,7 +90,7 @@ class Feeder:
 
 
 def until_done(pid: int) -> None:
-    """Wait until a node takes hardly any processor time."""
+    """Wait until a node is idle."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         before = cpu_ns(pid)
@@ -101,7 +101,7 @@ def until_done(pid: int) -> None:
 
 
 def through_node(command: list[str], log: CarmenLog, odometry: Poses, params: dict[str, Any]) -> Run:
-    """A whole log through a node that is started for it; this process is one of a running master."""
+    """Run a whole log through a node started for it; this process needs a running master."""
     rospy.set_param("/use_sim_time", True)
     rospy.set_param("/slam_gmapping", params)
     with tempfile.TemporaryFile() as out:

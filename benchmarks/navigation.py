@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Navigation: one table of what its parts take and what the whole achieves.
+"""Navigation: one table with the cost of its parts and the performance of the whole.
 
     python3 benchmarks/navigation.py [--json FILE] [--quick] [--goals N] [--only PART ...]
 
 It runs the programs beside it, each in a process of its own, one after the other: navigation_costmap (inflation),
 navigation_planning (global planners), navigation_control (local planners), navigation_node (the node move_base in a
-patrol: needs `. scripts/env`) and navigation_goals (200 random goals in three houses). Each says at its head what it
-measures. The column `C++` is what the originals took on a machine of this size with the tutorial's parameters.
-Where the original C++ nodes are on the ROS package path, navigation_node measures them on the same patrol as well.
+patrol: needs `. scripts/env`) and navigation_goals (200 random goals in three houses). The head of each says what it
+measures. The column `C++` has the originals' times on a machine of this size with the tutorial's parameters. If the
+original C++ nodes are on the ROS package path, navigation_node also measures them on the same patrol.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ CPP = {
 
 
 def run_part(part: str, arguments: list[str]) -> dict[str, float]:
-    """The figures of one program; what it prints is shown."""
+    """Run one program, show its output, and return its figures."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "figures.json"
         command = [sys.executable, "-u", str(HERE / f"navigation_{part}.py"), "--json", str(file), *arguments]
@@ -65,7 +65,7 @@ def run_part(part: str, arguments: list[str]) -> dict[str, float]:
 
 
 def table(found: dict[str, float]) -> str:
-    """Figures with aims and ratios: how many times better than the aim, and than C++."""
+    """Figures with aims and ratios: factors by which they beat the aim, and C++."""
     lines = ["| figure | value | aim | times the aim | C++ | times C++ |", "|---|---|---|---|---|---|"]
     for name, value in found.items():
         aim, ratio, original, against = "", "", "", ""
@@ -81,7 +81,7 @@ def table(found: dict[str, float]) -> str:
 
 
 def main() -> None:
-    """Run what is wanted, and print the table."""
+    """Run the wanted parts, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, metavar="FILE")
     parser.add_argument("--quick", action="store_true", help="few repeats, 12 goals")

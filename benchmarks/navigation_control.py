@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""The local planners: how long a control cycle takes.
+"""The local planners: duration of a control cycle.
 
     PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_control.py [--json FILE] [--quick]
 
 control_cycle_ms: `compute` of TrajectoryPlannerROS with the tutorial's parameters (20 x 20 samples over 1.7 s) on its
-local costmap (3 x 3 m in cells of 0.01 m, inflated by 1.0 m), cutting the plan and all distance fields included. The
-situations are those of a drive through the house: from the base through the door (0.90 m) to room 2, and to room 7,
-every 0.5 m along the global plan, which has a pose every 0.01 m; the costmap holds what a lidar of 720 beams sees
-there. Pinned to one core; median over the places of the median of each place's repeats. `worst` is the slowest place.
-control_cycle_DWAPlannerROS_ms is the same for DWAPlannerROS with its defaults (0.55 m/s) and 20 x 20 samples.
+local costmap (3 x 3 m in cells of 0.01 m, inflated by 1.0 m), with the cut of the plan and all distance fields.
+The situations are from a drive through the house: from the base through the door (0.90 m) to room 2, and to room 7,
+every 0.5 m along the global plan, which has a pose every 0.01 m. The costmap has the view of a 720-beam lidar there. It
+is pinned to one core; the figure is the median over the places of the median of each place's repeats. `worst` is the
+slowest place. control_cycle_DWAPlannerROS_ms is the same for DWAPlannerROS with its defaults (0.55 m/s) and 20 x 20
+samples.
 """
 
 from __future__ import annotations
@@ -52,14 +53,14 @@ from rosbot_patrol.scan import LaserScan  # noqa: E402
 
 AIMS = {"control_cycle_ms": 4.0}
 CONFIG = ROOT / "drop_in" / "tutorial_pkg" / "config"
-OWN = ("TrajectoryPlannerROS",)  # what the tutorial has parameters of
+OWN = ("TrajectoryPlannerROS",)  # the tutorial has parameters for it
 DWA_VALUES = {"max_vel_y": 0.0, "min_vel_y": 0.0, "vx_samples": 20, "vth_samples": 20}
 ROOMS = ((-3.489, 0.306), (14.75, 11.48))  # 2, behind the door, and 7, at the end of the house
 
 
 @dataclass(frozen=True)
 class Place:
-    """One situation: what the planner sees, the plan that it follows, and the local costmap it belongs to."""
+    """One situation: the planner's inputs, the plan that it follows, and its local costmap."""
 
     view: LocalView
     plan: np.ndarray
@@ -71,13 +72,13 @@ def tutorial(name: str) -> dict[str, Any]:
 
 
 def local_costmap() -> LayeredCostmap:
-    """The tutorial's, over an obstacle layer that also clears along beams without a hit."""
+    """The tutorial's local costmap, over an obstacle layer that also clears along beams without a hit."""
     tree = {**tutorial("costmap_common_params.yaml"), **tutorial("local_costmap_params.yaml")["local_costmap"]}
     return LayeredCostmap(read_costmap(tree))
 
 
 def global_plan(house: Grid, goal: tuple[float, float]) -> np.ndarray:
-    """Poses 0.01 m apart from the base to a place."""
+    """Make poses 0.01 m apart from the base to a place."""
     tree = {
         "plugins": [
             {"name": "static", "type": "costmap_2d::StaticLayer"},
@@ -97,7 +98,7 @@ def global_plan(house: Grid, goal: tuple[float, float]) -> np.ndarray:
 
 
 def scan_at(house: Grid, pose: Pose2D) -> LaserScan:
-    """720 beams over the map's occupied cells."""
+    """Cast 720 beams over the map's occupied cells."""
     angles = -math.pi + np.arange(720) * math.tau / 720
     reach = np.arange(0.0, 6.0, 0.01)
     x = pose.x + np.outer(np.cos(angles + pose.yaw), reach)
@@ -133,7 +134,7 @@ def places(spacing: float = 0.5) -> Iterator[Place]:
                     buffer.add(observe(scan_at(house, pose), pose))
             costmap.update(0.1, pose)
             grid = Grid(costmap.info, costmap.cells)
-            # the global plan is made once a second: it begins up to a few decimetres behind the robot
+            # the global plan is made once a second: it starts up to some decimetres behind the robot
             yield Place(
                 view=LocalView(now=0.0, pose=pose, velocity=Twist2D(0.1, 0.0, 0.1), costmap=grid),
                 plan=plan[max(0, start - 20) :],
@@ -148,7 +149,7 @@ def make_planner(plugin: str, place: Place, **changes: Any) -> LocalPlanner:
 
 
 def cycle_times(plugin: str, repeats: int, **changes: Any) -> tuple[list[float], int]:
-    """Milliseconds of `compute` at each place (median of the repeats), and how often no way was found."""
+    """Milliseconds of `compute` at each place (median of the repeats), and the number of places without a path."""
     times, refused = [], 0
     for place in places():
         planner = make_planner(plugin, place, **changes)
@@ -166,7 +167,7 @@ def cycle_times(plugin: str, repeats: int, **changes: Any) -> tuple[list[float],
 
 
 def figures(*, quick: bool = False) -> dict[str, float]:
-    """The figures of FIGURES.md that this module knows, printed as a table."""
+    """This module's figures of FIGURES.md, printed as a table."""
     repeats = 5 if quick else 50
     logging.disable(logging.WARNING)
     found: dict[str, float] = {}

@@ -4,11 +4,11 @@
     PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_costmap.py [--json FILE] [--quick]
 
 Content: the tutorial's rolling global costmap (drop_in/tutorial_pkg, 35 x 35 m at 0.01 m, inflation 2.5 m = 250 cells)
-after a patrol through all rooms of worlds/house.world, seen by the simulator's lidar (720 beams, 1 cm of noise): walls
-are ragged lines of marks, as they are in the robot's costmap, and each new scan moves some of them by a cell. The
-tutorial's `cost_scaling_factor` (upstream's 10) lets costs end after 0.69 m, so that 250 cells take no longer than 69;
-the figures are therefore taken at a factor of 1, with which all 250 cells have a cost, and `..._tutorial_ms` at 10.
-An update after 0.1 m is all of `LayeredCostmap.update`: shift, clearing, marking, inflation; each has its own scan.
+after a patrol through all rooms of worlds/house.world with the simulator's lidar (720 beams, 1 cm of noise). Walls are
+ragged lines of marks, as in the robot's costmap, and each new scan moves some of them by a cell. With the tutorial's
+`cost_scaling_factor` (upstream's 10) costs end after 0.69 m, so that 250 cells take no longer than 69. Therefore the
+figures are measured at a factor of 1, where all 250 cells have a cost, and `..._tutorial_ms` at 10. An update after
+0.1 m is all of `LayeredCostmap.update`: shift, clearing, marking, inflation; each has its own scan.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def tutorial_costmap(factor: float) -> LayeredCostmap:
 
 
 def patrol_poses() -> list[Pose2D]:
-    """Poses every 0.1 m of a way through all rooms and home."""
+    """Poses every 0.1 m of a path through all rooms and home."""
     tree = {
         "plugins": [{"name": "s", "type": "StaticLayer"}, {"name": "i", "type": "InflationLayer"}],
         "s": {},
@@ -82,7 +82,7 @@ def patrol_poses() -> list[Pose2D]:
 
 
 def drive(costmap: LayeredCostmap, poses: list[Pose2D]) -> list[float]:
-    """Milliseconds of each update along the poses, a new scan at each."""
+    """Milliseconds of each update along the poses, with a new scan at each."""
     scene = slice_bodies(load_world(ROOT / "worlds" / "house.world").bodies, LIDAR_HEIGHT)
     lidar, rng, times = LidarParams(), np.random.default_rng(1), []
     buffer = costmap.obstacle_layers[0].buffers["laser_scan_sensor"]
@@ -105,12 +105,12 @@ def full_times(costmap: LayeredCostmap, repeats: int) -> list[float]:
         before = time.perf_counter()
         layer.update_costs(cells, Bounds(0, 0, costmap.info.width, costmap.info.height))
         times.append(1e3 * (time.perf_counter() - before))
-    assert np.array_equal(cells, costmap.cells)  # what the updates made in parts
+    assert np.array_equal(cells, costmap.cells)  # equal to the result of the partial updates
     return times[1:]
 
 
 def figures(*, repeats: int = 20, every: int = 1) -> dict[str, float]:
-    """Medians by the names of FIGURES.md, with a row printed for each."""
+    """Medians by the names of FIGURES.md; prints a row for each."""
     print(f"{'figure':28s} {'ms':>8s} {'least':>8s} {'99 %':>8s} {'aim':>6s}")
     poses = patrol_poses()[::every] if every > 1 else patrol_poses()
     found: dict[str, float] = {}

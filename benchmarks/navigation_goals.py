@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Random goals in the three houses, half of them with somebody in the way who never yields.
+"""Random goals in the three houses, half of them with a person in the way who never yields.
 
     PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_goals.py [--goals 200] [--seed 1] [--house NAME]
 
 The robot's own programs (amcl, costmaps, move_base, collision guard) run in one process with the simulator, on its
-clock (`rosbot_patrol/closed_loop/loop.py`), each goal after the last, from where the robot then stands. Somebody
-walks the robot's plan towards it or from behind it, once, or across it, to and fro over 2.4 to 5 m, at 0.5 to 1.2 m/s,
-and stops for nothing: whoever meets the robot steps over it, and at the end of the way has left. A contact with a wall
-or a thing always counts, one with somebody unless the robot's wheels had stood for 0.5 s. `ideal` is the plan's length
-at full speed.
+clock (`rosbot_patrol/closed_loop/loop.py`). Each goal starts where the robot stands after the last one. A person walks
+along the robot's plan, towards it or from behind, once; or across it, to and fro over 2.4 to 5 m. The speed is 0.5 to
+1.2 m/s, and the person never stops: at the robot they step over it, and at the end of the path they leave. A contact
+with a wall or a thing always counts; one with a person counts unless the robot's wheels had stood for 0.5 s. `ideal` is
+the plan's length at full speed.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ from rosbot_patrol.simulation.sdf.world import load_world  # noqa: E402
 
 HOUSES = {"house": "rosbot_map", "flat": "flat_map", "office": "office_map"}
 FULL_SPEED = 0.36  # [m/s]
-ROOM = 0.28  # round a goal: the robot's corners, its padding, and what it may stand off the goal [m]
-HEIGHTS = (0.01, 0.04, 0.07, 0.1, 0.16, 0.2)  # of the robot [m]
-TRIES = 30  # to find a goal on whose way somebody can walk
+ROOM = 0.28  # free radius around a goal: the robot's corners, its padding, and the goal tolerance [m]
+HEIGHTS = (0.01, 0.04, 0.07, 0.1, 0.16, 0.2)  # heights at which the robot is checked for contact [m]
+TRIES = 30  # attempts to find a goal with a path that a person can walk
 BLOCK = 10  # goals from one start, with one amcl
 
 
 @dataclass
 class Result:
-    """One goal."""
+    """The result of one goal."""
 
     number: int
     house: str
@@ -64,18 +64,18 @@ class Result:
 
     @property
     def reached(self) -> bool:
-        """Whether move_base says so, and it is true."""
+        """Whether move_base reports success, and the robot is there."""
         outcome = self.drive.outcome
         return outcome is not None and outcome.succeeded and self.drive.error < 0.25
 
     @property
     def ideal(self) -> float:
-        """The plan at full speed [s]."""
+        """Time of the plan at full speed [s]."""
         return self.drive.planned / FULL_SPEED
 
 
 def _gap(cut: Slice, x: float, y: float) -> float:
-    """From a point to the nearest of what a plane cuts [m]."""
+    """Distance from a point to the nearest obstacle of a section [m]."""
     point = np.array([x, y])
     start, end = cut.segments[:, :2], cut.segments[:, 2:]
     along = end - start
@@ -87,7 +87,7 @@ def _gap(cut: Slice, x: float, y: float) -> float:
 
 
 def free_poses(loop: ClosedLoop, rng: np.random.Generator) -> Iterator[Pose2D]:
-    """Places where the robot has room to turn, by the world itself, and that can be reached, by the global costmap."""
+    """Places with room to turn in the true world, and reachable in the global costmap."""
     cuts = [slice_bodies(loop.engine.world.bodies, height) for height in HEIGHTS]
     costmap = loop.global_costmap
     planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
@@ -107,7 +107,7 @@ def free_poses(loop: ClosedLoop, rng: np.random.Generator) -> Iterator[Pose2D]:
 
 
 def _as_far_as_free(loop: ClosedLoop, start: Pose2D, yaw: float) -> Pose2D:
-    """The farthest place, up to 2.5 m off in a direction, that somebody can walk to."""
+    """The farthest place, up to 2.5 m away in a direction, that a person can walk to."""
     costmap, end = loop.global_costmap, start
     for away in np.arange(0.1, 2.55, 0.1):
         place = Pose2D(start.x + away * math.cos(yaw), start.y + away * math.sin(yaw), yaw)
@@ -119,7 +119,7 @@ def _as_far_as_free(loop: ClosedLoop, start: Pose2D, yaw: float) -> Pose2D:
 
 
 def send_somebody(loop: ClosedLoop, goal: Pose2D, rng: np.random.Generator) -> str:
-    """Let somebody walk in the way of the robot; how, or "" where there is no room for it."""
+    """Send a person into the robot's way; returns how, or "" if there is no room."""
     engine, costmap = loop.engine, loop.global_costmap
     planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
     plan = planner.plan(Grid(costmap.info, costmap.cells.copy()), loop.map_pose, goal)[:, :2]
@@ -144,7 +144,7 @@ def send_somebody(loop: ClosedLoop, goal: Pose2D, rng: np.random.Generator) -> s
         yaw = math.atan2(ahead.y - middle.y, ahead.x - middle.x) + math.pi / 2.0
         ways = [_as_far_as_free(loop, middle, yaw + turn) for turn in (math.pi, 0.0)]
         if min(math.dist(way[:2], middle[:2]) for way in ways) < 1.2:
-            return ""  # who turns round so near would walk over the robot without end
+            return ""  # turning this close, they would walk over the robot without end
     start = ways[0]
     if math.dist(start[:2], engine.pose[:2]) < 1.5:
         return ""
@@ -164,14 +164,14 @@ def send_somebody(loop: ClosedLoop, goal: Pose2D, rng: np.random.Generator) -> s
 
 
 def see_out(engine: Engine, *, always: bool = False) -> None:
-    """Take somebody out who has come to the end of the way."""
+    """Remove a person who has reached the end of the path."""
     for actor in engine.population.walkers:
         if actor.name == "somebody" and (always or actor.has_arrived):
             engine.population.remove("somebody")
 
 
 def drives(house: str, count: int, seed: int, *, only_block: int | None = None) -> Iterator[Result]:
-    """Goals in one house."""
+    """Drive to goals in one house."""
     known = read_map(ROOT / "maps" / f"{HOUSES[house]}.yaml")
     world = load_world(ROOT / "worlds" / f"{house}.world")
     params = read_profile(ROOT / "config" / "tuned")
@@ -189,7 +189,7 @@ def drives(house: str, count: int, seed: int, *, only_block: int | None = None) 
             for _ in range(TRIES if number % 2 else 0):
                 if walker := send_somebody(loop, goal, rng):
                     break
-                goal = next(goals)  # there was no room for anybody on the way
+                goal = next(goals)  # no room for a person on the path
             drive = loop.drive_to(goal, 240.0, each_step=partial(see_out, engine))
             see_out(engine, always=True)
             yield Result(number, house, goal, walker, drive)
@@ -225,7 +225,7 @@ def main() -> None:
 
 
 def tell(result: Result) -> None:
-    """One line of a goal."""
+    """Print one line for a goal."""
     drive = result.drive
     end = drive.outcome.text if drive.outcome else "timed out"
     line = f"{result.house} {result.number}: {'reached' if result.reached else 'NOT REACHED: ' + end}"

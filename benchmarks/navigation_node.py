@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""The node move_base in a patrol of the simulated house: what it costs, and whether it keeps its rate.
+"""The node move_base in a patrol of the simulated house: its cost, and whether it keeps its rate.
 
     python3 benchmarks/navigation_node.py [--json FILE] [--quick] [--seconds 120]
 
-For each profile the whole house runs at real time without the detector, and the robot is sent from room to room.
-CPU of the process counts while the robot drives, as a share of one core; memory is what is resident at the end.
-`--busy N` lets N other processes run without a pause meanwhile, in sessions of their own. `missed` counts the lines
-"missed its desired rate" since the start. Where the package path has the original move_base instead of ours, it is the
-one that is measured, and said so.
+For each profile the whole house runs in real time without the detector, and the robot is sent from room to room. CPU of
+the process counts while the robot drives, as a share of one core; memory is the resident size at the end. `--busy N`
+runs N other processes without a pause meanwhile, in sessions of their own. `missed` counts the lines "missed its
+desired rate" since the start. If the package path has the original move_base instead of ours, that one is measured, and
+the output says so.
 """
 
 from __future__ import annotations

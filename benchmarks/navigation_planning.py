@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
-"""Global planning: how long a plan takes, and how much longer than the shortest it is.
+"""Global planning: duration of a plan, and its extra length over the shortest path.
 
     PYTHONPATH=src .ws/venv/bin/python benchmarks/navigation_planning.py [--json FILE] [--quick]
 
-plan_room7_ms, plan_corner_ms: navfn on the costmap of the tutorial's simulation, 3500 x 3500 cells of 0.01 m about the
+plan_room7_ms, plan_corner_ms: navfn on the costmap of the tutorial's simulation: 3500 x 3500 cells of 0.01 m around the
 base, inflated by 2.5 m (250 cells) with a cost_scaling_factor of 10, with all walls of worlds/house.world in it and the
-rest free. Corner to corner is the slower of both diagonals; beside it, the same without walls.
-plan_house_map_ms: room 2 to room 7 on maps/rosbot_map.yaml with the inflation of the profile `tuned`.
-Each is the median of the repeats, pinned to one core, of `plan` alone on a fresh copy of the costmap; `first` is the
-first of all, which has to load what the kernels need.
+rest free. Corner to corner is the slower of both diagonals; the table also has it without walls. plan_house_map_ms:
+room 2 to room 7 on maps/rosbot_map.yaml with the inflation of the profile `tuned`. Each is the median of the repeats,
+pinned to one core, of `plan` alone on a fresh copy of the costmap; `first` is the very first, which also loads the
+kernels.
 
-plan_excess_percent: what the planned path costs, its price integrated exactly along its course, against the cheapest
-path known, over pairs of places by chance in the three houses and in mazes, for every planner. The cheapest path known
-comes from a graph of its own: Dijkstra over every cell, cut into 3 x 3, with edges to 32 neighbours that are priced
-exactly, then pulled straight, where a straight line between any two of its points is cheaper. The planned path is
-pulled straight in the same way, and the cheaper one counts.
+plan_excess_percent: cost of the planned path, integrated exactly along it, relative to the cheapest known path, over
+random pairs of places in the three houses and in mazes, for every planner. The cheapest known path comes from a graph
+of its own: Dijkstra over every cell, divided into 3 x 3, with exactly priced edges to 32 neighbours. The path is then
+pulled straight wherever a straight line between two of its points is cheaper. The planned path is pulled straight in
+the same way, and the cheaper one counts.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ AIMS = {"plan_room7_ms": 100.0, "plan_corner_ms": 350.0, "plan_house_map_ms": 25
 ROOMS = {0: (0.0, 0.0), 2: (-3.489, 0.306), 7: (14.75, 11.48)}
 CORNERS = [((-17.4, -17.4), (17.4, 17.4)), ((-17.4, 17.4), (17.4, -17.4))]
 BODY = np.array([[0.12, 0.14], [0.12, -0.14], [-0.12, -0.14], [-0.12, 0.14]])
-FINER = 3  # the reference cuts a cell into so many, each way
+FINER = 3  # the reference divides a cell into this many, each way
 
 
 def inflated(grid: Grid, *, radius: float, factor: float, padding: float) -> Grid:
@@ -65,7 +65,7 @@ def inflated(grid: Grid, *, radius: float, factor: float, padding: float) -> Gri
 
 
 def house_costmap(*, walls: bool = True) -> Grid:
-    """The global costmap of the tutorial's simulation about the base, once it has seen every wall."""
+    """The global costmap of the tutorial's simulation around the base, with every wall seen."""
     info = GridInfo(resolution=0.01, width=3500, height=3500, origin_x=-17.5, origin_y=-17.5)
     if not walls:
         return Grid(info, np.zeros(info.shape, np.uint8))
@@ -81,7 +81,7 @@ def map_costmap(name: str) -> Grid:
 
 
 def plan_times(costmap: Grid, start: tuple[float, float], goal: tuple[float, float], repeats: int) -> list[float]:
-    """Milliseconds of each plan by navfn; unknown space as free as the tutorial has it makes no difference here."""
+    """Milliseconds of each plan by navfn; the treatment of unknown space makes no difference here."""
     planner = make_global_planner("navfn/NavfnROS", {"NavfnROS": {"allow_unknown": False}})
     times = []
     for _ in range(repeats):
@@ -93,7 +93,7 @@ def plan_times(costmap: Grid, start: tuple[float, float], goal: tuple[float, flo
 
 
 def speed(repeats: int) -> dict[str, float]:
-    """The figures plan_*_ms, and a table."""
+    """Measure plan_*_ms and print a table."""
     house, rooms = house_costmap(), map_costmap("rosbot_map")
     print(f"1 core of {os.cpu_count()}, medians of {repeats} plans")
     print(f"{'figure':34s} {'ms':>7s} {'least':>7s} {'first':>7s} {'aim':>5s}")
@@ -117,7 +117,7 @@ def speed(repeats: int) -> dict[str, float]:
 
 
 def maze(seed: int, *, cells: int = 12, pitch: int = 16) -> Grid:
-    """A maze with more than one way, its walls inflated."""
+    """Make a maze with more than one path and inflated walls."""
     rng = np.random.default_rng(seed)
     size = cells * pitch + 1
     costs = np.zeros((size, size), np.uint8)
@@ -144,7 +144,7 @@ def maze(seed: int, *, cells: int = 12, pitch: int = 16) -> Grid:
 
 
 def cropped(grid: Grid, margin: int = 10) -> Grid:
-    """The part of a map that is known."""
+    """The known part of a map."""
     known = np.argwhere(grid.cells != 255)
     (y0, x0), (y1, x1) = np.maximum(known.min(axis=0) - margin, 0), known.max(axis=0) + margin
     cells = np.ascontiguousarray(grid.cells[y0:y1, x0:x1])
@@ -156,7 +156,7 @@ def cropped(grid: Grid, margin: int = 10) -> Grid:
 
 
 def excesses(costmap: Grid, plugin: str, *, starts: int, goals: int, seed: int) -> list[float]:
-    """Percent by which each planned path is dearer than the cheapest one known."""
+    """Excess cost of each planned path over the cheapest known one [%]."""
     planner = make_global_planner(plugin, {})
     table = planner.prices.astype(np.float64)
     prices = table[costmap.cells]
@@ -186,7 +186,7 @@ def excesses(costmap: Grid, plugin: str, *, starts: int, goals: int, seed: int) 
 
 
 def excess(pairs: int) -> dict[str, float]:
-    """The figure plan_excess_percent, and a table."""
+    """Measure plan_excess_percent and print a table."""
     costmaps = {name: cropped(map_costmap(name)) for name in ("rosbot_map", "office_map", "flat_map")}
     costmaps |= {f"maze {seed}": maze(seed) for seed in (1, 2)}
     print(f"{'dearer than the cheapest path, %':34s} {'pairs':>6s} {'median':>7s} {'most':>6s}")
@@ -206,7 +206,7 @@ def figures(*, quick: bool = False) -> dict[str, float]:
 
 
 def measured(quick: bool) -> dict[str, float]:
-    """All figures, told with their aims."""
+    """Measure all figures and print them with their aims."""
     found = figures(quick=quick)
     for name, value in found.items():
         print(f"{name}: {value} (aim <= {AIMS[name]:g})")

@@ -1,7 +1,7 @@
-"""What nodes of the house cost while the robot patrols: share of a core, memory.
+"""Cost of the house's nodes while the robot patrols: share of a core, memory.
 
-The whole house runs at real time without the detector, and the robot is sent from room to room. CPU counts while it
-drives; memory is what is resident at the end.
+The whole house runs in real time without the detector, and the robot is sent from room to room. CPU counts while it
+drives; memory is the resident size at the end.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ CONTACT = "floor"
 
 @dataclass
 class Cost:
-    """What was counted of one node in one profile."""
+    """Measurements of one node in one profile."""
 
     cpu: float = 0.0
     seconds: float = 0.0
@@ -35,7 +35,7 @@ class Cost:
 
     @property
     def percent(self) -> float:
-        """Of one core while driving."""
+        """Share of one core while driving [%]."""
         return 100.0 * self.cpu / self.seconds if self.seconds else float("nan")
 
 
@@ -52,7 +52,7 @@ def megabytes(pid: int, key: str) -> float:
 
 
 def original(package: str, name: str = "") -> str:
-    """Path of a package's node, by default of its name, that is not ours, "" where it is ours."""
+    """Path of a package's node (default: of its name) if it is the original, "" if it is ours."""
     found = subprocess.run(["catkin_find", "--libexec", package], capture_output=True, text=True, check=False)
     for folder in found.stdout.split():
         program = Path(folder) / (name or package)
@@ -63,12 +63,12 @@ def original(package: str, name: str = "") -> str:
 
 @contextmanager
 def busy_master(folder: Path, busy: int) -> Iterator[None]:
-    """A master, and so many processes that run without a pause."""
+    """Start a master, and `busy` processes that run without a pause."""
     from rosbot_patrol.ros.campaign.house import Master
 
     master = Master(folder / "roscore.log")
     spin = [sys.executable, "-c", "while True: pass"]
-    # each in a session of its own: Linux shares the processor between sessions first, as between the nodes
+    # each in a session of its own, like the nodes: Linux shares the processor between sessions first
     processes = [subprocess.Popen(spin, start_new_session=True) for _ in range(busy)]
     try:
         yield
@@ -79,7 +79,7 @@ def busy_master(folder: Path, busy: int) -> Iterator[None]:
 
 
 def measure(folder: Path, profile: str, seconds: float, nodes: Sequence[str]) -> dict[str, Cost]:
-    """Patrol until the robot has driven for so many seconds; the cost of each node, named as in "/amcl"."""
+    """Patrol until the robot has driven for `seconds`; returns the cost of each node, named as in "/amcl"."""
     import rospy
     from rosbot_patrol.msg import PatrolState
     from rosgraph_msgs.msg import Log
@@ -127,6 +127,6 @@ def measure(folder: Path, profile: str, seconds: float, nodes: Sequence[str]) ->
 def measure_profiles(
     nodes: Sequence[str], profiles: Sequence[str], seconds: float, busy: int = 0
 ) -> list[dict[str, Cost]]:
-    """The costs of each profile, with a master of its own."""
+    """The costs of each profile, each with a master of its own."""
     with tempfile.TemporaryDirectory(prefix="node-cost-") as name, busy_master(Path(name), busy):
         return [measure(Path(name) / profile, profile, seconds, nodes) for profile in profiles]

@@ -1,4 +1,4 @@
-"""What the benchmarks of single parts share: their arguments, one core, and the figures as JSON."""
+"""Common parts of the single benchmarks: their arguments, one core, and the figures as JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def run(doc: str | None, measure: Callable[[bool], dict[str, float]]) -> None:
-    """Read the arguments, measure on one core (`measure` is told whether few repeats do), and write what was found."""
+    """Read the arguments, measure on one core (`measure` takes whether few repeats suffice), and write the figures."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, metavar="FILE")
     parser.add_argument("--quick", action="store_true", help="few repeats")

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""What seeing costs the patrol: coverage, lidar motion, boxes with depth, viewpoints, the floor of our largest house.
+"""Cost of the patrol's perception: coverage, lidar motion, boxes with depth, viewpoints, the floor of our largest
+house.
 
     python3 benchmarks/patrol_eyes.py [--json FILE]
 
-On one core, in this process, over the office's map from its largest room. Each part is also given as the share of a
-core that it takes at the rates of a mission: 10 pictures and 10 scans a second (the witness takes 5), a box in each
-picture. Depth pictures coming in cost rospy besides (1.2 MB each), for the seconds in which somebody is in view.
+It runs on one core, in this process, over the office's map from its largest room. Each part is also given as its share
+of a core at the rates of a mission: 10 pictures and 10 scans a second (lidar motion uses 5), a box in each picture.
+Received depth pictures (1.2 MB each) also cost time in rospy, in the seconds with somebody in view.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ ROOM = 3
 
 
 def milliseconds(work: Callable[[], object], repeats: int) -> float:
-    """Median of some runs, after one that does not count."""
+    """Median of some runs, after a warm-up run."""
     work()
     times = []
     for _ in range(repeats):
@@ -66,7 +67,7 @@ def main() -> None:
 
 
 def measure_all() -> dict[str, float]:
-    """All figures."""
+    """Measure all figures."""
     grid, rooms = read_map(ROOT / "maps" / "office_map.yaml"), load_rooms(ROOT / "params" / "office_room_points.yaml")
     floor = floor_of(grid)
     regions = part_rooms(floor, rooms)
@@ -91,7 +92,7 @@ def measure_all() -> dict[str, float]:
 
 
 def one_scan(lengths: np.ndarray, angles: np.ndarray, stamp: float) -> LaserScan:
-    """A scan of the room in which somebody walks round the robot."""
+    """A scan of the room with somebody who walks around the robot."""
     bearing = 0.5 * stamp
     ranges = lengths.copy()
     near = np.abs((angles - bearing + math.pi) % math.tau - math.pi) < 0.07
@@ -108,7 +109,7 @@ def one_scan(lengths: np.ndarray, angles: np.ndarray, stamp: float) -> LaserScan
 
 
 def coverage_ms(floor: Floor, mask: np.ndarray, pose: Pose2D, scan: LaserScan) -> float:
-    """A picture of a turn, each with a scan of its own; the mean, as it gets cheaper the more was seen."""
+    """Time per picture of a turn, each with its own scan; the mean, because it falls with the area already seen."""
     coverage = Coverage(floor, mask)
     at = Pose2D(pose.x, pose.y, 0.0)
     began = time.perf_counter()
@@ -119,7 +120,7 @@ def coverage_ms(floor: Floor, mask: np.ndarray, pose: Pose2D, scan: LaserScan) -
 
 
 def witness_ms(floor: Floor, scans: list[LaserScan]) -> float:
-    """A scan, those that are left out with them."""
+    """Time per scan, with the skipped ones included."""
     room = Pose2D(4.2, 2.3, 0.0)
     witness = LidarMotion()
     began = time.perf_counter()
@@ -129,7 +130,7 @@ def witness_ms(floor: Floor, scans: list[LaserScan]) -> float:
 
 
 def box_ms() -> float:
-    """A box with depth."""
+    """Time of a box with depth."""
     pose = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.22], [0.0, 0.0, 0.0, 1.0]])
     rows, columns = np.mgrid[0:480, 0:640]
     metres = (3.0 + 0.1 * np.sin(columns / 20.0) + 0.05 * np.sin(rows / 30.0)).astype(np.float32)

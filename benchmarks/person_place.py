@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""How near to the truth a person is placed on the map, and what is refused: people, pets and posters in the houses.
+"""Accuracy of a person's place on the map, and rejections: people, pets and posters in the houses.
 
     python3 benchmarks/person_place.py [--number N] [--json FILE]
 
-The robot is put at places by chance; a person, a pet or a poster 1 to 6.5 m off is photographed once, with depth and
+The robot is put at random places. A person, a pet or a poster 1 to 6.5 m away is photographed once, with depth and
 scan, through the simulator's camera and the shipped network, without ROS. Places are measured with depth and without
-(lidar, else the floor). The pose in the map is the true one: what amcl is off by comes on top.
+(lidar, else the floor). The pose in the map is the true one, so amcl's error is not included.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class Stage:
         self.detector = load_detector(ROOT / "models" / "house.cfg", ROOT / "models" / "house.weights", list(CLASSES))
 
     def view(self) -> View:
-        """From where the camera looks now."""
+        """The camera's present viewpoint."""
         mount = self.engine.robot.description.camera
         assert mount is not None
         pose = from_pose2d(self.engine.pose, self.engine.robot.description.base_height) @ mount.pose
         return View(self.lens, np.asarray(pose, np.float64))
 
     def look(self) -> tuple[list[Box], Depth, np.ndarray]:
-        """What the detector sees, the depth beside it, and what the lidar hits off the map."""
+        """The detector's boxes, the depth, and the lidar's hits off the map."""
         self.engine.step()
         picture = self.engine.picture()
         boxes = [
@@ -71,7 +71,7 @@ class Stage:
 
 
 def put(stage: Stage, kind: str, place: Pose2D, rng: np.random.Generator) -> Pose2D | None:
-    """Something in the camera's view; None where there is no room for it."""
+    """Put something into the camera's view; None if there is no room for it."""
     engine = stage.engine
     for _ in range(30):
         engine.carry(place)
@@ -127,7 +127,7 @@ def tell(
     errors: dict[str, list[float]],
     told: Counter[str],
 ) -> None:
-    """Look, measure, and write down."""
+    """Look, measure, and record."""
     boxes, depth, off = stage.look()
     view = stage.view()
     people = [box for box in boxes if box.label == "person" and box.probability > 0.6]
@@ -148,17 +148,17 @@ def tell(
 
 
 def off_by(m: Measured, there: Pose2D) -> float:
-    """Of a place [m]."""
+    """Error of a place [m]."""
     return math.hypot(m.x - there.x, m.y - there.y)
 
 
 def house_text(stage: Stage, kind: str, there: Pose2D, box: Box, refusal: str) -> str:
-    """A person refused."""
+    """A line about a rejected person."""
     return f"{kind} at ({there.x:.1f}, {there.y:.1f}) seen from {stage.engine.pose}: {refusal}; {box.measured}"
 
 
 def report(errors: dict[str, list[float]], told: dict[str, Counter[str]], file: Path | None) -> None:
-    """Tables."""
+    """Print the tables."""
     figures: dict[str, float] = {}
     in_workspace.require_figures([e for found in errors.values() for e in found], "no person was measured")
     print("| place by | persons | median off [m] | 95 % | within 0.3 m |\n|---|---|---|---|---|")

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Bags replayed offline: how many times faster than they were recorded, on one core.
+"""Bags replayed offline on one core: speed relative to their recording.
 
     PYTHONPATH=src .ws/venv/bin/python benchmarks/replay.py [--json FILE] [--quick] [--bag FILE --map YAML]
 
-The bag is a drive through three rooms of the house (mapping_house.py): 720 beams at 10 Hz, odometry on /tf at 50 Hz,
-made once and kept in .ws. The patrol's is one of its small test world: a minute of rest, a mission, a minute of rest,
-with 25 tf messages and 8 answers of the detector a second and no scans, at the node's 25 steps a second. A replay is
-everything from opening the bag to the finished result; what is built before (the map's distances) stands in a column
-of its own. Medians of the repeats.
+The bag is a drive through three rooms of the house (mapping_house.py): 720 beams at 10 Hz, odometry on /tf at 50 Hz. It
+is made once and kept in .ws. The patrol's bag is from its small test world: a minute of rest, a mission, a minute of
+rest, with 25 tf messages and 8 answers of the detector a second and no scans, at the node's 25 steps a second. A replay
+is everything from opening the bag to the finished result. A separate column has the preparation (the map's distances).
+Medians of the repeats.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def patrol_messages() -> list[tuple[float, str, Any]]:
 
 
 def measure(bag: Path, setup: Setup, repeats: int) -> tuple[float, float, float]:
-    """Seconds of the bag, to build, and to replay."""
+    """Duration of the bag, of building, and of the replay [s]."""
     built, spent, duration = [], [], 0.0
     for _ in range(repeats):
         begin = time.perf_counter()

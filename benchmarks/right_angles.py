@@ -1,8 +1,8 @@
-"""Headings of a way against the walls of a building whose walls stand at right angles.
+"""Headings of a trajectory compared with a building's right-angled walls.
 
-A reference that an earlier SLAM run made has errors of its own. Where a building is rectangular its walls tell which of
-two ways has the truer headings: in each scan the straight pieces of wall give their common direction (modulo 90
-degrees), which with the true headings is the same throughout.
+A reference from an earlier SLAM run has errors of its own. In a rectangular building the walls show which of two
+trajectories has the truer headings. In each scan the straight pieces of wall give their common direction (modulo 90
+degrees); with the true headings it is the same throughout.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from rosbot_patrol.scan import LaserScan
 
 Array = NDArray[np.float64]
 
-CHORD = 12  # a piece of wall: so many beams from end to end
-LONG, FAR = (0.25, 2.0), 12.0  # its length, and how far beams are looked at [m]
-STRAIGHT = 0.015  # its middle is so near to the line between its ends [m]
-PIECES, AGREED = 25, 0.7  # a scan tells with so many, where such a share by length has one direction
-SAME = math.radians(4.0)  # which is so exact
-OTHER = 5.0  # walls that are farther from the right angles are others [deg]
+CHORD = 12  # beams from end to end of a piece of wall
+LONG, FAR = (0.25, 2.0), 12.0  # length of a piece, and range of the beams used [m]
+STRAIGHT = 0.015  # largest distance of its middle from the line between its ends [m]
+PIECES, AGREED = 25, 0.7  # smallest number of pieces in a usable scan, and smallest share by length with one direction
+SAME = math.radians(4.0)  # pieces within this angle have one direction
+OTHER = 5.0  # walls farther from the right angles are not used [deg]
 
 
 def wall_direction(scan: LaserScan) -> float:
-    """Of the walls in the laser's frame, modulo 90 degrees [rad]; NaN where they do not tell."""
+    """Direction of the walls in the laser's frame, modulo 90 degrees [rad]; NaN if they do not agree."""
     angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
     seen = np.isfinite(scan.ranges) & (scan.ranges < FAR)
     ranges = np.where(seen, scan.ranges, 0.0)
@@ -48,10 +48,10 @@ def wall_direction(scan: LaserScan) -> float:
 
 
 def heading_errors(scans: Sequence[LaserScan], ways: Sequence[Array]) -> list[float]:
-    """Mean error of each way's headings against the walls [deg], over the scans that tell in all of them.
+    """Mean error of each trajectory's headings against the walls [deg], over the scans that are usable in all of them.
 
     Args:
-        scans: whose laser looks ahead.
+        scans: scans of a laser that looks forward.
         ways: x, y, yaw at each scan, each of shape (N, 3).
     """
     walls = np.array([wall_direction(scan) for scan in scans])

@@ -3,8 +3,8 @@
 
     python3 benchmarks/rooms.py [--rooms 1 2 3] [--rate 1] [--profile tutorial]
 
-The table is by ground truth: distance from the room's point where the turn began, degrees turned, distance from home
-in the end, contacts with anything but the floor, and the mails in the Maildir.
+The table uses ground truth: distance from the room's point at the start of the turn, degrees turned, distance from home
+at the end, contacts with anything but the floor, and the mails in the Maildir.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ TITLES = (
 
 @dataclass(frozen=True)
 class Row:
-    """What one mission showed."""
+    """The result of one mission."""
 
     cells: tuple[str, ...]
     fault: str

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""The rosserial bridge under the load of a building's sensors, over loopback, before a real master.
+"""The rosserial bridge under the load of a building's sensors, over loopback, with a real master.
 
     python3 benchmarks/rosserial.py [--json FILE] [--quick] [--sensors 500] [--seconds 60]
 
-The sensors (rosserial_fleet.py) and those who listen (rosserial_ear.py) are processes of their own and do not count.
-CPU is the bridge's, of one core, with one rospy subscriber, diagnostics and all. Memory is read after that:
-RSS is all that is resident, PSS shares what other Python processes use too. Latency is from the `send` of a heartbeat's
-last byte to its arrival at a subscriber: a rospy one, and a bare TCPROS socket, which leaves rospy's receiver out.
-The flood is sent as fast as the bridge reads, without its limit of 200 frames a second and client, to the bare
-socket; nothing may be missing. Where the package path has the original rosserial_python, its flood is measured too.
+The sensors (rosserial_fleet.py) and the listeners (rosserial_ear.py) are processes of their own and do not count. CPU
+is the bridge's share of one core, with one rospy subscriber and diagnostics. Memory is read after that: RSS is all
+resident memory, PSS divides what other Python processes share. Latency is from the `send` of a heartbeat's last byte to
+its arrival at a subscriber: a rospy one, or a bare TCPROS socket, which excludes rospy's receiver. The flood is sent as
+fast as the bridge reads, without its limit of 200 frames a second and client, to the bare socket; no message may be
+missing. If the package path has the original rosserial_python, its flood is measured too.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ UNLIMITED = {"max_rate": 0, "max_rate_per_address": 0}
 
 
 class Child:
-    """A process that takes commands as lines of JSON and answers each."""
+    """A child process that takes commands as lines of JSON and answers each."""
 
     def __init__(self, *command: str) -> None:
         self.popen = subprocess.Popen(
@@ -46,7 +46,7 @@ class Child:
         )
 
     def hear(self) -> dict[str, Any]:
-        """Its next answer."""
+        """Read its next answer."""
         assert self.popen.stdout is not None
         while not (line := self.popen.stdout.readline()).startswith("{"):
             if not line:
@@ -54,18 +54,18 @@ class Child:
         return json.loads(line)
 
     def tell(self, **command: object) -> None:
-        """Command without waiting."""
+        """Send a command without waiting."""
         assert self.popen.stdin is not None
         self.popen.stdin.write(json.dumps(command) + "\n")
         self.popen.stdin.flush()
 
     def ask(self, **command: object) -> dict[str, Any]:
-        """Command, and wait for the answer."""
+        """Send a command, and wait for the answer."""
         self.tell(**command)
         return self.hear()
 
     def stop(self) -> None:
-        """End it."""
+        """End the process."""
         self.popen.kill()
         self.popen.wait()
 
@@ -86,7 +86,7 @@ def program() -> str:
 
 
 def upstream() -> str:
-    """Upstream's serial_node.py, "" where the package path has none (ours stands in for it)."""
+    """Upstream's serial_node.py, "" if the package path has none (ours replaces it)."""
     found = subprocess.run(["rospack", "find", "rosserial_python"], capture_output=True, text=True, check=False)
     folder = Path(found.stdout.strip() or "/nonexistent")
     is_upstream = (folder / "src/rosserial_python/SerialClient.py").exists()
@@ -111,7 +111,7 @@ class Bridge:
             time.sleep(0.1)
 
     def cpu_seconds(self) -> float:
-        """User and system time so far."""
+        """User and system time so far [s]."""
         fields = Path(f"/proc/{self.popen.pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / TICKS
 
@@ -130,7 +130,7 @@ class Bridge:
 
 
 def latencies_ms(sent: np.ndarray, heard: np.ndarray) -> np.ndarray:
-    """Heartbeats of one id come in the order in which they were sent, as the bridge is one thread."""
+    """Latencies [ms]; heartbeats of one id arrive in the order of sending, because the bridge has one thread."""
     found = []
     for sensor_id in np.unique(sent[:, 1]):
         left, right = sent[sent[:, 1] == sensor_id, 0], heard[heard[:, 1] == sensor_id, 0]
@@ -141,9 +141,9 @@ def latencies_ms(sent: np.ndarray, heard: np.ndarray) -> np.ndarray:
 
 
 def steady(folder: Path, fleet: Child, bridge: Bridge, kind: str, seconds: float) -> dict[str, float]:
-    """Heartbeats for some time: cost and latency with one listener."""
+    """Run heartbeats for some time: cost and latency with one listener."""
     listener = ear(kind)
-    fleet.ask(steady=3.0, save="/dev/null")  # each is heard of once
+    fleet.ask(steady=3.0, save="/dev/null")  # every sensor has been heard once
     time.sleep(0.3)
     listener.ask(clear=True)
     cpu, began = bridge.cpu_seconds(), time.monotonic()
@@ -162,7 +162,7 @@ def steady(folder: Path, fleet: Child, bridge: Bridge, kind: str, seconds: float
 
 
 def flood(fleet: Child, port: int, clients: int, messages: int) -> float:
-    """Messages a second that get through, all of them."""
+    """Messages per second that get through; all must."""
     fleet.ask(connect=clients, port=port)
     time.sleep(1.5)
     listener = ear("raw")
@@ -179,7 +179,7 @@ def flood(fleet: Child, port: int, clients: int, messages: int) -> float:
 
 
 def reconnect(folder: Path, fleet: Child, sensors: int) -> float:
-    """Seconds until the message of each of the sensors is out on the topic after all have lost their link."""
+    """Seconds until every sensor's message is on the topic, after all have lost their connection."""
     listener = ear("raw")
     time.sleep(0.5)
     listener.ask(clear=True)
@@ -194,7 +194,7 @@ def reconnect(folder: Path, fleet: Child, sensors: int) -> float:
 
 
 def killed(folder: Path, fleet: Child, bridge: Bridge, sensors: int, port: int) -> tuple[float, Bridge]:
-    """Seconds from `kill -9` of the bridge, which is started anew at once, until each sensor was heard again."""
+    """Seconds from `kill -9` of the bridge, which is restarted at once, until every sensor has been heard again."""
     listener = ear("rospy")
     fleet.tell(comeback=30.0)
     time.sleep(0.5)

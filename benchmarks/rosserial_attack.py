@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""What honest sensors notice of an attacker on the bridge's port, over loopback, before a real master.
+"""Effects of an attacker on the bridge's port on honest sensors, over loopback, with a real master.
 
     python3 benchmarks/rosserial_attack.py [--json FILE] [--quick] [--sensors 100]
 
 The attacks are those of the tests (test/process/rosserial/attacks.py), one after the other and then all at once from
 eight addresses, each against a bridge with lists and against one with keys. The attacker is a process of its own at low
 priority: on another machine it would take no time of this one. Latency is that of the sensors' heartbeats, from `send`
-to a bare TCPROS subscriber, each with all of the bridge's work for the attacker beside it. Memory is the bridge's RSS.
-`forged` counts messages in another's name that came through. `allowed` counts those of the one sensor that the
-attacker's address may be under lists.
+to a bare TCPROS subscriber, with the bridge's work for the attacker included. Memory is the bridge's RSS. `forged`
+counts messages in another sensor's name that came through. `allowed` counts those of the one sensor that the attacker's
+address may be under lists.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from rosbot_patrol.rosserial.protocol.keys import add_key, new_key
 
 ATTACKS = HERE.parent / "test" / "process" / "rosserial" / "attacks.py"
 SOURCE = "127.0.0.66"
-ALLOWED_ID = 201  # with lists the attacker's address may be that sensor, so that messages come through
+ALLOWED_ID = 201  # with lists the attacker's address may be this sensor, so that messages come through
 EVERYTHING = "all at once, 8 addresses"
 COLUMNS = ("attack", "tries", "heartbeats lost", "links lost", "p50 ms", "p99 ms", "max ms", "CPU %", "MB")
 COLUMNS += ("forged", "allowed", "log lines")
 
 
 class House:
-    """A bridge, its sensors and one who listens."""
+    """A bridge, its sensors and one listener."""
 
     def __init__(self, folder: Path, protection: str, sensors: int) -> None:
         self.sensors = sensors
@@ -62,7 +62,7 @@ class House:
         self.folder = folder
 
     def measure(self, seconds: float, attack: str = "") -> dict[str, Any]:
-        """Heartbeats for some time, with an attack beside them."""
+        """Run heartbeats for some time, with an attack beside them."""
         self.fleet.ask(steady=1.0, save="/dev/null")
         time.sleep(0.3)
         self.ear.ask(clear=True)
@@ -99,16 +99,16 @@ class House:
         return subprocess.Popen(["nice", "-n", "15", *command], stdout=subprocess.PIPE, text=True)
 
     def stop(self) -> None:
-        """End all of it."""
+        """End all processes."""
         self.ear.stop()
         self.fleet.stop()
         self.bridge.stop()
 
 
 def compare(sent: np.ndarray, heard: np.ndarray) -> tuple[np.ndarray, dict[str, int]]:
-    """Latencies [ms] of those ids of which as many came as were sent, and how many are missing or too many.
+    """Latencies [ms] of the ids with equal numbers sent and received, and the numbers of missing and surplus messages.
 
-    What came under the id that the lists allow the attacker is counted apart.
+    Messages with the id that the lists allow the attacker are counted apart.
     """
     late, lost, forged = [np.empty(0)], 0, 0
     ids = heard[:, 1] & 0xFF
@@ -123,7 +123,7 @@ def compare(sent: np.ndarray, heard: np.ndarray) -> tuple[np.ndarray, dict[str, 
 
 
 def row(figures: dict[str, Any]) -> str:
-    """One line of the table."""
+    """Format one line of the table."""
     f = figures
     latencies = f"{f['p50']:.2f} | {f['p99']:.2f} | {f['max']:.1f}"
     bridge = f"{f['cpu']:.1f} | {f['mb']:.1f} | {f['forged']} | {f['allowed']} | {f['lines']}"

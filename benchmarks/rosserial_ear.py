@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Who listens to /motion_trigger, for rosserial.py: `rosserial_ear.py rospy|raw`, commands by line on stdin.
+"""Listener to /motion_trigger for rosserial.py: `rosserial_ear.py rospy|raw`, with one command per line on stdin.
 
-`rospy` is an ordinary subscriber; `raw` reads the publisher's TCPROS connection itself, so that what is measured is the
-bridge and not rospy's receiving side. Commands: {"clear": true}, {"count": N, "within": SECONDS} (waits for that many),
+`rospy` is an ordinary subscriber. `raw` reads the publisher's TCPROS connection itself, which measures the bridge
+without rospy's receiving side. Commands: {"clear": true}, {"count": N, "within": SECONDS} (waits for that many),
 {"save": FILE} (time of arrival [ns, CLOCK_MONOTONIC] and id | move << 8 of each message).
 """
 
@@ -57,7 +57,7 @@ class RawEar:
             self.count = self._offset // FRAME
 
     def clear(self) -> None:
-        """Forget what came."""
+        """Forget the received messages."""
         self._pieces.clear()
         self._offset = self.count = 0
 
@@ -90,11 +90,11 @@ class RospyEar:
 
     @property
     def count(self) -> int:
-        """Messages so far."""
+        """Number of messages so far."""
         return len(self._heard)
 
     def clear(self) -> None:
-        """Forget what came."""
+        """Forget the received messages."""
         self._heard.clear()
 
     def arrivals(self) -> np.ndarray:

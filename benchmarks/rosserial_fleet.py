@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Motion sensors by the hundred in one process, for rosserial.py: JSON commands by line on stdin, answers on stdout.
+"""Hundreds of motion sensors in one process, for rosserial.py: one JSON command per line on stdin, answers on stdout.
 
     {"connect": N, "port": P}           N sensors, each from a loopback address of its own; until all are negotiated
-                                        ("keys": FILE where the bridge asks for them)
-    {"steady": SECONDS, "save": FILE}   each sends a heartbeat every 0.5 s, at phases by chance (seeded)
-    {"flood": COUNT}                    each sends so many heartbeats as fast as the bridge takes them
-    {"reconnect": SECONDS}              all drop their links at once, come back and report
+                                        ("keys": FILE if the bridge asks for them)
+    {"steady": SECONDS, "save": FILE}   each sends a heartbeat every 0.5 s, at random phases (seeded)
+    {"flood": COUNT}                    each sends COUNT heartbeats as fast as the bridge takes them
+    {"reconnect": SECONDS}              all drop their connections at once, come back and report
     {"comeback": SECONDS}               wait until the bridge has gone and all are back, and report
-    {"bye": true}                       all hang up
+    {"bye": true}                       all disconnect
 
 Times are CLOCK_MONOTONIC in ns, the same clock in all processes of a machine.
 """
@@ -37,26 +37,26 @@ from rosbot_patrol.rosserial.protocol.topics import ESP_TRIGGER_MD5, TopicInfo, 
 
 INFO = TopicInfo(topic_id=125, name="motion_trigger", message_type="rosbot_patrol/EspTrigger", md5=ESP_TRIGGER_MD5)
 PERIOD = 0.5
-IDS = 250  # the sensors beyond that share an id with another one, at another address
+IDS = 250  # further sensors share an id with another one, at another address
 
 
 class Sensor:
-    """One client. What it waits to send lies in `waiting`."""
+    """One client. `waiting` has its unsent bytes."""
 
     def __init__(self, number: int) -> None:
         self.sensor_id = number % IDS
-        self.key = self.sensor_id | (number // IDS % 2) << 8  # id and `move`: which of 500 it is
+        self.key = self.sensor_id | (number // IDS % 2) << 8  # id and `move`: identifies one of 500
         self.source = f"127.1.{number // 200}.{number % 200 + 1}"
         self.link: socket.socket | None = None
         self.session = DeviceSession([INFO])
         self.waiting = b""
         self.retry_at = 0.0
-        self.answered = False  # the bridge has told the time after the topics: it knows them
+        self.answered = False  # the bridge has sent the time after the topics, so it knows them
         self.secret: bytes | None = None
         self.breaks = 0
 
     def frame(self, *, move: bool = False) -> bytes:
-        """Its heartbeat, or a trigger."""
+        """Make a heartbeat, or a trigger."""
         return encode(INFO.topic_id, pack_esp_trigger(self.sensor_id, move))
 
 
@@ -69,11 +69,11 @@ class Fleet:
         self._selector = selectors.DefaultSelector()
 
     def open(self, sensor: Sensor) -> None:
-        """Begin to connect."""
+        """Start to connect."""
         link = socket.socket()
         link.setblocking(False)
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # its port does not keep a bridge from listening
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # its port must not prevent a bridge from listening
         link.bind((sensor.source, 0))
         link.connect_ex(("127.0.0.1", self.port))
         prover = Prover(sensor.sensor_id, sensor.secret) if sensor.secret is not None else None
@@ -82,7 +82,7 @@ class Fleet:
         self._selector.register(link, selectors.EVENT_READ, sensor)
 
     def drop(self, sensor: Sensor, *, abruptly: bool = False) -> None:
-        """Close a link, by a reset where `abruptly`."""
+        """Close a connection, with a reset if `abruptly`."""
         if sensor.link is None:
             return
         self._selector.unregister(sensor.link)
@@ -92,7 +92,7 @@ class Fleet:
         sensor.link = None
 
     def serve(self, timeout: float) -> None:
-        """Read and answer once; a link that broke is opened again 0.2 s later."""
+        """Read and answer once; a broken connection is reopened 0.2 s later."""
         now = time.monotonic()
         for key, _ in self._selector.select(max(timeout, 0.0)):
             self._read(key.data, now)
@@ -101,7 +101,7 @@ class Fleet:
                 self.open(sensor)
 
     def flush(self, sensor: Sensor) -> None:
-        """Send what the link takes."""
+        """Send as much as the connection takes."""
         sensor.waiting += b"".join(sensor.session.take_output())
         if not sensor.waiting or sensor.link is None:
             return
@@ -134,7 +134,7 @@ class Fleet:
         sensor.retry_at = time.monotonic() + 0.2
 
     def wait_all(self, seconds: float) -> int:
-        """Serve until the bridge knows all; how many it knows."""
+        """Serve until the bridge knows all; returns how many it knows."""
         until = time.monotonic() + seconds
         while (known := sum(s.answered for s in self.sensors)) < len(self.sensors) and time.monotonic() < until:
             self.serve(0.05)
@@ -152,7 +152,7 @@ def connect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
 
 
 def steady(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
-    """Heartbeats; saves when each was given to the kernel, and of which id."""
+    """Send heartbeats; saves the time of each `send`, and its id."""
     rng = random.Random(6)
     begin = time.monotonic()
     due = [(begin + rng.uniform(0.0, PERIOD), n) for n in range(len(fleet.sensors))]
@@ -179,7 +179,7 @@ def steady(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
 
 
 def flood(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
-    """As fast as the bridge reads."""
+    """Send as fast as the bridge reads."""
     for sensor in fleet.sensors:
         sensor.waiting += sensor.frame() * command["flood"]
     began = time.monotonic_ns()
@@ -191,7 +191,7 @@ def flood(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
 
 
 def reconnect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
-    """Drop all links at once and come back; each sends one message as soon as the bridge knows it."""
+    """Drop all connections at once and reconnect; each sends one message as soon as the bridge knows it."""
     for sensor in fleet.sensors:
         fleet.drop(sensor, abruptly=True)
     began = time.monotonic_ns()
@@ -201,14 +201,14 @@ def reconnect(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
 
 
 def comeback(fleet: Fleet, command: dict[str, Any]) -> dict[str, Any]:
-    """The bridge is about to be killed, and comes back: as `reconnect`."""
+    """Reconnect as in `reconnect`, when the bridge is killed and comes back."""
     for sensor in fleet.sensors:
         sensor.answered = False
     return {"known": report(fleet, command["comeback"])}
 
 
 def report(fleet: Fleet, seconds: float) -> int:
-    """Each sends one message as soon as the bridge knows it; how many have."""
+    """Let each send one message as soon as the bridge knows it; returns how many have."""
     waiting = list(fleet.sensors)
     until = time.monotonic() + seconds
     while waiting and time.monotonic() < until:

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""sensor_watch and what it costs the bridge, over loopback, before a real master, with 12 and with 250 sensors at 2 Hz.
+"""sensor_watch and its cost to the bridge, over loopback, with a real master, with 12 and with 250 sensors at 2 Hz.
 
     python3 benchmarks/sensor_watch.py [--json FILE] [--sensors 12 250] [--seconds 30]
 
-The sensors (rosserial_fleet.py) are a process of their own and do not count. CPU is of one core; the bridge's is given
-without and with sensor_watch, which is its one subscriber.
+The sensors (rosserial_fleet.py) are a process of their own and do not count. CPU is the share of one core; the bridge's
+is given without and with sensor_watch, its only subscriber.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ POINTS = HERE.parent / "params" / "room_points.yaml"
 
 
 class Watch(Bridge):
-    """The node sensor_watch, measured as the bridge is."""
+    """The node sensor_watch, measured like the bridge."""
 
     def __init__(self, folder: Path, sensors: int) -> None:
         file = folder / "sensors.yaml"
@@ -44,7 +44,7 @@ class Watch(Bridge):
 
 
 def measure(folder: Path, sensors: int, seconds: float) -> dict[str, float]:
-    """One size of house."""
+    """Measure one number of sensors."""
     port, fleet = free_port(), Child(str(HERE / "rosserial_fleet.py"))
     bridge = Bridge(program(), port, folder / "bridge.log")
     fleet.ask(connect=sensors, port=port)

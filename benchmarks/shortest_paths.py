@@ -1,7 +1,7 @@
-"""The cheapest paths over a grid by another way than the planners': a fine graph, and strings pulled straight.
+"""Cheapest paths over a grid by another method than the planners': a fine graph, and paths pulled straight.
 
-Points are (x, y) in cells, with centres at whole numbers; `prices[iy, ix]` is the price of a cell's length in that
-cell, inf where it cannot be crossed. Touching the corner of a closed cell is allowed.
+Points are (x, y) in cells, with centres at whole numbers. `prices[iy, ix]` is the price of a cell's length in that
+cell, inf if it cannot be crossed. A path may touch the corner of a closed cell.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def _spread(prices, neighbours, start_x, start_y):
 
 @numba.njit(nogil=True)
 def _pull(prices, points, window):
-    """The cheapest chain of straight lines over some of the points, in their order; true where a point is kept."""
+    """Find the cheapest chain of straight lines over some of the points, in their order; true for kept points."""
     n = len(points)
     least = np.full(n, np.inf)
     before = np.full(n, -1, np.int64)
@@ -120,13 +120,13 @@ def _pull(prices, points, window):
 
 
 def spread(prices: Array, start: tuple[int, int]) -> tuple[Array, NDArray[np.int32]]:
-    """Least price to each cell over the graph of 32 neighbours, and over which of them; shape of `prices` each."""
+    """Least price to each cell over the graph of 32 neighbours, and the neighbour used; shape of `prices` each."""
     found: tuple[Array, NDArray[np.int32]] = _spread(prices, NEIGHBOURS, *start)
     return found
 
 
 def path_to(came: NDArray[np.int32], goal: tuple[int, int]) -> Array:
-    """The path to a cell, from what `spread` returns; shape (N, 2)."""
+    """The path to a cell, from the result of `spread`; shape (N, 2)."""
     ix, iy = goal
     points = [(ix, iy)]
     while came[iy, ix] >= 0:
@@ -137,9 +137,9 @@ def path_to(came: NDArray[np.int32], goal: tuple[int, int]) -> Array:
 
 
 def pulled_straight(prices: Array, points: Array, *, window: int = 150, rounds: int = 3) -> Array:
-    """A path made cheaper by straight lines between its points; the points of shape (N, 2) that are kept.
+    """Make a path cheaper by straight lines between its points; returns the kept points, shape (N, 2).
 
-    Long lines are cut into pieces of two cells between the rounds, so that lines can begin in their middle.
+    Between the rounds long lines are cut into pieces of two cells, so that lines can begin in their middle.
     """
     for _ in range(rounds):
         points = _cut(points)

@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
-"""The simulator: how many times real time, what a picture costs, a world of 2,000 boxes, and where the time goes.
+"""The simulator: real-time factor, time per picture, a world of 2,000 boxes, and the shares of its parts.
 
     PYTHONPATH=src .ws/venv/bin/python benchmarks/simulation.py [--json FILE] [--quick] [--ros]
 
-The engine alone, without ROS, in the house with a person who walks and the robot driving curves. Each figure is taken
-in a process of its own, pinned to as many cores as it speaks of (llvmpipe's threads with it, by LP_NUM_THREADS), after
-a warm-up, as the median of the repeats.
+It runs the engine alone, without ROS, in the house with a walking person and the robot driving curves. Each figure is
+measured in a process of its own, pinned to the stated number of cores (with llvmpipe's threads, by LP_NUM_THREADS),
+after a warm-up, as the median of the repeats.
 
-rtf_lidar: simulated over wall time with the lidar (720 beams) and IMU at 10 Hz, odometry at 20 Hz. rtf_rgbd: with
-colour and depth of 640x480 at 10 Hz as well. rtf_lidar_40hz: the first with the lidar at 40 Hz; rtf_unheard: the
-first when nobody listens to lidar and IMU. render_rgbd_ms: one picture as the engine gives it, noise and limits
-included, from places all over the house. load_2000_boxes_s: a file of 2,000 models of a box each, read, put into an
-engine, and the robot spawned. steps_ratio_2000_boxes: rtf_lidar there against the house's.
+- rtf_lidar: simulated over wall time with the lidar (720 beams) and IMU at 10 Hz, odometry at 20 Hz.
+- rtf_rgbd: with colour and depth of 640x480 at 10 Hz as well.
+- rtf_lidar_40hz: the first with the lidar at 40 Hz; rtf_unheard: the first without subscribers of lidar and IMU.
+- render_rgbd_ms: one picture of the engine, noise and limits included, from places all over the house.
+- load_2000_boxes_s: a file of 2,000 models of a box each, read and put into an engine, and the robot spawned.
+- steps_ratio_2000_boxes: rtf_lidar there relative to the house's.
 
 --ros: the node as well, on a master of its own, rate 0, with one listener process on the topics; needs `. scripts/env`.
 """
@@ -40,7 +41,7 @@ ROOT = Path(__file__).resolve().parents[1]
 HOUSE = ROOT / "worlds" / "house.world"
 URDF = ROOT / "urdf" / "rosbot.urdf"
 BOXES = 2000
-PORT = 11599  # of the benchmark's own master
+PORT = 11599  # port of the benchmark's own master
 
 AIMS = {  # figure: aim, whether more is better
     "rtf_lidar": (20.0, True),
@@ -60,13 +61,13 @@ PARTS = ("physics", "drive", "lidar", "draw", "read back", "noise", "rest")
 
 @dataclass
 class Watch:
-    """Wall seconds by label; what runs inside another label's time is taken off that."""
+    """Wall seconds by label, without the time of labels inside."""
 
     seconds: dict[str, float] = field(default_factory=dict)
     _inner: list[float] = field(default_factory=lambda: [0.0])
 
     def timed(self, label: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, its time counted under a label."""
+        """Wrap a function so that its time counts under a label."""
 
         def run(*args: Any, **options: Any) -> Any:
             self._inner.append(0.0)
@@ -81,13 +82,13 @@ class Watch:
         return run
 
     def watch(self, label: str, owner: Any, *names: str) -> None:
-        """Count methods of an object or a class under a label."""
+        """Count the time of an object's or a class's methods under a label."""
         for name in names:
             setattr(owner, name, self.timed(label, getattr(owner, name)))
 
 
 def make_engine(world: Path, *, with_actor: bool = True) -> Any:
-    """An engine with the robot in it."""
+    """Make an engine with the robot in it."""
     from rosbot_patrol.geometry import Pose2D
     from rosbot_patrol.simulation.engine import Engine, EngineParams
     from rosbot_patrol.simulation.render.egl import make_renderer
@@ -105,14 +106,14 @@ def make_engine(world: Path, *, with_actor: bool = True) -> Any:
 def simulate(
     engine: Any, seconds: float, *, scan_hz: float = 10.0, pictures: bool = False, heard: bool = True
 ) -> float:
-    """Drive curves for simulated seconds and take what the sensors give; returns simulated over wall time.
+    """Drive curves for a simulated time and read the sensors; returns simulated over wall time.
 
     Args:
-        engine: with the robot in it.
-        seconds: of simulated time.
+        engine: engine with the robot in it.
+        seconds: simulated time.
         scan_hz: rate of the lidar.
-        pictures: whether the camera is listened to, at 10 Hz.
-        heard: whether anybody listens to the lidar and the inertial unit.
+        pictures: whether the camera has a subscriber, at 10 Hz.
+        heard: whether the lidar and the inertial unit have subscribers.
     """
     from rosbot_patrol.geometry import Twist2D
     from rosbot_patrol.simulation.engine import STEP
@@ -164,7 +165,7 @@ def picture_times(quick: bool) -> list[float]:
 
 
 def shares(pictures: bool) -> dict[str, float]:
-    """Wall milliseconds that each part takes of a simulated second."""
+    """Wall milliseconds of each part per simulated second."""
     from rosbot_patrol.simulation.engine import Engine
     from rosbot_patrol.simulation.physics.world import Physics
     from rosbot_patrol.simulation.render.egl import EglRenderer
@@ -176,7 +177,7 @@ def shares(pictures: bool) -> dict[str, float]:
     watch.watch("drive", Drive, "step")
     watch.watch("lidar", Engine, "scan")
     watch.watch("noise", Camera, "_noisy_colour", "_sensed_depth")
-    draw = EglRenderer._draw  # OpenGL draws when it is asked for the pixels: wait for it here, to tell both apart
+    draw = EglRenderer._draw  # OpenGL draws when the pixels are read: wait for it here, to separate both times
 
     def drawn(self: EglRenderer, *args: Any) -> Any:
         buffer = draw(self, *args)
@@ -199,7 +200,7 @@ def shares(pictures: bool) -> dict[str, float]:
 
 
 def write_boxes(path: Path) -> None:
-    """A world of 2,000 models, each a box, with room for the robot at the origin."""
+    """Write a world of 2,000 models, each a box, with room for the robot at the origin."""
     rng = random.Random(5)
     models = []
     for i in range(BOXES):
@@ -238,7 +239,7 @@ def boxes(quick: bool) -> dict[str, float]:
 
 
 def listen(topics: Iterable[str]) -> None:
-    """Take messages for good: the listener's process."""
+    """Receive messages until killed: the listener's process."""
     import rospy
 
     rospy.init_node("listener")
@@ -248,7 +249,7 @@ def listen(topics: Iterable[str]) -> None:
 
 
 def node_factor(topics: list[str], quick: bool) -> float:
-    """Simulated over wall time of the node with one listener, by its /clock."""
+    """Simulated over wall time of the node with one listener, from its /clock."""
     import rospy
     from rosgraph_msgs.msg import Clock
 
@@ -298,7 +299,7 @@ def ros(quick: bool) -> dict[str, float]:
 
 
 def measure(what: str, quick: bool) -> dict[str, float]:
-    """One measurement, in the process that was pinned for it."""
+    """Make one measurement, in the process that was pinned for it."""
     if what == "lidar":
         return {
             "rtf_lidar": factor(HOUSE, quick),
@@ -318,7 +319,7 @@ def measure(what: str, quick: bool) -> dict[str, float]:
 
 
 def pinned(what: str, quick: bool) -> dict[str, float]:
-    """Measure in a process of its own on as many cores as the figure speaks of."""
+    """Measure in a process of its own on the figure's number of cores."""
     cores = CORES.get(what, 1)
     allowed = sorted(os.sched_getaffinity(0))[:cores]
     environment = {**os.environ, "LP_NUM_THREADS": str(cores), "OMP_NUM_THREADS": str(cores)}

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""An hour (or so) of detection at the camera's full rate: does the memory of darknet_ros and republish stay flat?
+"""An hour of detection at the camera's full rate: does the memory of darknet_ros and republish stay constant?
 
     python3 benchmarks/soak_detection.py [--minutes 60] [--rate 30] [--json FILE] [--log FILE]
 
-Starts a master on a free port, the node darknet_ros with our network, and two republish (to jpeg and back) before it,
-as in the tutorial; sends 640x480 rgb8 pictures with people at the rate, has somebody listen to all that the nodes
-publish (the drawn picture too, 20 seconds in ten minutes), sends goals to the action and switches the detector off and
-on now and then, and once a minute notes each node's memory. Flat: a node's memory after the first ten minutes rises by
-less than 2 MB an hour, as the median of the slopes between all pairs of minutes (Theil and Sen). A leak shows in it, in
-small steps too; one single step does not, as of a receive buffer that was once filled while the machine was busy. That
-is in the table, and the slope of the straight line through the values is told as well.
+It starts a master on a free port, the node darknet_ros with our network, and two republish nodes (to jpeg and back) in
+front of it, as in the tutorial. It sends 640x480 rgb8 pictures with people at the rate and subscribes to all outputs
+(to the drawn picture for 20 seconds in ten minutes). Now and then it sends goals to the action and switches the
+detector off and on. Once a minute it records each node's memory. Constant: after the first ten minutes a node's memory
+rises by less than 2 MB an hour, as the median of the slopes between all pairs of minutes (Theil and Sen). This shows a
+leak, also one in small steps, but not one single step, such as a receive buffer that was once filled on a busy machine.
+The table also has that step, and the slope of the straight line through the values.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from rosbot_patrol.ros.campaign.ports import free_port
 ROOT = Path(__file__).resolve().parents[1]
 NODES = ("darknet_ros", "rgb_compress", "rgb_decompress")
 FLAT_MB_PER_HOUR = 2.0
-WARM_UP = 10.0  # minutes; less in a short run
+WARM_UP = 10.0  # minutes; fewer in a short run
 
 
 def make_pictures() -> list[np.ndarray]:
-    """Pictures with people in them: those the README shows, moved about, so that no two in a row are alike."""
+    """Pictures with people: the README's, shifted so that consecutive ones differ."""
     import cv2
 
     base = cv2.imread(str(ROOT / "docs/images/actors.png"))[:336]
@@ -84,7 +84,7 @@ class House:
         return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=self._log, stderr=subprocess.STDOUT)
 
     def resident_mb(self) -> dict[str, float]:
-        """Resident memory of each node; RuntimeError where one has ended."""
+        """Resident memory of each node; RuntimeError if one has ended."""
         found = {}
         for name, node in self.nodes.items():
             if node.poll() is not None:
@@ -102,7 +102,7 @@ class House:
 
 
 class Camera:
-    """Sends pictures at a rate, and counts what comes back."""
+    """Send pictures at a rate, and count the outputs."""
 
     def __init__(self, rate: float) -> None:
         import actionlib
@@ -152,12 +152,12 @@ class Camera:
         self.boxes += len(message.bounding_boxes)  # type: ignore[attr-defined]
 
     def on_drawn(self, _: object) -> None:
-        """A drawn picture has come."""
+        """Count a drawn picture."""
         self.drawn += 1
 
 
 def disturb(camera: Camera, minute: int) -> None:
-    """What happens now and then: somebody looks at the drawn picture, asks by the action, switches off and on."""
+    """Occasional events: a subscriber of the drawn picture, goals of the action, switching off and on."""
     import rospy
     from darknet_ros_msgs.msg import CheckForObjectsGoal
     from sensor_msgs.msg import Image

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""How often the watch calls an empty house occupied, and finds who is there: full turns at places by chance.
+"""Error rates of the sightings: false alarms in an empty house, and people missed, over full turns at random places.
 
     benchmarks/watch.py [--world FILE] [--turns N] [--weights FILE] [--json FILE]
 
-The robot is put at N places of the house and turns once, a picture every 3 degrees as it would take them at 10 Hz;
-each goes through jpeg, the network and the watch, exactly as in the nodes, but without ROS and as fast as it goes.
-Every turn is made twice: nobody there, and with a person (look or posture that training never drew) 1 to 6 m off.
-Several settings of the watch are judged on the same boxes; the first is the one in config/tuned/watch.yaml.
+The robot is put at N places of the house and turns once, with a picture every 3 degrees, as at 10 Hz. Each picture goes
+through jpeg, the network and the sightings, exactly as in the nodes, but without ROS and as fast as possible. Every
+turn is made twice: with nobody, and with a person (with a look or posture that training never drew) 1 to 6 m away.
+Several settings are judged on the same boxes; the first is the one in config/tuned/watch.yaml.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ PERIOD = 0.1
 
 
 def make_engine(world: World) -> Engine:
-    """The world with the ROSbot in it, at the origin."""
+    """Make the world with the ROSbot at the origin."""
     engine = Engine(world, EngineParams(seed=1), make_renderer=lambda: make_renderer("egl"))
     engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
     return engine
 
 
 def is_inside(engine: Engine, place: Pose2D) -> bool:
-    """Whether a robot can stand and turn there, with walls about it."""
+    """Whether a robot can stand and turn there, with walls around it."""
     try:
         engine.carry(place)
     except WorldError:
@@ -64,7 +64,7 @@ def is_inside(engine: Engine, place: Pose2D) -> bool:
 
 
 def draw_places(engine: Engine, rng: np.random.Generator, count: int) -> Iterator[Pose2D]:
-    """Places by chance."""
+    """Draw random places."""
     segments = engine.ways.cut(engine.robot.lidar_height).segments.reshape(-1, 2)
     low, high = segments.min(axis=0), segments.max(axis=0)
     while count:
@@ -76,7 +76,7 @@ def draw_places(engine: Engine, rng: np.random.Generator, count: int) -> Iterato
 
 
 def place_person(engine: Engine, place: Pose2D, rng: np.random.Generator, looks: list[str]) -> bool:
-    """A person whom the robot could see from there; False where chance found no spot."""
+    """Place a person visible to the robot there; False if no place was found."""
     engine.carry(place)
     level = engine.level_scan()
     scan = level.scan
@@ -101,7 +101,7 @@ def place_person(engine: Engine, place: Pose2D, rng: np.random.Generator, looks:
 
 
 def turn(engine: Engine, detector: DarknetDetector, place: Pose2D) -> list[Frame]:
-    """Boxes of a full turn, the first half metre of arc repeated."""
+    """Boxes of a full turn, with the first half metre of arc repeated."""
     frames = []
     for i in range(round(360.0 / STEP_DEG) + 6):
         engine.carry(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
@@ -118,7 +118,7 @@ def turn(engine: Engine, detector: DarknetDetector, place: Pose2D) -> list[Frame
 
 
 def judge(params: SightingsParams, frames: list[Frame]) -> str:
-    """Class that the watch confirms on those pictures, "" for none."""
+    """Class that the sightings confirm on those pictures, "" for none."""
     watch = Sightings(CLASSES, params)
     watch.start(0.0)
     for frame in frames:
@@ -130,7 +130,7 @@ def judge(params: SightingsParams, frames: list[Frame]) -> str:
 
 
 def settings(weights_free: SightingsParams) -> dict[str, SightingsParams]:
-    """The shipped setting, and others beside it."""
+    """The shipped setting, and alternatives."""
     others = [(3, 5, 0.5), (3, 5, 0.65), (4, 6, 0.7), (5, 6, 0.7), (5, 6, 0.8)]
     named = {f"shipped: {weights_free.frames} of {weights_free.window} at {weights_free.min_score}": weights_free}
     for frames, window, score in others:
@@ -193,7 +193,7 @@ def main() -> None:
 
 
 def save(engine: Engine, place: Pose2D, frames: list[Frame], folder: Path) -> None:
-    """The picture with the surest false box of a turn."""
+    """Save the picture with the most probable false box of a turn."""
     i = max(range(len(frames)), key=lambda k: max((b.probability for b in frames[k].boxes), default=0.0))
     engine.carry(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
     colour = engine.picture(depth=False).colour[:, :, ::-1].copy()
