@@ -1,24 +1,24 @@
-// How long to wait before the next try: longer each time, and never the same for two sensors.
+// Waits between tries: longer each time, and never the same for two sensors.
 #pragma once
 
 #include <stdint.h>
 
 namespace patrol {
 
-/** Doubling waits with jitter, so that sensors that lost the same bridge do not come back in step. */
+/** Doubling waits with jitter, so that sensors that lost the same bridge do not reconnect in step. */
 class Backoff {
  public:
   /** The first wait and the longest one [ms], before jitter. */
   Backoff(uint32_t first, uint32_t longest) : first_(first), longest_(longest), base_(first) {}
 
-  /** The next wait [ms]: the base with up to half of it taken off or added; `random` is any number. */
+  /** The next wait [ms]: the base, reduced or increased by up to a half; `random` is any number. */
   uint32_t next(uint32_t random) {
     const uint32_t wait = base_ - base_ / 2 + random % (base_ + 1);
     base_ = base_ > longest_ / 2 ? longest_ : base_ * 2;
     return wait;
   }
 
-  /** Begin with the first wait again. */
+  /** Start with the first wait again. */
   void reset() { base_ = first_; }
 
  private:

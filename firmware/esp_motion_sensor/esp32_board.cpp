@@ -34,7 +34,7 @@ void IRAM_ATTR onRisingEdge() {
   if (woken == pdTRUE) portYIELD_FROM_ISR();
 }
 
-// An address in the house's own network wants IPv6 on Wi-Fi; Husarnet has an interface of its own.
+// An address in the house's own network needs IPv6 on Wi-Fi; Husarnet has its own interface.
 bool wantsIpv6() { return !USE_HUSARNET && strchr(BRIDGE_HOST, ':') != nullptr; }
 
 void startWatchdog(uint32_t timeout_s) {
@@ -56,7 +56,7 @@ void Esp32Board::begin(uint32_t watchdog_s) {
   Serial.setTxBufferSize(1024);  // so that a few lines at once do not wait for the port
   Serial.begin(115200);
   loop_task = xTaskGetCurrentTaskHandle();
-  pinMode(static_cast<uint8_t>(pir_pin_), INPUT_PULLDOWN);  // a broken wire is no motion
+  pinMode(static_cast<uint8_t>(pir_pin_), INPUT_PULLDOWN);  // a broken wire must not read as motion
   if (led_pin_ >= 0) pinMode(static_cast<uint8_t>(led_pin_), OUTPUT);
   attachInterrupt(digitalPinToInterrupt(static_cast<uint8_t>(pir_pin_)), onRisingEdge, RISING);
   startWatchdog(watchdog_s);
@@ -91,7 +91,7 @@ void Esp32Board::setLed(bool on) {
 }
 
 void Esp32Board::log(const char* line) {
-  // The serial port must not hold the loop either: what its buffer has no room for is left out.
+  // The serial port must not block the loop either: text beyond its buffer is dropped.
   if (Serial.availableForWrite() > static_cast<int>(strlen(line)) + 2) Serial.println(line);
 }
 
@@ -102,9 +102,9 @@ void Esp32Board::joinNetwork() {
     WiFi.disconnect();
   } else {
     wifi_begun_ = true;
-    WiFi.persistent(false);  // do not wear the flash out
+    WiFi.persistent(false);  // do not wear out the flash
     WiFi.mode(WIFI_STA);
-    WiFi.setSleep(false);  // asleep it would hear the bridge up to 0.3 s late
+    WiFi.setSleep(false);  // in sleep mode it would receive the bridge's data up to 0.3 s late
     WiFi.setAutoReconnect(true);
 #if ESP_IDF_VERSION_MAJOR >= 5  // Arduino core 3; core 2 wants it once Wi-Fi is up
     if (wantsIpv6()) WiFi.enableIPv6();

@@ -5,12 +5,12 @@
 
 namespace patrol {
 
-/** One board; its interrupt handler knows only one. */
+/** The board; the interrupt handler supports only one instance. */
 class Esp32Board final : public Board {
  public:
   Esp32Board(int pir_pin, int led_pin) : pir_pin_(pir_pin), led_pin_(led_pin) {}
 
-  /** Pins, interrupt, watchdog, log; once, from setup(). */
+  /** Set up pins, interrupt, watchdog and log; once, from setup(). */
   void begin(uint32_t watchdog_s);
 
   /** Rest for a moment; the motion interrupt ends it at once. */

@@ -1,6 +1,6 @@
 // A motion sensor of rosbot_patrol: ESP32 and HC-SR501. Wiring, flashing and settings: ../README.md
 //
-// Copy secrets.example.h to secrets.h and fill it in. Nothing else has to be installed.
+// Copy secrets.example.h to secrets.h and fill it in. There is nothing else to install.
 
 #include "esp32_board.h"
 #include "key_proof.h"

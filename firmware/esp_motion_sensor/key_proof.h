@@ -1,7 +1,7 @@
-// The pre-shared key: how a sensor proves who it is before anything is negotiated, and how the bridge does.
+// The pre-shared key: mutual proof of identity between sensor and bridge, before anything is negotiated.
 //
 // The bridge sends frame 8 (01 | 32 random bytes), the sensor answers frame 9 (01 | its id | 16 random bytes | HMAC),
-// and the bridge answers frame 9 (01 | HMAC). Both HMACs are SHA-256 over a text of their own, both nonces and the id.
+// and the bridge answers frame 9 (01 | HMAC). Each HMAC is SHA-256 over its own text, both nonces and the id.
 #pragma once
 
 #include <stddef.h>
@@ -19,17 +19,17 @@ constexpr size_t kChallengeSize = 1 + kServerNonceSize;
 constexpr size_t kProofSize = 1 + 1 + kDeviceNonceSize + kDigestSize;
 constexpr size_t kBridgeProofSize = 1 + kDigestSize;
 
-/** One exchange; holds what the bridge's answer is checked against. */
+/** One exchange, with the data to check the bridge's answer. */
 class KeyProof {
  public:
-  /** Answer a challenge (the 33 bytes of its frame); false where it is none of this version. */
+  /** Answer a challenge (the 33 bytes of its frame); false if it is not of this version. */
   bool answer(const uint8_t key[kKeySize], uint8_t sensor_id, const uint8_t* challenge, size_t size,
               const uint8_t device_nonce[kDeviceNonceSize], uint8_t proof[kProofSize]);
 
   /** Whether the bridge's answer proves that it knows the key; false without a challenge before it. */
   bool bridgeProves(const uint8_t* data, size_t size) const;
 
-  /** Forget the exchange, as on a new connection. */
+  /** Forget the exchange, for a new connection. */
   void clear() { asked_ = false; }
 
  private:
@@ -37,7 +37,7 @@ class KeyProof {
   bool asked_ = false;
 };
 
-/** A key from 64 hexadecimal digits; false where it is anything else. */
+/** A key from 64 hexadecimal digits; false for anything else. */
 bool parseKey(const char* hex, uint8_t key[kKeySize]);
 
 }  // namespace patrol

@@ -20,7 +20,7 @@ Motion MotionInput::update(bool level, uint64_t now) {
   switch (state_) {
     case State::kWarming:
       if (now < warm_at_) return Motion::kNothing;
-      state_ = level ? State::kActive : State::kIdle;  // what began while it was cold is no motion
+      state_ = level ? State::kActive : State::kIdle;  // a level that rose during the warm-up is no motion
       began_at_ = now;
       stuck_told_ = false;
       return Motion::kWarm;

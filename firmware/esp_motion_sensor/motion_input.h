@@ -1,22 +1,22 @@
-// The HC-SR501's output: which of its edges are motion.
+// Motion from the edges of the HC-SR501's output.
 #pragma once
 
 #include <stdint.h>
 
 namespace patrol {
 
-/** How the output is read [ms]. */
+/** Timing of the output [ms]. */
 struct MotionTiming {
-  uint32_t warm_up;  // after power on the module fires at random
-  uint32_t confirm;  // high for that long is motion, for less a spike (the module holds its output for seconds)
-  uint32_t release;  // low for that long ends a motion
-  uint32_t stuck;    // high for longer than that is told
+  uint32_t warm_up;  // after power on the module triggers at random
+  uint32_t confirm;  // high for this long is motion, shorter is a spike (the module holds its output for seconds)
+  uint32_t release;  // low for this long ends a motion
+  uint32_t stuck;    // high for longer is reported as stuck
 };
 
-/** What one `update` found. */
+/** Result of one `update`. */
 enum class Motion : uint8_t { kNothing, kWarm, kBegan, kEnded, kSpike, kStuck };
 
-/** Follows the output by its interrupt and its level; one `kBegan` for each time it goes high. */
+/** Follow the output by its interrupt and its level; one `kBegan` per time it goes high. */
 class MotionInput {
  public:
   explicit MotionInput(const MotionTiming& timing) : timing_(timing) {}
@@ -27,13 +27,13 @@ class MotionInput {
    */
   void begin(bool cold, uint64_t now);
 
-  /** The interrupt saw a rising edge. */
+  /** Record a rising edge seen by the interrupt. */
   void edge(uint64_t when);
 
-  /** Look at the level; call it often, as a motion is confirmed here. */
+  /** Check the level; call it often, because it confirms motions. */
   Motion update(bool level, uint64_t now);
 
-  /** When the motion told last began [ms]. */
+  /** Start time of the last reported motion [ms]. */
   uint64_t beganAt() const { return began_at_; }
 
   bool warming() const { return state_ == State::kWarming; }

@@ -5,17 +5,17 @@
 namespace patrol {
 namespace {
 
-constexpr uint32_t kNetworkFirst = 12000;  // joining Wi-Fi takes some seconds: to ask sooner would only begin anew
+constexpr uint32_t kNetworkFirst = 12000;  // joining Wi-Fi takes some seconds; an earlier retry would restart it
 constexpr uint32_t kNetworkLongest = 30000;
 constexpr uint32_t kLinkFirst = 250;
 constexpr uint32_t kLinkLongest = 8000;
 constexpr uint64_t kConnectTimeout = 5000;
-constexpr uint64_t kSendTimeout = 5000;     // without a byte taken the link is dead
-constexpr uint64_t kReceiptTimeout = 4000;  // for the answer behind a trigger
-constexpr uint64_t kStable = 10000;         // a connection that held that long makes the next wait short again
+constexpr uint64_t kSendTimeout = 5000;     // if no byte is sent for this long, the link is dead
+constexpr uint64_t kReceiptTimeout = 4000;  // for the answer to the time request behind a trigger
+constexpr uint64_t kStable = 10000;         // a connection of this length resets the backoff
 constexpr uint64_t kMotionShown = 1000;
 constexpr uint64_t kSpikePeriod = 60000;
-constexpr uint64_t kLate = 1000;            // a trigger told later than that is explained in the log
+constexpr uint64_t kLate = 1000;            // a later trigger is explained in the log
 constexpr int kReadsPerStep = 4;
 
 unsigned long seconds(uint64_t milliseconds) { return static_cast<unsigned long>(milliseconds / 1000); }
@@ -101,12 +101,12 @@ void MotionSensor::keepNetwork(uint64_t now) {
       say("Wi-Fi is there");
       network_backoff_.reset();
       link_backoff_.reset();
-      // After a power cut all sensors come up at once: not all in the same moment.
+      // After a power cut all sensors start at once: spread their first connections.
       link_due_ = pending_.raised ? now : now + board_.random() % (kLinkFirst + 1);
     } else {
       say("Wi-Fi is lost");
       if (link_state_ != LinkState::kClosed) loseLink("Wi-Fi is lost", now);
-      network_due_ = now + network_backoff_.next(board_.random());  // the Wi-Fi driver itself tries first
+      network_due_ = now + network_backoff_.next(board_.random());  // first the Wi-Fi driver itself retries
     }
   }
   if (!up && now >= network_due_) {
@@ -152,7 +152,7 @@ void MotionSensor::connecting(uint64_t now) {
 
 void MotionSensor::talk(uint64_t now) {
   uint8_t data[256];
-  for (int i = 0; i < kReadsPerStep; ++i) {  // bounded, so that a flood does not hold the loop
+  for (int i = 0; i < kReadsPerStep; ++i) {  // bounded, so that a flood does not block the loop
     const int count = link_.readSome(data, sizeof(data));
     if (count < 0) {
       loseLink(link_.error(), now);
@@ -205,7 +205,7 @@ void MotionSensor::report(uint64_t now) {
   const uint8_t id = config_.identity.sensor_id;
   if (pending_.raised) {
     const uint8_t message[2] = {id, 1};
-    if (!client_.publish(message, sizeof(message))) return;  // the output is full: with the next step
+    if (!client_.publish(message, sizeof(message))) return;  // the output is full: retry in the next step
     if (now - pending_.at > kLate) {
       say("motion of %lu s ago is told now, %lu in all", seconds(now - pending_.at),
           static_cast<unsigned long>(late_motions_));
@@ -257,7 +257,7 @@ void MotionSensor::loseLink(const char* why, uint64_t now) {
   if (held && now - link_since_ > kStable) link_backoff_.reset();
   link_state_ = LinkState::kClosed;
   was_configured_ = false;
-  if (in_flight_.raised) {  // nobody knows whether it arrived: better twice than never (pending_.at is its time still)
+  if (in_flight_.raised) {  // its arrival is unknown: better twice than never (pending_.at is still its time)
     pending_.raised = true;
     ++late_motions_;
     in_flight_.raised = false;
@@ -292,7 +292,7 @@ void MotionSensor::tellBridge(LogLevel level, const char* format, ...) {
   va_start(arguments, format);
   vsnprintf(line, sizeof(line), format, arguments);
   va_end(arguments);
-  client_.log(level, line);  // best effort: what the bridge must know is in its messages
+  client_.log(level, line);  // best effort: the messages contain everything that the bridge must know
 }
 
 }  // namespace patrol

@@ -1,4 +1,4 @@
-// The sensor: motion in, EspTrigger out, over a link that may go at any time.
+// The sensor: motion in, EspTrigger out, over a link that may break at any time.
 #pragma once
 
 #include <stdarg.h>
@@ -18,11 +18,11 @@ struct SensorConfig {
   Publisher publisher;
   Identity identity;
   MotionTiming motion;
-  uint32_t heartbeat;        // between two messages
-  uint32_t trigger_max_age;  // a motion that could not be told for longer is dropped
+  uint32_t heartbeat;        // time between two messages
+  uint32_t trigger_max_age;  // a motion that could not be sent for longer is dropped
 };
 
-/** Call `begin` once and `step` for ever; neither waits. */
+/** Call `begin` once and `step` forever; neither blocks. */
 class MotionSensor {
  public:
   MotionSensor(const SensorConfig& config, Board& board, Link& link);
@@ -30,7 +30,7 @@ class MotionSensor {
   void begin();
   void step();
 
-  /** How long the loop may rest before the next `step` [ms]; an interrupt should end the rest. */
+  /** Longest rest of the loop before the next `step` [ms]; an interrupt should end the rest. */
   uint32_t restFor() const { return input_.deciding() ? 1 : 2; }
 
   const MotionInput& input() const { return input_; }
@@ -41,8 +41,8 @@ class MotionSensor {
   /** A motion on its way to the bridge. */
   struct Trigger {
     bool raised = false;
-    uint64_t at = 0;       // when the motion began
-    uint32_t receipt = 0;  // the time request behind it
+    uint64_t at = 0;       // start of the motion
+    uint32_t receipt = 0;  // number of the time request behind it
     uint64_t sent_at = 0;
   };
 
@@ -75,7 +75,7 @@ class MotionSensor {
   bool plain_told_ = false;
   Trigger pending_;
   Trigger in_flight_;
-  uint32_t late_motions_ = 0;  // motions that the pending trigger stands for
+  uint32_t late_motions_ = 0;  // motions that the pending trigger represents
   uint32_t connections_ = 0;
   uint32_t spikes_ = 0;
   uint64_t network_due_ = 0;

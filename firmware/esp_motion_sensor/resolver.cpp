@@ -67,7 +67,7 @@ void Resolver::lookUp() {
   hints.ai_family = AF_UNSPEC;
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
-  if (lwip_getaddrinfo(host_, nullptr, &hints, &found) != 0) {  // then what was known before is still worth a try
+  if (lwip_getaddrinfo(host_, nullptr, &hints, &found) != 0) {  // the earlier addresses are still worth a try
     state_.store(count_ > 0 ? ResolverState::kKnown : ResolverState::kFailed, std::memory_order_release);
     return;
   }

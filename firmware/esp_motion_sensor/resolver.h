@@ -1,4 +1,4 @@
-// Names to addresses, on a task of its own: lwIP's look-up waits, and the sensor must not.
+// Host names to addresses, in a task of its own: lwIP's look-up blocks, and the sensor must not.
 #pragma once
 
 #include <lwip/netdb.h>
@@ -17,7 +17,7 @@ struct Address {
 
 enum class ResolverState : uint8_t { kAsking, kKnown, kFailed };
 
-/** Looks up one name; an IPv4 or IPv6 address in figures needs no look-up, and then no task is started. */
+/** Look up one name; a numeric IPv4 or IPv6 address needs no look-up, and then no task is started. */
 class Resolver {
  public:
   Resolver(const char* host, uint16_t port) : host_(host), port_(port) {}
@@ -32,7 +32,7 @@ class Resolver {
   /** One of the addresses, in turn; only while `state` is kKnown. */
   const Address& address(unsigned index) const { return addresses_[index % count_]; }
 
-  /** The address did not answer: look the name up again next time. */
+  /** Report that the address did not answer: the name is looked up again next time. */
   void doubt() { doubtful_ = true; }
 
  private:

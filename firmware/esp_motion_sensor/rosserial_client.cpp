@@ -11,7 +11,7 @@ constexpr uint64_t kNegotiationTimeout = 15000;  // upstream's server asks after
 constexpr uint64_t kFrameTimeout = 1000;         // a frame that stalls for longer is given up
 constexpr size_t kMaxLog = 160;
 
-/** Serialises a message as ROS 1 does; remembers that it did not fit. */
+/** Serialise a message as ROS 1 does; remember whether it fitted. */
 class Writer {
  public:
   Writer(uint8_t* out, size_t room) : out_(out), room_(room) {}
@@ -107,7 +107,7 @@ bool RosserialClient::log(LogLevel level, const char* text) {
 uint32_t RosserialClient::requestTime(uint64_t now) {
   const uint8_t zero[8] = {0};
   last_request_ = now;
-  if (!put(kTopicTime, zero, sizeof(zero))) return requests_ + 1;  // no room: the next one will do
+  if (!put(kTopicTime, zero, sizeof(zero))) return requests_ + 1;  // no room: the next request will succeed
   return ++requests_;
 }
 
@@ -134,7 +134,7 @@ void RosserialClient::frame(const Frame& frame, uint64_t now) {
     case kTopicProof:
       bridgeProof(frame);
       break;
-    default:  // nothing is subscribed: whatever this is, it is not for a sensor
+    default:  // nothing is subscribed, so other messages are not for a sensor
       break;
   }
 }
@@ -152,7 +152,7 @@ void RosserialClient::topicsAsked(uint64_t now) {
   info.text(publisher_.md5);
   info.u32(static_cast<uint32_t>(publisher_.buffer_size));
   requestTime(now);
-  if (!info.fits() || !put(kTopicPublisher, data, info.size())) return;  // the output is full: it will ask again
+  if (!info.fits() || !put(kTopicPublisher, data, info.size())) return;  // output full: it will ask again
   if (!configured_) last_answer_ = now;
   configured_ = true;
 }

@@ -1,7 +1,7 @@
 // A rosserial device without sockets: bytes in, bytes out. One publisher, time, log and the key.
 //
-// Behaves towards the bridge as rosserial's NodeHandle does: answers a topic request with a time request and its topic,
-// asks for the time every 2.5 s, and gives a connection up after 11 s without an answer.
+// It behaves towards the bridge like rosserial's NodeHandle: it answers a topic request with a time request and its
+// topic, asks for the time every 2.5 s, and gives up a connection after 11 s without an answer.
 #pragma once
 
 #include <stddef.h>
@@ -12,7 +12,7 @@
 
 namespace patrol {
 
-/** Topic ids with a meaning of their own (rosserial_msgs/TopicInfo), and the two of the key. */
+/** Topic ids with a fixed meaning (rosserial_msgs/TopicInfo), and the two of the key. */
 enum TopicId : uint16_t {
   kTopicPublisher = 0,
   kTopicLog = 7,
@@ -25,7 +25,7 @@ enum TopicId : uint16_t {
 /** Levels of rosserial_msgs/Log. */
 enum class LogLevel : uint8_t { kDebug = 0, kInfo = 1, kWarn = 2, kError = 3, kFatal = 4 };
 
-/** The one topic that is published. */
+/** The only published topic. */
 struct Publisher {
   uint16_t id;
   const char* name;
@@ -34,14 +34,14 @@ struct Publisher {
   int32_t buffer_size;
 };
 
-/** The sensor's own side of the key. */
+/** The sensor's side of the key. */
 struct Identity {
   uint8_t sensor_id;
   const uint8_t* key;  // kKeySize bytes, or null
-  bool insist;         // talk to no bridge that has not proved that it knows the key
+  bool insist;         // refuse a bridge that has not proved that it knows the key
 };
 
-/** Where random bytes come from. */
+/** Source of random bytes. */
 class RandomSource {
  public:
   virtual void fill(uint8_t* data, size_t size) = 0;
@@ -50,33 +50,33 @@ class RandomSource {
   ~RandomSource() = default;
 };
 
-/** One device; `begin` at each new connection. All times are milliseconds of one clock that does not wrap. */
+/** One device; call `begin` for each new connection. All times are milliseconds of one clock without wrap-around. */
 class RosserialClient {
  public:
   RosserialClient(const Publisher& publisher, const Identity& identity, RandomSource& random);
 
-  /** A connection was made. */
+  /** Start a new connection. */
   void begin(uint64_t now);
 
-  /** Bytes came from the bridge. */
+  /** Process bytes from the bridge. */
   void receive(const uint8_t* data, size_t size, uint64_t now);
 
-  /** Ask for the time where it is due; notice what did not come. */
+  /** Send due time requests; detect missing answers. */
   void tick(uint64_t now);
 
-  /** Whether the bridge was told the topic, so that messages go through. */
+  /** Whether the bridge knows the topic, so that it accepts messages. */
   bool configured() const { return configured_; }
 
-  /** Why the connection is not worth keeping, null while it is. */
+  /** Reason to give up the connection, null if there is none. */
   const char* fault() const { return fault_; }
 
   /** Whether the bridge has proved that it knows the key. */
   bool bridgeProven() const { return proven_; }
 
-  /** Queue a message; false where the topic is not negotiated or the output is full. */
+  /** Queue a message; false if the topic is not negotiated or the output is full. */
   bool publish(const uint8_t* data, size_t size);
 
-  /** Queue a line for the bridge's log; false as `publish`, and where it does not fit. */
+  /** Queue a line for the bridge's log; false as in `publish`, and if it does not fit. */
   bool log(LogLevel level, const char* text);
 
   /**
@@ -88,20 +88,20 @@ class RosserialClient {
   /** Whether that request was answered. */
   bool answered(uint32_t request) const { return answers_ >= request; }
 
-  /** Whether the bridge has told the time. */
+  /** Whether the bridge has sent the time. */
   bool knowsTime() const { return knows_time_; }
 
-  /** The bridge's time [ms since 1970]; it lags by the way back of the answer. */
+  /** The bridge's time [ms since 1970]; it lags by the answer's travel time. */
   uint64_t bridgeTime(uint64_t now) const { return bridge_time_ + (now - bridge_time_at_); }
 
   /** Bytes to send, and how many. */
   const uint8_t* output() const { return output_; }
   size_t outputSize() const { return output_size_; }
 
-  /** The first bytes of the output have been sent. */
+  /** Remove the first bytes of the output, which have been sent. */
   void sent(size_t count);
 
-  /** Bytes of all connections that were no frame. */
+  /** Bytes of all connections that were not part of a frame. */
   uint32_t garbage() const { return parser_.garbage(); }
 
  private:

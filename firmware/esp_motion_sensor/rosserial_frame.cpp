@@ -15,7 +15,7 @@ uint8_t sumOf(const uint8_t* data, size_t size) {
   return static_cast<uint8_t>(sum);
 }
 
-/** Whether a frame may begin here; the second sync byte may not have come yet. */
+/** Whether a frame may begin here; the second sync byte may still be missing. */
 bool mayBegin(const uint8_t* data, size_t size) { return data[0] == kSync && (size < 2 || data[1] == kProtocol); }
 
 uint8_t checksum(const uint8_t* data, size_t size) { return static_cast<uint8_t>(255 - sumOf(data, size)); }

@@ -8,12 +8,12 @@
 namespace patrol {
 
 constexpr size_t kFrameOverhead = 8;
-constexpr size_t kMaxReceived = 128;  // longest payload taken from a bridge; the longest that a sensor needs has 33
+constexpr size_t kMaxReceived = 128;  // longest accepted payload from a bridge; the longest needed has 33
 
-/** Write one frame to `out`; returns its size, 0 where it does not fit into `room`. */
+/** Write one frame to `out`; returns its size, 0 if it does not fit into `room`. */
 size_t encodeFrame(uint16_t topic_id, const uint8_t* data, size_t size, uint8_t* out, size_t room);
 
-/** One frame; `data` points into the parser and holds until its next call. */
+/** One frame; `data` points into the parser and is valid until its next call. */
 struct Frame {
   uint16_t topic_id;
   const uint8_t* data;
@@ -21,27 +21,27 @@ struct Frame {
 };
 
 /**
- * Turns a stream of bytes into frames. What is no frame is skipped: the search goes on right behind the sync bytes that
- * failed, so a frame that was cut off costs itself only. A frame longer than `kMaxReceived` counts as none.
+ * Parser of a byte stream into frames. Other bytes are skipped: the search continues directly behind the failed sync
+ * bytes, so a truncated frame costs only itself. A frame longer than `kMaxReceived` counts as none.
  */
 class FrameParser {
  public:
-  /** Forget what has begun, as on a new connection. */
+  /** Forget an incomplete frame, for a new connection. */
   void clear() { size_ = taken_ = 0; }
 
-  /** Take bytes; returns how many were taken, at least one of them once `next` has returned false. */
+  /** Add bytes; returns how many were accepted, at least one after `next` has returned false. */
   size_t write(const uint8_t* data, size_t size);
 
-  /** The next whole frame, false where there is none yet. */
+  /** The next complete frame, false if there is none yet. */
   bool next(Frame* frame);
 
-  /** Stop waiting for the rest of the frame that has begun: go on behind its first byte. */
+  /** Give up waiting for the rest of an incomplete frame: continue behind its first byte. */
   void giveUp();
 
   /** Whether a frame has begun and not ended. */
   bool pending() const { return size_ > taken_; }
 
-  /** Bytes skipped so far because they belonged to no frame. */
+  /** Number of skipped bytes that were not part of a frame. */
   uint32_t garbage() const { return garbage_; }
 
  private:
@@ -50,7 +50,7 @@ class FrameParser {
 
   uint8_t buffer_[kMaxReceived + kFrameOverhead] = {0};
   size_t size_ = 0;
-  size_t taken_ = 0;  // bytes of the frame given last, dropped at the next call
+  size_t taken_ = 0;  // bytes of the last returned frame, removed at the next call
   uint32_t garbage_ = 0;
 };
 

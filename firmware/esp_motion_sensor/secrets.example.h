@@ -4,7 +4,7 @@
 #define WIFI_SSID "your network"
 #define WIFI_PASSWORD "its password"
 
-// The computer that runs serial_node.py: an IPv4 or IPv6 address, or a name that DNS knows. The port is that of
+// The computer that runs serial_node.py: an IPv4 or IPv6 address, or a name that DNS resolves. The port is that of
 // esp_connector.launch (11411, 11412, 11413), or the same one for all sensors.
 #define BRIDGE_HOST "192.168.1.10"
 #define BRIDGE_PORT 11411
@@ -12,11 +12,11 @@
 // The number of the room that this sensor watches, 0 to 255.
 #define SENSOR_ID 1
 
-// The key that `rosrun rosbot_patrol sensor_key ID` printed: 64 hexadecimal digits, another one for each sensor.
-// Without it the sensor proves nothing, and a bridge with keys turns it away.
+// The key printed by `rosrun rosbot_patrol sensor_key ID`: 64 hexadecimal digits, different for each sensor.
+// Without it the sensor proves nothing, and a bridge with keys refuses it.
 // #define SENSOR_KEY "..."
 
-// true: talk to no bridge that does not prove that it knows this key.
+// true: refuse a bridge that does not prove that it knows this key.
 // #define INSIST_ON_KEY true
 
 // #define PIR_PIN 27  // GPIO of the HC-SR501's output

@@ -1,4 +1,4 @@
-// The settings of this sensor: secrets.h, and defaults for what it leaves out.
+// The settings of this sensor: secrets.h, with defaults for missing values.
 #pragma once
 
 #if defined(PATROL_SECRETS_FILE)
@@ -85,7 +85,7 @@ namespace patrol {
 constexpr char kEspTriggerMd5[] = "95f4bf9b776b2424e3a9da1182e3a9d2";
 constexpr uint16_t kPublisherId = 125;
 
-/** The settings as the sensor takes them; `key` is null or the parsed SENSOR_KEY. */
+/** The sensor's settings; `key` is null or the parsed SENSOR_KEY. */
 inline SensorConfig sensorConfig(const uint8_t* key) {
   SensorConfig config = {};
   config.publisher = {kPublisherId, TOPIC, TOPIC_TYPE, kEspTriggerMd5, 512};

@@ -36,7 +36,7 @@ class HmacSha256 {
   Sha256 outer_;
 };
 
-/** Whether two digests are the same, in a time that does not tell where they differ. */
+/** Compare two digests in constant time. */
 bool sameDigest(const uint8_t* a, const uint8_t* b);
 
 }  // namespace patrol

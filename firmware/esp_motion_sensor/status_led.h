@@ -1,11 +1,11 @@
-// What the LED says.
+// Patterns of the status LED.
 #pragma once
 
 #include <stdint.h>
 
 namespace patrol {
 
-/** Ordered by what is shown first. */
+/** In order of priority. */
 enum class SensorState : uint8_t { kMotion, kNoNetwork, kNoBridge, kWarming, kGuarding };
 
 /** Whether the LED is on at a time [ms]. */

@@ -8,7 +8,7 @@
 namespace patrol {
 namespace {
 
-/** Best effort: a link without an option still works. */
+/** Best effort: a link without the option still works. */
 void setOption(int socket, int level, int option, int value) {
   lwip_setsockopt(socket, level, option, &value, sizeof(value));
 }
@@ -85,7 +85,7 @@ void TcpLink::connectTo(const Address& address) {
     failed("fcntl", errno);
     return;
   }
-  setOption(socket_, IPPROTO_TCP, TCP_NODELAY, 1);  // each frame at once, in a segment of its own
+  setOption(socket_, IPPROTO_TCP, TCP_NODELAY, 1);  // send each frame at once, in its own segment
   const sockaddr* const where = reinterpret_cast<const sockaddr*>(&address.storage);
   if (lwip_connect(socket_, where, address.size) != 0 && errno != EINPROGRESS) failed("connect", errno);
 }
@@ -97,7 +97,7 @@ LinkState TcpLink::failed(const char* what, int code) {
     snprintf(error_, sizeof(error_), "%s", what);
   }
   hangUp();
-  resolver_.doubt();  // the bridge may have got another address
+  resolver_.doubt();  // the bridge may have a new address
   return state_;
 }
 

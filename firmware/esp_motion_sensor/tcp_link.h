@@ -1,4 +1,4 @@
-// The connection to the bridge over lwIP's sockets: IPv4 and IPv6, and no call that waits.
+// The connection to the bridge through lwIP's sockets: IPv4 and IPv6, without blocking calls.
 #pragma once
 
 #include <stdint.h>
@@ -8,12 +8,12 @@
 
 namespace patrol {
 
-/** Connects to `host` (an address or a name) and `port`; the addresses of a name are tried in turn. */
+/** Connect to `host` (an address or a name) and `port`; a name's addresses are tried in turn. */
 class TcpLink final : public Link {
  public:
   TcpLink(const char* host, uint16_t port) : resolver_(host, port) {}
 
-  /** Start what has to run beside the loop: the look-up of a name. */
+  /** Start the task beside the loop: the look-up of a name. */
   void begin() { resolver_.begin(); }
 
   void dial() override;

@@ -1,5 +1,5 @@
-// Feeds a client with damaged conversations: it must never crash, never send what is no frame, and never give its
-// topics to a bridge without proof when it insists on one.
+// Fuzzer of the client with damaged conversations: it must never crash, never send an invalid frame, and never reveal
+// its topics to a bridge without proof if it insists on one.
 //
 // usage: fuzz_client [INPUTS [SEED]]     mutated frames, by default 100000
 // With clang and libFuzzer: clang++ -DPATROL_LIBFUZZER -fsanitize=fuzzer,address,undefined ... (see firmware/README.md)
@@ -28,7 +28,7 @@ void must(bool good, const char* what) {
   abort();
 }
 
-/** All that is sent has to be whole frames. */
+/** Check that all sent bytes are complete frames. */
 void drain(patrol::RosserialClient* client, patrol::FrameParser* sent) {
   must(client->outputSize() <= 512, "the output is bounded");
   patrol::Frame frame;

@@ -1,10 +1,10 @@
-// The sketch as a program: real sockets, its pin and its troubles from lines on stdin.
+// The sketch as a program: real sockets; its pin and faults are controlled by lines on stdin.
 //
-//   motion 0|1   the PIR's output; on 1 it says "edge NANOSECONDS" (CLOCK_MONOTONIC) and calls the interrupt
+//   motion 0|1   the PIR's output; on 1 it prints "edge NANOSECONDS" (CLOCK_MONOTONIC) and calls the interrupt
 //   spike MS     high for MS milliseconds
 //   wifi 0|1     Wi-Fi down, up
-//   cable 0|1    cut (packets vanish without a word), plugged in
-//   reset        starts anew as the board does: the bridge is told nothing, the connection hangs about
+//   cable 0|1    cut (packets vanish silently), plugged in
+//   reset        restarts like the board: the bridge is not told, the connection stays open
 //   break        the same in the middle of a frame
 //   quit
 #include <getopt.h>
@@ -35,7 +35,7 @@ const char kUsage[] =
     "usage: esp_motion_sensor [--host NAME] [--port N] [--id N] [--key HEX [--insist]] [--warm-up MS] [--max-age MS]\n"
     "                         [--clock MS] [--after-reset]\n";
 
-/** A number from an argument; ends the program where it is none or too large. */
+/** A number from an argument; ends the program if it is invalid or too large. */
 uint32_t number(const char* text, uint32_t highest) {
   char* end = nullptr;
   const unsigned long value = strtoul(text, &end, 10);
@@ -46,7 +46,7 @@ uint32_t number(const char* text, uint32_t highest) {
   return static_cast<uint32_t>(value);
 }
 
-/** Runs before the sketch's global objects are made, as those read the options. */
+/** Runs before the sketch's global objects are constructed, because those read the options. */
 __attribute__((constructor(101))) void readOptions(int count, char** values, char**) {
   arguments = values;
   host::Options& to = host::options();
@@ -83,7 +83,7 @@ void sayEdge() {
   static char after_reset[] = "--after-reset";
   values[count++] = after_reset;
   values[count] = nullptr;
-  execv("/proc/self/exe", values);  // sockets stay open: a board that resets closes nothing either
+  execv("/proc/self/exe", values);  // sockets stay open: a board's reset closes nothing either
   perror("execv");
   _exit(1);
 }
@@ -113,7 +113,7 @@ void obey(const char* line) {
   }
 }
 
-/** Reads without a buffer, so that a start anew loses no line. */
+/** Unbuffered reader, so that a restart loses no line. */
 void listen() {
   char line[128];
   size_t filled = 0;
@@ -125,7 +125,7 @@ void listen() {
     filled = 0;
     obey(line);
   }
-  _exit(0);  // whoever started it has gone
+  _exit(0);  // the parent process has gone
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// lwIP's calls by the host's sockets, with a cable that can be cut.
+// lwIP's calls through the host's sockets, with a cable that can be cut.
 #include <errno.h>
 #include <fcntl.h>
 #include <lwip/netdb.h>
@@ -17,7 +17,7 @@ std::atomic<bool> cut(false);
 std::atomic<bool> half(false);
 std::atomic<bool> half_done(false);
 
-// What a stack holds back while no packet gets through, and sends again when one does; used on the loop's thread only.
+// Data that the stack holds back while no packet gets through, and sends later; used by the loop's thread only.
 constexpr size_t kSendBuffer = 5744;
 std::map<int, std::vector<char>> held;
 
@@ -34,7 +34,7 @@ ssize_t hold(int socket, const void* data, size_t size) {
   return static_cast<ssize_t>(size);
 }
 
-/** Send what was held back; false where it does not go. */
+/** Send the data held back; false if that is impossible. */
 bool release(int socket, int flags) {
   const auto buffer = held.find(socket);
   if (buffer == held.end()) return true;
@@ -86,7 +86,7 @@ ssize_t lwip_send(int socket, const void* data, size_t size, int flags) {
 }
 int lwip_close(int socket) {
   held.erase(socket);
-  // With the cable cut no farewell reaches the bridge: the socket stays as it is until the program ends.
+  // With the cable cut no FIN reaches the bridge: the socket stays open until the program ends.
   return cut ? 0 : close(socket);
 }
 int lwip_inet_pton(int family, const char* text, void* address) { return inet_pton(family, text, address); }

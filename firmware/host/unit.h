@@ -1,4 +1,4 @@
-// A test framework of a few lines: TEST(name) { CHECK(...); EQUAL(a, b); }
+// A minimal test framework: TEST(name) { CHECK(...); EQUAL(a, b); }
 #pragma once
 
 #include <stdint.h>

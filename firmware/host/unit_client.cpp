@@ -92,7 +92,7 @@ TEST(long_log_lines_and_a_full_output_are_refused_not_cut) {
   while (peer.client.publish(message, 2)) ++queued;
   CHECK(queued > 30 && peer.client.outputSize() <= 512);
   const uint32_t receipt = peer.client.requestTime(11);
-  CHECK(!peer.client.answered(receipt));  // it could not be asked: no answer so far stands for it
+  CHECK(!peer.client.answered(receipt));  // the request could not be sent, so no earlier answer counts for it
   peer.tell(kTime, 12);
   CHECK(!peer.client.answered(receipt));
 }
@@ -141,7 +141,7 @@ TEST(an_answer_is_a_receipt_for_what_was_sent_before_it) {
   CHECK(!peer.client.answered(receipt));
   peer.tell(kTime, 40);
   CHECK(peer.client.answered(receipt));
-  peer.tell(kTime, 50);  // nobody asked
+  peer.tell(kTime, 50);  // unrequested
   CHECK(!peer.client.answered(receipt + 1));
 }
 
@@ -262,7 +262,7 @@ TEST(who_insists_talks_to_no_bridge_without_proof) {
 
 TEST(without_insisting_a_bridge_without_keys_will_do) {
   Peer peer(true);
-  peer.tell(frame(9, bytes(kBridgeProof)), 5);  // nobody asked
+  peer.tell(frame(9, bytes(kBridgeProof)), 5);  // unrequested
   CHECK(!peer.client.bridgeProven());
   peer.tell(kTopics, 10);
   CHECK(peer.client.configured());

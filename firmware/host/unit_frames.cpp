@@ -15,7 +15,7 @@ Bytes encoded(uint16_t id, const Bytes& data) {
   return out;
 }
 
-/** What a parser finds in a stream that comes in pieces: "id:hex id:hex ". */
+/** Frames that a parser finds in a stream given in pieces: "id:hex id:hex ". */
 std::string parsed(patrol::FrameParser* parser, const Bytes& stream, size_t piece) {
   std::string found;
   patrol::Frame frame;
@@ -69,10 +69,10 @@ TEST(garbage_costs_itself_only) {
   const Bytes good = encoded(10, Bytes(8, 3));
   const std::string expected = "10:0303030303030303 ";
   EQUAL(parsed(bytes("00 ff ff fe 12 34 ff") + good), expected);
-  EQUAL(parsed(bytes("ff fe 08 00 f7 0a 00 01") + good), expected);  // cut off
+  EQUAL(parsed(bytes("ff fe 08 00 f7 0a 00 01") + good), expected);  // truncated
   EQUAL(parsed(bytes("ff fe ff 7f 81") + good), expected);            // announces 32767 bytes
   EQUAL(parsed(bytes("ff") + good), expected);
-  EQUAL(parsed(encoded(10, Bytes(129, 0)) + good), expected);         // longer than a sensor takes
+  EQUAL(parsed(encoded(10, Bytes(129, 0)) + good), expected);         // longer than a sensor accepts
   Bytes wrong = good;
   wrong[9] = static_cast<uint8_t>(wrong[9] ^ 1);
   EQUAL(parsed(wrong + good), expected);

@@ -1,4 +1,4 @@
-// Runs the tests named on the command line, or all of them; exit status 1 where one failed.
+// Run the tests named on the command line, or all of them; exit status 1 after a failure.
 #include <stdio.h>
 #include <string.h>
 

@@ -1,4 +1,4 @@
-// Debounce, warm-up, the clock's wrap and the waits between tries.
+// Debounce, warm-up, the clock's wrap-around and the waits between tries.
 #include "backoff.h"
 #include "clock.h"
 #include "motion_input.h"
@@ -12,7 +12,7 @@ namespace {
 
 constexpr patrol::MotionTiming kTiming = {60000, 5, 50, 600000};
 
-/** Update every millisecond; returns when something other than nothing was found, -1 for never. */
+/** Update every millisecond; returns the time of the first event, -1 for never. */
 int64_t until(MotionInput* input, bool level, uint64_t from, uint64_t to, Motion expected) {
   for (uint64_t now = from; now <= to; ++now) {
     const Motion found = input->update(level, now);
@@ -54,7 +54,7 @@ TEST(a_level_without_an_interrupt_counts_too) {
 TEST(spikes_are_no_motion) {
   MotionInput input = idle();
   input.edge(100);
-  CHECK(input.update(false, 101) == Motion::kSpike);  // gone before anyone looked
+  CHECK(input.update(false, 101) == Motion::kSpike);  // over before the first check
   input.edge(200);
   CHECK(input.update(true, 202) == Motion::kNothing);
   CHECK(input.update(false, 204) == Motion::kSpike);
@@ -121,7 +121,7 @@ TEST(the_clock_counts_on_where_the_board_wraps) {
   EQUAL(clock.update(0xFFFFFFFFU), 255U);
   EQUAL(clock.update(0x00000010U), 272U);
   EQUAL(clock.timeOf(0xFFFFFFF0U), 240U);  // an interrupt before the wrap
-  EQUAL(clock.timeOf(0x00000011U), 272U);  // one newer than the reading
+  EQUAL(clock.timeOf(0x00000011U), 272U);  // newer than the reading
   uint64_t expected = 272;
   uint32_t raw = 0x10;
   for (int day = 0; day < 200; ++day) {

@@ -1,4 +1,4 @@
-// The whole sensor on a board, a link and a bridge of the test's own, millisecond by millisecond.
+// The whole sensor with the test's own board, link and bridge, millisecond by millisecond.
 #include <string.h>
 
 #include <deque>
@@ -50,14 +50,14 @@ struct FakeBoard final : patrol::Board {
   }
 };
 
-/** The link and the bridge at its end. */
+/** The link, and the bridge at its other end. */
 struct FakeBridge final : patrol::Link {
   bool reachable = true;   // connects succeed
   bool refuses = false;    // connects fail at once
-  bool hears = true;       // what is sent arrives, what it says too
+  bool hears = true;       // data arrives in both directions
   bool takes = true;       // there is room to send
   bool answers = true;     // tells the time
-  bool closes = false;     // says goodbye
+  bool closes = false;     // closes the connection
   int opened = 0;
   LinkState state = LinkState::kClosed;
   patrol::FrameParser parser;
@@ -405,7 +405,7 @@ TEST(spikes_are_told_once_a_minute) {
   EQUAL(lines, 1U);
 }
 
-/** A bridge and a link to which something happens every few seconds, until `calm_from`. */
+/** A bridge and a link with an event every few seconds, until `calm_from`. */
 struct Trouble {
   explicit Trouble(uint32_t seed) : state(seed * 2654435761U) {}
 
@@ -423,7 +423,7 @@ struct Trouble {
     const bool was_cut = cut;
     cut = !calm && random(3) == 0;
     bridge.refuses = !calm && random(4) == 0;
-    bridge.closes = was_cut || bridge.refuses;  // TCP does not come back from a cut as if nothing had been
+    bridge.closes = was_cut || bridge.refuses;  // after a cut TCP does not resume as if nothing had happened
     bridge.hears = bridge.reachable = !cut;
     bridge.takes = calm || random(6) != 0;
     world->board.up = calm || random(8) != 0;
@@ -441,13 +441,13 @@ struct Trouble {
 TEST(whatever_happens_to_the_link_no_motion_is_lost) {
   int reconnects = 0;
   for (uint32_t seed = 1; seed <= 12; ++seed) {
-    World world(0xFFFFFFFFU - 300000U);  // it wraps on the way
+    World world(0xFFFFFFFFU - 300000U);  // it wraps during the test
     world.board.seed = seed;
     Trouble trouble(seed);
     uint32_t move_at = 2000;
     uint32_t moved_at = 0;
     uint32_t motions = 0;
-    bool waiting = false;  // for a motion to be told
+    bool waiting = false;  // for a motion to be reported
     for (uint32_t now = 0; now < 630000; ++now) {
       trouble.step(&world, now, now >= 600000);
       if (now == move_at && now < 600000) {
@@ -463,7 +463,7 @@ TEST(whatever_happens_to_the_link_no_motion_is_lost) {
       const int before = world.bridge.triggers();
       world.run(1);
       if (world.bridge.triggers() > before) waiting = false;
-      if (world.said("is dropped")) waiting = false;  // it says so, which is all that it can do after a minute
+      if (world.said("is dropped")) waiting = false;  // after a minute it can only log this
       world.board.lines.clear();
       if (waiting && now - trouble.good_since > 20000 && now - moved_at > 20000) {
         CHECK(!"a motion is told 20 s after the link is well");

@@ -1,4 +1,4 @@
-// Stand-in for the ESP32 Arduino core: what the sketch calls of it, declared as there; board.cpp fakes it.
+// Stand-in for the ESP32 Arduino core: the functions that the sketch calls; board.cpp fakes them.
 #pragma once
 
 #include <stddef.h>

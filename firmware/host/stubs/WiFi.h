@@ -1,4 +1,4 @@
-// Stand-in for the ESP32 core's Wi-Fi: up or down as the test says.
+// Stand-in for the ESP32 core's Wi-Fi: up or down as the test sets it.
 #pragma once
 
 typedef enum { WL_IDLE_STATUS = 0, WL_CONNECTED = 3, WL_CONNECTION_LOST = 5, WL_DISCONNECTED = 6 } wl_status_t;
