@@ -24,7 +24,7 @@ from rosbot_patrol.ros.campaign.house import House, HouseError, Master, child_pi
 from rosbot_patrol.ros.campaign.mail_sink import MailSink
 
 HOUSE = "flat"  # its rooms are close together: short patrols
-PATROLS = 4  # in one life
+PATROLS = 4  # number per life
 READY, ENDS, MOMENT, DELIVERED = 120.0, 240.0, 60.0, 40.0  # longest waits [s]
 FORGOTTEN = 20.0  # time at rest after which a patrol has forgotten a call [s]
 JOURNAL = "journal.jsonl"
@@ -34,10 +34,10 @@ class CrashLife:
     """A house from its start until everything is killed, or its patrols are over.
 
     Args:
-        folder: with the journal, the guard's state and the mails, including those of earlier lives.
-        root: of the package.
-        seed: of the campaign.
-        kills: of the whole campaign.
+        folder: folder of the journal, the guard's state and the mails, including those of earlier lives.
+        root: folder of the package.
+        seed: seed of the campaign.
+        kills: number of kills in the whole campaign.
     """
 
     def __init__(self, folder: Path, root: Path, seed: int, kills: int) -> None:

@@ -30,13 +30,13 @@ log = logging.getLogger(__name__)
 
 
 class CrashCampaign:
-    """Crash campaign in a folder.
+    """A crash campaign in a folder.
 
     Args:
-        folder: of the campaign.
-        seed: of it.
+        folder: folder of the campaign.
+        seed: seed of the campaign.
         kills: number of kills.
-        wrap: command to run each life under.
+        wrap: command that wraps each life.
     """
 
     def __init__(self, folder: Path, seed: int, kills: int, wrap: list[str]) -> None:
@@ -74,7 +74,7 @@ class CrashCampaign:
         )
 
     def _lives(self, space: bool) -> Iterator[Job]:
-        """Run lives until every patrol was called for, and one more if everything was killed at the end."""
+        """Run lives until every patrol has been requested, and one more if everything was killed at the end."""
         while True:
             lines = self._journal.read()
             if next_patrol(lines) >= self._patrols and not everything_killed(lines):

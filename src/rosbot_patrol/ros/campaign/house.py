@@ -39,8 +39,8 @@ class Master:
     """Our own roscore, with this process as a node on wall time.
 
     Args:
-        log: of the roscore.
-        host: name of this machine, or its address, for those on others.
+        log: log file of the roscore.
+        host: name or address of this machine, for nodes on other machines.
     """
 
     def __init__(self, log: Path, host: str = "localhost") -> None:
@@ -128,9 +128,9 @@ class House:
     Args:
         folder: for logs, mails and state.
         launch: package and file for roslaunch.
-        plain: give the launch file only the arguments named here.
+        plain: pass only the arguments named here to the launch file.
         before: command that starts roslaunch, such as one that enters another host.
-        arguments: of the launch file; `ns` is the namespace of its topics.
+        arguments: arguments of the launch file; `ns` is the namespace of its topics.
     """
 
     def __init__(
@@ -286,7 +286,7 @@ class House:
             raise HouseError(answer.message)
 
     def walk(self, name: str, points: list[tuple[float, float]], speed: float = 0.8, loop: bool = False) -> None:
-        """Let an actor walk."""
+        """Make an actor walk."""
         path = [Pose2DMsg(x, y, 0.0) for x, y in points]
         answer = rospy.ServiceProxy(self.name("simulator/move_actor"), MoveActor)(
             name=name, path=path, speed=speed, loop=loop
@@ -295,7 +295,7 @@ class House:
             raise HouseError(answer.message)
 
     def remove(self, name: str) -> None:
-        """Take an actor away."""
+        """Remove an actor."""
         answer = rospy.ServiceProxy(self.name("simulator/remove_actor"), RemoveActor)(name)
         if not answer.success:
             raise HouseError(answer.message)
@@ -343,7 +343,7 @@ class House:
             if state.state == PatrolState.LOOKING and PatrolState.LOOKING not in mission.states:
                 mission.arrival = self.pose
             if not mission.states and state.state == PatrolState.IDLE:
-                return  # still the rest before it
+                return  # still the rest before the mission
             mission.states.append(state.state)
             mission.why.append(state.why)
             if state.state == PatrolState.IDLE:
@@ -351,7 +351,7 @@ class House:
 
     def _on_alert(self, alert: Alert) -> None:
         if alert.kind == Alert.VERDICT:
-            return  # the state tells it
+            return  # the state reports it
         with self._lock:
             self.alerts.append(alert)
             if self._mission is not None:

@@ -19,11 +19,11 @@ INCIDENT = "X-Rosbot-Patrol-Incident"
 
 
 class MailSink:
-    """Speaks SMTP (RFC 5321, no extensions) on a local port; every mail is on the disk before it is acknowledged.
+    """SMTP server (RFC 5321, no extensions) on a local port; every mail is on the disk before it is acknowledged.
 
     Args:
-        folder: of the mails.
-        port: of the server, 0: any.
+        folder: folder of the mails.
+        port: port of the server, 0: any.
 
     Raises:
         OSError: the port is taken.
@@ -45,7 +45,7 @@ class MailSink:
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
     def stop(self) -> None:
-        """Accept no more mails."""
+        """Stop accepting mails."""
         self._server.shutdown()
         self._server.server_close()
 

@@ -10,7 +10,7 @@ FIRST, END = 20000, 32768  # Linux assigns ports from END on to connections
 
 
 def free_port() -> int:
-    """A free port that no connection gets before it is listened on."""
+    """Find a free port that Linux does not assign to a connection before the server listens."""
     while True:
         port = random.SystemRandom().randrange(FIRST, END)
         with socket.socket() as probe, contextlib.suppress(OSError):

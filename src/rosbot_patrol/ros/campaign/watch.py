@@ -65,7 +65,7 @@ def _between(track: Track, time: float) -> Pose2D | None:
 
 
 class CampaignWatch:
-    """Listens from before the house's start to its end."""
+    """Recorder of the house's topics, from before its start to its end."""
 
     def __init__(self) -> None:
         self.heard = Recording()
@@ -84,7 +84,7 @@ class CampaignWatch:
         ]
 
     def stop(self) -> None:
-        """Stop listening."""
+        """Stop recording."""
         for subscriber in self._subscribers:
             subscriber.unregister()
 
@@ -108,7 +108,7 @@ class CampaignWatch:
 
     def _on_alert(self, message: Alert) -> None:
         if message.kind == Alert.VERDICT:
-            return  # the state tells it
+            return  # the state reports it
         with self._lock:
             self.heard.alerts.append((message.header.stamp.to_sec(), message))
 

@@ -37,8 +37,8 @@ class PatrolActions:
     """Goals of the action, several at once.
 
     Args:
-        manager: which looks at the rooms.
-        rooms: of the points file.
+        manager: manager of the missions.
+        rooms: rooms of the points file.
     """
 
     def __init__(self, manager: PatrolManager, rooms: Rooms) -> None:

@@ -1,4 +1,4 @@
-"""The alert desk: a thread writes notices to the disk, the post delivers them, and neither ever stops the patrol."""
+"""The alert desk: a thread writes notices to the disk, the post delivers them, and the patrol waits for neither."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ from rosbot_patrol.ros.runtime.node import Worker
 
 log = logging.getLogger(__name__)
 
-DISK_RETRY = 5.0  # [s] between attempts while the disk does not take something
-RECORD_WAIT = 2.0  # [s] that the patrol's memory waits for the records
+DISK_RETRY = 5.0  # time between attempts while the disk refuses something [s]
+RECORD_WAIT = 2.0  # longest wait of the patrol's memory for the records [s]
 
 
 class AlertDesk:
-    """Takes the patrol's notices and has them kept and delivered.
+    """Store the patrol's notices and have them delivered.
 
     Args:
-        post: keeps notices and delivers them.
+        post: stores and delivers notices.
         pictures: the camera's last pictures.
-        keeper: of the records.
-        health: hears how it goes.
+        keeper: keeper of the records.
+        health: receives the desk's health.
     """
 
     def __init__(
@@ -72,18 +72,18 @@ class AlertDesk:
         self._publisher = rospy.Publisher("patrol/alerts", Alert, queue_size=10)
 
     def start(self) -> None:
-        """Begin to work."""
+        """Start the threads."""
         self._post.on_delivery(self._delivered)
         self._post.start()
         Worker(partial(_repeat, self._record_next, self._to_record), name="record").start()
 
     @property
     def is_recorded(self) -> bool:
-        """Whether every notice and memory that was taken is on the disk."""
+        """Whether every accepted notice and memory is on the disk."""
         return not self._jobs and self._memory is None
 
     def is_held(self, incident: str) -> bool:
-        """Whether the notice of this incident waits for the entry delay."""
+        """Whether the notice of this incident is delayed by the entry delay."""
         try:
             return self._delayed.has(token(incident))
         except OSError as err:
@@ -91,7 +91,7 @@ class AlertDesk:
             return False
 
     def told(self, incident: str) -> PostNotice | None:
-        """The notice of an incident from before the program's start, None if there is none."""
+        """The notice of an incident from before the restart, None if there is none."""
         try:
             return self._delayed.get(token(incident)) or self._post.find(token(incident))
         except (OSError, ValueError) as err:
@@ -99,14 +99,14 @@ class AlertDesk:
             return None
 
     def write_later(self, write: Callable[[], None]) -> None:
-        """Have `write` called again and again until it raises no OSError; returns at once."""
+        """Call `write` repeatedly until it raises no OSError; returns at once."""
         with self._listing:
             if write not in self._unwritten:
                 self._unwritten.append(write)
         self._to_record.set()
 
     def recall(self, incident: str, notice: PostNotice) -> None:
-        """Complete the record of a mission with the notice that outlived the patrol's memory."""
+        """Complete the record of a mission with its notice, which survived the restart without the patrol's memory."""
         event = Event(wall=notice.wall, kind="seen", text="somebody was seen, and the program was killed right after")
         self._keeper.put([Entry(incident=incident, changes={"confirmed": notice.wall}, events=(event,))])
         if notice.picture is not None:
@@ -115,7 +115,7 @@ class AlertDesk:
             self._keeper.put_picture(incident, file)
 
     def take(self, notice: Notice, ros_time: float) -> None:
-        """Take an intruder's notice; returns at once."""
+        """Accept an intruder's notice; returns at once."""
         mission, seen, pose = notice.mission, notice.seen, notice.pose
         incident = Incident(
             id=mission.id,
@@ -139,7 +139,7 @@ class AlertDesk:
         self._to_record.set()
 
     def follow(self, commands: Commands) -> None:
-        """Take what else a step has for the owner: delayed notices, words, calls that start nothing."""
+        """Process a step's other outputs for the owner: delayed notices, messages, calls that start no mission."""
         jobs = [partial(self._release, release) for release in commands.releases]
         jobs += [partial(self._tell, word, time.time()) for word in commands.words]
         jobs += [partial(self._note_ignored, commands.ignored)] * bool(commands.ignored)
@@ -148,10 +148,10 @@ class AlertDesk:
             self._to_record.set()
 
     def remember(self, save: Callable[[], None]) -> None:
-        """Save the patrol's memory once every notice taken so far is on the disk; returns at once.
+        """Save the patrol's memory once every accepted notice is on the disk; returns at once.
 
-        So the memory never says that a mission gave its notice before that is written. Nor does it say that a mission
-        is over before the record does, as long as the disk takes records.
+        So the memory never says that a mission gave its notice before that is written. It also never says that a
+        mission is over before the record does, unless the disk refuses records.
         """
         if self._memory is None:
             self._memory_due = time.monotonic() + RECORD_WAIT
@@ -161,12 +161,12 @@ class AlertDesk:
     # -- the threads
 
     def _record_next(self) -> float:
-        """Write one thing; returns the pause until the next [s]."""
+        """Write one item; returns the pause until the next [s]."""
         if self._jobs:
             job = self._jobs[0]
             try:
                 job()
-            except Exception:  # this job waits for the others
+            except Exception:  # this job must wait for the others
                 self._jobs.rotate(-1)
                 raise
             self._jobs.popleft()
@@ -188,7 +188,7 @@ class AlertDesk:
         with self._listing:
             waiting = list(self._unwritten)
         for write in waiting:
-            with suppress(OSError):  # the failure was said when it came
+            with suppress(OSError):  # the failure was reported when it occurred
                 write()
                 with self._listing:
                     self._unwritten.remove(write)
@@ -214,8 +214,8 @@ class AlertDesk:
                     self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
     def _record(self, incident: Incident, notice: Notice) -> None:
-        """Write a notice to the disk, or to the post's memory, from which it is sent if the disk takes nothing."""
-        if self._post.has(incident.id) or self.is_held(incident.id):  # the program was killed after it was written
+        """Write a notice to the disk; if the disk refuses, keep it in the post's memory, which sends it from there."""
+        if self._post.has(incident.id) or self.is_held(incident.id):  # written before a kill
             return
         picture, note = self._picture(notice)
         place = str(self._delayed.folder) if notice.is_held else self._post.place
@@ -234,7 +234,7 @@ class AlertDesk:
             self._keeper.put_picture(incident.id, file)
 
     def _hold(self, notice: PostNotice) -> bool:
-        """Keep a notice for the entry delay; returns whether it is on the disk."""
+        """Store a notice for the entry delay; returns whether it is on the disk."""
         try:
             self._delayed.put(notice)
         except OSError as err:
@@ -264,7 +264,7 @@ class AlertDesk:
         self._keeper.put([Entry(incident=release.mission, events=(event,))])
 
     def _tell(self, word: OwnerMessage, wall: float) -> None:
-        """Tell the owner of something else than an intruder."""
+        """Send the owner a message about something other than an intruder."""
         self._post.put(
             PostNotice(
                 id=token(f"{word.kind}-{wall:.3f}"),
@@ -326,7 +326,7 @@ def _repeat(work: Callable[[], float], wake: threading.Event) -> None:
     while not rospy.is_shutdown():
         try:
             pause = work()
-        except Exception:  # a defect that one notice brings out must not end the desk
+        except Exception:  # a defect triggered by one notice must not end the desk
             log.error("the alert desk stumbled", exc_info=True)
             pause = DISK_RETRY
         if pause > 0.0:

@@ -1,6 +1,6 @@
-"""Calls of motion sensors: each is on disk before its callback ends, and a step takes it.
+"""Calls of motion sensors: each is on disk before its callback ends; the next step processes it.
 
-A call that was taken before a restart and comes again, as from a latched topic, is left out.
+A call that was processed before a restart and comes again, such as from a latched topic, is ignored.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ from rosbot_patrol.ros.runtime.node import now
 
 log = logging.getLogger(__name__)
 
-_MOST = 1000  # calls that wait
-_DISK = -1  # the disk is reported by itself, not for each room
+_MOST = 1000  # most waiting calls
+_DISK = -1  # the disk has its own diagnostic, apart from the rooms
 
 
 @dataclass(frozen=True)
 class _Call:
     room: int
-    sender: str  # of a latched topic, else ""
-    number: int  # in the journal, 0 if it need not be there
+    sender: str  # sender of a latched topic, else ""
+    number: int  # number in the journal, 0 if it need not be there
 
 
 class CallDesk:
-    """Takes calls from callbacks, writes them down and hands them to the step.
+    """Accept calls in callbacks, write them to the journal, and pass them to the step.
 
     Args:
-        rooms: of the points file.
-        store: of the patrol's memory.
-        journal: where calls are written down.
-        latched_window: time after the start in which a latched call may be one from before [s].
-        wake: has a step made at once.
+        rooms: rooms of the points file.
+        store: store of the patrol's memory.
+        journal: journal of the calls.
+        latched_window: time after the start in which a latched call may be an old one [s].
+        wake: requests a step at once.
 
     Attributes:
-        taken: number of the last line of the journal that a step took.
-        guarded: what is armed, set by each step.
+        taken: number of the journal's last line that a step has processed.
+        guarded: the armed rooms, set by each step.
     """
 
     def __init__(
@@ -53,8 +53,8 @@ class CallDesk:
     ) -> None:
         self._rooms, self._store, self._journal, self._wake = rooms, store, journal, wake
         self._latched_window = latched_window
-        self._lock = threading.Lock()  # of the calls; the step wants it, so nobody holds it over the disk
-        self._writing = threading.Lock()  # of the journal
+        self._lock = threading.Lock()  # protects the calls; the step needs it, so nobody holds it during disk access
+        self._writing = threading.Lock()  # protects the journal
         self._calls: deque[_Call] = deque()
         self._on_disk: frozenset[int] = frozenset()
         self._served: frozenset[int] = frozenset()
@@ -68,23 +68,23 @@ class CallDesk:
     # -- callbacks
 
     def is_first(self, sender: str) -> bool:
-        """Tell whether a sender's call is its first since the start, and soon after it."""
+        """Whether a sender's call is its first since the start, and soon after it."""
         is_first = sender not in self._first_heard
         self._first_heard.add(sender)
         return is_first and time.monotonic() - self._started < self._latched_window
 
     def was_taken_before(self, sender: str, room: int) -> bool:
-        """Tell whether a latched call was taken before the restart."""
+        """Whether a latched call was processed before the restart."""
         is_handled = self._store.is_handled(sender, room)
         if is_handled:
             log.info("the latched trigger for room %d from %s was taken before the restart", room, sender)
         return is_handled
 
     def call(self, room: int, latched_sender: str) -> None:
-        """Take a call; it is on disk afterwards, if it has to be.
+        """Accept a call; if it must be on disk, it is there when this returns.
 
         Args:
-            room: that the sensor calls to.
+            room: room of the sensor.
             latched_sender: name of the node that latched the call, "" if it is not latched.
         """
         with self._writing:
@@ -98,7 +98,7 @@ class CallDesk:
         self._wake()
 
     def _is_covered(self, room: int) -> bool:
-        """Tell whether a call need not be written down: what is on disk answers it, or nothing is to answer it."""
+        """Whether a call need not be written: the state on disk covers it, or nothing will answer it."""
         is_waiting = any(call.room == room and call.number for call in self._calls)
         is_served = room in self._on_disk and room in self._served
         return is_waiting or is_served or not self.guarded.counts(room) or self._rooms.find(room) is None
@@ -114,7 +114,7 @@ class CallDesk:
     # -- a step
 
     def take(self) -> tuple[int, ...]:
-        """Take the rooms that were called since the last step."""
+        """Take the rooms called since the last step."""
         with self._lock:
             calls = drain(self._calls)
             self.taken = max((call.number for call in calls), default=0) or self.taken
@@ -125,16 +125,16 @@ class CallDesk:
         return tuple(call.room for call in calls)
 
     def has_latched(self) -> bool:
-        """Tell whether the store has heard of a latched trigger since this was asked last."""
+        """Whether the store has received a latched trigger since the last call of this."""
         was, self._has_latched = self._has_latched, False
         return was
 
     def note_served(self, served: frozenset[int]) -> None:
-        """Note the rooms that wait or are being looked at now."""
+        """Set the rooms that wait or are being searched now."""
         self._served = served
 
     def note_saved(self, served: frozenset[int], taken: int) -> None:
-        """Note the same of the memory that is on disk now, which knows the journal up to `taken`."""
+        """Set the same for the memory on disk, which includes the journal up to `taken`."""
         self._on_disk = served
         with self._writing:
             self._journal.drop(taken)

@@ -1,7 +1,7 @@
-"""The record of every mission, kept on a thread of its own: the patrol hands over what happens and never waits.
+"""Keeper of the mission records, on a thread of its own: the patrol hands entries over and never waits.
 
-Entries are written in order. What the disk does not take is tried again, and said in the log and on /diagnostics. A
-full disk loses its oldest clear incidents first. A damaged database is set aside and a new one begun.
+Entries are written in order. Refused writes are retried, and reported in the log and on /diagnostics. On a full disk
+the oldest clear incidents are removed first. A damaged database is set aside and a new one started.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ from rosbot_patrol.ros.runtime.node import Worker
 
 log = logging.getLogger(__name__)
 
-DISK_RETRY = 5.0  # [s] between attempts while the disk does not take something
-_BUSY, _IDLE = 0.5, 5.0  # [s] between two looks at the pictures, in a mission and without one
-_TIDY = 600.0  # [s] between two checks of age and size
-_MOST = 5000  # entries in memory while the disk takes nothing; 2 kB each at most
-_RECENT = 5  # latest records that are checked for a missing report
-_SAME_AGAIN = 60.0  # [s] until the same complaint is logged again
-_PATIENCE = 3.0  # [s] to wait for pictures beyond the end of a clip
+DISK_RETRY = 5.0  # time between attempts while the disk refuses something [s]
+_BUSY, _IDLE = 0.5, 5.0  # time between checks for pictures, in a mission and without one [s]
+_TIDY = 600.0  # time between checks of age and size [s]
+_MOST = 5000  # entries in memory while the disk refuses writes; 2 kB each at most
+_RECENT = 5  # number of latest records checked for a missing report
+_SAME_AGAIN = 60.0  # time until the same problem is logged again [s]
+_PATIENCE = 3.0  # longest wait for pictures after the end of a clip [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordParams:
-    """Incidents that get a report of their own on the disk."""
+    """Parameters of the incidents' own reports on the disk."""
 
     report_verdicts: list[str] = param(
         ["confirmed", "unverified"],
@@ -59,7 +59,7 @@ class RecordParams:
 
 @dataclass(kw_only=True)
 class _Closing:
-    """A mission that is over. Its record waits for the last pictures, until `deadline` (monotonic) at most."""
+    """A finished mission. Its record waits for the last pictures, until `deadline` (monotonic) at most."""
 
     wall: float
     deadline: float
@@ -67,14 +67,14 @@ class _Closing:
 
 
 class _Report:
-    """Says on /diagnostics and in the log how the keeping of incidents goes."""
+    """Report of the keeper's health on /diagnostics and in the log."""
 
     def __init__(self, health: Health) -> None:
         self._health = health
         self._complaint = ("", 0.0)
 
     def works(self, done: Pruned | None = None) -> None:
-        """Everything is written; `done` is what was removed meanwhile."""
+        """Report that everything is written; `done` is what was removed meanwhile."""
         if done is None or not done.ids:
             self._health.set("incidents", OK, "incidents are kept")
             return
@@ -82,17 +82,17 @@ class _Report:
         self._health.set("incidents", WARN if is_of_disk else OK, done.sentence)
 
     def made_room(self, done: Pruned) -> None:
-        """The disk is full, and `done` is what was removed."""
+        """Report a full disk, with what was removed."""
         log.warning("incidents: %s", done.sentence)
         what = f"the disk is full: {count_of(len(done.ids), 'old incident was', 'old incidents were')} removed"
         self._health.set("incidents", WARN if done.ids else ERROR, what)
 
     def failed(self, err: StoreError) -> None:
-        """Nothing can be written."""
+        """Report that nothing can be written."""
         self._health.set("incidents", ERROR, f"incidents cannot be written: {err}")
 
     def complain(self, err: StoreError) -> None:
-        """Log what is wrong; the same thing once a minute at most."""
+        """Log a problem; the same one at most once a minute."""
         text, at = self._complaint
         if str(err) == text and time.monotonic() - at < _SAME_AGAIN:
             return
@@ -101,12 +101,12 @@ class _Report:
 
 
 class IncidentKeeper:
-    """Writes entries and pictures into the incidents' store.
+    """Write entries and pictures into the incidents' store.
 
     Args:
         state_dir: folder of the database and the incidents' folders.
         pictures: the camera's last pictures.
-        health: hears how it goes.
+        health: receives the keeper's health.
         evidence, retention, records: parameters.
         on_verdict: called on the keeper's thread when a mission is over and its verdict on the disk.
     """
@@ -140,10 +140,10 @@ class IncidentKeeper:
         self._wake = threading.Event()
 
     def start(self, running: Collection[str] = ()) -> None:
-        """Begin to work.
+        """Start the thread.
 
         Args:
-            running: ids of missions that go on after the program's start; other open records are closed.
+            running: ids of missions that continue after the restart; other open records are closed.
         """
         self._running = tuple(running)
         self._map.start()
@@ -153,48 +153,48 @@ class IncidentKeeper:
 
     @property
     def is_written(self) -> bool:
-        """Whether all entries are on the disk (pictures may still come, until `finish`)."""
+        """Whether all entries are on the disk (pictures may follow until `finish`)."""
         return not self._entries and not (self._is_ending and self._closing)
 
     @property
     def needs_pictures(self) -> bool:
-        """Whether pictures are wanted although no mission runs."""
+        """Whether pictures are needed although no mission runs."""
         return self._evidence.evidence_always or bool(self._closing) or self._album.is_waiting
 
     def finish(self) -> None:
-        """Complete the records of missions that are over without more pictures, as the program ends."""
+        """Complete the records of finished missions without more pictures, because the program ends."""
         self._is_ending = True
         self._wake.set()
 
     def give_way(self, wanted: bool) -> None:
-        """Write no pictures and reports while a notice waits for room on the disk."""
+        """Suspend pictures and reports while a notice waits for room on the disk."""
         if wanted != self._gives_way:
             self._gives_way = wanted
             self._wake.set()
 
     def put(self, entries: Sequence[Entry]) -> None:
-        """Take entries for the records."""
+        """Accept entries for the records."""
         if not entries:
             return
         self._entries.extend(entries)
         self._wake.set()
 
     def put_picture(self, incident_id: str, file: NewFile) -> None:
-        """Take a picture for a record."""
+        """Accept a picture for a record."""
         self._entries.append((incident_id, file))
         self._wake.set()
 
     def see(self, incident_id: str, stamp: float) -> None:
-        """Note that somebody was confirmed in the picture of this stamp [s]."""
+        """Record that somebody was confirmed in the picture of this stamp [s]."""
         self._seen.append((incident_id, stamp))
         self._wake.set()
 
     def note(self, sighting: Sighting) -> None:
-        """Take what the detector saw in a picture."""
+        """Accept a detection in a picture."""
         self._album.note(sighting)
 
     def look(self, incident_id: str) -> None:
-        """Set the mission for which the robot looks around, "" for none."""
+        """Set the mission of the present look-around, "" for none."""
         self._looking = incident_id
 
     # -- the thread
@@ -205,21 +205,21 @@ class IncidentKeeper:
             self._wake.clear()
 
     def step(self) -> float:
-        """Write what there is, whatever the disk says; returns the pause until the next step [s]."""
-        while len(self._entries) > _MOST:  # on this thread, since another one would remove what is being written
+        """Write everything available; disk errors are handled. Returns the pause until the next step [s]."""
+        while len(self._entries) > _MOST:  # on this thread, because another one could remove the entry being written
             self._entries.popleft()
             self._lost += 1
         try:
             return self._work()
         except StoreError as err:
             return self._trouble(err)
-        except Exception:  # a defect that one record brings out must not end the records
+        except Exception:  # a defect triggered by one record must not end the keeper
             log.error("the keeping of incidents stumbled, and goes on", exc_info=True)
             self._forget_store()
             return DISK_RETRY
 
     def _work(self) -> float:
-        """Write what there is; returns the pause until the next step [s]. Raises StoreError."""
+        """Write everything available; returns the pause until the next step [s]. Raises StoreError."""
         store = self._store or self._open()
         while self._entries:
             self._write(store, self._entries[0])
@@ -252,7 +252,7 @@ class IncidentKeeper:
         return store
 
     def _catch_up(self, store: IncidentStore) -> None:
-        """Write the reports that the program's last end prevented."""
+        """Write the reports that are missing because the program ended."""
         for row in find_incidents(store.connection, store.path, Query(limit=_RECENT)):
             is_wanted = row.closed is not None and row.verdict in self._records.report_verdicts
             if is_wanted and not store.folder.path(row.id, REPORT).exists():
@@ -363,7 +363,7 @@ class IncidentKeeper:
 
 
 def _amend(store: IncidentStore, kept: Incident, entry: Entry) -> None:
-    """Add news to the chain, for a mission that went on after its record was closed, as after a crash."""
+    """Append news to the chain, for a mission that continued after its record was closed, such as after a crash."""
     known = f"{kept.verdict}: {kept.reason}"
     for event in entry.events:
         if event.kind == "seen" or (event.kind == "verdict" and event.text != known):

@@ -1,4 +1,4 @@
-"""What the patrol hears: callbacks keep it, and a step hands it to the senses."""
+"""Inputs of the patrol: callbacks store messages, and a step passes them to the senses."""
 
 from __future__ import annotations
 
@@ -70,12 +70,12 @@ class PatrolInputs:
         self._map = MapTopic(senses.house_map)
 
     def ask(self, request: Request) -> None:
-        """Take a request from elsewhere."""
+        """Accept a request from another part of the node."""
         self._requests.append(request)
         self._wake()
 
     def start(self) -> None:
-        """Begin to listen."""
+        """Start the subscribers."""
         rospy.Subscriber("motion_trigger", EspTrigger, self._on_trigger, queue_size=100, tcp_nodelay=True)
         rospy.Subscriber("sensors/events", SensorEvent, self._on_sensor_event, queue_size=100)
         rospy.Subscriber("darknet_ros/bounding_boxes", BoundingBoxes, self._on_boxes, queue_size=10)
@@ -99,7 +99,7 @@ class PatrolInputs:
         self.calls.call(room, sender if is_latched else "")
 
     def room_of(self, sensor_id: int) -> int | None:
-        """Find the room that a sensor calls to; None if the sensor is refused."""
+        """Find the room of a sensor; None if the sensor is refused."""
         return self._sensor_rooms.room_of(sensor_id, now())
 
     def _hear(self, text: str, **data: object) -> None:
@@ -131,13 +131,13 @@ class PatrolInputs:
     # -- a step takes
 
     def take(self, time_now: float, guarded: Guarded, stop: str, *, is_busy: bool) -> Inputs:
-        """Take what is known now, and what was heard since the last step; links and pictures are left to the caller.
+        """Take the present state, and the events since the last step; the caller adds links and pictures.
 
         Args:
             time_now: ROS time [s].
-            guarded: what is armed.
-            stop: why the emergency stop holds the robot, "" if it does not.
-            is_busy: a mission runs, so that scans and pictures are looked at.
+            guarded: the armed rooms.
+            stop: reason of the emergency stop, "" if the robot may drive.
+            is_busy: a mission runs, so scans and pictures are needed.
         """
         self.calls.guarded = guarded
         self._deliver(is_busy=is_busy)
@@ -152,11 +152,11 @@ class PatrolInputs:
         return taken
 
     def take_heard(self) -> list[Event]:
-        """Take what sensors said since this was asked last, for the record."""
+        """Take the sensors' events since the last call, for the record."""
         return drain(self._heard)
 
     def _deliver(self, *, is_busy: bool) -> None:
-        """Hand what came since the last step to the senses; a scan is converted only if somebody looks at it."""
+        """Pass the messages since the last step to the senses; scans are converted only if needed."""
         senses = self._senses
         for room in self.calls.take():
             senses.hear_call(room)
@@ -181,7 +181,7 @@ class PatrolInputs:
 
 
 def moment() -> Moment:
-    """This moment, on the node's three clocks."""
+    """The present moment on the node's three clocks."""
     return Moment(now=now(), steady=time.monotonic(), wall=time.time())
 
 

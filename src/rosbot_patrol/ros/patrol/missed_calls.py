@@ -21,11 +21,11 @@ _LISTEN = 15.0  # longest wait: sensor_watch reports all sensors every five seco
 
 
 class MissedCalls:
-    """Asks once, after the start, for the calls in the gap.
+    """One query, after the start, for the calls in the gap.
 
     Args:
-        path: of the patrol's signs of life.
-        ask: takes the missed calls.
+        path: file of the patrol's signs of life.
+        ask: receives the missed calls.
         room_of: room of a sensor's id, None if it has none.
     """
 
@@ -47,7 +47,7 @@ class MissedCalls:
             self._subscriber = rospy.Subscriber("sensors/states", SensorStates, self._on_states, queue_size=5)
 
     def step(self) -> None:
-        """Give signs of life; stop listening after a while."""
+        """Write a sign of life; stop listening after a while."""
         try:
             self._vigil.step(time.time())
         except OSError as err:
@@ -58,7 +58,7 @@ class MissedCalls:
             self._subscriber = None
 
     def end(self) -> None:
-        """Record an orderly end of the patrol."""
+        """Record a regular end of the patrol."""
         try:
             self._vigil.end()
         except OSError as err:

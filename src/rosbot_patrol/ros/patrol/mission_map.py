@@ -1,4 +1,4 @@
-"""The map of a mission for its record: the house, the robot's way, where it stood, and the person."""
+"""Map of a mission for its record: the house, the robot's path and stops, and the person."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ log = logging.getLogger(__name__)
 
 
 class MissionMap:
-    """Keeps the last map of the topic `map`, and draws missions on it."""
+    """Store the last map of the topic `map`, and draw missions on it."""
 
     def __init__(self) -> None:
         self._view: MapView | None = None
 
     def start(self) -> None:
-        """Begin to listen."""
+        """Subscribe to the map."""
         rospy.Subscriber("map", GridMsg, self._on_map, queue_size=1, buff_size=1 << 23)
 
     def draw(self, incident: Incident) -> list[NewFile]:
-        """The picture of a mission; on white if no map came, none if nothing is known of the robot."""
+        """Draw a mission; on white without a map, nothing without positions of the robot."""
         if not incident.path and incident.pose is None:
             return []
         marks = Marks(path=incident.path, robot=incident.pose, person=incident.person)

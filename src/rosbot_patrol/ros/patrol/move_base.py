@@ -15,10 +15,10 @@ from rosbot_patrol.ros.messages import convert
 
 
 class MoveBase:
-    """Sends goals to the action server `move_base` and reports their state.
+    """Send goals to the action server `move_base` and report their state.
 
     Args:
-        frame: of the goals.
+        frame: frame of the goals.
         silence: silence of its status after which the server counts as down [s], wall time.
     """
 
@@ -54,7 +54,7 @@ class MoveBase:
             return GoalLink(is_up=self.is_up, tag=self._tag, state=goal_state(state), text=text)
 
     def send(self, goal: Goal) -> None:
-        """Send a goal; the previous one is no longer followed."""
+        """Send a goal; the previous one is dropped."""
         message = MoveBaseGoal()
         message.target_pose = convert.pose_to_msg(goal.pose, self._frame, rospy.get_time())
         with self._lock:
@@ -62,7 +62,7 @@ class MoveBase:
             self._tag = goal.tag
 
     def cancel(self) -> None:
-        """Give up the goal, if there is one."""
+        """Cancel the goal, if there is one."""
         with self._lock:
             if self._tag:
                 self._client.cancel_goal()

@@ -1,13 +1,14 @@
-"""patrol_robot: drives to the room whose motion sensor calls, looks around, mails what it finds, comes home.
+"""patrol_robot: drives to the room of a triggered motion sensor, looks around, mails what it finds, comes home.
 
 Matches `patrol_robot` and `patrol_robot_simulation` of the tutorial: topics /motion_trigger,
 /darknet_ros/bounding_boxes, /cmd_vel, action move_base, parameters ~path_to_params, ~email_to, ~email_from.
 
-Differs: see rosbot_patrol.patrol.mission.manager, .patrol.rooms, .patrol.spin and .alerts.mail; beyond the original it
-publishes /patrol/state, /patrol/alerts and /patrol/arming, takes the action /patrol and the services /patrol/cancel,
-home, all, arm and emergency_stop, makes scheduled rounds, keeps its outbox, queue and incidents in ~state_dir, and
-stops the robot and gives up its goal when it is ended. Only one action client, one tf listener and one publisher are
-made.
+Differs: see rosbot_patrol.patrol.mission.manager, .patrol.rooms, .patrol.spin and .alerts.mail. Additional:
+- It publishes /patrol/state, /patrol/alerts and /patrol/arming.
+- It has the action /patrol and the services /patrol/cancel, home, all, arm and emergency_stop.
+- It makes scheduled rounds, and keeps its outbox, queue and incidents in ~state_dir.
+- On shutdown it stops the robot and cancels its goal.
+- It makes only one action client, one tf listener and one publisher per topic.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ HELD_MOST = 600.0  # [s] no entry delay is longer; when one is over arming says
 
 
 class PatrolNode:
-    """Inputs, one thread that steps the manager, outputs."""
+    """The node patrol_robot: inputs, one thread that steps the manager, outputs."""
 
     def __init__(self) -> None:
         tree = rospy.get_param("~", {}) or {}
@@ -139,7 +140,7 @@ class PatrolNode:
         self.markers = PeopleMarkers(inputs.map_frame)
         self._shown = ""
         self._is_over = False
-        self._older: dict[str, PostNotice] = {}  # by incident: from before the start, and of which the memory knows not
+        self._older: dict[str, PostNotice] = {}  # by incident: notices from before the restart, unknown to the memory
         self._is_signalled = False
         self._round_at = -math.inf
         self._schedule_changed = False
@@ -190,7 +191,7 @@ class PatrolNode:
         rospy.spin()
 
     def _recall_notice(self, mission_id: str) -> None:
-        """The program may have been killed after a notice was written and before the rest knew of it."""
+        """Restore a notice that was written before a kill, if nothing else knows it."""
         notice = self.desk.told(mission_id)
         if notice is None:
             return
@@ -227,7 +228,7 @@ class PatrolNode:
         )
 
     def _rounds(self, time_now: float, known: Inputs) -> tuple[Request, ...]:
-        """Rooms of the rounds that are due; looked for once a second."""
+        """Rooms of the due rounds; checked once a second."""
         if 0.0 <= time.monotonic() - self._round_at < 1.0:
             return ()
         self._round_at = time.monotonic()
@@ -324,10 +325,10 @@ class PatrolNode:
         signal.signal(number, note)
 
     def _stop(self) -> None:
-        """Leave the robot at rest: goal given up, wheels still.
+        """Stop the robot: cancel the goal, stop the wheels.
 
-        A signal (Ctrl-C, the end of the launch) gives up missions, too; after anything else (`rosnode kill`) the
-        respawned node goes on with them.
+        A signal (Ctrl-C, the end of the launch) also cancels missions; after any other end (`rosnode kill`) the
+        respawned node continues them.
         """
         with self._stepping:
             self._is_over = True
@@ -341,7 +342,7 @@ class PatrolNode:
         deadline = time.monotonic() + 2.0
         while not (self.desk.is_recorded and self.keeper.is_written) and time.monotonic() < deadline:
             time.sleep(0.02)
-        time.sleep(0.1)  # let the two messages leave
+        time.sleep(0.1)  # time for the two messages to leave
 
 
 def main() -> None:

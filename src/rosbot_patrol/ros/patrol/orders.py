@@ -1,4 +1,4 @@
-"""What people order: services to cancel, come home, look at all rooms, arm, and the emergency stop."""
+"""Commands of people: services to cancel, come home, look at all rooms, arm, and the emergency stop."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from rosbot_patrol.srv import Arm, ArmRequest, ArmResponse
 
 log = logging.getLogger(__name__)
 
-STOP_REPEAT = 0.5  # [s] between two words on /e_stop while it is held, against a button that says it is not
+STOP_REPEAT = 0.5  # period of /e_stop while the stop is held, against a button that publishes false [s]
 NOTED = "; it does not outlive a restart, as it cannot be kept: "
 
 
 class StopSwitch:
-    """The emergency stop towards ROS: the service, the topic, the wheels and everybody's goals.
+    """ROS interface of the emergency stop: the service, the topic, the wheels and everybody's goals.
 
     Args:
-        stop: whether it is held.
-        move_base: whose goals are given up.
-        cmd_vel: where zero velocity goes at once.
-        write_later: takes what the disk did not, and tries it until it does.
+        stop: state of the emergency stop.
+        move_base: cancels all goals.
+        cmd_vel: publisher of the immediate zero velocity.
+        write_later: retries writes that the disk refused.
     """
 
     def __init__(
@@ -63,11 +63,11 @@ class StopSwitch:
 
     @property
     def why(self) -> str:
-        """Why the robot has to stand still, "" where it has not."""
+        """Reason why the robot must stand still, "" if it may drive."""
         return self._stop.why
 
     def step(self) -> None:
-        """Repeat the word while the stop is held, and everybody's goals stay given up."""
+        """Repeat the stop message and the cancelling of goals while the stop is held."""
         if self._stop.is_held and time.monotonic() - self._told > STOP_REPEAT:
             self._hold()
 
@@ -91,11 +91,11 @@ class StopSwitch:
         if header.get("callerid") == rospy.get_name():
             return
         self._press(bool(message.data), TOPIC)
-        if self._stop.is_held and not message.data:  # another holds it: the base's lock has to hear that last
+        if self._stop.is_held and not message.data:  # another source holds it: the base's lock must hear that last
             self._topic.publish(Bool(data=True))
 
     def _press(self, pressed: bool, source: str) -> str:
-        """Press or release; what was wrong with keeping it."""
+        """Press or release; returns the problem of saving it, "" if there is none."""
         with self._lock:
             changed = self._stop.press(pressed, source)
             if self._stop.is_held and changed:
@@ -118,13 +118,13 @@ class StopSwitch:
 
 
 class ArmingDesk:
-    """The mode towards ROS: service `/patrol/arm`, latched topic `/patrol/arming`.
+    """ROS interface of the mode: service `/patrol/arm`, latched topic `/patrol/arming`.
 
     Args:
         arming: the mode.
-        path: where it is kept.
-        tell: takes a word for the owner, from any thread; returns at once.
-        write_later: takes what the disk did not, and tries it until it does.
+        path: file of the mode.
+        tell: accepts a message for the owner, from any thread; returns at once.
+        write_later: retries writes that the disk refused.
     """
 
     def __init__(
@@ -135,15 +135,15 @@ class ArmingDesk:
         write_later: Callable[[Callable[[], None]], None],
     ) -> None:
         self._arming, self._path, self._tell, self._write_later = arming, path, tell, write_later
-        self._lock = threading.Lock()  # of the mode; the step wants it, so nobody holds it over the disk
-        self._keeping = threading.Lock()  # of the file: one change after the other
+        self._lock = threading.Lock()  # protects the mode; the step needs it, so nobody holds it during disk access
+        self._keeping = threading.Lock()  # protects the file: one change after the other
         self._told: Guarded | None = None
         log.log(logging.WARNING if arming.mode == DISARMED else logging.INFO, "the mode is %s", arming.mode)
         self._publisher = rospy.Publisher("patrol/arming", ArmingMsg, queue_size=5, latch=True)
         CallerService("patrol/arm", Arm, self._on_service)
 
     def step(self, calls: dict[str, int]) -> Guarded:
-        """What is guarded; `calls` are the rooms of missions, by id, that sensors called for."""
+        """The armed rooms; `calls` are the rooms of missions, by id, started by sensors."""
         with self._lock:
             wall = time.time()
             self._arming.follow(calls, wall)
@@ -168,7 +168,7 @@ class ArmingDesk:
         return ArmResponse(accepted=accepted, message=text + (NOTED + problem if problem else ""))
 
     def _keep(self, memory: Mapping[str, Any]) -> str:
-        """Bring the mode to the disk; what was wrong with that."""
+        """Save the mode; returns the problem, "" if there is none."""
         try:
             write_json(self._path, memory)
         except OSError as err:
@@ -194,19 +194,19 @@ class ArmingDesk:
 
 
 def changed_word(mode: str, text: str, caller: str, wall: float) -> OwnerMessage:
-    """What the owner is told of another mode: what, who, from where, when."""
+    """Message to the owner about a change of mode: the mode, the caller, the machine, the time."""
     when = time.strftime("%Y-%m-%d %H:%M:%S %Z", time.localtime(wall))
     kind = "disarmed" if mode == DISARMED else f"armed ({mode})"
     return OwnerMessage(kind=kind, text=f"{text}. Ordered by {caller}, by the service /patrol/arm, {when}")
 
 
 class Orders:
-    """Services that change what the patrol does, between two steps.
+    """Services that change the patrol's work, between two steps.
 
     Args:
-        manager: of the missions.
-        rooms: of the points file.
-        stepping: held while the manager steps.
+        manager: manager of the missions.
+        rooms: rooms of the points file.
+        stepping: lock held while the manager steps.
     """
 
     def __init__(self, manager: PatrolManager, rooms: Rooms, stepping: threading.Lock) -> None:

@@ -1,6 +1,6 @@
 """Outputs of the patrol: sign of life, state, and wheel commands during turns.
 
-And persons met on a mission, for rviz on /patrol/people (latched): a figure with a label.
+Persons met on a mission are shown in rviz on /patrol/people (latched): a figure with a label each.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ log = logging.getLogger(__name__)
 
 
 class Wheels:
-    """/cmd_vel during the patrol's turns; otherwise it publishes nothing."""
+    """Publisher of /cmd_vel during the patrol's turns; silent at other times."""
 
     def __init__(self) -> None:
         self.publisher = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         self._turning = False
 
     def turn(self, speed: float | None) -> None:
-        """Turn [rad/s]; None: no longer, with a stop at the end of a turn."""
+        """Turn at a speed [rad/s]; None ends a turn with a stop."""
         if speed is None:
             self.stop()
             return
@@ -49,14 +49,14 @@ class Wheels:
 
 
 class Pulse:
-    """/patrol/alive: the patrol's own step runs; about once a second of wall time."""
+    """Publisher of /patrol/alive, about once a second of wall time, as proof that the patrol's step runs."""
 
     def __init__(self) -> None:
         self._at = -math.inf
         self._publisher = rospy.Publisher("patrol/alive", Empty, queue_size=2)
 
     def step(self) -> None:
-        """Call it in each step."""
+        """Publish if it is due; call in each step."""
         if 0.0 <= time.monotonic() - self._at < 1.0:
             return
         self._at = time.monotonic()
@@ -64,10 +64,10 @@ class Pulse:
 
 
 class StatePublisher:
-    """/patrol/state, the log and /diagnostics.
+    """Publisher of /patrol/state, with log and /diagnostics.
 
     Args:
-        health: of the node.
+        health: health of the node.
     """
 
     def __init__(self, health: Health) -> None:
@@ -113,10 +113,10 @@ _RED, _DARK = ColorRGBA(0.9, 0.1, 0.1, 0.9), ColorRGBA(0.4, 0.0, 0.0, 1.0)
 
 
 class PeopleMarkers:
-    """Publishes markers of the persons met.
+    """Publisher of markers of the persons met.
 
     Args:
-        frame: of their places.
+        frame: frame of their places.
     """
 
     def __init__(self, frame: str) -> None:
@@ -131,9 +131,9 @@ class PeopleMarkers:
         """Show the persons with a known place.
 
         Args:
-            people: each with its place.
-            stamp: of now [s].
-            room: of the mission, for people.
+            people: the persons, each with its place.
+            stamp: present time [s].
+            room: name of the mission's room, for the labels.
         """
         markers = [marker for person in people for marker in self._markers(person, stamp, room)]
         self._publisher.publish(MarkerArray(markers=markers))

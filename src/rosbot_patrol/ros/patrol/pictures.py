@@ -23,10 +23,10 @@ _MB = 1_000_000
 
 
 class PictureRing:
-    """Subscribes on `start`, clears on `stop`; finds the picture of a detection.
+    """Subscribe on `start`, clear on `stop`; find the picture of a detection.
 
     Args:
-        topic: of the camera; "": none.
+        topic: topic of the camera; "": none.
         params: number of pictures to keep.
     """
 

@@ -1,4 +1,4 @@
-"""sensor_watch tells of a patrol that hangs; here the patrol tells of a sensor_watch that does."""
+"""The patrol's watch over sensor_watch; each of the two reports if the other hangs."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ PART = "sensor_watch"
 
 
 class Neighbour:
-    """Listens to /sensors/states, which comes every 5 s of the wall at least.
+    """Watch over /sensors/states, which comes at least every 5 s of wall time.
 
     Args:
-        silent_after: so long without it sensor_watch has gone, or hangs [s].
-        told_after: that lasting so long the owner is told [s].
-        health: of the patrol.
+        silent_after: silence after which sensor_watch counts as dead or hanging [s].
+        told_after: duration of that after which the owner is told [s].
+        health: health of the patrol.
     """
 
     def __init__(self, silent_after: float, told_after: float, health: Health) -> None:
@@ -32,14 +32,14 @@ class Neighbour:
         self._is_gone: bool | None = None
 
     def start(self) -> None:
-        """Begin to listen."""
+        """Subscribe to /sensors/states."""
         rospy.Subscriber("sensors/states", SensorStates, self._on_states, queue_size=2)
 
     def _on_states(self, _: SensorStates) -> None:
         self._absence.heard(time.monotonic())
 
     def step(self) -> tuple[OwnerMessage, ...]:
-        """Say on /diagnostics how it is; what the owner is told."""
+        """Report the state on /diagnostics; returns messages for the owner."""
         now = time.monotonic()
         silence = self._absence.silence(now)
         if self._absence.was_heard and (silence > 0.0) != self._is_gone:

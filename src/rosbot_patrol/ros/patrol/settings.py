@@ -1,4 +1,4 @@
-"""The parameters of patrol_robot, and its files that may be wrong without ending the guard."""
+"""The parameters of patrol_robot, and its optional files, which may be wrong without ending the guard."""
 
 from __future__ import annotations
 
@@ -51,18 +51,18 @@ FLAT = (
 
 
 def load_flat(cls: type[P], tree: dict[str, Any]) -> P:
-    """One of the groups that share the node's flat namespace; only NodeParams' warns of unknown names."""
+    """Load one of the groups that share the node's flat namespace; only NodeParams' warns of unknown names."""
     others = {name for other in FLAT if other is not cls for name, *_ in declared(other)}
     return load_params(cls, tree=tree, ignore=others | (set(tree) if cls is not NodeParams else set()))
 
 
 def load_manager_params(node: NodeParams, tree: dict[str, Any], prefix: str) -> ManagerParams:
-    """Everything that the manager is told. Raises ParamError."""
+    """Load the manager's parameters. Raises ParamError."""
     return manager_params(node, lambda cls: load_flat(cls, tree), prefix)
 
 
 def load_or_say(load: Callable[[str, Rooms], V], path: str, rooms: Rooms, without: V, health: Health) -> V:
-    """What a file says; a guard whose file of modes or rounds is wrong stands guard without it, and says so."""
+    """Load a file of modes or rounds; if it is wrong, the guard reports that and works without it."""
     try:
         return load(path, rooms)
     except ParamError as err:

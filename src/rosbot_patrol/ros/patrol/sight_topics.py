@@ -24,13 +24,13 @@ log = logging.getLogger(__name__)
 
 
 class LensTopic:
-    """The lens of a camera, from the first camera_info that describes one.
+    """The lens of a camera, from its first valid camera_info.
 
     Args:
-        topic: of the camera_info, "" for none.
+        topic: topic of the camera_info, "" for none.
 
     Attributes:
-        record: the lens, None before it came.
+        record: the lens, None before its message.
     """
 
     def __init__(self, topic: str) -> None:
@@ -49,12 +49,12 @@ class LensTopic:
 
 
 class DepthTopic:
-    """Depth pictures, listened to only while the ring wants them.
+    """Depth pictures, subscribed to only while the ring needs them.
 
     Args:
-        topic: of the pictures, "" for none.
-        info_topic: of their camera_info.
-        ring: takes them.
+        topic: topic of the pictures, "" for none.
+        info_topic: topic of their camera_info.
+        ring: receives them.
     """
 
     def __init__(self, topic: str, info_topic: str, ring: DepthRing) -> None:
@@ -65,18 +65,18 @@ class DepthTopic:
 
     @property
     def has_publisher(self) -> bool:
-        """Whether somebody publishes depth, while it is listened to."""
+        """Whether depth has a publisher; valid while subscribed."""
         return self._subscriber is not None and self._subscriber.get_num_connections() > 0
 
     def deliver(self) -> None:
-        """Hand over what came."""
+        """Pass the received pictures on."""
         if self._lens.record is not None:
             self._ring.hear_lens(self._lens.record)
         for message in drain(self._came):
             self._ring.hear(image_from_msg(message))
 
     def follow(self) -> None:
-        """Begin to listen or stop, as the ring wants."""
+        """Subscribe or unsubscribe, as the ring needs."""
         if self._ring.is_on and self._subscriber is None:
             self._came.clear()
             self._subscriber = rospy.Subscriber(
@@ -89,10 +89,10 @@ class DepthTopic:
 
 
 class MapTopic:
-    """The map, parted among the rooms on a thread of its own.
+    """The map, divided into rooms on a thread of its own.
 
     Args:
-        house_map: takes it.
+        house_map: receives the map.
     """
 
     def __init__(self, house_map: HouseMap) -> None:

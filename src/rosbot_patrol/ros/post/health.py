@@ -1,4 +1,4 @@
-"""Health of the post, on /diagnostics and on the disk: each channel, who delivers, what nobody delivers."""
+"""Health of the post, on /diagnostics and on the disk: each channel, the delivering node, undelivered notices."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from rosbot_patrol.alerts.dispatch.status_file import read_status
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN, Health
 
-OVERDUE = 120.0  # [s] after which a notice that nobody delivers is a fault
-COMPARE = 30.0  # [s] between two comparisons with the channels of other programs
-STATUS = 60.0  # [s] between two writings of an unchanged status
+OVERDUE = 120.0  # age after which an undelivered notice is a fault [s]
+COMPARE = 30.0  # time between comparisons with the channels of other programs [s]
+STATUS = 60.0  # time between writes of an unchanged status [s]
 
 
 class PostHealth:
-    """Reports how the post does.
+    """Report of the post's health.
 
     Args:
         who: name of this program.
         mail: its channels.
         dispatcher: delivers, or waits for its turn.
-        health: hears it.
+        health: receives the report.
 
     Attributes:
-        trouble: why the outbox takes nothing, "" if it does.
+        trouble: reason why the outbox accepts nothing, "" if it does.
     """
 
     def __init__(self, who: str, mail: MailParams, dispatcher: Dispatcher, health: Health) -> None:
@@ -52,12 +52,12 @@ class PostHealth:
             self._report_from_afar()
 
     def say_trouble(self, what: str) -> None:
-        """Report that the outbox takes nothing, until `trouble` is "" again."""
+        """Report that the outbox accepts nothing, until `trouble` is "" again."""
         self.trouble = what
         self._set("outbox", ERROR, what)
 
     def report_spare(self, statuses: Sequence[ChannelStatus]) -> None:
-        """Report the channels that have something to take from memory."""
+        """Report the channels that have notices to send from memory."""
         found = {f"{status.name} (from memory)": status for status in statuses}
         for part in self._spare_parts - set(found):
             self._health.drop(part)
@@ -79,7 +79,7 @@ class PostHealth:
 
     def _report_from_afar(self) -> None:
         outbox, holder = self._dispatcher.outbox, self._dispatcher.lock.holder()
-        for part in self._parts - {"outbox"}:  # of the time when this program delivered
+        for part in self._parts - {"outbox"}:  # from the time when this program delivered
             self._health.drop(part)
         self._parts &= {"outbox"}
         late = [entry for entry in outbox.waiting() if time.time() - entry.wall > OVERDUE]

@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _command_first(words: list[str]) -> list[str]:
-    """The same words with the command in front, since argparse takes a command's options only after it."""
+    """Move the command to the front, because argparse accepts a command's options only after it."""
     for i, word in enumerate(words):
         before = words[i - 1] if i else ""
         is_value = before.startswith("-") and before not in _FLAGS and "=" not in before
@@ -125,7 +125,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _when(text: str) -> float:
-    """A time in seconds since 1970, of a date or of how long ago."""
+    """Parse a date, or an age, to seconds since 1970."""
     if text[-1:] in _UNITS and text[:-1].replace(".", "", 1).isdigit():
         return time.time() - float(text[:-1]) * _UNITS[text[-1]]
     try:
@@ -165,7 +165,7 @@ def _list(store: IncidentStore, given: argparse.Namespace) -> int:
 
 @dataclass(frozen=True, kw_only=True)
 class _Person:
-    """Where somebody was; see Incident."""
+    """Place of a person; see Incident."""
 
     person_room_id: int | None = None
     person_room: str = ""
@@ -173,7 +173,7 @@ class _Person:
 
 
 def _where(store: IncidentStore, row: Found) -> _Person:
-    """Where the person of a list's row was, as the record tells."""
+    """Place of the person in a list's row, from the record."""
     try:
         kept = store.get(row.id) if row.object_class else None
     except StoreError:  # `verify` names it
@@ -199,7 +199,7 @@ def _cells(row: Found, person: _Person) -> tuple[str, ...]:
         room = f"{number}{person.person_room}, called by {room}" if person.person_room else f"none, called by {room}"
     verdict = row.verdict or "open"
     cells = (row.id, clock_text(row.wall), room, verdict, share, row.reason)
-    return tuple("".join(c if c.isprintable() else " " for c in cell) for cell in cells)  # no escape codes of others
+    return tuple("".join(c if c.isprintable() else " " for c in cell) for cell in cells)  # no foreign escape codes
 
 
 def _get(store: IncidentStore, incident_id: str) -> Incident:
@@ -255,7 +255,7 @@ def _export(store: IncidentStore, given: argparse.Namespace) -> int:
         archive.writestr("record.json", json.dumps(record, ensure_ascii=False, indent=1))
         archive.writestr("link.json", json.dumps(proof, indent=1))
         if link is not None and link.body is not None:
-            archive.writestr("record.canonical.json", link.body)  # the digest is of these bytes
+            archive.writestr("record.canonical.json", link.body)  # the digest covers these bytes
         archive.writestr(REPORT, make_report(store, incident))
         for file in incident.files:
             archive.writestr(file.name, store.folder.read(incident.id, file.name))

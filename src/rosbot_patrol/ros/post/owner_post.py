@@ -40,7 +40,7 @@ from rosbot_patrol.ros.runtime.node import Worker, ros_home
 
 log = logging.getLogger(__name__)
 
-LOOK = 0.2  # [s] between looks at the folder, in which other programs put
+LOOK = 0.2  # time between checks of the folder for other programs' notices [s]
 HOUSEKEEPING = 2.0  # [s]
 
 
@@ -50,11 +50,11 @@ class OwnerPost:
     Args:
         mail: channels to the owner.
         state_dir: folder of the outbox.
-        health: hears how it goes.
-        clocks: time.
+        health: receives the post's health.
+        clocks: wall and monotonic time.
 
     Raises:
-        ParamError: there is a mistake in the channels.
+        ParamError: a channel is invalid.
     """
 
     def __init__(self, mail: MailParams, state_dir: Path, health: Health, *, clocks: Clocks | None = None) -> None:
@@ -93,7 +93,7 @@ class OwnerPost:
 
     @property
     def is_written(self) -> bool:
-        """Whether every notice that was put is on the disk."""
+        """Whether every notice put so far is on the disk."""
         return self._box.is_written
 
     @property
@@ -103,39 +103,39 @@ class OwnerPost:
 
     @property
     def notify_verdicts(self) -> tuple[str, ...]:
-        """Verdicts that the owner wants to be told, besides that somebody was seen."""
+        """Verdicts that the owner wants notices about, besides confirmed intruders."""
         return tuple(self._mail.notify_verdicts)
 
     def describe(self) -> str:
-        """The channels, for people."""
+        """Description of the channels, for people."""
         return "; ".join(f"{c.name}: {c.transport.describe()}" for c in self._dispatcher.channels.values())
 
     def on_delivery(self, listener: Callable[[Delivery], None]) -> None:
-        """Have every delivery told, whichever program does it; on threads of this object."""
+        """Register a listener for every delivery, by whichever program; called on threads of this object."""
         self._listeners.append(listener)
 
     def has(self, notice_id: str) -> bool:
-        """Whether a notice of this id waits or was delivered, as far as memory and disk can tell."""
+        """Whether a notice of this id waits or was delivered, as far as memory and disk show."""
         return self._box.has(notice_id)
 
     def find(self, notice_id: str) -> Notice | None:
-        """A notice that waits or was delivered, None if there is none. Raises OSError, ValueError."""
+        """Find a waiting or delivered notice, None if there is none. Raises OSError, ValueError."""
         return self._box.find(notice_id)
 
     def put(self, notice: Notice) -> bool:
-        """Keep a notice until it is delivered; whatever the disk says. Returns whether it is on the disk."""
+        """Keep a notice until it is delivered, even if the disk fails. Returns whether it is on the disk."""
         is_on_disk = self._box.put(notice)
         if is_on_disk:
             self._wake.set()
         return is_on_disk
 
     def keep(self, notice: Notice) -> None:
-        """As `put`, on another thread; returns at once."""
+        """Put a notice as in `put`, on another thread; returns at once."""
         self._kept.append(notice)
         self._wake.set()
 
     def start(self) -> None:
-        """Begin to deliver, or to wait for the turn."""
+        """Start to deliver, or to wait for the turn."""
         settings = Settings(who=self._who, pid=os.getpid(), wall=self._clocks.wall(), mail=self._mail)
         waiting = 0
         try:
@@ -149,7 +149,7 @@ class OwnerPost:
         for name in self._dispatcher.channels:
             Worker(partial(self._carry, name), name=f"post: {name}").start()
 
-    # -- the thread that looks
+    # -- the thread that checks the outbox
 
     def _supervise(self) -> None:
         while not rospy.is_shutdown():
@@ -157,7 +157,7 @@ class OwnerPost:
             self._wake.clear()
 
     def _pass(self) -> float:
-        """Look at everything once; returns how long to wait for the next time [s]."""
+        """Check everything once; returns the time until the next check [s]."""
         has_written, has_failed = False, False
         for part in (self._write, self._look, self._box.watch_recent, self._keep_house):
             try:
@@ -177,11 +177,11 @@ class OwnerPost:
         return self._box.save()
 
     def _look(self) -> None:
-        """Deliver what is new in the outbox, or hear what another program delivers."""
+        """Deliver new notices of the outbox, or read what another program delivers."""
         was_delivering = self._dispatcher.is_delivering
         if not was_delivering:
             self._hear_others()
-        self._has_other, self._box.is_stuck = False, True  # if the lock cannot be used
+        self._has_other, self._box.is_stuck = False, True  # stays so if the lock cannot be used
         self._has_other, self._box.is_stuck = not self._dispatcher.take_over(), False
         if not self._has_other and (not was_delivering or self._has_changed()):
             self._dispatcher.refresh()
@@ -190,7 +190,7 @@ class OwnerPost:
     def _hear_others(self) -> None:
         try:
             receipts = self._dispatcher.receipts.read_new()
-        except OSError as err:  # it is no reason not to deliver
+        except OSError as err:  # this must not prevent delivery
             self._box.failed(err)
             return
         for receipt in receipts:
@@ -200,7 +200,7 @@ class OwnerPost:
         mtime = os.stat(self._outbox.folder).st_mtime_ns
         if mtime == self._seen_mtime:
             return False
-        # A change within the clock's grain leaves no other mark: look again.
+        # A change within the clock's resolution leaves no other mark: check again.
         is_settled = time.time_ns() - mtime > 50_000_000
         self._seen_mtime = mtime if is_settled else 0
         return True
@@ -218,7 +218,7 @@ class OwnerPost:
             log.warning("notice to the owner: %s", notice.subject)
             self.put(notice)
 
-    # -- now and then
+    # -- housekeeping
 
     def _keep_house(self) -> None:
         if self._clocks.now() - self._housekept < HOUSEKEEPING:
@@ -233,7 +233,7 @@ class OwnerPost:
         self._reporter.report()
 
     def _mend(self) -> None:
-        """Make notices that were damaged on the disk again, or tell that they are lost."""
+        """Restore notices that were damaged on the disk, or report that they are lost."""
         for name, notice_id in self._outbox.broken():
             log.error("notice %s was damaged on the disk: it is made again of what its record tells", notice_id)
             self.put(replacement(self._state_dir, notice_id, self._clocks.wall()))
@@ -263,14 +263,14 @@ class OwnerPost:
             done, pause = self._send(name)
             if done is not None:
                 self._tell(done)
-                self._housekept = float("-inf")  # say it
+                self._housekept = float("-inf")  # report it
                 self._wake.set()
             else:
                 wake.wait(pause)
                 wake.clear()
 
     def _send(self, name: str) -> tuple[Delivery | None, float]:
-        """Send what is due on a channel; returns what it was, and how long to wait if nothing is [s]."""
+        """Send a due notice on a channel; returns its delivery, and the time to wait if none is due [s]."""
         done = self._spare.deliver(name)
         pause = self._spare.pause(name)
         try:
