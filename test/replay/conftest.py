@@ -1,4 +1,4 @@
-"""Our own bags as tests, by the plugin that users have. To refresh what is expected:
+"""Our own bags as tests, through the users' plugin. To refresh the expected results:
 
 pytest -p rosbot_patrol.replay.pytest_plugin test/replay --replay-record
 """

@@ -1,4 +1,4 @@
-"""Judges the recording of one patrol, and the guard's own record of it, by the truth."""
+"""Evaluation of one patrol: its recording, and the guard's own record, compared with ground truth."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class Run:
     """Facts about the programs of one patrol.
 
     Attributes:
-        problem: why the house did not run to the end, "" if it did.
+        problem: reason why the house did not run to the end, "" if it did.
         mails: number of mails about incidents.
-        contacts: names of what the robot touched, the floor left out.
-        wall_s: real time that it took [s].
+        contacts: names of the things that the robot touched, without the floor.
+        wall_s: duration in real time [s].
     """
 
     problem: str
@@ -50,9 +50,9 @@ class Mission:
     """The first mission to a room in a recording.
 
     Attributes:
-        id: of the mission, None if none has begun.
+        id: id of the mission, None if none has begun.
         states: its states, and the first state after it if there is one.
-        end: the first state after it, None while it goes on.
+        end: first state after it, None while it runs.
         triggered: time of the room's first trigger [s], 0 if there was none.
         was_called_again: whether another mission followed, or this one has not ended.
     """
@@ -82,18 +82,18 @@ class Mission:
 
     @property
     def share_told(self) -> float | None:
-        """Share of the floor that the guard claims to have seen, None if it claimed none."""
+        """Share of the floor that the guard reports as seen, None if it reports none."""
         largest = max((float(s.message.share_seen) for s in self.states), default=-1.0)
         return largest if largest >= 0.0 else None
 
     @property
     def decided(self) -> float | None:
-        """When the verdict was told: the first notice, else the end of the look around [s]."""
+        """Time of the verdict: the first notice, else the end of the look-around [s]."""
         moments = self._moments()
         return moments.get("notice", moments.get("looked"))
 
     def times(self) -> Times:
-        """Seconds from the trigger to what followed."""
+        """Seconds from the trigger to later events."""
         return {name: at - self._start for name, at in self._moments().items()} if self._start is not None else {}
 
     def _moments(self) -> Times:
@@ -117,13 +117,13 @@ class Mission:
 
 
 def evaluate(patrol: Patrol, heard: Recording, root: Path, state_dir: Path, run: Run) -> Result:
-    """Judge a recording, and what the guard kept of it, by the truth.
+    """Compare a recording, and the guard's own record, with ground truth.
 
     Args:
         patrol: the plan.
         heard: the recording.
         root: folder of the package.
-        state_dir: the guard's state.
+        state_dir: folder of the guard's state.
         run: facts about the programs.
     """
     mission = Mission(heard, patrol.room)
@@ -186,7 +186,7 @@ def _place_error(kept: Incident | None, patrol: Patrol, tracks: dict[str, Track]
 
 
 def _share_true(floor: Floor, room: int, robot: Track, mission: Mission) -> float | None:
-    """Share of the floor that the camera really saw from the trigger to the end of the look around."""
+    """Share of the floor that the camera really saw from the trigger to the end of the look-around."""
     looked = mission.times().get("looked")
     return true_share(floor, room, robot, mission.triggered, mission.triggered + looked) if looked else None
 
@@ -200,7 +200,7 @@ def _from_view(there: Presence, heard: Recording) -> Times:
 
 
 def _kept(state_dir: Path, mission: str | None) -> Incident | None:
-    """The guard's own record of a mission, None if it keeps none."""
+    """The guard's own record of a mission, None if there is none."""
     if mission is None or not (state_dir / NAME).is_file():
         return None
     try:

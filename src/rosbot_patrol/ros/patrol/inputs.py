@@ -31,18 +31,18 @@ log = logging.getLogger(__name__)
 
 
 class PatrolInputs:
-    """Subscribers and what they heard since the last step.
+    """Subscribers, and their messages since the last step.
 
     Args:
         params: topic of the battery.
         eyes: topics of camera, depth and map.
-        senses: make a step's inputs of it.
-        calls: write the calls of motion sensors down.
-        sensor_rooms: know which room a sensor calls to.
-        wake: has a step made at once.
+        senses: turn the messages into a step's inputs.
+        calls: write the motion sensors' calls to the journal.
+        sensor_rooms: rooms of the sensors.
+        wake: requests a step at once.
 
     Attributes:
-        on_boxes: told of each picture with a detection, with its stamp, in the callback.
+        on_boxes: called with each picture's stamp and detections, in the callback.
     """
 
     def __init__(

@@ -1,11 +1,11 @@
-"""notify: tests the channels to the owner, and shows the notices that wait; needs no ROS master.
+"""notify: tests the channels to the owner, and shows the waiting notices; needs no ROS master.
 
 rosrun rosbot_patrol notify --test [--channel NAME] [--config FILE]     a real test notice through each channel
-rosrun rosbot_patrol notify --list                                      what waits, and why
-rosrun rosbot_patrol notify --flush                                     try all that waits now
+rosrun rosbot_patrol notify --list                                      waiting notices, with reasons
+rosrun rosbot_patrol notify --flush                                     retry all waiting notices now
 
-It uses the channels that the robot's nodes were last started with, as they left them in the outbox, or those of a file.
-Exit status: 0 all well, 1 something was not taken or waits still, 2 it cannot be tried.
+It uses the channels that the robot's nodes were last started with, from the outbox, or those of a file.
+Exit status: 0 success, 1 a notice was refused or still waits, 2 it cannot be tried.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def run(arguments: list[str]) -> int:
-    """Do what is asked; returns the exit status. Raises ParamError, OSError."""
+    """Run the requested command; returns the exit status. Raises ParamError, OSError."""
     options = _parse(arguments)
     folder = state_folder(options.state_dir, get_ros_namespace()) / "outbox"
     around = Surroundings(home=ros_home(), environ=os.environ, host=socket.gethostname())

@@ -1,7 +1,7 @@
 """Notices to the owner from any node: on disk when `put` returns, delivered by threads of the node that has the lock.
 
 All nodes with the same state_dir share one outbox. One of them delivers for all, and another takes over when it ends.
-A node sends from its memory what the disk does not take. The owner is told that the disk is gone, and when it is back.
+If the disk fails, a node sends notices from its memory. The owner is told when the disk fails, and when it works again.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def run_node(
         name: name of the node if the launch file gives none.
         body: builds and runs it; returns on shutdown.
         priority: among the processes of the machine, as far as the system permits.
-        by_hand: people type this program: it ends if there is no ROS master, unless roslaunch started it.
+        by_hand: people type this program: without a ROS master it ends, unless roslaunch started it.
         init_options: further arguments of `rospy.init_node`.
     """
     if by_hand:

@@ -140,7 +140,7 @@ class FaultBoard:
         return bool(self._in_force) and any(self._of(_SILENT[what]))
 
     def driven(self, twist: Twist2D) -> Twist2D:
-        """How the base is driven where the wheels ask for a velocity."""
+        """Velocity of the base for the velocity that the wheels request."""
         for entry in self._in_force.values():
             if isinstance(entry.fault, OdometrySlip):
                 factor = entry.fault.factor
