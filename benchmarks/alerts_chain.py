@@ -25,7 +25,7 @@ from pathlib import Path
 from rosserial import HERE, Bridge, free_port, program
 
 ROOT = HERE.parent
-sys.path.insert(0, str(ROOT / "test" / "unit" / "alerts"))
+sys.path.insert(0, str(ROOT / "test" / "process" / "alerts"))
 
 MISSIONS = 15
 PICTURES = 10.0  # [Hz]

@@ -308,13 +308,9 @@ def smtp(port, **params):
 
 @pytest.fixture
 def smtp_server():
-    """The class of the mail server that the unit tests use."""
-    folder = str(ROOT / "test" / "unit" / "alerts")
-    sys.path.insert(0, folder)
-    try:
-        from smtp_server import SmtpServer
-    finally:
-        sys.path.remove(folder)
+    """The class of the mail server that the process tests use."""
+    from smtp_server import SmtpServer
+
     return SmtpServer
 
 

@@ -13,7 +13,7 @@ from ros_processes import Process, Ros
 
 NODE = """
 import rospy
-from rosbot_patrol.ros import greeting
+from rosbot_patrol.ros.runtime import greeting
 from rosbot_patrol.ros.runtime.node import run_node
 
 greeting.PATIENCE_S = 2.0

@@ -7,7 +7,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -245,7 +244,6 @@ def test_bad_parameter_is_one_sentence_and_exit_1(house, params, said):
 
 
 def test_the_mail_server_comes_back_and_gets_it_once(house):
-    sys.path.insert(0, str(ROOT / "test" / "unit" / "alerts"))
     from smtp_server import SmtpServer
 
     port = free_port()

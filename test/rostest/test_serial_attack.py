@@ -13,7 +13,7 @@ from ros_processes import free_port, wait_for
 from rosbot_patrol.rosserial.device.tcp_client import EspClient
 from rosbot_patrol.rosserial.protocol.keys import add_key, new_key
 
-ATTACKS = Path(__file__).parents[1] / "unit" / "rosserial" / "attacks.py"
+ATTACKS = Path(__file__).parents[1] / "process" / "rosserial" / "attacks.py"
 SECONDS = 5.0
 
 
