@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "src"), str(ROOT / "test" / "unit" / "replay")]
+sys.path[:0] = [str(ROOT / "src"), *(str(ROOT / "test" / "unit" / name) for name in ("replay", "patrol"))]
 
 import made_patrol  # noqa: E402
 import mapping_house  # noqa: E402
