@@ -44,13 +44,13 @@ def house(policy, **options):
 @pytest.mark.parametrize("name", [name for name in attacks.ATTACKS if "proof" not in name])
 def test_a_stranger_without_a_key_before_a_bridge_with_lists(name, caplog):
     with house(LISTS) as (recorder, server, port):
-        threads = threading.active_count()
+        threads = set(threading.enumerate())
         assert attacks.ATTACKS[name](port, SOURCE, 0.3) > 0
         assert {info.name for _, info in recorder.opened} == {"motion_trigger"}
         heard = {m[0] for m in recorder.messages if isinstance(m, bytes)}
         assert heard <= ({2, 3, 201} if name.startswith(("valid", "wrong", "frames")) else {2, 3})
         assert len(server.clients) <= 2 + LIMITS.per_address
-        assert threading.active_count() == threads
+        assert set(threading.enumerate()) <= threads  # one of an earlier test may end meanwhile
     assert len(caplog.records) < 40
 
 
