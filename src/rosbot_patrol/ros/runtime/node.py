@@ -17,7 +17,7 @@ from rospy.core import is_shutdown_requested
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import PatrolError
-from rosbot_patrol.ros.runtime import greeting, logs
+from rosbot_patrol.ros.runtime import greeting, logs, single_links
 from rosbot_patrol.ros.runtime.by_hand import require_master
 from rosbot_patrol.ros.runtime.process import Priority, take
 
@@ -50,6 +50,7 @@ def run_node(
         require_master(name)
     refused = take(priority)  # before any thread starts: threads inherit it
     greeting.install()
+    single_links.install()
     rospy.init_node(name, **init_options)
     logs.install()
     if refused:
