@@ -83,6 +83,11 @@ def sight(house):
     sight.close()
 
 
+def plain_text(mail):
+    part = next(part for part in mail.walk() if part.get_content_type() == "text/plain")
+    return part.get_payload(decode=True).decode()
+
+
 def test_a_person_has_a_place_and_a_marker_and_the_robot_goes_on(house, sight):
     from visualization_msgs.msg import Marker, MarkerArray
 
@@ -105,10 +110,12 @@ def test_a_person_has_a_place_and_a_marker_and_the_robot_goes_on(house, sight):
     wait_until(house.mails, 20, "the mail")
     kept = house.incident(house.alerts[0].id)
     assert kept.person_room_id not in (None, -1, 2)  # in view from the base on, and the sensor of room 2 called
-    text = next(part for part in house.mails()[0].walk() if part.get_content_type() == "text/plain")
-    lines = text.get_payload(decode=True).decode().splitlines()
-    assert f"Room:     {kept.person_title.removeprefix('room ')}" in lines
-    assert "Caller:   a motion sensor in room 2 (square room behind the door)" in lines
+    expected = {
+        f"Room:     {kept.person_title.removeprefix('room ')}",
+        "Caller:   a motion sensor in room 2 (square room behind the door)",
+    }
+    # a further person, met elsewhere on the way, may have a mail as well
+    assert any(expected <= set(plain_text(mail).splitlines()) for mail in house.mails())
     assert f"seen in {kept.person_title} while driving to room 2" in house.alerts[0].text
 
 
