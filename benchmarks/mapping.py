@@ -12,8 +12,8 @@ angles of the building (right_angles.py). A finished run is stored in `--keep` a
 gmapping, the parameters and the log are the same. `x C++` is the C++ original's error divided by ours (one seed).
 
 In the house the robot drives at 0.3 m/s with 720 beams at 10 Hz (mapping_house.py). gmapping_update_ms is the median of
-the updates on one core. gmapping_rtf is the duration of the drive over that of the mapping. gmapping_mb is the
-program's peak memory.
+the updates on one core. gmapping_rtf is the duration of the drive divided by the duration of the mapping. gmapping_mb
+is the program's peak memory.
 
 If the package path has the C++ original, the logs go by topics through it and through our node, one seed each
 (mapping_node.py). NAME_node_* are our errors and costs, NAME_original_* the original's. `--only nodes` measures ours

@@ -4,11 +4,12 @@
     python3 benchmarks/rosserial_attack.py [--json FILE] [--quick] [--sensors 100]
 
 The attacks are those of the tests (test/process/rosserial/attacks.py), one after the other and then all at once from
-eight addresses, each against a bridge with lists and against one with keys. The attacker is a process of its own at low
-priority: on another machine it would take no time of this one. Latency is that of the sensors' heartbeats, from `send`
-to a bare TCPROS subscriber, with the bridge's work for the attacker included. Memory is the bridge's RSS. `forged`
-counts messages in another sensor's name that came through. `allowed` counts those of the one sensor that the attacker's
-address may be under lists.
+eight addresses, each against a bridge with lists and against one with keys. The attacker is a separate process at low
+priority, because a real attacker would not use this machine's processor.
+
+Latency is measured on the sensors' heartbeats, from `send` to a bare TCPROS subscriber, with the bridge's work for the
+attacker included. Memory is the bridge's RSS. `forged` counts messages in another sensor's name that came through.
+`allowed` counts messages of the one sensor that the attacker's address may be under lists.
 """
 
 from __future__ import annotations

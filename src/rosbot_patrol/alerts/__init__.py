@@ -1,1 +1,1 @@
-"""Incidents, and what the owner is told about them."""
+"""Incidents: their records, and the notices to the owner."""
