@@ -22,7 +22,7 @@ import os
 import statistics
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +55,7 @@ def messages() -> Iterator[tuple[float, str, Any]]:
     poses = mapping_house.drive(mapping_house.waypoints([*rooms[:4], rooms[0]]))
     odometry = noisy_odometry(poses, np.random.default_rng(1))
     field = blocked_distances(mapping_house.plan(mapping_house.WORLD, mapping_house.BOUNDS, 0.02), 3.0)
-    mount = mapping_house.MOUNT.pose
+    mount = mapping_house.MOUNT
     laser = maker.transform("base_link", "laser", BEGIN, (mount.x, mount.y, 0.1), (0.0, 0.0, 1.0, 0.0))
     yield BEGIN, "/tf_static", maker.tf(laser)
     period = 1.0 / mapping_house.RATE
@@ -80,6 +80,13 @@ def patrol_messages() -> list[tuple[float, str, Any]]:
     for _ in range(25 * 60):
         world.step()
     return sorted(world.messages, key=lambda each: each[0])
+
+
+def make_bag(path: Path, content: Iterable[tuple[float, str, Any]]) -> None:
+    """Write a bag, whole or not at all."""
+    part = path.with_suffix(".part")
+    write_bag(part, content)
+    part.replace(path)
 
 
 def measure(bag: Path, setup: Setup, repeats: int) -> tuple[float, float, float]:
@@ -107,10 +114,10 @@ def main() -> None:
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     print(f"1 core of {os.cpu_count()}")
     if not options.bag.exists():
-        write_bag(options.bag, messages())
+        make_bag(options.bag, messages())
     patrol, points = options.bag.with_suffix(".patrol.bag"), options.bag.with_suffix(".rooms.yaml")
     if not patrol.exists():
-        write_bag(patrol, patrol_messages())
+        make_bag(patrol, patrol_messages())
         points.write_text(made_patrol.POINTS, encoding="utf-8")
     logging.disable(logging.WARNING)
     figures: dict[str, float] = {}
