@@ -32,7 +32,7 @@ from rosbot_patrol.simulation.scene.matrices import from_pose2d
 from rosbot_patrol.simulation.scene.scene import SceneRenderer
 from rosbot_patrol.simulation.scene.ways import Ways
 from rosbot_patrol.simulation.sdf.world import World
-from rosbot_patrol.simulation.sensors.camera import Camera, CameraParams, Picture, poses_before
+from rosbot_patrol.simulation.sensors.camera import Camera, CameraParams, Picture
 from rosbot_patrol.simulation.sensors.lidar import LidarParams, measure_scan
 from rosbot_patrol.simulation.sensors.motion_sensors import MotionSensorParams, SensorPlace
 from rosbot_patrol.simulation.sensors.range_sensors import RangeParams, measure_range
@@ -265,11 +265,15 @@ class Engine:
         robot = self.robot
         if self._camera is None or robot.base_from_optical is None:
             raise WorldError("simulation", "has no camera")
-        *earlier, pose = (
-            from_pose2d(base, robot.description.base_height) @ robot.base_from_optical
-            for base in (*poses_before(self.pose, self.twist, self.params.camera.blur), self.pose)
+        return self._camera.take(
+            from_pose2d(self.pose, robot.description.base_height) @ robot.base_from_optical,
+            self.population,
+            self._steps,
+            now=self.now,
+            turning=self.twist.wz,
+            colour=colour,
+            depth=depth,
         )
-        return self._camera.take(pose, self.population, self._steps, colour=colour, depth=depth, earlier=earlier)
 
     def view_from_above(self, height: float = 9.0) -> NDArray[np.uint8]:
         """Draw the house from a height [m] above the robot, north up; call from the thread of `picture`."""

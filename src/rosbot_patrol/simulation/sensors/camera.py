@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import simplejpeg
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import Pose2D, Twist2D, compose
 from rosbot_patrol.params import param
 from rosbot_patrol.simulation.noise import noise_of
 from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, Mover, SceneRenderer
 from rosbot_patrol.simulation.sensors import picture_kernels as kernels
+from rosbot_patrol.simulation.sensors.exposure import AutoExposure
 
 _BANK = 8
-_BLUR_VIEWS = 4, 16  # number of pictures averaged for motion blur: least, most
-_BLUR_TURN = 0.006  # rotation between two of them [rad]
-_BRIGHT = 115.0  # target mean colour of the automatic exposure, of 255
-_GAINS = (0.4, 2.5)
+_LEAST_MOTION = 0.5  # of the scene in the picture that is worth computing [px]
 _NO_DEPTH_NOISE = np.zeros(0, np.float32)
 _ROBOT = "the robot, in the window"
 
@@ -38,8 +35,13 @@ class CameraParams:
         0.0012, lo=0.0, doc="standard deviation of depth at 1 m [m]; it grows with the square of the depth"
     )
     exposure: float = param(1.0, lo=0.01, hi=20.0, doc="gain of the colours; at 1 a white surface in full light is 255")
-    auto_exposure: bool = param(False, doc="choose the gain from each image's brightness")
-    blur: float = param(0.0, unit="s", lo=0.0, hi=0.2, doc="exposure time; motion blurs the colours")
+    auto_exposure: bool = param(True, doc="choose the gain from the images' brightness")
+    settling: float = param(0.3, unit="s", lo=0.0, hi=10.0, doc="time constant of the automatic exposure")
+    blur: float = param(0.02, unit="s", lo=0.0, hi=0.2, doc="exposure time; a turn blurs the colours")
+    readout: float = param(
+        0.025, unit="s", lo=-0.2, hi=0.2, doc="time from the first row to the last; a turn slants the colours"
+    )
+    jpeg_quality: int = param(80, lo=0, hi=100, doc="compression of the colours, as of a USB camera; 0: none")
     renderer: str = param("egl", choices=("egl", "tiny"), doc="egl: OpenGL without a display; tiny: PyBullet's own")
 
     @property
@@ -86,6 +88,11 @@ class Camera:
     _boxes_shown: dict[str, Body] = field(default_factory=dict)
     _bank: list[NDArray[np.int8]] = field(default_factory=list)
     _depth_bank: list[NDArray[np.float32]] = field(default_factory=list)
+    _exposure: AutoExposure | None = None
+
+    def __post_init__(self) -> None:
+        if self.params.auto_exposure:
+            self._exposure = AutoExposure(self.params.settling)
 
     @property
     def renderer(self) -> SceneRenderer:
@@ -103,9 +110,10 @@ class Camera:
         walkers: Iterable[Mover],
         sample: int,
         *,
+        now: float = 0.0,
+        turning: float = 0.0,
         colour: bool = True,
         depth: bool = True,
-        earlier: Sequence[Matrix] = (),
     ) -> Picture:
         """Take one picture; its number `sample` selects the noise. Unrequested channels stay as drawn.
 
@@ -113,18 +121,15 @@ class Camera:
             world_from_optical: pose of the camera, shape (4, 4).
             walkers: actors and doors.
             sample: number of the picture.
-            colour: whether to add exposure and noise to the colour.
+            now: time of the picture [s].
+            turning: speed of the camera about its vertical axis, positive to the left [rad/s].
+            colour: whether to add shutter, exposure, noise and compression to the colour.
             depth: whether to add limits and noise to the depth.
-            earlier: poses of the camera while the shutter was open.
         """
         self._show(list(walkers))
-        optics = self.params.intrinsics
-        blurred = [self.renderer.render(pose, optics)[0] for pose in earlier] if colour else []
-        drawn, metres = self.renderer.render(world_from_optical, optics)
-        if blurred:
-            drawn = np.rint(np.mean([*blurred, drawn], axis=0, dtype=np.float32)).astype(np.uint8)
+        drawn, metres = self.renderer.render(world_from_optical, self.params.intrinsics)
         return Picture(
-            self._noisy_colour(self._exposed(drawn), sample) if colour else drawn,
+            self._sensed_colour(drawn, sample, now, turning) if colour else drawn,
             self._sensed_depth(metres, sample) if depth else metres,
         )
 
@@ -181,25 +186,38 @@ class Camera:
                 flat = noise_of(self.seed, "depth", i).standard_normal((p.height, p.width), dtype=np.float32)
                 self._depth_bank.append(flat * np.float32(p.depth_noise))
 
-    def _exposed(self, colour: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _sensed_colour(self, drawn: NDArray[np.uint8], sample: int, now: float, turning: float) -> NDArray[np.uint8]:
+        """Colours after shutter, exposure, noise and compression, in the order of a real camera."""
         gain = self.params.exposure
-        if self.params.auto_exposure:
-            mean = float(colour[::8, ::8].mean())
-            gain = min(max(_BRIGHT / max(mean, 1.0), _GAINS[0]), _GAINS[1])
-        if gain == 1.0:
-            return colour
-        table = np.clip(np.rint(np.arange(256) * gain), 0, 255).astype(np.uint8)
-        return np.asarray(table[colour])
+        if self._exposure is not None:
+            gain = self._exposure.gain(float(drawn[::8, ::8].mean()), now)
+        exposed = np.clip(np.rint(np.arange(256) * gain), 0, 255).astype(np.uint8)
+        seen = self._noisy_colour(self._shuttered(drawn, turning), exposed, sample)
+        quality = self.params.jpeg_quality
+        if not quality:
+            return seen
+        packed = simplejpeg.encode_jpeg(np.ascontiguousarray(seen), quality, "RGB", "420")
+        return np.asarray(simplejpeg.decode_jpeg(packed))
 
-    def _noisy_colour(self, colour: NDArray[np.uint8], sample: int) -> NDArray[np.uint8]:
+    def _shuttered(self, drawn: NDArray[np.uint8], turning: float) -> NDArray[np.uint8]:
+        moving = turning * self.params.intrinsics.fx  # the middle of the picture [px/s]
+        smear, slant = abs(moving) * self.params.blur, moving * self.params.readout
+        if max(smear, abs(slant)) < _LEAST_MOTION:
+            return drawn
+        rows = np.ascontiguousarray(drawn).reshape(len(drawn), -1)
+        seen = np.empty(rows.shape, np.uint8)
+        kernels.roll_and_smear(rows, slant, smear, seen)
+        return seen.reshape(drawn.shape)
+
+    def _noisy_colour(self, drawn: NDArray[np.uint8], exposed: NDArray[np.uint8], sample: int) -> NDArray[np.uint8]:
         if not self._bank:
-            return colour
+            return np.asarray(exposed[drawn])
         noise = self._bank[sample % _BANK].ravel()
-        drawn, seen = colour.ravel(), np.empty(colour.size, np.uint8)
-        start = sample // _BANK * 37 % colour.shape[0] * colour.shape[1] * 3  # rows of a noise bank, shifted down
-        kernels.add_noise(drawn[:start], noise[colour.size - start :], seen[:start])
-        kernels.add_noise(drawn[start:], noise[: colour.size - start], seen[start:])
-        return seen.reshape(colour.shape)
+        colours, seen = drawn.ravel(), np.empty(drawn.size, np.uint8)
+        start = sample // _BANK * 37 % drawn.shape[0] * drawn.shape[1] * 3  # rows of a noise bank, shifted down
+        kernels.expose(colours[:start], exposed, noise[colours.size - start :], seen[:start])
+        kernels.expose(colours[start:], exposed, noise[: colours.size - start], seen[start:])
+        return seen.reshape(drawn.shape)
 
     def _sensed_depth(self, depth: NDArray[np.float32], sample: int) -> NDArray[np.float32]:
         p = self.params
@@ -208,12 +226,3 @@ class Camera:
         exact = np.ascontiguousarray(depth, np.float32).ravel()
         kernels.sense_depth(exact, noise, p.depth_min, p.depth_max, sensed)
         return sensed.reshape(depth.shape)
-
-
-def poses_before(pose: Pose2D, twist: Twist2D, seconds: float) -> list[Pose2D]:
-    """Poses of a moving base while the shutter was open, without the last; the velocity is in its own frame."""
-    if seconds <= 0.0 or (twist.vx == twist.vy == twist.wz == 0.0):
-        return []
-    views = min(max(math.ceil(abs(twist.wz) * seconds / _BLUR_TURN), _BLUR_VIEWS[0]), _BLUR_VIEWS[1])
-    steps = [-seconds * k / views for k in range(views - 1, 0, -1)]
-    return [compose(pose, Pose2D(twist.vx * t, twist.vy * t, twist.wz * t)) for t in steps]
