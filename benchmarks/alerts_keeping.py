@@ -24,7 +24,7 @@ from rosbot_patrol.alerts.records.incident import Event
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.records.commands import Commands, Notice, Report
+from rosbot_patrol.patrol.records.commands import Commands, IntruderAlarm, Report
 from rosbot_patrol.patrol.records.findings import Confirmation
 from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.story.mission_log import MissionLog
@@ -79,16 +79,16 @@ def patrol(keeper: IncidentKeeper, number: int, frames: list[bytes], *, is_seen:
             Report(phase=phase, why=f"{phase.value}, {seconds:.0f} s", mission=mission.id) if tick % 50 == 0 else None
         )
         heard = [Event(wall=WALL + now, kind="sensor", text="motion sensor 3 sees motion")] if tick % 125 == 0 else []
-        notices: tuple[Notice, ...] = ()
+        alarms: tuple[IntruderAlarm, ...] = ()
         if is_seen and tick == 25 * STEPS:
             mission.verdict, mission.reason = Verdict.CONFIRMED, "person seen"
             seen = Confirmation(label="person", probability=0.9, stamp=now, boxes=(), pictures=3)
-            notices = (Notice(mission=mission, seen=seen, phase=phase, pose=mission.room.pose),)
+            alarms = (IntruderAlarm(mission=mission, seen=seen, phase=phase, pose=mission.room.pose),)
         mission.phase = phase
         is_last = tick == SECONDS * STEPS - 1
         if is_last and mission.verdict is None:
             mission.verdict, mission.reason = Verdict.CLEAR, "nobody seen"
-        commands = Commands(report=report, notices=notices, ended=(mission,) if is_last else ())
+        commands = Commands(report=report, alarms=alarms, ended=(mission,) if is_last else ())
         picture = None
         if tick * PICTURES // STEPS != (tick - 1) * PICTURES // STEPS:
             data = frames[tick % len(frames)]
@@ -103,7 +103,7 @@ def patrol(keeper: IncidentKeeper, number: int, frames: list[bytes], *, is_seen:
         entries = chronicle.step(now=now, wall=WALL + now, mission=mission, commands=commands, pose=pose, heard=heard)
         keeper.put(entries)
         keeper.look(mission.id if phase is Phase.LOOKING else "")
-        if notices:
+        if alarms:
             keeper.see(mission.id, now)
         if entries or tick % (STEPS // 2) == 0:
             keeper.step()

@@ -32,8 +32,8 @@ _SHOWN_BY_BEING_HEARD = (Kind.SILENT, Kind.BRIDGE_GONE, Kind.PATROL_GONE)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Notice:
-    """A notice to send: a unique id, a subject line, a text, and the number of `items` in it."""
+class SensorReport:
+    """What the owner hears about sensors: a unique id, a subject line, a text, and the problems in it."""
 
     id: str
     subject: str
@@ -92,8 +92,8 @@ class Notices:
         except (KeyError, TypeError, ValueError) as err:
             log.warning("the stored notices about sensors are invalid (%r): starting without them", err)
 
-    def update(self, watch: Supervisor, listed: Sequence[SensorStatus], now: float, wall: float) -> Notice | None:
-        """Notice to send now, None: none; call it about once a second.
+    def update(self, watch: Supervisor, listed: Sequence[SensorStatus], now: float, wall: float) -> SensorReport | None:
+        """Report to send now, None: none; call it about once a second.
 
         Args:
             watch: the supervisor with the present problems.
@@ -121,7 +121,7 @@ class Notices:
         items += self._tell_well(well, watch, wall)
         self._last = now
         self._count += 1
-        return self._notice(tuple(items), statuses, watch, wall)
+        return self._report(tuple(items), statuses, watch, wall)
 
     def _is_calm(self, key: Key, watch: Supervisor) -> bool:
         """Whether the cause of a problem may be people at home."""
@@ -194,13 +194,13 @@ class Notices:
             items.append(Item(kind=None, title=title, what=what, since=since, lasted=max(wall - since, 0.0)))
         return items
 
-    def _notice(
+    def _report(
         self, items: tuple[Item, ...], statuses: Mapping[int, SensorStatus], watch: Supervisor, wall: float
-    ) -> Notice:
+    ) -> SensorReport:
         expected = [status for status in statuses.values() if status.watched]
         well = sum(not s.problems and not s.waiting for s in expected)
         stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(wall))
-        return Notice(
+        return SensorReport(
             id=f"{stamp}-sensors{self._count}",
             subject=wording.subject(items),
             text=wording.text(items, watched=len(expected), well=well),

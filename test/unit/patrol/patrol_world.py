@@ -81,7 +81,7 @@ class World:
             self.yaw += out.speed * 0.04
         self.speeds.append(out.speed)
         self.reports += [out.report] if out.report else []
-        self.notices += out.notices
+        self.notices += out.alarms
         self.ended += out.ended
 
     def _glide(self):

@@ -153,7 +153,7 @@ class World:
             self.glide(self.goals[-1])
         if out.speed is not None:
             self.pose = self.pose._replace(yaw=wrap_angle(self.pose.yaw + out.speed * 0.08))
-        self.notices += out.notices
+        self.notices += out.alarms
         self.ended += out.ended
         self.words += out.words
         self.ignored += out.ignored

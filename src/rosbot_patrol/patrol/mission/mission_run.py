@@ -23,7 +23,7 @@ from rosbot_patrol.patrol.mission.phases import (
 )
 from rosbot_patrol.patrol.mission.views import Viewpoints, Views
 from rosbot_patrol.patrol.records.activity import Activity, Place
-from rosbot_patrol.patrol.records.commands import Commands, Notice
+from rosbot_patrol.patrol.records.commands import Commands, IntruderAlarm
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.story import status_text
@@ -204,19 +204,19 @@ class MissionRun:
         if mission.verdict is not Verdict.CONFIRMED:
             self.decide(Verdict.CONFIRMED, said)
         if finding.is_new:
-            out.notices += (self._notice(finding, said, inputs),)
+            out.alarms += (self._alarm(finding, said, inputs),)
             mission.notified = out.changed = True
 
-    def _notice(self, finding: Finding, said: str, inputs: Inputs) -> Notice:
-        """The notice of a person met for the first time; a second person has a record of their own."""
+    def _alarm(self, finding: Finding, said: str, inputs: Inputs) -> IntruderAlarm:
+        """The alarm about a person met for the first time; a second person has a record of their own."""
         mission = self.mission
         copy = dataclasses.replace(mission, people=list(mission.people))
         if finding.number > 1:
             copy.id, copy.place = f"{mission.id}-{finding.number}", finding.places[finding.number - 1]
             copy.place_room, copy.is_outside, copy.reason = finding.room, finding.is_outside, said
             log.warning("a second incident, %s: %s", copy.id, said)
-        notice = Notice(mission=copy, seen=finding.seen, phase=mission.phase, pose=inputs.pose)
-        return self._parts.notices.admit(notice, inputs.guarded)
+        alarm = IntruderAlarm(mission=copy, seen=finding.seen, phase=mission.phase, pose=inputs.pose)
+        return self._parts.notices.admit(alarm, inputs.guarded)
 
     def _follow_somebody(self, now: float, inputs: Inputs, out: Commands) -> bool:
         """Turn towards the person in view; the phase waits meanwhile."""

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 
 from rosbot_patrol.patrol.guard.modes import DISARMED
-from rosbot_patrol.patrol.records.commands import Notice, Release
+from rosbot_patrol.patrol.records.commands import IntruderAlarm, Release
 from rosbot_patrol.patrol.records.inputs import Guarded
 
 
@@ -24,12 +24,12 @@ class NoticeGate:
         self.held = dict(held)
         self._written: dict[str, str] = {}  # reasons, by the id of a call that waits
 
-    def admit(self, notice: Notice, guarded: Guarded) -> Notice:
-        """The notice, marked as held if an entry delay runs."""
+    def admit(self, alarm: IntruderAlarm, guarded: Guarded) -> IntruderAlarm:
+        """The alarm, marked as held if an entry delay runs."""
         if guarded.holds_until is None:
-            return notice
-        self.held[notice.mission.id] = guarded.holds_until
-        return dataclasses.replace(notice, is_held=True)
+            return alarm
+        self.held[alarm.mission.id] = guarded.holds_until
+        return dataclasses.replace(alarm, is_held=True)
 
     def hold(self, mission_id: str, until: float) -> None:
         """Hold a notice that was written before a restart, unless it is known."""

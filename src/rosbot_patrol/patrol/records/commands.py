@@ -27,13 +27,13 @@ class Report:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Notice:
-    """A confirmed intruder: the first of its mission, or somebody else elsewhere.
+class IntruderAlarm:
+    """A confirmed intruder: the first of the mission, or another person elsewhere.
 
     Attributes:
-        mission: a copy of what it was at that moment; for somebody else with an id of its own, "ID-2", ...
-        seen: what the detector saw; phase: what the robot did; pose: where it was in map.
-        is_held: an entry delay runs: keep all of it, but tell nobody until a `Release` says so.
+        mission: copy of the mission at that moment; for another person under an id of its own, "ID-2", ...
+        seen: what the detector saw; phase: what the robot did; pose: of the robot in map.
+        is_held: an entry delay runs: write the notice, but send it only after a `Release`.
     """
 
     mission: Mission
@@ -92,7 +92,7 @@ class Commands:
         goal: to be sent; cancel: give up the goal that runs; cancel_all: and everybody else's.
         speed: turning speed to command [rad/s], None where the patrol has no wish (the wheels are another's).
         report: the state, where it changed.
-        notices: intruders that were confirmed: keep each, send it.
+        alarms: intruders that were confirmed: keep each, send it.
         releases: what becomes of notices that were held.
         ended: missions that are over, with their verdicts; the robot may not be at home yet.
         ignored: calls that start no mission.
@@ -107,7 +107,7 @@ class Commands:
     cancel_all: bool = False
     speed: float | None = None
     report: Report | None = None
-    notices: tuple[Notice, ...] = ()
+    alarms: tuple[IntruderAlarm, ...] = ()
     releases: tuple[Release, ...] = ()
     ended: tuple[Mission, ...] = ()
     ignored: tuple[Ignored, ...] = ()

@@ -14,7 +14,7 @@ from typing import Any
 from rosbot_patrol.alerts.records.incident import NO_ROOM, Event, Incident
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.records.commands import Commands, Notice
+from rosbot_patrol.patrol.records.commands import Commands, IntruderAlarm
 from rosbot_patrol.patrol.records.mission import Mission
 
 BEFORE = 60.0  # [s] of what the sensors said before a mission began, in its record
@@ -84,12 +84,12 @@ class MissionLog:
             elif heard:
                 entries.append(Entry(incident=mission.id, events=tuple(heard)))
             entries += self._follow(now, wall, mission, commands, pose)
-        for notice in commands.notices:
+        for alarm in commands.alarms:
             if (
-                mission is not None and notice.mission.id != mission.id
+                mission is not None and alarm.mission.id != mission.id
             ):  # somebody else elsewhere, with a record of their own
-                entries.append(self._opened(now, wall, notice.mission))
-            entries.append(_seen(wall, notice))
+                entries.append(self._opened(now, wall, alarm.mission))
+            entries.append(_seen(wall, alarm))
         ignored = (i for i in commands.ignored if i.mission)
         entries += [Entry(incident=i.mission, events=(Event(wall=i.wall, kind="sensor", text=i.why),)) for i in ignored]
         for ended in commands.ended:
@@ -189,11 +189,11 @@ def person_room(mission: Mission) -> dict[str, Any]:
     return {"person_room_id": NO_ROOM} if mission.is_outside else {}
 
 
-def _seen(wall: float, notice: Notice) -> Entry:
-    mission, seen, pose = notice.mission, notice.seen, notice.pose
+def _seen(wall: float, alarm: IntruderAlarm) -> Entry:
+    mission, seen, pose = alarm.mission, alarm.seen, alarm.pose
     changes = _state(mission) | {
         "confirmed": wall,
-        "phase": notice.phase.value,
+        "phase": alarm.phase.value,
         "object_class": seen.label,
         "probability": seen.probability,
         "pictures": seen.pictures,

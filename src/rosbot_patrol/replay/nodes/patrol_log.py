@@ -55,7 +55,7 @@ class PatrolLog:
         if is_turning != self._is_turning:
             self._is_turning = is_turning
             self._rows["turns"].add(now, is_turning)
-        if out.notices or out.ended or out.ignored or out.words:
+        if out.alarms or out.ended or out.ignored or out.words:
             self._note_news(now, out)
 
     def _note_report(self, now: float, commands: Commands) -> None:
@@ -66,10 +66,10 @@ class PatrolLog:
         self._rows["reports"].add(now, said.phase.value, said.room_id, said.origin, queue, *texts)
 
     def _note_news(self, now: float, commands: Commands) -> None:
-        for notice in commands.notices:
-            seen, place = notice.seen, notice.seen.measured
+        for alarm in commands.alarms:
+            seen, place = alarm.seen, alarm.seen.measured
             x, y = (place.x, place.y) if place is not None else (math.nan, math.nan)
-            row = notice.mission.room.id, seen.label, seen.probability, seen.pictures, x, y, notice.is_held
+            row = alarm.mission.room.id, seen.label, seen.probability, seen.pictures, x, y, alarm.is_held
             self._rows["notices"].add(now, *row)
         for mission in commands.ended:
             verdict = mission.verdict.value if mission.verdict else ""

@@ -16,7 +16,7 @@ from rosbot_patrol.alerts.dispatch.delivery import Delivery
 from rosbot_patrol.alerts.outbox.damaged_notices import replacement
 from rosbot_patrol.alerts.outbox.delayed_notices import DelayedNotices
 from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
-from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
+from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox, to_jpeg
 from rosbot_patrol.alerts.records.database import FOLDER
 from rosbot_patrol.alerts.records.files import NewFile
@@ -26,7 +26,7 @@ from rosbot_patrol.alerts.safe_text import one_line, token
 from rosbot_patrol.errors import AlertError
 from rosbot_patrol.msg import Alert
 from rosbot_patrol.patrol.calls.ignored_log import IgnoredLog
-from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, OwnerMessage, Release
+from rosbot_patrol.patrol.records.commands import Commands, Ignored, IntruderAlarm, OwnerMessage, Release
 from rosbot_patrol.patrol.story.mission_log import Entry, person_room
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.patrol.pictures import PictureRing
@@ -90,7 +90,7 @@ class AlertDesk:
             log.error("the notice about %s cannot be looked for: %s", incident, err)
             return False
 
-    def told(self, incident: str) -> PostNotice | None:
+    def told(self, incident: str) -> Notice | None:
         """The notice of an incident from before the restart, None if there is none."""
         try:
             return self._delayed.get(token(incident)) or self._post.find(token(incident))
@@ -105,7 +105,7 @@ class AlertDesk:
                 self._unwritten.append(write)
         self._to_record.set()
 
-    def recall(self, incident: str, notice: PostNotice) -> None:
+    def recall(self, incident: str, notice: Notice) -> None:
         """Complete the record of a mission with its notice, which survived the restart without the patrol's memory."""
         event = Event(wall=notice.wall, kind="seen", text="somebody was seen, and the program was killed right after")
         self._keeper.put([Entry(incident=incident, changes={"confirmed": notice.wall}, events=(event,))])
@@ -114,9 +114,9 @@ class AlertDesk:
             file = NewFile(name="seen.jpg", role="detection", data=notice.picture, stamp=notice.wall, caption=caption)
             self._keeper.put_picture(incident, file)
 
-    def take(self, notice: Notice, ros_time: float) -> None:
-        """Accept an intruder's notice; returns at once."""
-        mission, seen, pose = notice.mission, notice.seen, notice.pose
+    def take(self, alarm: IntruderAlarm, ros_time: float) -> None:
+        """Accept an intruder alarm; returns at once."""
+        mission, seen, pose = alarm.mission, alarm.seen, alarm.pose
         incident = Incident(
             id=mission.id,
             wall=time.time(),
@@ -124,7 +124,7 @@ class AlertDesk:
             room_id=mission.room.id,
             room_name=mission.room.name,
             origin=mission.origin.value,
-            phase=notice.phase.value,
+            phase=alarm.phase.value,
             object_class=seen.label,
             probability=seen.probability,
             pictures=seen.pictures,
@@ -134,7 +134,7 @@ class AlertDesk:
             person=mission.place,
             **person_room(mission),
         )
-        self._jobs.append(lambda: self._record(incident, notice))
+        self._jobs.append(lambda: self._record(incident, alarm))
         self._keeper.see(incident.id, seen.stamp)
         self._to_record.set()
 
@@ -213,27 +213,27 @@ class AlertDesk:
                 if incident is not None:
                     self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
-    def _record(self, incident: Incident, notice: Notice) -> None:
+    def _record(self, incident: Incident, alarm: IntruderAlarm) -> None:
         """Write a notice to the disk; if the disk refuses, keep it in the post's memory, which sends it from there."""
         if self._post.has(incident.id) or self.is_held(incident.id):  # written before a kill
             return
-        picture, note = self._picture(notice)
-        place = str(self._delayed.folder) if notice.is_held else self._post.place
+        picture, note = self._picture(alarm)
+        place = str(self._delayed.folder) if alarm.is_held else self._post.place
         with self._telling:
             self._told[incident.id] = incident
-            is_on_disk = (self._hold if notice.is_held else self._post.put)(
+            is_on_disk = (self._hold if alarm.is_held else self._post.put)(
                 incident_notice(incident, picture, picture_note=note)
             )
             self._publish(incident, transport="", location=place, text=incident.sentence)
         where = "is on disk" if is_on_disk else "is in memory only, as the disk does not take it"
-        waits = " and waits for the entry delay" if notice.is_held else ""
+        waits = " and waits for the entry delay" if alarm.is_held else ""
         log.warning("ALERT: %s; the notice %s%s", incident.sentence, where, waits)
         if picture is not None:
             caption = "sent with the notice"
-            file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=notice.seen.stamp, caption=caption)
+            file = NewFile(name="seen.jpg", role="detection", data=picture, stamp=alarm.seen.stamp, caption=caption)
             self._keeper.put_picture(incident.id, file)
 
-    def _hold(self, notice: PostNotice) -> bool:
+    def _hold(self, notice: Notice) -> bool:
         """Store a notice for the entry delay; returns whether it is on the disk."""
         try:
             self._delayed.put(notice)
@@ -266,7 +266,7 @@ class AlertDesk:
     def _tell(self, word: OwnerMessage, wall: float) -> None:
         """Send the owner a message about something other than an intruder."""
         self._post.put(
-            PostNotice(
+            Notice(
                 id=token(f"{word.kind}-{wall:.3f}"),
                 wall=wall,
                 kind="fault",
@@ -281,22 +281,22 @@ class AlertDesk:
         except OSError as err:
             log.error("calls that start no mission cannot be written down: %s", err)
 
-    def _picture(self, notice: Notice) -> tuple[bytes | None, str]:
+    def _picture(self, alarm: IntruderAlarm) -> tuple[bytes | None, str]:
         if not self._pictures.is_wanted:
             return None, "none, no camera topic is set"
-        raw = self._pictures.wait_for(notice.seen.stamp, 0.5)
+        raw = self._pictures.wait_for(alarm.seen.stamp, 0.5)
         boxes = [
             LabelledBox(
                 text=f"{one_line(b.label)} {b.probability:.2f}", xmin=b.xmin, ymin=b.ymin, xmax=b.xmax, ymax=b.ymax
             )
-            for b in notice.seen.boxes
+            for b in alarm.seen.boxes
         ]
         note = "attached, the one that the boxes were found in"
         if raw is None:
-            raw, boxes = self._pictures.find(notice.seen.stamp, tolerance=2.0), []
+            raw, boxes = self._pictures.find(alarm.seen.stamp, tolerance=2.0), []
             if raw is None:
                 return None, "none came from the camera"
-            note = f"attached, taken {abs(raw.stamp - notice.seen.stamp):.1f} s from the detection"
+            note = f"attached, taken {abs(raw.stamp - alarm.seen.stamp):.1f} s from the detection"
         try:
             return to_jpeg(raw, boxes), note
         except AlertError as err:

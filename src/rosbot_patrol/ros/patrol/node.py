@@ -26,7 +26,7 @@ from typing import Any
 import rospy
 
 from rosbot_patrol.alerts.channels.params import MailParams
-from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
+from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.pictures.album import Sighting
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
@@ -140,7 +140,7 @@ class PatrolNode:
         self.markers = PeopleMarkers(inputs.map_frame)
         self._shown = ""
         self._is_over = False
-        self._older: dict[str, PostNotice] = {}  # by incident: notices from before the restart, unknown to the memory
+        self._older: dict[str, Notice] = {}  # by incident: notices from before the restart, unknown to the memory
         self._is_signalled = False
         self._round_at = -math.inf
         self._schedule_changed = False
@@ -264,8 +264,8 @@ class PatrolNode:
         self._wheels.turn(commands.speed)
         if commands.report is not None:
             self._state.publish(time_now, commands.report, self.manager.mission)
-        for notice in commands.notices:
-            self.desk.take(notice, time_now)
+        for alarm in commands.alarms:
+            self.desk.take(alarm, time_now)
         commands.words += self.neighbour.step()
         self.desk.follow(commands)
         self._record(time_now, commands, inputs.pose)

@@ -24,7 +24,7 @@ from std_msgs.msg import Empty
 
 from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.safe_outbox import RETRY
-from rosbot_patrol.alerts.outbox.notice import Notice as PostNotice
+from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StateError
 from rosbot_patrol.files import read_json, write_json
@@ -40,7 +40,7 @@ from rosbot_patrol.ros.runtime.private_files import keep_private
 from rosbot_patrol.ros.runtime.state_folder import state_folder
 from rosbot_patrol.ros.sensors.reports import Reports, event_to_msg, look_to_msg, states_to_msg
 from rosbot_patrol.sensors.looks import Looks
-from rosbot_patrol.sensors.notices import Notice, Notices
+from rosbot_patrol.sensors.notices import Notices, SensorReport
 from rosbot_patrol.sensors.problems import SERIOUS, Kind
 from rosbot_patrol.sensors.sensor_file import SensorList, load_sensors
 from rosbot_patrol.sensors.settings import LookTimes, NoticeTimes, WatchTimes
@@ -193,10 +193,10 @@ class SensorWatch:
 
     def _tell_owner(self, statuses: list[SensorStatus]) -> None:
         now = time.monotonic()
-        notice = self._notices.update(self._watch, statuses, now, time.time())
-        if notice is not None:
-            log.warning("notice to the owner: %s", notice.subject)
-            self._post.put(to_post(notice))
+        report = self._notices.update(self._watch, statuses, now, time.time())
+        if report is not None:
+            log.warning("notice to the owner: %s", report.subject)
+            self._post.put(to_notice(report))
             self._unwritten, self._retry_at = True, now
         if self._unwritten and now >= self._retry_at and self._post.is_written:
             self._remember(now)
@@ -212,9 +212,9 @@ class SensorWatch:
             self._unwritten = False
 
 
-def to_post(notice: Notice) -> PostNotice:
-    """Convert a notice for the outbox."""
-    return PostNotice(id=notice.id, wall=time.time(), kind="sensor", subject=notice.subject, text=notice.text)
+def to_notice(report: SensorReport) -> Notice:
+    """Convert a report for the outbox."""
+    return Notice(id=report.id, wall=time.time(), kind="sensor", subject=report.subject, text=report.text)
 
 
 def read_memory(path: Path) -> Mapping[str, Any] | None:

@@ -5,7 +5,7 @@ import pytest
 from rosbot_patrol.alerts.records.incident import Event
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.records.commands import Commands, Ignored, Notice, Report
+from rosbot_patrol.patrol.records.commands import Commands, Ignored, IntruderAlarm, Report
 from rosbot_patrol.patrol.records.findings import Confirmation
 from rosbot_patrol.patrol.records.mission import Mission, Phase, Verdict
 from rosbot_patrol.patrol.story.mission_log import MissionLog
@@ -83,8 +83,10 @@ def test_somebody_seen_then_the_verdict_then_the_end(patrol):
     patrol.step(mission(), said(Phase.LOOKING, "turning"))
     found = mission(verdict=Verdict.CONFIRMED, reason="a person", sightings=1, place=(3.0, 4.0), share_seen=0.5)
     seen = Confirmation(label="person", probability=0.9, stamp=101.5, boxes=(), pictures=3)
-    notice = Notice(mission=dataclasses.replace(found), seen=seen, phase=Phase.LOOKING, pose=Pose2D(1.0, 2.0, 0.5))
-    verdict, sighting = patrol.step(found, notices=(notice,))
+    alarm = IntruderAlarm(
+        mission=dataclasses.replace(found), seen=seen, phase=Phase.LOOKING, pose=Pose2D(1.0, 2.0, 0.5)
+    )
+    verdict, sighting = patrol.step(found, alarms=(alarm,))
     assert verdict.changes["verdict"] == "confirmed"
     assert verdict.events[0].text == "confirmed: a person"
     assert sighting.changes["object_class"] == "person"
