@@ -1,6 +1,6 @@
 """The pictures that networks are tested on: what in them no training picture holds, and their seeds.
 
-Half of the scenes are the villa in test/test_pictures, whose plan and furniture are its own; half are rooms by chance.
+Half of the scenes are the villa in test/data/villa, whose plan and furniture are its own; half are rooms by chance.
 Every texture is replaced, under the same name, by a pattern that training does not have (`unseen_textures`); people
 have reserved looks and a reserved posture (`scenes.draw_person`), those on the posters too. All of this, and the seeds,
 stood in the repository before the training whose weights are measured with it.
@@ -16,7 +16,7 @@ import numpy as np
 
 from rosbot_patrol.simulation.scene.textures import SIDE, Field, Texture, grey, smooth_noise
 
-WORLD = Path("test/test_pictures/villa.world")
+WORLD = Path("test/data/villa/villa.world")
 
 
 @dataclass(frozen=True)

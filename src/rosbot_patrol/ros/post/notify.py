@@ -22,7 +22,7 @@ from pathlib import Path
 from rosgraph.names import get_ros_namespace
 
 from rosbot_patrol.alerts.channels.channel import Channel
-from rosbot_patrol.alerts.channels.channel_test import make_test_notice, try_channel
+from rosbot_patrol.alerts.channels.channel_check import make_test_notice, try_channel
 from rosbot_patrol.alerts.channels.config import Surroundings, load_channels, make_channels
 from rosbot_patrol.alerts.channels.params import MailParams
 from rosbot_patrol.alerts.dispatch.delivery import ChannelStatus

@@ -1,9 +1,9 @@
 from rosbot_patrol.alerts.channels.channel import FailureCause
-from rosbot_patrol.alerts.channels.channel_test import ChannelTest
+from rosbot_patrol.alerts.channels.channel_check import ChannelCheck
 
 
 def test_every_cause_that_has_a_name_has_advice():
     for cause in FailureCause:
-        tested = ChannelTest(channel="a", text="", seconds=0.0, cause=cause)
+        tested = ChannelCheck(channel="a", text="", seconds=0.0, cause=cause)
         assert bool(tested.advice) is (cause is not FailureCause.OTHER)
-    assert ChannelTest(channel="a", text="", seconds=0.0).advice == ""
+    assert ChannelCheck(channel="a", text="", seconds=0.0).advice == ""

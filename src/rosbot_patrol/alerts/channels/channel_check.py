@@ -1,4 +1,4 @@
-"""Channel test: a real notice that says that it is a test, and its outcome in plain words."""
+"""Check of a channel: a real notice that says that it is a test, and its outcome in plain words."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _ADVICE = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class ChannelTest:
+class ChannelCheck:
     """Outcome of a test notice on one channel.
 
     Attributes:
@@ -61,14 +61,14 @@ class ChannelTest:
         return _ADVICE.get(self.cause, "") if self.cause else ""
 
 
-def try_channel(channel: Channel, notice: Notice, clock: Callable[[], float] = time.monotonic) -> ChannelTest:
+def try_channel(channel: Channel, notice: Notice, clock: Callable[[], float] = time.monotonic) -> ChannelCheck:
     """Send a notice through a channel, past the outbox."""
     began = clock()
     try:
         where = channel.transport.send(notice)
     except DeliveryError as err:
-        return ChannelTest(channel=channel.name, text=str(err), seconds=clock() - began, cause=err.cause)
-    return ChannelTest(channel=channel.name, text=where, seconds=clock() - began)
+        return ChannelCheck(channel=channel.name, text=str(err), seconds=clock() - began, cause=err.cause)
+    return ChannelCheck(channel=channel.name, text=where, seconds=clock() - began)
 
 
 def make_test_notice(wall: float, host: str) -> Notice:
