@@ -1,18 +1,18 @@
-"""Download of one large file over HTTP: resumed after a break; at the end complete or absent."""
+"""Download of one file over HTTP: resumed after a break; at the end complete or absent."""
 
 from __future__ import annotations
 
-import hashlib
 import http.client
 import os
 import re
 import shutil
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
+from rosbot_patrol.detection.catalogue import check_sums
 from rosbot_patrol.errors import DetectorError
 
 TIMEOUT = 20.0
@@ -22,19 +22,24 @@ MOST_CUTS = 20
 
 
 def fetch(
-    url: str, target: Path, *, size: int, sha256: str = "", progress: Callable[[int], None] = lambda _: None
+    urls: Sequence[str],
+    target: Path,
+    *,
+    size: int,
+    sums: Mapping[str, str] | None = None,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> None:
     """Download a file; a partial download stays in TARGET.part and is resumed the next time.
 
     Args:
-        url: http or https.
+        urls: http or https addresses of the same file, tried in this order.
         target: path of the file; its folder is created.
         size: expected size [bytes].
-        sha256: expected sum of its content, "" for any.
+        sums: expected checksums of its content by the name of their algorithm, such as sha256.
         progress: called now and then with the number of bytes.
 
     Raises:
-        DetectorError: it is not available, or is another file; says why.
+        DetectorError: no address gives it; says why each of them does not.
         OSError: the disk does not take it.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -46,13 +51,24 @@ def fetch(
     free = shutil.disk_usage(target.parent).free
     if free < size - have:
         raise DetectorError(f"{target.parent} has {free:,} bytes free, {target.name} needs {size - have:,}")
+    problems = []
+    for url in urls:
+        try:
+            _fetch_checked(url, part, size, sums or {}, progress)
+        except DetectorError as err:
+            problems.append(str(err))
+        else:
+            os.replace(part, target)
+            return
+    raise DetectorError("; ".join(problems))
+
+
+def _fetch_checked(url: str, part: Path, size: int, sums: Mapping[str, str], progress: Callable[[int], None]) -> None:
     _fetch_all(url, part, size, progress)
-    if sha256:
-        found = _sum(part)
-        if found != sha256:
-            part.unlink()
-            raise DetectorError(f"what {url} gave has the sha256 {found}, expected {sha256}; it was thrown away")
-    os.replace(part, target)
+    problem = check_sums(part, sums)
+    if problem:
+        part.unlink()
+        raise DetectorError(f"what {url} gave {problem}; it was thrown away")
 
 
 def _fetch_all(url: str, part: Path, size: int, progress: Callable[[int], None]) -> None:
@@ -122,8 +138,3 @@ def _copy(
         file.write(chunk)
         progress(have)
     return "the connection was closed"
-
-
-def _sum(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -11,7 +11,7 @@ from rosbot_patrol.detection.download import fetch
 from rosbot_patrol.errors import DetectorError
 
 DATA = os.urandom(300_000)
-SUM = hashlib.sha256(DATA).hexdigest()
+SUM, MD5 = hashlib.sha256(DATA).hexdigest(), hashlib.md5(DATA).hexdigest()
 
 
 class Server(http.server.ThreadingHTTPServer):
@@ -60,7 +60,7 @@ def server():
 
 
 def get(server, target, **change):
-    fetch(server.url, target, **{"size": len(DATA), "sha256": SUM} | change)
+    fetch([server.url], target, **{"size": len(DATA), "sums": {"sha256": SUM}} | change)
 
 
 def leftovers(target):
@@ -120,7 +120,10 @@ def test_another_file_is_noticed_before_it_is_fetched(server, tmp_path):
 
 def test_a_wrong_sum_is_thrown_away(server, tmp_path):
     with pytest.raises(DetectorError, match=rf"has the sha256 {SUM}, expected 00; it was thrown away"):
-        get(server, tmp_path / "a.weights", sha256="00")
+        get(server, tmp_path / "a.weights", sums={"sha256": "00"})
+    assert leftovers(tmp_path / "a.weights") == []
+    with pytest.raises(DetectorError, match=rf"has the md5 {MD5}, expected 00; it was thrown away"):
+        get(server, tmp_path / "a.weights", sums={"sha256": SUM, "md5": "00"})
     assert leftovers(tmp_path / "a.weights") == []
 
 
@@ -135,10 +138,47 @@ def test_no_way_there(server, tmp_path, monkeypatch):
     with pytest.raises(DetectorError, match="answers 403 Forbidden"):
         get(server, tmp_path / "a.weights")
     with pytest.raises(DetectorError, match=r"cannot be reached: .*refused"):
-        fetch("http://127.0.0.1:1/a.weights", tmp_path / "a.weights", size=5)
+        fetch(["http://127.0.0.1:1/a.weights"], tmp_path / "a.weights", size=5)
     monkeypatch.setattr(download.shutil, "disk_usage", lambda _: SimpleNamespace(free=9))
     with pytest.raises(DetectorError, match=r"has 9 bytes free, a.weights needs 300,000"):
         get(server, tmp_path / "a.weights")
+
+
+@pytest.fixture
+def mirror():
+    found = Server()
+    yield found
+    found.shutdown()
+    found.server_close()
+
+
+def test_the_second_address_when_the_first_is_gone(server, mirror, tmp_path):
+    urls = ["http://127.0.0.1:1/a.weights", mirror.url]
+    fetch(urls, tmp_path / "a.weights", size=len(DATA), sums={"sha256": SUM})
+    assert (tmp_path / "a.weights").read_bytes() == DATA
+    server.status = 404
+    fetch([server.url, mirror.url], tmp_path / "b.weights", size=len(DATA))
+    assert (tmp_path / "b.weights").read_bytes() == DATA
+
+
+def test_the_second_address_when_the_first_gives_another_file(server, mirror, tmp_path):
+    server.data = os.urandom(len(DATA))
+    fetch([server.url, mirror.url], tmp_path / "a.weights", size=len(DATA), sums={"md5": MD5})
+    assert (tmp_path / "a.weights").read_bytes() == DATA
+    assert mirror.asked == [None]
+
+
+def test_the_second_address_goes_on_where_the_first_was_cut(server, mirror, tmp_path):
+    server.ranges, server.cut_after = False, 100_000
+    fetch([server.url, mirror.url], tmp_path / "a.weights", size=len(DATA), sums={"sha256": SUM})
+    assert (tmp_path / "a.weights").read_bytes() == DATA
+    assert mirror.asked == ["bytes=100000-"]
+
+
+def test_each_address_that_fails_is_named(server, mirror, tmp_path):
+    server.status, mirror.status = 404, 503
+    with pytest.raises(DetectorError, match=r"answers 404 Not Found; .* answers 503 Service Unavailable"):
+        fetch([server.url, mirror.url], tmp_path / "a.weights", size=len(DATA))
 
 
 def test_a_folder_that_cannot_be_written(server, tmp_path):

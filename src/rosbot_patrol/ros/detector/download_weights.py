@@ -1,6 +1,6 @@
-"""Program download_weights: downloads a network's weights to darknet_ros's folder.
+"""Program download_weights: downloads a network's files to darknet_ros's folders.
 
-rosrun rosbot_patrol download_weights yolov2-tiny
+rosrun rosbot_patrol download_weights yolo-fastest-1.1-xl
 """
 
 from __future__ import annotations
@@ -8,14 +8,15 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import rospkg
 
+from rosbot_patrol.detection.catalogue import CATALOGUE, NetworkFile, PublishedNetwork, check_file
 from rosbot_patrol.detection.darknet.cfg import read_cfg
 from rosbot_patrol.detection.darknet.weights import read_weights
 from rosbot_patrol.detection.download import fetch
-from rosbot_patrol.detection.weights_catalogue import CATALOGUE, WeightsFile
 from rosbot_patrol.errors import DetectorError
 from rosbot_patrol.params import unknown_name
 
@@ -24,7 +25,7 @@ BAR_PERIOD = 0.2
 
 
 def main() -> None:
-    """Run the program; exit status 1 if the file could not be downloaded."""
+    """Run the program; exit status 1 if a file could not be downloaded."""
     try:
         sys.exit(run([word for word in sys.argv[1:] if ":=" not in word]))  # roslaunch adds __name:=...
     except KeyboardInterrupt:
@@ -34,49 +35,89 @@ def main() -> None:
 
 def run(arguments: list[str]) -> int:
     """Download the files that the arguments name; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="download_weights", description="Fetch a network's weights for darknet_ros.")
+    parser = argparse.ArgumentParser(prog="download_weights", description="Fetch a network's files for darknet_ros.")
     parser.add_argument("name", nargs="?", help="of the network; without it, all that are known are listed")
-    parser.add_argument("--folder", type=Path, help="where to put it; default: where the launch files look")
-    parser.add_argument("--url", help="another place to fetch it from; it has to be the same file")
+    parser.add_argument("--folder", type=Path, help="where to put the files; default: where the launch files look")
+    parser.add_argument("--url", help="another address of the same file; of a folder with the files if it ends in /")
     wanted = parser.parse_args(arguments)
     if wanted.name is None:
         for entry in CATALOGUE.values():
-            print(f"{entry.name:16} {entry.size:>12,} bytes  {entry.url}")
+            print(f"{entry.name:20} {entry.size:>12,} bytes  {entry.files[-1].urls[0]}")
         return 0
     name = wanted.name.removesuffix(".weights")
     if name not in CATALOGUE:
         print(f"download_weights: {unknown_name(wanted.name, CATALOGUE)}", file=sys.stderr)
         return 1
     entry = CATALOGUE[name]
-    network = Path(rospkg.RosPack().get_path("darknet_ros"), "yolo_network_config")
-    folder = wanted.folder or network / "weights"
-    return get(entry, folder.expanduser().resolve(), network / "cfg" / f"{entry.name}.cfg", wanted.url or entry.url)
+    shared = Path(rospkg.RosPack().get_path("darknet_ros"), "yolo_network_config")
+    folder = wanted.folder.expanduser().resolve() if wanted.folder else None
+    cfgs = folder if folder and entry.has_cfg else shared / "cfg"
+    return get(entry, folder or shared / "weights", cfgs, wanted.url or "")
 
 
-def get(entry: WeightsFile, folder: Path, cfg: Path, url: str) -> int:
-    """Download one file and check it against its network; returns the exit status."""
-    target = folder / entry.file
+def get(network: PublishedNetwork, weights: Path, cfgs: Path, url: str = "") -> int:
+    """Download a network's files and check that they fit each other; returns the exit status.
+
+    Args:
+        network: from the catalogue.
+        weights: folder of the weights.
+        cfgs: folder of the cfg file, published or ours.
+        url: replaces the addresses of the catalogue; a folder if it ends in "/".
+    """
+    for file in network.files:
+        folder = cfgs if file.is_cfg else weights
+        try:
+            _get_file(file, folder, _addresses(file, url, is_folder=len(network.files) > 1))
+        except DetectorError as err:
+            print(f"\ndownload_weights: {err}\n{_by_hand(file, folder)}", file=sys.stderr)
+            return 1
+        except OSError as err:
+            print(f"\ndownload_weights: {folder} does not take the file: {err.strerror}", file=sys.stderr)
+            return 1
+    cfg = cfgs / f"{network.name}.cfg"
     try:
-        if target.exists():
-            print(f"{target} is there already")
-        else:
-            print(f"fetching {url}\ninto {target}")
-            fetch(url, target, size=entry.size, sha256=entry.sha256, progress=Bar(entry.size))
-        read_weights(str(target), read_cfg(str(cfg)))
+        read_weights(str(weights / network.files[-1].file), read_cfg(str(cfg)))
     except DetectorError as err:
         print(f"\ndownload_weights: {err}", file=sys.stderr)
-        if not target.exists():
-            print(
-                f"Where there is no way to it from here, fetch {entry.describe()} elsewhere and put it into {folder}; "
-                f"its authors offer it at {entry.url}",
-                file=sys.stderr,
-            )
         return 1
-    except OSError as err:
-        print(f"\ndownload_weights: {folder} does not take the file: {err.strerror}", file=sys.stderr)
-        return 1
-    print(f"it fits {cfg.name}. Start with: roslaunch rosbot_patrol rosbot_patrol.launch network:={entry.name}")
+    print(f"it fits {cfg.name}. Start with: roslaunch rosbot_patrol rosbot_patrol.launch network:={network.name}")
     return 0
+
+
+def _get_file(file: NetworkFile, folder: Path, urls: Sequence[str]) -> None:
+    """Download one file unless it is there; one with another sum than the published file's is replaced."""
+    target = folder / file.file
+    if target.exists():
+        problem = _problem_of(target, file)
+        if not problem:
+            print(f"{target} is there already")
+            return
+        print(f"{problem}; it is fetched again")
+    print(f"fetching {urls[0]}\ninto {target}")
+    fetch(urls, target, size=file.size, sums=file.sums, progress=Bar(file.size))
+
+
+def _problem_of(target: Path, file: NetworkFile) -> str:
+    """What is wrong with a file that is there; "" also for one without a published sum."""
+    if file.sums:
+        try:
+            check_file(target, file)
+        except DetectorError as err:
+            return str(err)
+    return ""
+
+
+def _addresses(file: NetworkFile, url: str, *, is_folder: bool) -> Sequence[str]:
+    if not url:
+        return file.urls
+    return [f"{url.rstrip('/')}/{file.file}" if is_folder or url.endswith("/") else url]
+
+
+def _by_hand(file: NetworkFile, folder: Path) -> str:
+    return (
+        f"Where there is no way to it from here, fetch {file.describe()} elsewhere and put it into {folder}; "
+        f"its authors offer it at {file.urls[0]}"
+    )
 
 
 class Bar:

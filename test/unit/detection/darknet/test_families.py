@@ -3,10 +3,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from rosbot_patrol.detection.catalogue import CATALOGUE, REAL_CAMERA
 from rosbot_patrol.detection.darknet.cfg import parse_cfg
 from rosbot_patrol.detection.darknet.families import FAMILIES, Family, cfg_text
 from rosbot_patrol.detection.darknet.weights import weights_size
-from rosbot_patrol.detection.weights_catalogue import CATALOGUE
 
 PACKAGE = Path(__file__).parents[4] / "drop_in/darknet_ros"
 
@@ -28,14 +28,14 @@ def test_the_authors_weights_have_just_the_size_that_the_network_needs(name):
 def test_yaml_and_cfg_go_together(name):
     model = yaml.safe_load((PACKAGE / f"config/{name}.yaml").read_text())["yolo_model"]
     assert model["config_file"]["name"] == f"{name}.cfg"
-    assert model["weight_file"]["name"] == CATALOGUE[name].file
+    assert model["weight_file"]["name"] == CATALOGUE[name].files[-1].file
     names = model["detection_classes"]["names"]
     assert len(names) == len(set(names)) == FAMILIES[name].classes
     assert "person" in names
 
 
 def test_every_network_has_its_weights_in_the_catalogue():
-    assert set(CATALOGUE) == set(FAMILIES)
+    assert set(CATALOGUE) == set(FAMILIES) | {REAL_CAMERA}  # which brings its own cfg
 
 
 def test_a_thinner_and_smaller_one_has_the_same_layers():
