@@ -1,4 +1,4 @@
-"""Paths of this package's own files, without ROS: in the source tree, or where catkin installed them.
+"""Paths of this package's and the drop-ins' files, without ROS: in the source tree, or where catkin installed them.
 
 move_base's parameters as the launch files load them from the files of a profile.
 """
@@ -6,6 +6,7 @@ move_base's parameters as the launch files load them from the files of a profile
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +22,29 @@ def package_file(relative: str) -> Path:
     Raises:
         ParamError: it is nowhere; names the folders that were tried.
     """
+    return _first([folder / relative for folder in (_SOURCE, *_installed("rosbot_patrol"))], relative)
+
+
+def package_folder(drop_in: str) -> Path:
+    """Path of a drop-in package, such as "darknet_ros".
+
+    Raises:
+        ParamError: it is nowhere; names the folders that were tried.
+    """
+    return _first([_SOURCE / "drop_in" / drop_in, *_installed(drop_in)], drop_in)
+
+
+def _installed(package: str) -> list[Path]:
     spaces = filter(None, os.environ.get("CMAKE_PREFIX_PATH", "").split(":"))
-    folders = [_SOURCE, *(Path(space) / "share" / "rosbot_patrol" for space in spaces)]
-    for folder in folders:
-        if (folder / relative).exists():
-            return folder / relative
-    tried = ", ".join(map(str, folders))
-    raise ParamError(relative, f"is in none of {tried}: source the workspace (. scripts/env)")
+    return [Path(space) / "share" / package for space in spaces]
+
+
+def _first(paths: Sequence[Path], name: str) -> Path:
+    for path in paths:
+        if path.exists():
+            return path
+    tried = ", ".join(str(path).removesuffix(f"/{name}") for path in paths)
+    raise ParamError(name, f"is in none of {tried}: source the workspace (. scripts/env)")
 
 
 def read_move_base(folder: Path) -> dict[str, Any]:

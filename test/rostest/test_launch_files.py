@@ -139,17 +139,31 @@ def network_of(launch: str, *arguments: str, robot: bool = False) -> tuple[str, 
 
 
 def test_networks_by_name() -> None:
-    house, hog = ("darknet", "house.cfg", "models"), ("hog", "", "weights")
+    house, hog, auto = ("darknet", "house.cfg", "models"), ("hog", "", "weights"), ("auto", "", "weights")
     tiny = ("darknet", "yolov2-tiny.cfg", "weights")
     assert network_of("rosbot_patrol.launch") == house
-    assert network_of("rosbot_patrol.launch", robot=True) == hog
+    assert network_of("rosbot_patrol.launch", robot=True) == auto
     assert network_of("rosbot_patrol.launch", "network:=yolov2-tiny") == tiny
-    assert network_of("rosbot_patrol_pc.launch") == hog
+    assert network_of("rosbot_patrol_pc.launch") == auto
     assert network_of("rosbot_patrol_pc.launch", "network:=house") == house
     assert network_of("darknet_yolo_simulation_only.launch") == house
     assert network_of("darknet_yolo_only.launch", "network:=hog") == hog
+    assert network_of("darknet_yolo_only.launch", "network:=auto") == auto
+    fastest = ("darknet", "yolo-fastest-1.1-xl.cfg", "weights")
+    assert network_of("rosbot_patrol.launch", "network:=yolo-fastest-1.1-xl") == fastest
     yaml = ROOT / "drop_in/darknet_ros/config/yolov2-tiny.yaml"
     assert network_of("rosbot_patrol.launch", f"network_param_file:={yaml}", robot=True) == tiny
+
+
+def test_on_a_robot_only_people_alarm() -> None:
+    key = "/patrolling_node/alarm_classes"
+    assert parse(ROOT / "launch" / "rosbot_patrol.launch", robot=True).params[key].value == ["person"]
+    assert key not in parse(ROOT / "launch" / "rosbot_patrol.launch").params
+
+
+def test_the_standby_on_a_robot_takes_what_is_ready() -> None:
+    given = parse(ROOT / "launch" / "rosbot_patrol.launch", "detector:=pc", robot=True).params
+    assert given["/darknet_ros_standby/network"].value == "auto"
 
 
 def test_darknet_ros_own_launch_files() -> None:

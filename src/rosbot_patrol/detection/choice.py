@@ -1,27 +1,139 @@
-"""Choice of the detector from darknet_ros's parameters."""
+"""Choice of the detector from darknet_ros's parameters.
+
+`auto` takes the best network for a real camera that is ready: what was downloaded, else what was installed without a
+download.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import logging
+from dataclasses import dataclass
+from pathlib import Path
 
-from rosbot_patrol.counts import count_of
+from rosbot_patrol.detection.catalogue import CATALOGUE, REAL_CAMERA, check_file
 from rosbot_patrol.detection.detector import Detector, load_detector
 from rosbot_patrol.detection.params import DarknetParams
+from rosbot_patrol.detection.quality import describe_quality
+from rosbot_patrol.errors import DetectorError, ParamError
+from rosbot_patrol.params import load, unknown_name
+from rosbot_patrol.yaml_files import read_mapping
 
 log = logging.getLogger(__name__)
 
+REAL_CAMERAS = (REAL_CAMERA, "ssdlite")
+"""Networks that `auto` tries, the best one first."""
+DOWNLOAD = f"rosrun rosbot_patrol download_weights {REAL_CAMERA}"
+INSTALL = "scripts/bootstrap --robot"
+_MODULES = {"hog": ("hog", "HogDetector"), "ssdlite": ("ssdlite", "load_ssdlite")}
 
-def make_detector(params: DarknetParams, own_models: str) -> Detector:
-    """Make the detector that the parameters name; DetectorError if its files are missing or damaged, or do not fit."""
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkFolders:
+    """Folders of the networks' files.
+
+    Args:
+        own: our own network, `models/` of this package.
+        darknet: the package darknet_ros, with `config/NAME.yaml` and `yolo_network_config/`.
+    """
+
+    own: Path
+    darknet: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """A detector that is ready to run, and what is known of it.
+
+    Args:
+        detector: the detector.
+        network: its name, as `network:=` takes it.
+        passed_over: a sentence for each better network that is not ready.
+    """
+
+    detector: Detector
+    network: str
+    passed_over: tuple[str, ...] = ()
+
+    def describe(self) -> str:
+        """Which network runs, and how good it is."""
+        return f"{self.network} {describe_quality(self.network)}"
+
+
+def choose_detector(params: DarknetParams, folders: NetworkFolders) -> Choice:
+    """Make the detector that the parameters name.
+
+    Raises:
+        DetectorError: its files are missing or damaged, or do not fit; for `auto`, no network is ready.
+        ParamError: the settings of a network cannot be read.
+    """
+    choice = _choose_ready(params, folders) if params.network == "auto" else _load(params, folders)
+    log.info("people by %s, %s", choice.describe(), choice.detector.runtime)
+    return choice
+
+
+def network_settings(name: str, params: DarknetParams, folders: NetworkFolders) -> DarknetParams:
+    """Parameters with the settings of the network of this name, and the folders where its files belong.
+
+    Raises:
+        ParamError: there are no such settings, or they cannot be used.
+    """
+    settings = {path.stem: path for path in sorted((folders.darknet / "config").glob("*.yaml"))}
+    settings |= {"house": folders.own / "house.yaml"}
+    if name not in settings:
+        raise ParamError(str(folders.darknet / "config"), unknown_name(name, settings))
+    given = load(DarknetParams, read_mapping(settings[name], keys="of darknet_ros"), name=f"{settings[name]}: ")
+    shared = folders.darknet / "yolo_network_config"
+    cfgs, weights = (folders.own, folders.own) if name == "house" else (shared / "cfg", shared / "weights")
+    return dataclasses.replace(
+        params,
+        network=given.network,
+        yolo_model=given.yolo_model,
+        config_path=str(cfgs),
+        weights_path=str(weights),
+    )
+
+
+def _choose_ready(params: DarknetParams, folders: NetworkFolders) -> Choice:
+    passed_over: list[str] = []
+    for name in REAL_CAMERAS:
+        settings = network_settings(name, params, folders)
+        settings = dataclasses.replace(
+            settings,
+            config_path=params.config_path or settings.config_path,
+            weights_path=params.weights_path or settings.weights_path,
+        )
+        try:
+            _check_download(name, settings, folders)
+            choice = _load(settings, folders)
+        except DetectorError as err:
+            passed_over.append(f"{name} is not ready: {err}")
+        else:
+            for sentence in passed_over:
+                log.warning("%s; to get it: %s", sentence, DOWNLOAD)
+            return dataclasses.replace(choice, passed_over=tuple(passed_over))
+    raise DetectorError(
+        f"no network for a real camera: {'; '.join(passed_over)}. Fetch one with `{DOWNLOAD}`; "
+        f"without the Internet, `{INSTALL}` sets up ssdlite from what is installed"
+    )
+
+
+def _check_download(name: str, settings: DarknetParams, folders: NetworkFolders) -> None:
+    """Check that a network's downloaded files are whole; DetectorError with what is wrong with one."""
+    if name in CATALOGUE:
+        cfg, weights = settings.network_files(str(folders.own))
+        for file in CATALOGUE[name].files:
+            check_file(Path(cfg if file.is_cfg else weights), file)
+
+
+def _load(params: DarknetParams, folders: NetworkFolders) -> Choice:
     threshold = params.yolo_model.threshold.value
-    if params.network == "hog":
-        hog = importlib.import_module("rosbot_patrol.detection.hog")  # brings OpenCV, 98 MB
-        found: Detector = hog.HogDetector(threshold=threshold, threads=params.threads)
-        log.info("people by %s", found.runtime)
-        return found
-    cfg, weights = params.network_files(own_models)
+    if params.network in _MODULES:
+        module, make = _MODULES[params.network]
+        maker = getattr(importlib.import_module(f"rosbot_patrol.detection.{module}"), make)  # may bring OpenCV, 98 MB
+        return Choice(detector=maker(threshold=threshold, threads=params.threads), network=params.network)
+    cfg, weights = params.network_files(str(folders.own))
     names = params.yolo_model.detection_classes.names
     detector = load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
-    log.info("%s, %s, by %s", cfg, count_of(len(detector.names), "class", "classes"), detector.runtime)
-    return detector
+    return Choice(detector=detector, network=Path(cfg).stem)

@@ -1,4 +1,4 @@
-"""People detector of OpenCV, for a real camera without any weights.
+"""People detector of OpenCV up to version 4, without any weights.
 
 Histograms of oriented gradients and a linear support vector machine (Dalal and Triggs, CVPR 2005), trained by them on
 whole standing and walking people. It does not find people who sit, lie, are cut off by the picture's border or are
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.detection.darknet.decode import Candidates, suppress_by_objectness
 from rosbot_patrol.detection.detector import IOU_THRESHOLD, Detection, to_detections
+from rosbot_patrol.errors import DetectorError
 from rosbot_patrol.images.encodings import Picture
 
 NAMES = ("person",)
@@ -34,9 +35,14 @@ class HogDetector:
     Args:
         threshold: minimum probability, 0 to 1.
         threads: number of cores it may use; OpenCV applies it to the whole process.
+
+    Raises:
+        DetectorError: this OpenCV has no such detector.
     """
 
     def __init__(self, *, threshold: float = 0.7, threads: int = 1) -> None:
+        if not hasattr(cv2, "HOGDescriptor"):
+            raise DetectorError(f"OpenCV {cv2.__version__} has no HOGDescriptor, so hog is gone: use network:=auto")
         self._hog = cv2.HOGDescriptor()
         self._hog.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
         self._threshold = threshold

@@ -126,7 +126,11 @@ class DarknetParams:
     yolo_model: YoloModel = field(default_factory=YoloModel)
     weights_path: str = param("", doc="folder of the weights file")
     config_path: str = param("", doc="folder of the network file")
-    network: str = param("darknet", choices=("darknet", "hog"), doc="hog: OpenCV's people detector, without any files")
+    network: str = param(
+        "darknet",
+        choices=("darknet", "auto", "ssdlite", "hog"),
+        doc="auto: the best one for a real camera that is ready; ssdlite, hog: people only, without darknet's files",
+    )
     image_transport: str = param("raw", choices=("raw", "compressed"), doc="transport of the images")
     publish_empty: bool = param(False, doc="publish bounding_boxes for images without a detection, too")
     enabled: bool = param(True, doc="detect from the start; the service ~enable switches it")

@@ -114,7 +114,7 @@ def test_a_damaged_file_is_fetched_again(whole, capsys, name):
     assert get(*whole) == 0
     path = (cfgs if name.endswith("cfg") else weights) / name
     good = path.read_bytes()
-    for bad, problem in ((good[:-9], f"it has {len(good) - 9} bytes"), (good[:-1] + b"?", "it has the sha256")):
+    for bad, problem in ((good[:-9], f"it has {len(good) - 9} bytes"), (good[:-1] + b"!", "it has the sha256")):
         path.write_bytes(bad)
         assert get(*whole) == 0
         assert f"{path} is damaged: {problem}" in capsys.readouterr().out

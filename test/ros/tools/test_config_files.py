@@ -105,8 +105,8 @@ def test_darknet(launch: str) -> None:
 def test_networks_of_darknet_ros(name: str) -> None:
     tree = yaml.safe_load((ROOT / "drop_in" / "darknet_ros" / "config" / name).read_text())
     loaded = load(DarknetParams, tree, name=f"{name}: ")
-    if name == "hog.yaml":
-        assert loaded.network == "hog"
+    if name in ("auto.yaml", "hog.yaml", "ssdlite.yaml"):
+        assert f"{loaded.network}.yaml" == name
         return
     if name == "ros.yaml":
         assert loaded.subscribers.camera_reading.topic == "/camera/rgb/image_raw"

@@ -10,12 +10,12 @@ from typing import Any
 
 from rosbot_patrol import params
 from rosbot_patrol.amcl.parameters import AmclParams
-from rosbot_patrol.detection.choice import make_detector
+from rosbot_patrol.detection.choice import NetworkFolders, choose_detector
 from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.errors import ParamError
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.maps.map_io import read_map
-from rosbot_patrol.package_files import package_file, read_move_base
+from rosbot_patrol.package_files import package_file, package_folder, read_move_base
 from rosbot_patrol.patrol.house.rooms import load_rooms
 from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.known_objects import load_known
@@ -183,7 +183,8 @@ def _detector(setup: Setup) -> Replay:
     tree, name = _parameters(setup)
     loaded = params.load(DarknetParams, tree, name=name)
     topic = loaded.subscribers.camera_reading.topic
-    detector = make_detector(loaded, str(package_file("models")))
+    folders = NetworkFolders(own=package_file("models"), darknet=package_folder("darknet_ros"))
+    detector = choose_detector(loaded, folders).detector
     is_told = "subscribers" in tree
     return detector_replay.DetectorReplay(detector, topic if is_told else detector_replay.INPUTS[0].topic)
 

@@ -11,9 +11,9 @@ Differs:
 - Of more than 100 boxes the 100 most probable are sent; upstream sends none.
 - More encodings (`rosbot_patrol.images.encodings`); upstream takes mono8, mono16, rgb8, bgr8, rgba8 and bgra8.
 - Weights or class names that do not fit the network end the node with one sentence; upstream goes on.
-- Additional: compressed input (`~image_transport`), `~network` hog, `~publish_empty`, `~max_rate`, `~threads`, the
-  service `~enable`, `~standby_after` (replaces another detector that has gone), `~camera_ok` (std_msgs/Bool, latched)
-  and /diagnostics, which report a stopped or frozen camera.
+- Additional: compressed input (`~image_transport`), `~network` auto, ssdlite and hog, `~publish_empty`, `~max_rate`,
+  `~threads`, the service `~enable`, `~standby_after` (replaces another detector that has gone), `~camera_ok`
+  (std_msgs/Bool, latched) and /diagnostics, which report a stopped or frozen camera and the network.
 - There is no nodelet: Python has none.
 """
 
@@ -21,10 +21,10 @@ from __future__ import annotations
 
 import importlib
 import logging
-import os
 import threading
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import rospkg
@@ -34,8 +34,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
-from rosbot_patrol.detection.choice import make_detector
-from rosbot_patrol.detection.detector import Detection, Detector
+from rosbot_patrol.detection.choice import Choice, NetworkFolders, choose_detector
+from rosbot_patrol.detection.detector import Detection
 from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.errors import ImageError
 from rosbot_patrol.images.encodings import Picture
@@ -63,9 +63,10 @@ def main() -> None:
 
 def _body() -> None:
     params = load_params(DarknetParams)
-    models = os.path.join(rospkg.RosPack().get_path("rosbot_patrol"), "models")
-    detector = make_detector(params, models)
-    DarknetNode(params, detector).run()
+    packages = rospkg.RosPack()
+    own, darknet = (Path(packages.get_path(name)) for name in ("rosbot_patrol", "darknet_ros"))
+    choice = choose_detector(params, NetworkFolders(own=own / "models", darknet=darknet))
+    DarknetNode(params, choice).run()
 
 
 def boxes_to_msg(found: Sequence[Detection], image_header: Header) -> BoundingBoxes:
@@ -91,15 +92,16 @@ class DarknetNode:
 
     Args:
         params: its parameters.
-        detector: a detector that is ready to run.
+        choice: a detector that is ready to run.
     """
 
-    def __init__(self, params: DarknetParams, detector: Detector) -> None:
+    def __init__(self, params: DarknetParams, choice: Choice) -> None:
         self._params = params
-        self._detector = detector
+        self._detector = choice.detector
         self._enabled = params.enabled
         self._wake = threading.Condition()
         self._health = diagnostics.Health()
+        self._report_network(choice)
         self._console = _Console() if params.image_view.enable_console_output else None
         self._window = self._open_window()
         self._advertise()
@@ -192,6 +194,11 @@ class DarknetNode:
             if self._window is not None:
                 self._window.show(drawn.pixels)
         return boxes
+
+    def _report_network(self, choice: Choice) -> None:
+        level = diagnostics.WARN if choice.passed_over else diagnostics.OK
+        text = "; ".join([choice.describe(), *choice.passed_over])
+        self._health.set("network", level, text, {"network": choice.network, "runtime": choice.detector.runtime})
 
     def _report(self, found: Sequence[Detection], seconds: float) -> None:
         values = {"milliseconds": f"{seconds * 1e3:.1f}", "objects": len(found), "runtime": self._detector.runtime}

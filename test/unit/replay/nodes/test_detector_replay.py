@@ -9,7 +9,7 @@ import pytest
 from made_bag import Maker, write_bag
 
 from rosbot_patrol.detection import detector as darknet
-from rosbot_patrol.detection.choice import make_detector
+from rosbot_patrol.detection.choice import NetworkFolders, choose_detector
 from rosbot_patrol.detection.detector import Detection
 from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.images.encodings import Picture
@@ -76,7 +76,8 @@ def test_our_network_on_a_compressed_picture_and_a_planted_fault(
     message = maker.new(COMPRESSED, maker.header(3.0, "camera"), "rgb8; jpeg compressed bgr8", data)
     path = write_bag(tmp_path / "a.bag", [(3.1, "/camera/rgb/image_raw", message)])
     stored = replayed(path, build_replay(Setup(node="darknet_ros")))
-    network = make_detector(load(DarknetParams, read_mapping(ROOT / "models" / "house.yaml", keys="")), str(MODELS))
+    given = load(DarknetParams, read_mapping(MODELS / "house.yaml", keys=""))
+    network = choose_detector(given, NetworkFolders(own=MODELS, darknet=ROOT / "drop_in" / "darknet_ros")).detector
     assert "person" in stored.tables["boxes"]["label"].tolist()
     again = replayed(path, DetectorReplay(network))
     assert again.digest == stored.digest
