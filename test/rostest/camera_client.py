@@ -1,6 +1,6 @@
 """The camera before the detector, or the picture before republish, and the listener behind it; prints lines of JSON.
 
-    camera_client.py SCENARIO
+    camera_client.py SCENARIO [PHOTOGRAPH]
 
 One process a scenario, because rospy knows one master in its life. The network of the tests sees a person where a
 picture is red and a fire hydrant where it is blue.
@@ -210,6 +210,19 @@ def hog():
         message.header.stamp = rospy.Time(stamp)
         counts, found = client.look(message)
         say(counts=[c.count for c in counts], boxes=[describe(m) for m in found])
+
+
+def photograph():
+    """A photograph, and which network the detector says it has."""
+    client = Client()
+    message = picture_to_msg(Picture(cv2.imread(sys.argv[2]), "bgr8"), rospy.Header())
+    message.header.stamp = rospy.Time(100)
+    found = client.look(message)[1]
+    client.wait(lambda: client.heard["health"])
+    states = [s for m in client.heard["health"] for s in m.status if s.name == "darknet_ros: network"]
+    network = {value.key: value.value for value in states[-1].values}["network"]
+    classes = [box.Class for boxes in found for box in boxes.bounding_boxes]
+    say(classes=classes, network=[states[-1].level, network])
 
 
 def compressed():

@@ -1,8 +1,11 @@
 """darknet_ros and republish before a real master: what darknet_ros promises, and what ours promises beyond."""
 
+import functools
+import http.server
 import json
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,8 +16,10 @@ pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
 from ros_processes import Process, Ros, wait_for
 
+from rosbot_patrol.detection.catalogue import REAL_CAMERA
 from rosbot_patrol.detection.darknet.cfg import parse_cfg
 from rosbot_patrol.detection.darknet.weights import ConvWeights, format_weights
+from rosbot_patrol.ros.detector.download_weights import run
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -72,9 +77,11 @@ def start(ros, models, **params):
     return ros.node("darknet_ros", "__name:=darknet_ros", *(f"_{name}:={value}" for name, value in params.items()))
 
 
-def play(ros, scenario):
+def play(ros, scenario, *arguments):
     """Everything that a scenario of camera_client.py says, in one dict; lists of lines under their keys."""
-    client = Process([sys.executable, str(HERE / "camera_client.py"), scenario], ros.env, stdin=subprocess.DEVNULL)
+    client = Process(
+        [sys.executable, str(HERE / "camera_client.py"), scenario, *arguments], ros.env, stdin=subprocess.DEVNULL
+    )
     wait_for(lambda: client.popen.poll() is not None, 45.0, scenario)
     lines = [json.loads(line) for line in client.lines if line.startswith("{")]
     assert lines[-1:] == [{"done": True}], client.output
@@ -190,6 +197,58 @@ def test_people_without_weights(ros, models):
     assert ymin < 200
     assert ymax > 330
     assert nobody == {"counts": [0], "boxes": []}
+
+
+PEOPLE = ROOT.parent / "shared" / "people"
+
+
+@pytest.fixture
+def downloaded(tmp_path):
+    """Folder with yolo-fastest-1.1-xl as download_weights puts it there, from a server on this machine."""
+    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(PEOPLE / "networks"))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
+        url = f"http://127.0.0.1:{server.server_address[1]}/"
+        assert run([REAL_CAMERA, "--folder", str(tmp_path), "--url", url]) == 0
+        server.shutdown()
+    return tmp_path
+
+
+AUTO = ("__name:=darknet_ros", "_network:=auto")
+needs_people = pytest.mark.skipif(not PEOPLE.is_dir(), reason=f"{PEOPLE} is not here")
+
+
+def largest_person():
+    """The photograph with the largest single person."""
+    known = json.loads((PEOPLE / "coco.json").read_text())
+    alone = {name: one for name, one in known.items() if len(one["persons"]) == 1}
+    height = {name: (one["persons"][0][3] - one["persons"][0][1]) / one["size"][1] for name, one in alone.items()}
+    return str(PEOPLE / "coco" / max(height, key=height.get))
+
+
+@needs_people
+def test_auto_takes_the_downloaded_network_and_says_how_good_it_is(ros, downloaded):
+    node = ros.node("darknet_ros", *AUTO, f"_config_path:={downloaded}", f"_weights_path:={downloaded}")
+    (seen,) = play(ros, "photograph", largest_person())
+    assert "person" in seen["classes"]
+    node.says(f"people by {REAL_CAMERA} finds 73 % of the large persons on photographs")
+    assert seen["network"] == [0, REAL_CAMERA]
+
+
+@needs_people
+def test_auto_passes_a_damaged_download_over(ros, downloaded):
+    cfg = downloaded / f"{REAL_CAMERA}.cfg"
+    cfg.write_bytes(cfg.read_bytes()[:5000])
+    node = ros.node("darknet_ros", *AUTO, f"_config_path:={downloaded}", f"_weights_path:={downloaded}")
+    node.says(f"{REAL_CAMERA} is not ready: {cfg} is damaged: it has 5,000 bytes, expected 9,696")
+    wait_for(lambda: node.popen.poll() is not None or "people by ssdlite" in node.output, 15.0, "what comes instead")
+    if node.popen.poll() is None:
+        (seen,) = play(ros, "photograph", largest_person())
+        assert "person" in seen["classes"]
+        assert seen["network"] == [1, "ssdlite"]
+    else:
+        assert "`scripts/bootstrap --robot` sets up ssdlite" in node.output
+    assert "Traceback" not in node.output
 
 
 def test_compressed_input(ros, models):

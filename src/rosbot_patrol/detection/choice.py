@@ -1,7 +1,7 @@
 """Choice of the detector from darknet_ros's parameters.
 
 `auto` takes the best network for a real camera that is ready: what was downloaded, else what was installed without a
-download.
+download. `python -m rosbot_patrol.detection.choice` prints which one that is.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from rosbot_patrol.detection.detector import Detector, load_detector
 from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.detection.quality import describe_quality
 from rosbot_patrol.errors import DetectorError, ParamError
+from rosbot_patrol.package_files import package_file, package_folder
 from rosbot_patrol.params import load, unknown_name
 from rosbot_patrol.yaml_files import read_mapping
 
@@ -130,10 +132,37 @@ def _check_download(name: str, settings: DarknetParams, folders: NetworkFolders)
 def _load(params: DarknetParams, folders: NetworkFolders) -> Choice:
     threshold = params.yolo_model.threshold.value
     if params.network in _MODULES:
-        module, make = _MODULES[params.network]
-        maker = getattr(importlib.import_module(f"rosbot_patrol.detection.{module}"), make)  # may bring OpenCV, 98 MB
+        maker = _maker(params.network)
         return Choice(detector=maker(threshold=threshold, threads=params.threads), network=params.network)
     cfg, weights = params.network_files(str(folders.own))
     names = params.yolo_model.detection_classes.names
     detector = load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
     return Choice(detector=detector, network=Path(cfg).stem)
+
+
+def _maker(network: str) -> Callable[..., Detector]:
+    """The function that makes such a detector; imported late, as it may bring OpenCV, 98 MB."""
+    module, name = _MODULES[network]
+    try:
+        found: Callable[..., Detector] = getattr(importlib.import_module(f"rosbot_patrol.detection.{module}"), name)
+    except ModuleNotFoundError as err:
+        raise DetectorError(f"{network} needs the module {err.name}, which is not installed") from err
+    return found
+
+
+def main() -> None:
+    """Print which network `auto` takes here, and why no better one, without a log."""
+    logging.disable()
+    try:
+        folders = NetworkFolders(own=package_file("models"), darknet=package_folder("darknet_ros"))
+        choice = choose_detector(DarknetParams(network="auto"), folders)
+    except DetectorError as err:
+        print(f"The guard has {err}")
+        return
+    for sentence in choice.passed_over:
+        print(f"{sentence}; to get it: {DOWNLOAD}")
+    print(f"With a real camera, the guard uses {choice.describe()}")
+
+
+if __name__ == "__main__":
+    main()

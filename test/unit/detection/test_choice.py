@@ -161,3 +161,9 @@ def test_another_network_was_not_measured(folders, tmp_path):
     )
     found = choose_detector(dataclasses.replace(mine, yolo_model=model), folders)
     assert found.describe() == "mine was not measured on photographs"
+
+
+def test_a_detector_without_its_module_is_a_sentence(folders, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rosbot_patrol.detection.hog", None)
+    with pytest.raises(DetectorError, match=r"hog needs the module \S+\.hog, which is not installed"):
+        choose_detector(DarknetParams(network="hog"), folders)
