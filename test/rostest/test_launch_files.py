@@ -164,6 +164,17 @@ def test_on_a_robot_only_people_alarm() -> None:
 def test_the_standby_on_a_robot_takes_what_is_ready() -> None:
     given = parse(ROOT / "launch" / "rosbot_patrol.launch", "detector:=pc", robot=True).params
     assert given["/darknet_ros_standby/network"].value == "auto"
+    given = parse(
+        ROOT / "launch" / "rosbot_patrol.launch", "detector:=pc", "second_opinion:=ssdlite", robot=True
+    ).params
+    assert given["/darknet_ros_standby/second_opinion"].value == "ssdlite"
+
+
+@pytest.mark.parametrize("launch", ["rosbot_patrol", "rosbot_patrol_pc", "darknet_yolo_simulation_only"])
+def test_a_second_opinion(launch: str) -> None:
+    path, key = ROOT / "launch" / f"{launch}.launch", "/darknet_ros/second_opinion"
+    assert parse(path).params[key].value == ""
+    assert parse(path, "second_opinion:=ssdlite").params[key].value == "ssdlite"
 
 
 def test_darknet_ros_own_launch_files() -> None:

@@ -17,6 +17,7 @@ from rosbot_patrol.detection.catalogue import CATALOGUE, REAL_CAMERA, check_file
 from rosbot_patrol.detection.detector import Detector, load_detector
 from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.detection.quality import describe_quality
+from rosbot_patrol.detection.second_opinion import UNSURE, WEAK, SecondOpinion
 from rosbot_patrol.errors import DetectorError, ParamError
 from rosbot_patrol.package_files import package_file, package_folder
 from rosbot_patrol.params import load, unknown_name
@@ -51,16 +52,19 @@ class Choice:
     Args:
         detector: the detector.
         network: its name, as `network:=` takes it.
-        passed_over: a sentence for each better network that is not ready.
+        second: name of the network that gives the second opinion, "" for none.
+        passed_over: a sentence for each wanted or better network that is not ready.
     """
 
     detector: Detector
     network: str
+    second: str = ""
     passed_over: tuple[str, ...] = ()
 
     def describe(self) -> str:
-        """Which network runs, and how good it is."""
-        return f"{self.network} {describe_quality(self.network)}"
+        """Which networks run, and how good they are."""
+        second = f"; second opinion by {self.second}, which {describe_quality(self.second)}" if self.second else ""
+        return f"{self.network} {describe_quality(self.network)}{second}"
 
 
 def choose_detector(params: DarknetParams, folders: NetworkFolders) -> Choice:
@@ -114,7 +118,7 @@ def _choose_ready(params: DarknetParams, folders: NetworkFolders) -> Choice:
         else:
             for sentence in passed_over:
                 log.warning("%s; to get it: %s", sentence, DOWNLOAD)
-            return dataclasses.replace(choice, passed_over=tuple(passed_over))
+            return dataclasses.replace(choice, passed_over=(*passed_over, *choice.passed_over))
     raise DetectorError(
         f"no network for a real camera: {'; '.join(passed_over)}. Fetch one with `{DOWNLOAD}`; "
         f"without the Internet, `{INSTALL}` sets up ssdlite from what is installed"
@@ -130,14 +134,34 @@ def _check_download(name: str, settings: DarknetParams, folders: NetworkFolders)
 
 
 def _load(params: DarknetParams, folders: NetworkFolders) -> Choice:
+    """Load the network of these settings, and the one for a second opinion."""
     threshold = params.yolo_model.threshold.value
+    network = params.network if params.network in _MODULES else Path(params.network_files(str(folders.own))[0]).stem
+    if not params.second_opinion:
+        return Choice(detector=_make(params, folders, threshold), network=network)
+    other = network_settings(params.second_opinion, params, folders)
+    if other.network == "auto":
+        raise ParamError("second_opinion", "is auto, expected the name of a network")
+    other_threshold = other.yolo_model.threshold.value
+    try:
+        if params.second_opinion == network:
+            raise DetectorError("it is the first network already")
+        second = _make(other, folders, min(WEAK, other_threshold))
+    except DetectorError as err:
+        problem = f"no second opinion by {params.second_opinion}: {err}"
+        log.warning(problem)
+        return Choice(detector=_make(params, folders, threshold), network=network, passed_over=(problem,))
+    first = _make(params, folders, min(UNSURE, threshold))
+    both = SecondOpinion(first, second, threshold=threshold, second_threshold=other_threshold)
+    return Choice(detector=both, network=network, second=params.second_opinion)
+
+
+def _make(params: DarknetParams, folders: NetworkFolders, threshold: float) -> Detector:
     if params.network in _MODULES:
-        maker = _maker(params.network)
-        return Choice(detector=maker(threshold=threshold, threads=params.threads), network=params.network)
+        return _maker(params.network)(threshold=threshold, threads=params.threads)
     cfg, weights = params.network_files(str(folders.own))
     names = params.yolo_model.detection_classes.names
-    detector = load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
-    return Choice(detector=detector, network=Path(cfg).stem)
+    return load_detector(cfg, weights, names, threshold=threshold, threads=params.threads)
 
 
 def _maker(network: str) -> Callable[..., Detector]:

@@ -131,6 +131,10 @@ class DarknetParams:
         choices=("darknet", "auto", "ssdlite", "hog"),
         doc="auto: the best one for a real camera that is ready; ssdlite, hog: people only, without darknet's files",
     )
+    second_opinion: str = param(
+        "",
+        doc="name of a slower network that looks again where the first is unsure of people, or sure for the first time",
+    )
     image_transport: str = param("raw", choices=("raw", "compressed"), doc="transport of the images")
     publish_empty: bool = param(False, doc="publish bounding_boxes for images without a detection, too")
     enabled: bool = param(True, doc="detect from the start; the service ~enable switches it")

@@ -17,6 +17,7 @@ from rosbot_patrol.detection.darknet.cfg import parse_cfg
 from rosbot_patrol.detection.darknet.random_weights import random_weights
 from rosbot_patrol.detection.darknet.weights import format_weights
 from rosbot_patrol.detection.params import DarknetParams
+from rosbot_patrol.detection.second_opinion import SecondOpinion
 from rosbot_patrol.errors import DetectorError, ParamError
 
 ROOT = Path(__file__).parents[3]
@@ -167,3 +168,29 @@ def test_a_detector_without_its_module_is_a_sentence(folders, monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbot_patrol.detection.hog", None)
     with pytest.raises(DetectorError, match=r"hog needs the module \S+\.hog, which is not installed"):
         choose_detector(DarknetParams(network="hog"), folders)
+
+
+def test_a_second_opinion(folders, files, ssdlite, caplog):
+    params = dataclasses.replace(AUTO, second_opinion="ssdlite")
+    found = choose_detector(params, folders)
+    assert (found.network, found.second, found.passed_over) == (REAL_CAMERA, "ssdlite", ())
+    assert ssdlite == [(0.1, 2)]
+    assert isinstance(found.detector, SecondOpinion)
+    assert "finds 73 %" in found.describe()
+    assert "; second opinion by ssdlite, which finds 61 %" in found.describe()
+
+
+def test_without_the_second_network_the_first_goes_on(folders, files, no_ssdlite):
+    found = choose_detector(dataclasses.replace(AUTO, second_opinion="ssdlite"), folders)
+    assert (found.network, found.second) == (REAL_CAMERA, "")
+    assert found.passed_over == ("no second opinion by ssdlite: its graph was not made",)
+    tiny = choose_detector(dataclasses.replace(AUTO, second_opinion="yolov2-tiny"), folders)
+    assert tiny.passed_over[0].startswith("no second opinion by yolov2-tiny: the network file ")
+
+
+def test_a_second_opinion_of_the_same_network_is_none(folders, ssdlite):
+    found = choose_detector(dataclasses.replace(AUTO, second_opinion="ssdlite"), folders)
+    assert (found.network, found.second) == ("ssdlite", "")
+    assert found.passed_over[1] == "no second opinion by ssdlite: it is the first network already"
+    with pytest.raises(ParamError, match="second_opinion: is auto, expected the name of a network"):
+        choose_detector(dataclasses.replace(AUTO, second_opinion="auto"), folders)
