@@ -231,8 +231,17 @@ def test_auto_takes_the_downloaded_network_and_says_how_good_it_is(ros, download
     node = ros.node("darknet_ros", *AUTO, f"_config_path:={downloaded}", f"_weights_path:={downloaded}")
     (seen,) = play(ros, "photograph", largest_person())
     assert "person" in seen["classes"]
-    node.says(f"people by {REAL_CAMERA} finds 73 % of the large persons on photographs")
+    node.says(f"the network {REAL_CAMERA} finds 73 % of the large persons on photographs")
     assert seen["network"] == [0, REAL_CAMERA]
+
+
+@needs_people
+def test_a_second_opinion(ros, downloaded):
+    files = (f"_config_path:={downloaded}", f"_weights_path:={downloaded}")
+    node = ros.node("darknet_ros", *AUTO, *files, "_second_opinion:=hog")
+    (seen,) = play(ros, "photograph", largest_person())
+    assert "person" in seen["classes"]
+    node.says("; second opinion by hog, which finds 5 % of the large persons")
 
 
 @needs_people
@@ -241,7 +250,7 @@ def test_auto_passes_a_damaged_download_over(ros, downloaded):
     cfg.write_bytes(cfg.read_bytes()[:5000])
     node = ros.node("darknet_ros", *AUTO, f"_config_path:={downloaded}", f"_weights_path:={downloaded}")
     node.says(f"{REAL_CAMERA} is not ready: {cfg} is damaged: it has 5,000 bytes, expected 9,696")
-    wait_for(lambda: node.popen.poll() is not None or "people by ssdlite" in node.output, 15.0, "what comes instead")
+    wait_for(lambda: node.popen.poll() is not None or "the network ssdlite" in node.output, 15.0, "what comes instead")
     if node.popen.poll() is None:
         (seen,) = play(ros, "photograph", largest_person())
         assert "person" in seen["classes"]

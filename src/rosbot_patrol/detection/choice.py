@@ -75,7 +75,7 @@ def choose_detector(params: DarknetParams, folders: NetworkFolders) -> Choice:
         ParamError: the settings of a network cannot be read.
     """
     choice = _choose_ready(params, folders) if params.network == "auto" else _load(params, folders)
-    log.info("people by %s, %s", choice.describe(), choice.detector.runtime)
+    log.info("the network %s, by %s", choice.describe(), choice.detector.runtime)
     return choice
 
 
@@ -185,7 +185,7 @@ def main() -> None:
         return
     for sentence in choice.passed_over:
         print(f"{sentence}; to get it: {DOWNLOAD}")
-    print(f"With a real camera, the guard uses {choice.describe()}")
+    print(f"With a real camera, the guard uses {choice.network}: it {describe_quality(choice.network)}")
 
 
 if __name__ == "__main__":

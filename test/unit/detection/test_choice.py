@@ -90,7 +90,7 @@ def test_auto_takes_what_was_downloaded(folders, files, ssdlite, caplog):
     assert ssdlite == []
     said = "finds 73 % of the large persons on photographs (COCO val2017), no alarm on 55 pictures without people"
     assert found.describe() == f"{REAL_CAMERA} {said}"
-    assert f"people by {REAL_CAMERA} {said}, onnxruntime" in caplog.text
+    assert f"the network {REAL_CAMERA} {said}, by onnxruntime" in caplog.text
 
 
 def test_auto_takes_ssdlite_where_nothing_was_downloaded(folders, ssdlite, caplog):
