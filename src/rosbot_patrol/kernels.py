@@ -1,9 +1,8 @@
 """Decorator of all numba kernels, and the cache folder of their machine code.
 
 numba's `cache=True` does not notice changes of a callee in another module, and cannot write to a read-only install.
-Therefore the name of the cache folder contains a hash of all kernel sources. It lies below `ROSBOT_PATROL_CACHE` (by
-default `$XDG_CACHE_HOME/rosbot_patrol`, `~/.cache/rosbot_patrol`). `python -m rosbot_patrol.kernels` compiles
-everything (the set-up does it); after that a node only loads at its start.
+Therefore the name of the cache folder contains a hash of all kernel sources; it lies in `cache_folder()`.
+`python -m rosbot_patrol.kernels` compiles everything (the set-up does it); after that a node only loads at its start.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -19,6 +17,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+
+from rosbot_patrol.cache_folder import cache_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -37,14 +37,7 @@ def cache_dir() -> Path:
     for path in kernel_sources():
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
-    shipped = os.environ.get("ROSBOT_PATROL_CACHE", "")
-    base = Path(shipped) if shipped else _user_cache()
-    return base / f"numba-{digest.hexdigest()[:16]}"
-
-
-def _user_cache() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "rosbot_patrol"
+    return cache_folder() / f"numba-{digest.hexdigest()[:16]}"
 
 
 def kernel(*signatures: str, **options: Any) -> Callable[[F], F]:

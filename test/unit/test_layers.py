@@ -12,8 +12,8 @@ SRC = ROOT / "src" / "rosbot_patrol"
 
 # Rows from the bottom up: a module may import from rows below its own, and from its own package.
 ROWS: list[set[str]] = [
-    {"errors", "kernels", "counts"},
-    {"params", "files", "yaml_files"},
+    {"errors", "counts", "cache_folder"},
+    {"kernels", "params", "files", "yaml_files"},
     {"geometry", "tunable", "package_files"},
     {"grid", "scan", "goal"},
     {"maps", "images", "tf", "scan_line", "scan_check"},

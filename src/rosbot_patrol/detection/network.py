@@ -41,16 +41,8 @@ class OnnxNetwork:
     """
 
     def __init__(self, model: bytes, *, channels: int, threads: int) -> None:
-        runtime = importlib.import_module("onnxruntime")
-        options = runtime.SessionOptions()
-        options.intra_op_num_threads = threads
-        options.inter_op_num_threads = 1
-        # let waiting threads sleep: the other programs need the robot's two cores
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        options.log_severity_level = 3
-        self._session = runtime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        self._session, self.name = open_session(model, threads=threads)
         self._grey = channels == 1
-        self.name = f"onnxruntime {runtime.__version__}"
 
     def run(self, picture: Picture, place: Letterbox) -> list[NDArray[np.float32]]:
         """Values before each head."""
@@ -66,6 +58,27 @@ class OnnxNetwork:
             "order": np.array(picture.order[:1] if self._grey else picture.order, dtype=np.int64),
         }
         return [values[0] for values in self._session.run(None, inputs)]
+
+
+def open_session(model: bytes, *, threads: int) -> tuple[Any, str]:
+    """Open an ONNX graph in onnxruntime, which has to be installed.
+
+    Args:
+        model: the serialised graph.
+        threads: number of cores it may use.
+
+    Returns:
+        The session, and the run-time's name for logs.
+    """
+    runtime = importlib.import_module("onnxruntime")
+    options = runtime.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    # let waiting threads sleep: the other programs need the robot's two cores
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.log_severity_level = 3
+    session = runtime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    return session, f"onnxruntime {runtime.__version__}"
 
 
 class CvNetwork:
