@@ -256,7 +256,7 @@ def test_auto_passes_a_damaged_download_over(ros, downloaded):
         assert "person" in seen["classes"]
         assert seen["network"] == [1, "ssdlite"]
     else:
-        assert "`scripts/bootstrap --robot` sets up ssdlite" in node.output
+        assert "let `scripts/bootstrap --robot` set up both" in node.output
     assert "Traceback" not in node.output
 
 

@@ -120,8 +120,8 @@ def _choose_ready(params: DarknetParams, folders: NetworkFolders) -> Choice:
                 log.warning("%s; to get it: %s", sentence, DOWNLOAD)
             return dataclasses.replace(choice, passed_over=(*passed_over, *choice.passed_over))
     raise DetectorError(
-        f"no network for a real camera: {'; '.join(passed_over)}. Fetch one with `{DOWNLOAD}`; "
-        f"without the Internet, `{INSTALL}` sets up ssdlite from what is installed"
+        f"no network for a real camera: {'; '.join(passed_over)}. Fetch one with `{DOWNLOAD}`, "
+        f"or let `{INSTALL}` set up both"
     )
 
 
