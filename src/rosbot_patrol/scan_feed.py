@@ -45,7 +45,7 @@ class ScanFeed:
         self._frames = frames
         self._line = ScanLine(self._place, size)
         self._beams: dict[str, int] = {}  # of the last scan of each frame
-        self._told = -math.inf
+        self._logged_at = -math.inf
 
     def __len__(self) -> int:
         """Number of scans that wait."""
@@ -101,8 +101,8 @@ class ScanFeed:
     def _watch_beams(self, scan: LaserScan, now: float) -> None:
         beams = len(scan.ranges)
         before, self._beams[scan.frame_id] = self._beams.get(scan.frame_id, beams), beams
-        if beams != before and abs(now - self._told) > _REPEAT:
-            self._told = now
+        if beams != before and abs(now - self._logged_at) > _REPEAT:
+            self._logged_at = now
             many = count_of(beams, "beam")
             log.warning("scan of frame '%s': it has %s, %d before; it is taken as it is", scan.frame_id, many, before)
 

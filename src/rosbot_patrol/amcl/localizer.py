@@ -187,7 +187,7 @@ class Localizer:
         known = self._map
         if known is None:
             return Outcome()
-        reading = self._track.judge(scan.stamp, odom_from_base)
+        reading = self._track.classify(scan.stamp, odom_from_base)
         if reading is Reading.LATE:
             return Outcome(is_late=True)
         if reading is Reading.RESTART:

@@ -90,11 +90,11 @@ class Seeker:
         sharp = np.exp(SHARPNESS * (weighing.fit - weighing.fit.max()))
         self.filter.weigh(Weighing(sharp, weighing.fit, weighing.evidence))
         self.estimate = self.filter.estimate()
-        self._judge(self.estimate, beams)
+        self._update_agreement(self.estimate, beams)
         self.filter.resample(self._floor.random_poses)
         self._freshen(beams)
 
-    def _judge(self, estimate: Estimate, beams: Beams) -> None:
+    def _update_agreement(self, estimate: Estimate, beams: Beams) -> None:
         found = agreement(estimate.pose, beams, self._obstacles)
         if found is None:
             return

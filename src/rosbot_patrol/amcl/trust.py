@@ -84,7 +84,7 @@ def agreement(pose: Pose2D, beams: Beams, obstacles: Field) -> float | None:
 
 
 class Witness:
-    """Averages the agreement over time and judges the estimate.
+    """Averages the agreement over time and evaluates the estimate.
 
     Args:
         lost_below: agreement below which the robot is lost.
@@ -114,10 +114,10 @@ class Witness:
             gain = 1.0 - math.exp(-max(stamp - self._stamp, 0.0) / MEMORY_S)
             self._average = found if math.isnan(self._average) else self._average + gain * (found - self._average)
         self._stamp = stamp
-        self.trust = self._judged(estimate)
+        self.trust = self._evaluate(estimate)
         return self.trust
 
-    def _judged(self, estimate: Estimate) -> Trust:
+    def _evaluate(self, estimate: Estimate) -> Trust:
         average = self._average
         if math.isnan(average):
             return Trust(reason="too few beams of the scans measured anything")

@@ -36,7 +36,7 @@ class Cast:
     actors: tuple[dict[str, Any], ...] = ()
     people: tuple[Person, ...] = ()
     viewpoint: tuple[float, float] | None = None
-    told: str = ""
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def _standing(stage: Stage) -> Cast | None:
         return None
     posture = ("standing", "standing", "sitting", "crouching")[int(stage.rng.integers(4))]
     actor = {"name": "intruder", "at": 1.0, "start": [*place, stage.facing()], "posture": posture}
-    return Cast((actor,), (Person(name="intruder", posture=posture),), told=f"somebody {posture}")
+    return Cast((actor,), (Person(name="intruder", posture=posture),), title=f"somebody {posture}")
 
 
 def _walking(stage: Stage) -> Cast | None:
@@ -109,7 +109,7 @@ def _walking(stage: Stage) -> Cast | None:
                 "name": "intruder", "at": 1.0, "start": [*a], "path": [[*b], [*a]],
                 "speed": speed, "loop": True, "pause": 1.0,
             }  # fmt: skip
-            return Cast((actor,), (Person(name="intruder"),), told=f"somebody who walks to and fro at {speed} m/s")
+            return Cast((actor,), (Person(name="intruder"),), title=f"somebody who walks to and fro at {speed} m/s")
     return None
 
 
@@ -130,8 +130,8 @@ def _hidden(stage: Stage, *, also_from_the_way: bool = False) -> Cast | None:
             if floor.share_seen(view, place, posture) >= PLAIN:
                 spot = _rounded(place)
                 actor = {"name": "intruder", "at": 1.0, "start": [*spot, stage.facing()], "posture": posture}
-                told = f"somebody {posture} out of sight of the room's point"
-                return Cast((actor,), (Person(name="intruder", posture=posture),), _rounded(view), told)
+                title = f"somebody {posture} out of sight of the room's point"
+                return Cast((actor,), (Person(name="intruder", posture=posture),), _rounded(view), title)
     return None
 
 
@@ -157,8 +157,8 @@ def _late(stage: Stage) -> Cast | None:
             "name": "intruder", "after": "looking", "at": late, "start": [*start],
             "path": [list(_rounded(p)) for p in way[1:]], "speed": 0.9,
         }  # fmt: skip
-        told = f"somebody who comes {late} s after the robot has begun to look"
-        return Cast((actor,), (Person(name="intruder"),), told=told)
+        title = f"somebody who comes {late} s after the robot has begun to look"
+        return Cast((actor,), (Person(name="intruder"),), title=title)
     return None
 
 
@@ -173,7 +173,7 @@ def _two(stage: Stage) -> Cast | None:
                 {"name": name, "at": 1.0, "start": [*place, stage.facing()]}
                 for name, place in zip(names, (a, b), strict=True)
             )
-            return Cast(actors, tuple(Person(name=name) for name in names), told="two people")
+            return Cast(actors, tuple(Person(name=name) for name in names), title="two people")
     return None
 
 
@@ -187,7 +187,7 @@ def _pets(stage: Stage) -> Cast | None:
         actors.append(
             {"name": name, "model": model, "at": 1.0, "start": [*place], "roam": 1.5, "speed": speed, "pause": 2.0}
         )
-    return Cast(tuple(actors), told=" and ".join(f"a {actor['model']}" for actor in actors))
+    return Cast(tuple(actors), title=" and ".join(f"a {actor['model']}" for actor in actors))
 
 
 def _poster(stage: Stage) -> Cast | None:
@@ -198,12 +198,12 @@ def _poster(stage: Stage) -> Cast | None:
         ahead = (wall.x + 0.2 * math.cos(wall.yaw), wall.y + 0.2 * math.sin(wall.yaw))
         if stage.floor.share_seen(stage.point, ahead) >= PLAIN:
             start = [round(float(value), 3) for value in wall]
-            return Cast(({"name": "poster", "model": "poster", "at": 1.0, "start": start},), told="a poster")
+            return Cast(({"name": "poster", "model": "poster", "at": 1.0, "start": start},), title="a poster")
     return None
 
 
 def _empty(stage: Stage) -> Cast | None:
-    return Cast(told="nobody")
+    return Cast(title="nobody")
 
 
 # How to cast each kind; the next function only if no room of the house has a place for the previous one.

@@ -159,10 +159,10 @@ def balance(
         moments=Counter(str(kill["moment"]) for kill in kills),
         calls=len(answers),
         answered=Counter(answer.verdict for answer in answers if answer.verdict),
-        lost=[f"{answer.told} no verdict" for answer in answers if not answer.verdict],
+        lost=[f"{answer.text} no verdict" for answer in answers if not answer.verdict],
         watched=len(watched),
         overlooked=[
-            f"{answer.told} clear, and somebody stood there"
+            f"{answer.text} clear, and somebody stood there"
             for answer in answers
             if answer.verdict == CLEAR and answer.call in watched
         ],
@@ -180,7 +180,7 @@ class _Answer:
     """Number of a call, the call in words with what was killed during it, and its verdict ("": none)."""
 
     call: int
-    told: str
+    text: str
     verdict: str
 
 
@@ -189,12 +189,12 @@ def _answers(
 ) -> list[_Answer]:
     calls = [line for line in lines if line["kind"] == "call"]
     return [
-        _Answer(call["call"], _told(call, kills), _verdict_of(call, after, records))
+        _Answer(call["call"], _call_text(call, kills), _verdict_of(call, after, records))
         for call, after in zip(calls, [*calls[1:], None], strict=True)
     ]
 
 
-def _told(call: Mapping[str, Any], kills: Iterable[Mapping[str, Any]]) -> str:
+def _call_text(call: Mapping[str, Any], kills: Iterable[Mapping[str, Any]]) -> str:
     """A call in words, with what was killed during it."""
     hit = [f"{k['victim']} {k['moment']}+{k['delay']:.2f} s" for k in kills if k["call"] == call["call"]]
     return f"call {call['call']} of room {call['room']}, killed: {', '.join(hit) or 'none'}:"

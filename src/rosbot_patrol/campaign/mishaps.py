@@ -24,12 +24,12 @@ class Mishap:
     """One fault of a patrol.
 
     Attributes:
-        told: the fault in words.
+        text: the fault in words.
         fault: its entry in the scenario.
         allowed: verdicts accepted besides the expected one.
     """
 
-    told: str
+    text: str
     fault: dict[str, Any]
     allowed: tuple[str, ...] = ()
 
@@ -52,29 +52,29 @@ def mishap_of(seed: int, number: int, room: int, rooms: Sequence[int]) -> Mishap
     return make(own, room, int(own.choice(others)))
 
 
-def _camera(kind: str, told: str) -> Callable[[np.random.Generator, int, int], Mishap]:
+def _camera(kind: str, text: str) -> Callable[[np.random.Generator, int, int], Mishap]:
     def make(rng: np.random.Generator, room: int, other: int) -> Mishap:
         after = str(rng.choice(["driving", "looking"]))
         fault = {"kind": kind, "after": after, "at": _drawn(rng, 0.0, 8.0), "duration": _drawn(rng, 5.0, 40.0)}
-        return Mishap(told=f"{told} for {fault['duration']:g} s", fault=fault, allowed=UNSURE)
+        return Mishap(text=f"{text} for {fault['duration']:g} s", fault=fault, allowed=UNSURE)
 
     return make
 
 
-def _driving(kind: str, told: str, longest: float, **keys: Any) -> Callable[[np.random.Generator, int, int], Mishap]:
+def _driving(kind: str, text: str, longest: float, **keys: Any) -> Callable[[np.random.Generator, int, int], Mishap]:
     def make(rng: np.random.Generator, room: int, other: int) -> Mishap:
         lasts = _drawn(rng, 2.0, longest)
         fault = {"kind": kind, "after": "driving", "at": _drawn(rng, 0.0, 10.0), "duration": lasts, **keys}
-        return Mishap(told=f"{told} for {lasts:g} s", fault=fault, allowed=STRANDED)
+        return Mishap(text=f"{text} for {lasts:g} s", fault=fault, allowed=STRANDED)
 
     return make
 
 
-def _sensor(kind: str, told: str, *, own: bool, **keys: Any) -> Callable[[np.random.Generator, int, int], Mishap]:
+def _sensor(kind: str, text: str, *, own: bool, **keys: Any) -> Callable[[np.random.Generator, int, int], Mishap]:
     def make(rng: np.random.Generator, room: int, other: int) -> Mishap:
         target = room if own else other
         fault = {"kind": kind, "target": target, "after": "driving", "at": _drawn(rng, 0.0, 5.0), **keys}
-        return Mishap(told=f"motion sensor {target} {told}", fault=fault)
+        return Mishap(text=f"motion sensor {target} {text}", fault=fault)
 
     return make
 

@@ -121,11 +121,11 @@ def _broken(patrol: Patrol, rooms: Sequence[int]) -> Patrol:
     expect = {key: value for key, value in patrol.scenario["expect"].items() if key != "verdicts"}
     tree = {
         **patrol.scenario,
-        "title": f"{patrol.title}; {mishap.told}",
+        "title": f"{patrol.title}; {mishap.text}",
         "faults": [mishap.fault],
         "expect": expect if mishap.allowed else patrol.scenario["expect"],
     }
-    return replace(patrol, scenario=tree, mishap=mishap.told, allowed=mishap.allowed)
+    return replace(patrol, scenario=tree, mishap=mishap.text, allowed=mishap.allowed)
 
 
 def _patrol(seed: int, number: int, kind: str, *, files: HouseFiles, floor: Floor, room: int, cast: Cast) -> Patrol:
@@ -133,7 +133,7 @@ def _patrol(seed: int, number: int, kind: str, *, files: HouseFiles, floor: Floo
     assert known is not None
     expected = CONFIRMED if kind in INTRUDERS else CLEAR
     tree: dict[str, Any] = {
-        "title": f"{cast.told} in the {known.name} ({files.name})",
+        "title": f"{cast.title} in the {known.name} ({files.name})",
         "world": str(files.world),
         "motion_sensors": str(files.sensors),
         "map": str(files.map),

@@ -123,7 +123,7 @@ def touches(contacts: Sequence[tuple[float, str]], robot: Track, tracks: dict[st
         robot: its poses.
         tracks: of the actors.
     """
-    told: list[str] = []
+    sentences: list[str] = []
     last: dict[str, float] = {}
     for time, name in contacts:
         is_new = time - last.get(name, -math.inf) > _ONE_TOUCH
@@ -132,8 +132,10 @@ def touches(contacts: Sequence[tuple[float, str]], robot: Track, tracks: dict[st
         if not is_new or pose is None:
             continue
         whose = f", {name} {_motion(tracks[name], time)}" if name in tracks else ""
-        told.append(f"{name} at {time:.1f} s, the robot at ({pose.x:.2f}, {pose.y:.2f}), {_motion(robot, time)}{whose}")
-    return told
+        sentences.append(
+            f"{name} at {time:.1f} s, the robot at ({pose.x:.2f}, {pose.y:.2f}), {_motion(robot, time)}{whose}"
+        )
+    return sentences
 
 
 def _motion(track: Track, time: float) -> str:

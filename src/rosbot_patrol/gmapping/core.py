@@ -78,14 +78,14 @@ class GmappingCore:
         outcome = slam.update(placed.scan, placed.odom_from_base, placed.base_from_laser)
         if slam.map_from_odom is not None:
             self.correction = slam.map_from_odom
-        self._judge(outcome, placed.scan)
+        self._note_problem(outcome, placed.scan)
         since = stamp - self._map_stamp
         if not outcome.updated or 0.0 <= since <= self._params.map_update_interval:
             return Step(stamp, outcome)
         self._map_stamp = stamp
         return Step(stamp, outcome, slam.grid())
 
-    def _judge(self, outcome: Outcome, scan: LaserScan) -> None:
+    def _note_problem(self, outcome: Outcome, scan: LaserScan) -> None:
         """Record the problem of an update, and log it now and then."""
         if outcome.is_blind:
             text = f"no beam of the scan of frame '{scan.frame_id}' measured anything: only the odometry is followed"

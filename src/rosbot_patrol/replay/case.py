@@ -105,7 +105,7 @@ def read_case(path: Path) -> Case:
     return Case(path, folder / loaded.bag, setup, remaps, expected, fields, loaded.optional, named)
 
 
-def run_case(case: Case, *, told: Callable[[float], None] = lambda _share: None) -> Result:
+def run_case(case: Case, *, progress: Callable[[float], None] = lambda _share: None) -> Result:
     """Replay a case; the result records its origin.
 
     Raises:
@@ -113,7 +113,7 @@ def run_case(case: Case, *, told: Callable[[float], None] = lambda _share: None)
     """
     replay = build_replay(case.setup)
     with Bag(case.bag) as bag:
-        result = run_replay(bag, replay, remaps=case.remaps, told=told)
+        result = run_replay(bag, replay, remaps=case.remaps, progress=progress)
         _check_names(case.named, result)
         own = {"bag": case.bag.name, "duration": f"{bag.duration:.3f} s"}
         return replace(result, facts={**own, **result.facts})

@@ -84,7 +84,7 @@ def run(arguments: Sequence[str]) -> int:
             return _list(options.bag)
         case = _case(options, remaps)
         result = _replayed(case, is_quiet=options.quiet)
-        return _judge(case, result, options)
+        return _finish(case, result, options)
     except PatrolError as err:
         sys.stderr.write(f"replay: {err}\n")
         return BAD_INPUT
@@ -131,7 +131,7 @@ def _tolerances(texts: Sequence[str]) -> dict[str, float]:
 def _replayed(case: Case, *, is_quiet: bool) -> Result:
     bar = _Bar()
     try:
-        result = run_case(case, told=bar.show)
+        result = run_case(case, progress=bar.show)
     finally:
         bar.clear()
     if not is_quiet:
@@ -142,7 +142,7 @@ def _replayed(case: Case, *, is_quiet: bool) -> Result:
     return result
 
 
-def _judge(case: Case, result: Result, options: argparse.Namespace) -> int:
+def _finish(case: Case, result: Result, options: argparse.Namespace) -> int:
     """Store or compare the result, and draw."""
     if options.save_map:
         if "map" not in result.grids:

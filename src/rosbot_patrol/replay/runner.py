@@ -59,7 +59,7 @@ def run_replay(
     replay: Replay,
     *,
     remaps: Mapping[str, str] | None = None,
-    told: Callable[[float], None] = lambda _share: None,
+    progress: Callable[[float], None] = lambda _share: None,
 ) -> Result:
     """Feed a whole bag to a replay.
 
@@ -67,7 +67,7 @@ def run_replay(
         bag: an open bag.
         replay: replay of a node.
         remaps: topics of the bag by the names of the inputs, if they differ.
-        told: called with the share done, after each record.
+        progress: called with the share done, after each record.
 
     Raises:
         BagError: a needed topic is missing or of another type, or the bag is broken.
@@ -76,7 +76,7 @@ def run_replay(
     replay.begin(names.values())
     for record in bag.records(names, replay.kinds):
         replay.hear(names[record.topic], record.time, record.content)
-        told(bag.done)
+        progress(bag.done)
     return replay.finish()
 
 

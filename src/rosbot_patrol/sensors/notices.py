@@ -42,7 +42,7 @@ class SensorReport:
 
 
 @dataclass
-class _Told:
+class _Reported:
     """A problem that the owner knows: its begin [s since 1970]; time since its end [s], None: not over."""
 
     since: float
@@ -72,23 +72,25 @@ class Notices:
         self._began = now
         self._last = float("-inf")
         self._seen: dict[Key, float] = {}
-        self._told: dict[Key, _Told] = {}
+        self._reported: dict[Key, _Reported] = {}
         self._count = 0
         if memory:
             self._recall(memory)
 
     def snapshot(self) -> dict[str, Any]:
         """State that must survive a restart, for JSON."""
-        told = [[key.kind_name, key.sensor_id, key.bridge, told.since] for key, told in self._told.items()]
-        return {"count": self._count, "told": told}
+        reported = [
+            [key.kind_name, key.sensor_id, key.bridge, reported.since] for key, reported in self._reported.items()
+        ]
+        return {"count": self._count, "told": reported}
 
     def _recall(self, memory: Mapping[str, Any]) -> None:
         try:
-            told = {
-                Key(Kind(kind).value, int(sensor_id), str(bridge)): _Told(float(since), is_recalled=True)
+            reported = {
+                Key(Kind(kind).value, int(sensor_id), str(bridge)): _Reported(float(since), is_recalled=True)
                 for kind, sensor_id, bridge, since in memory["told"]
             }
-            self._count, self._told = int(memory["count"]), told
+            self._count, self._reported = int(memory["count"]), reported
         except (KeyError, TypeError, ValueError) as err:
             log.warning("the stored notices about sensors are invalid (%r): starting without them", err)
 
@@ -110,8 +112,8 @@ class Notices:
             self._seen.setdefault(key, now)
         for key in calm:
             self._seen[key] = now + watch.motion_pause
-        untold = {key: p for key, p in problems.items() if key not in self._told and key not in calm}
-        new = {key: p for key, p in untold.items() if not self._is_covered(p, problems)}
+        unreported = {key: p for key, p in problems.items() if key not in self._reported and key not in calm}
+        new = {key: p for key, p in unreported.items() if not self._is_covered(p, problems)}
         well = self._well(problems, statuses, watch, now)
         due = any(now - self._seen[key] >= self._times.notice_after for key in new)
         if not (due or well) or now - self._last < self._times.notice_interval:
@@ -140,23 +142,23 @@ class Notices:
         """Reported problems that are over, for sensors and bridges without other problems."""
         bad = {(key.sensor_id, key.bridge) for key in problems}
         found = []
-        for key, told in self._told.items():
-            if (key.sensor_id, key.bridge) in bad or not self._may_be_well(key, told, statuses, watch, now):
-                told.well_since = None
+        for key, reported in self._reported.items():
+            if (key.sensor_id, key.bridge) in bad or not self._may_be_well(key, reported, statuses, watch, now):
+                reported.well_since = None
                 if key in problems:
-                    told.is_recalled = False
+                    reported.is_recalled = False
                 continue
-            if told.well_since is None:
-                told.well_since = now
-            if now - told.well_since >= self._times.well_after:
+            if reported.well_since is None:
+                reported.well_since = now
+            if now - reported.well_since >= self._times.well_after:
                 found.append(key)
         return found
 
     def _may_be_well(
-        self, key: Key, told: _Told, statuses: Mapping[int, SensorStatus], watch: Supervisor, now: float
+        self, key: Key, reported: _Reported, statuses: Mapping[int, SensorStatus], watch: Supervisor, now: float
     ) -> bool:
         """Whether a missing problem means anything: after a restart nothing is known yet."""
-        if not told.is_recalled:
+        if not reported.is_recalled:
             return True
         if key.kind not in _SHOWN_BY_BEING_HEARD:
             return now - self._began > PATIENCE
@@ -169,7 +171,7 @@ class Notices:
 
     def _tell(self, problem: Problem, watch: Supervisor, wall: float) -> Item:
         lasted = watch.age(problem.since)
-        self._told[problem.key] = _Told(wall - lasted)
+        self._reported[problem.key] = _Reported(wall - lasted)
         what = problem.what
         if problem.key.kind is Kind.BRIDGE_GONE:
             behind = [
@@ -189,7 +191,7 @@ class Notices:
             by_title.setdefault(watch.title(key), []).append(key)
         items = []
         for title, of_one in by_title.items():
-            since = min(self._told.pop(key).since for key in of_one)
+            since = min(self._reported.pop(key).since for key in of_one)
             what = wording.short([key.kind for key in of_one])
             items.append(Item(kind=None, title=title, what=what, since=since, lasted=max(wall - since, 0.0)))
         return items

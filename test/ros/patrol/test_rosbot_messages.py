@@ -43,11 +43,11 @@ def test_what_the_patrol_takes_from_a_battery():
 
 def test_a_range_sensor_without_a_frame_or_with_a_negative_reading_is_told_and_left_out(caplog):
     guard = SimpleNamespace(see_range=lambda *_: pytest.fail("placed"))
-    eyes = SimpleNamespace(_told=-math.inf, _mounts={}, guard=guard)
+    eyes = SimpleNamespace(_logged_at=-math.inf, _mounts={}, guard=guard)
     eyes._complain = MethodType(Eyes._complain, eyes)
     eyes._mount = MethodType(Eyes._mount, eyes)
     Eyes._look_low(eyes, "/range/fl", Range(range=0.4), 1.0)
     assert "cannot place /range/fl: its messages name no frame" in caplog.text
-    eyes._told = -math.inf
+    eyes._logged_at = -math.inf
     Eyes._look_low(eyes, "/range/fr", Range(range=-1.0), 1.0)
     assert "/range/fr says -1 m, as a broken sensor does" in caplog.text

@@ -65,7 +65,7 @@ def test_it_is_over_when_everything_has_happened_and_each_room_has_its_verdict(t
     house.play()
     assert house.told == ["Bob appears.", PLAYED]
     assert house.is_over
-    assert house.watch.judge(house.narrator) == []
+    assert house.watch.failures(house.narrator) == []
 
 
 def test_what_disappoints_is_said(tmp_path, monkeypatch) -> None:
@@ -74,7 +74,7 @@ def test_what_disappoints_is_said(tmp_path, monkeypatch) -> None:
     house.play()
     house.mission("a", 5, "clear", "not at home")
     assert house.is_over
-    assert house.watch.judge(house.narrator) == [
+    assert house.watch.failures(house.narrator) == [
         "The verdict for room 5 should have been confirmed; it was clear.",
         "1 mail should have been written; there were 0.",
         "The robot should have been home.",
@@ -87,7 +87,7 @@ def test_its_time_passes_on_the_simulated_clock(tmp_path, monkeypatch) -> None:
     assert not house.is_over
     house.now += 61.0
     assert house.is_over
-    assert house.watch.judge(house.narrator) == [
+    assert house.watch.failures(house.narrator) == [
         "The verdict for room 5 should have been clear; no mission to it has ended.",
         "Not everything in the scenario has happened: an event that it waits for did not come.",
         "Its time of 60 simulated seconds has passed.",
@@ -101,4 +101,4 @@ def test_no_mission_at_all_may_be_what_is_expected(tmp_path, monkeypatch) -> Non
     assert not house.is_over
     house.now += 31.0
     assert house.is_over
-    assert house.watch.judge(house.narrator) == []
+    assert house.watch.failures(house.narrator) == []

@@ -91,16 +91,16 @@ def test_a_restart_of_the_odometry_in_mid_drive_keeps_the_way_until_then() -> No
 
 def test_what_a_stamp_and_an_odometry_are() -> None:
     track = OdometryTrack()
-    assert track.judge(10.0, Pose2D(50.0, 0.0, 0.0)) is Reading.USUAL
+    assert track.classify(10.0, Pose2D(50.0, 0.0, 0.0)) is Reading.USUAL
     track.follow(10.0, Pose2D())
-    assert track.judge(10.0, Pose2D()) is Reading.USUAL  # two lasers
-    assert track.judge(9.9, Pose2D()) is Reading.LATE
-    assert track.judge(9.0, Pose2D()) is Reading.LATE
-    assert track.judge(8.9, Pose2D(0.5, 0.0, 0.0)) is Reading.USUAL  # the clock was set, the odometry goes on
-    assert track.judge(8.9, Pose2D(3.0, 0.0, 0.0)) is Reading.RESTART
-    assert track.judge(10.1, Pose2D(1.4, 0.0, 0.0)) is Reading.USUAL
-    assert track.judge(10.1, Pose2D(1.6, 0.0, 0.0)) is Reading.RESTART
-    assert track.judge(20.0, Pose2D(30.0, 0.0, 0.0)) is Reading.USUAL  # ten seconds without a scan
+    assert track.classify(10.0, Pose2D()) is Reading.USUAL  # two lasers
+    assert track.classify(9.9, Pose2D()) is Reading.LATE
+    assert track.classify(9.0, Pose2D()) is Reading.LATE
+    assert track.classify(8.9, Pose2D(0.5, 0.0, 0.0)) is Reading.USUAL  # the clock was set, the odometry goes on
+    assert track.classify(8.9, Pose2D(3.0, 0.0, 0.0)) is Reading.RESTART
+    assert track.classify(10.1, Pose2D(1.4, 0.0, 0.0)) is Reading.USUAL
+    assert track.classify(10.1, Pose2D(1.6, 0.0, 0.0)) is Reading.RESTART
+    assert track.classify(20.0, Pose2D(30.0, 0.0, 0.0)) is Reading.USUAL  # ten seconds without a scan
 
 
 def test_each_of_two_lasers_weighs_a_motion_once() -> None:

@@ -93,7 +93,7 @@ class WebhookTransport:
         self._parts = urlsplit(address.url)
         self._tls = self._parts.scheme == "https"
         self._where = f"{self._parts.hostname}:{self._parts.port or (443 if self._tls else 80)}"
-        self._has_told_of_pause = False
+        self._has_warned_of_pause = False
         self._mask = Mask([*url_secrets(address.url), address.token, address.secret])
 
     def describe(self) -> str:
@@ -130,8 +130,8 @@ class WebhookTransport:
         try:
             return parse_retry_after(pause, self._wall())
         except ValueError:
-            if not self._has_told_of_pause:
-                self._has_told_of_pause = True
+            if not self._has_warned_of_pause:
+                self._has_warned_of_pause = True
                 words = "asks for a pause (Retry-After) that is neither seconds nor a date, using our own: %r"
                 log.warning(f"%s {words}", self.describe(), self._mask(pause)[:80])
             return None

@@ -23,7 +23,7 @@ class DiskWatch:
         self._failed_at: float | None = None
         self._wall = 0.0
         self._error: OSError | None = None
-        self._is_told = False
+        self._is_reported = False
 
     @property
     def error(self) -> OSError | None:
@@ -43,13 +43,13 @@ class DiskWatch:
     def notice(self, now: float, wall: float) -> Notice | None:
         """The notice that is due now, None if there is nothing new."""
         if self._error is not None and self._failed_at is not None:
-            if self._is_told or now - self._failed_at < self._patience:
+            if self._is_reported or now - self._failed_at < self._patience:
                 return None
-            self._is_told = True
+            self._is_reported = True
             return self._gone(self._error, wall)
-        if not self._is_told:
+        if not self._is_reported:
             return None
-        self._is_told = False
+        self._is_reported = False
         return self._back(wall)
 
     def _gone(self, error: OSError, wall: float) -> Notice:

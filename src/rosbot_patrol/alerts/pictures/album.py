@@ -96,7 +96,7 @@ class Album:
             name = f"{role}-{shelf.count:03}.jpg"
             caption = f"{picture.stamp - clip.stamp:+.1f} s"
             files.append(NewFile(name=name, role=role, data=data, stamp=picture.stamp, caption=caption))
-            self._judge(shelf, picture, data)
+            self._consider(shelf, picture, data)
         if is_over:
             shelf.count = max(shelf.count, 1)
             shelf.clip = None
@@ -130,7 +130,7 @@ class Album:
             files.append(NewFile(name=f"best-{number}.jpg", role="best", data=data, stamp=stamp, caption=caption))
         return files
 
-    def _judge(self, shelf: _Shelf, picture: Picture, plain: bytes) -> None:
+    def _consider(self, shelf: _Shelf, picture: Picture, plain: bytes) -> None:
         with self._guard:
             seen = next((s for s in self._sightings if abs(s.stamp - picture.stamp) <= _SAME), None)
         if seen is None or not seen.boxes:

@@ -38,7 +38,7 @@ class OdometryTrack:
         self.last: Pose2D | None = None
         self._stamp = -math.inf
 
-    def judge(self, stamp: float, odometry: Pose2D) -> Reading:
+    def classify(self, stamp: float, odometry: Pose2D) -> Reading:
         """Classify a scan; call `follow` unless it is late.
 
         Args:

@@ -1,4 +1,4 @@
-"""Whether a neighbour of the patrol has fallen silent, and when the owner is told: the sensors' watch."""
+"""Silence of a neighbour of the patrol, the sensor watch, and the messages to the owner about it."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ class Absence:
     """One neighbour. Times are of any monotonic clock [s].
 
     Args:
-        silent_after: so long without a word it counts as gone [s].
-        told_after: so long it has to be gone before the owner is told, and to be back before that is told [s].
+        silent_after: silence after which it counts as gone [s].
+        notice_after: duration of its absence, and of its return, before the owner hears of it [s].
     """
 
-    def __init__(self, silent_after: float, told_after: float) -> None:
-        self._silent_after, self._told_after = silent_after, told_after
+    def __init__(self, silent_after: float, notice_after: float) -> None:
+        self._silent_after, self._notice_after = silent_after, notice_after
         self._heard = -math.inf
-        self._since = math.inf  # when what is not told yet was first seen
-        self._is_told = False
+        self._since = math.inf  # when a change not reported yet was first seen
+        self._is_reported = False
 
     def heard(self, now: float) -> None:
         """It has said something."""
@@ -38,15 +38,15 @@ class Absence:
         return quiet if self.was_heard and quiet > self._silent_after else 0.0
 
     def step(self, now: float) -> tuple[OwnerMessage, ...]:
-        """What the owner is told now; call it often: what this program slept through is not held against it."""
+        """Messages to the owner that are due; call it often: gaps in our own calls are not counted as its silence."""
         is_gone = self.silence(now) > 0.0
-        if is_gone == self._is_told:
+        if is_gone == self._is_reported:
             self._since = math.inf
             return ()
         self._since = min(self._since, now)
-        if now - self._since < self._told_after:
+        if now - self._since < self._notice_after:
             return ()
-        self._is_told = is_gone
+        self._is_reported = is_gone
         text = "the program sensor_watch has gone, or hangs: nobody tells of motion sensors that fail. See its log"
         if not is_gone:
             text = "the program sensor_watch is heard again: it tells of motion sensors that fail"

@@ -69,7 +69,7 @@ class BatteryWatch:
 
     def __init__(self, params: BatteryParams) -> None:
         self._params = params
-        self._is_other_told = False
+        self._has_warned = False
         self.is_low = False
         self.text = ""
 
@@ -85,27 +85,27 @@ class BatteryWatch:
             self.is_low = False
             self.text = "the battery was low and is silent now" if was_low else ""
         else:
-            self._judge(battery)
+            self._evaluate(battery)
         return self.is_low != was_low
 
-    def _judge(self, battery: Battery) -> None:
+    def _evaluate(self, battery: Battery) -> None:
         p = self._params
         has_voltage = battery.voltage is not None and p.battery_low_voltage > 0.0
         if battery.share is not None and not (has_voltage and p.battery_voltage_first):
             self.text = f"{battery.share:.0%}"
             self._compare(battery.share, p.battery_low, p.battery_ok)
         elif battery.voltage is not None and has_voltage:
-            self._judge_voltage(battery.voltage)
+            self._evaluate_voltage(battery.voltage)
         else:
             self.is_low, self.text = False, ""
 
-    def _judge_voltage(self, voltage: float) -> None:
+    def _evaluate_voltage(self, voltage: float) -> None:
         p = self._params
         self.text = f"{voltage:.1f} V"
         if voltage >= _OTHER * p.battery_low_voltage:
             self._compare(voltage, p.battery_low_voltage, p.battery_ok_voltage)
-        elif not self._is_other_told:
-            self._is_other_told = True
+        elif not self._has_warned:
+            self._has_warned = True
             log.warning(
                 "the battery says %.1f V, and battery_low_voltage is %.1f V: not judged, as this must be another "
                 "battery; set battery_low_voltage and battery_ok_voltage for it, or 0 for none",

@@ -145,7 +145,7 @@ class PatrolManager:
 
     # -- orders between two steps
 
-    def note_told(self, mission_id: str, reason: str, *, held_until: float | None = None) -> bool:
+    def note_earlier_notice(self, mission_id: str, reason: str, *, held_until: float | None = None) -> bool:
         """Take in a notice that is on disk from before the start; the memory may be older.
 
         Args:

@@ -31,7 +31,7 @@ class Lidar:
         self._params, self._transforms, self._health = params, transforms, health
         self._check = ScanCheck("the patrol looks as without a lidar")
         self._newest: tuple[LaserScan, float] | None = None
-        self._judged: tuple[LaserScan, bool] | None = None
+        self._checked: tuple[LaserScan, bool] | None = None
         self._placed: LaserScan | None = None  # the scan of `view`, as it was heard
         self._nearest: tuple[LaserScan, float | None] | None = None
         self.view: ScanView | None = None
@@ -45,11 +45,11 @@ class Lidar:
         if self._newest is None or abs(now - self._newest[1]) > self._params.scan_timeout:
             return None
         scan = self._newest[0]
-        if self._judged is None or self._judged[0] is not scan:
-            self._judged = scan, self._check.accepts(scan, now)
+        if self._checked is None or self._checked[0] is not scan:
+            self._checked = scan, self._check.accepts(scan, now)
             if self._check.problem:
                 self._tell()
-        return scan if self._judged[1] else None
+        return scan if self._checked[1] else None
 
     def place(self, scan: LaserScan | None, now: float) -> ScanView | None:
         """Lay a scan level and place it in map; None if there is none or its place is not known."""

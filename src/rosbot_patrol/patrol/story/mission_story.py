@@ -71,37 +71,37 @@ class Narrator:
         self._called.add(room_id)
         return [f"Motion sensor {room_id} calls."]
 
-    def state(self, now: float, told: Telling) -> list[str]:
+    def state(self, now: float, report: Telling) -> list[str]:
         """The patrol's state was published."""
-        last, self._last = self._last, told
-        mission = self._mission(told)
-        if mission and told.phase not in mission.times:
-            mission.times[told.phase] = now
-        if last is not None and (last.phase, last.mission) == (told.phase, told.mission):
-            return self._news(last, told)
-        if told.phase == Phase.IDLE.value:
-            return self._idle(now, last, told)
-        if told.phase == Phase.STARTING.value:
-            return [f"Not yet on guard: {told.why}."]
-        return [self._step(told)]
+        last, self._last = self._last, report
+        mission = self._mission(report)
+        if mission and report.phase not in mission.times:
+            mission.times[report.phase] = now
+        if last is not None and (last.phase, last.mission) == (report.phase, report.mission):
+            return self._news(last, report)
+        if report.phase == Phase.IDLE.value:
+            return self._idle(now, last, report)
+        if report.phase == Phase.STARTING.value:
+            return [f"Not yet on guard: {report.why}."]
+        return [self._step(report)]
 
-    def alert(self, told: AlertTelling) -> list[str]:
+    def alert(self, report: AlertTelling) -> list[str]:
         """An intruder was seen, or the mail about one has left."""
-        mission = next((m for m in self.missions if m.id == told.id), None)
-        if not told.delivered:
+        mission = next((m for m in self.missions if m.id == report.id), None)
+        if not report.delivered:
             if mission:
-                mission.seen.append(told.object_class)
+                mission.seen.append(report.object_class)
             return [
-                f"INTRUDER: a {told.object_class} seen on the mission to {told.room},"
-                f" probability {told.probability:.2f}. The notice is on disk."
+                f"INTRUDER: a {report.object_class} seen on the mission to {report.room},"
+                f" probability {report.probability:.2f}. The notice is on disk."
             ]
         if mission:
-            mission.mails.append(told.location)
-        if told.transport == "maildir":
-            return [f"The mail lies in {told.location}"]
-        return [f"The mail was sent to {told.location} by {told.transport}."]
+            mission.mails.append(report.location)
+        if report.transport == "maildir":
+            return [f"The mail lies in {report.location}"]
+        return [f"The mail was sent to {report.location} by {report.transport}."]
 
-    def is_told(self, mission: MissionSummary) -> bool:
+    def is_complete(self, mission: MissionSummary) -> bool:
         """Whether nothing more is to come of a mission that ended."""
         return mission.verdict != Verdict.CONFIRMED.value or bool(mission.mails)
 
@@ -109,56 +109,56 @@ class Narrator:
         """All missions, for JSON."""
         return {"on_guard_s": self.on_guard_at, "missions": [vars(mission) for mission in self.missions]}
 
-    def _mission(self, told: Telling) -> MissionSummary | None:
-        if not told.mission:
+    def _mission(self, report: Telling) -> MissionSummary | None:
+        if not report.mission:
             return None
-        found = next((m for m in self.missions if m.id == told.mission), None)
+        found = next((m for m in self.missions if m.id == report.mission), None)
         if found is None:
-            found = MissionSummary(id=told.mission, room_id=told.room_id, room_name=told.room_name)
+            found = MissionSummary(id=report.mission, room_id=report.room_id, room_name=report.room_name)
             self.missions.append(found)
         return found
 
-    def _idle(self, now: float, last: Telling | None, told: Telling) -> list[str]:
+    def _idle(self, now: float, last: Telling | None, report: Telling) -> list[str]:
         if last is None or not last.mission:
             if self.on_guard_at is not None:
                 return []
             self.on_guard_at = now
-            extra = told.why.removeprefix(ON_GUARD).strip("; ")
+            extra = report.why.removeprefix(ON_GUARD).strip("; ")
             return [f"On guard{f' ({extra})' if extra else ''}."]
         mission = next(m for m in self.missions if m.id == last.mission)
-        mission.verdict, mission.why = told.last_verdict, told.why
+        mission.verdict, mission.why = report.last_verdict, report.why
         mission.times["end"] = now
         self.ended += 1
         self._called.discard(mission.room_id)
-        self.is_home = not is_away(told.why)
+        self.is_home = not is_away(report.why)
         place = "Home again" if self.is_home else "Not home"
-        return [f"{place}. Verdict for {last.room}: {told.last_verdict}.", f"On guard ({_details(told.why)})."]
+        return [f"{place}. Verdict for {last.room}: {report.last_verdict}.", f"On guard ({_details(report.why)})."]
 
     @staticmethod
-    def _news(last: Telling, told: Telling) -> list[str]:
-        if told.phase == Phase.STARTING.value and told.why != last.why:
-            return [f"Not yet on guard: {told.why}."]
-        before, doing = activity_of(last.why), activity_of(told.why)
+    def _news(last: Telling, report: Telling) -> list[str]:
+        if report.phase == Phase.STARTING.value and report.why != last.why:
+            return [f"Not yet on guard: {report.why}."]
+        before, doing = activity_of(last.why), activity_of(report.why)
         if doing is before:
             return []
         if doing.is_waiting and not before.is_waiting and before is not Activity.WAITING_FOR_PICTURES:
-            return [f"{told.why[:1].upper()}{told.why[1:]}."]
+            return [f"{report.why[:1].upper()}{report.why[1:]}."]
         if doing is Activity.FOLLOWING:
             return ["Somebody is in view: the camera is kept on them."]
         if doing is Activity.TO_VIEWPOINT:
-            return [f"On to a further viewpoint in {told.room}."]
+            return [f"On to a further viewpoint in {report.room}."]
         if doing is Activity.TURNING:
-            once = "Turning once" if is_full_turn(told.why) else "Turning"
-            return [f"{once} to look around in {told.room}."]
+            once = "Turning once" if is_full_turn(report.why) else "Turning"
+            return [f"{once} to look around in {report.room}."]
         return []
 
     @staticmethod
-    def _step(told: Telling) -> str:
-        if told.phase == Phase.DRIVING.value:
-            return f"Driving to {told.room}."
-        if told.phase == Phase.LOOKING.value:
-            return f"Arrived in {told.room}."
-        return f"Driving home. {_details(told.why).removeprefix('driving home, ').capitalize()}."
+    def _step(report: Telling) -> str:
+        if report.phase == Phase.DRIVING.value:
+            return f"Driving to {report.room}."
+        if report.phase == Phase.LOOKING.value:
+            return f"Arrived in {report.room}."
+        return f"Driving home. {_details(report.why).removeprefix('driving home, ').capitalize()}."
 
 
 def _details(why: str) -> str:

@@ -27,7 +27,7 @@ class Motion:
         horizon: duration [s].
         accelerations: of vx, vy [m/s^2] and wz [rad/s^2].
         granularity: longest step [m]; angular_granularity: the same for turning [rad].
-        judged_at: time at which the trajectory is scored [s]; None: at its end.
+        scored_at: time at which the trajectory is scored [s]; None: at its end.
         stop_time_buffer: time reserve for braking before an obstacle [s].
         growing: speed above which the footprint grows [m/s], its largest growth, and the speed of that growth.
         is_held: the base has the velocity at once, as in a dynamic window; accelerations count for braking only.
@@ -37,7 +37,7 @@ class Motion:
     accelerations: tuple[float, float, float]
     granularity: float = 0.025
     angular_granularity: float = 0.025
-    judged_at: float | None = None
+    scored_at: float | None = None
     stop_time_buffer: float = 0.0
     growing: tuple[float, float, float] = (math.inf, 0.0, 0.0)
     is_held: bool = False
@@ -53,9 +53,9 @@ class Motion:
 
     def packed(self, reach: float, spacing: float) -> Array:
         """The values as `sweep_kernels.drive` expects them."""
-        judged_at = self.horizon if self.judged_at is None else min(self.judged_at, self.horizon)
+        scored_at = self.horizon if self.scored_at is None else min(self.scored_at, self.horizon)
         steps = self.granularity, self.angular_granularity
-        own = (self.horizon, judged_at, *steps, *self.accelerations, self.stop_time_buffer)
+        own = (self.horizon, scored_at, *steps, *self.accelerations, self.stop_time_buffer)
         return np.array([*own, reach, spacing, *self.growing, float(self.is_held)])
 
 

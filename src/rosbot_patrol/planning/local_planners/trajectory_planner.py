@@ -218,7 +218,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
             accelerations=self._accelerations,
             granularity=p.sim_granularity,
             angular_granularity=p.angular_sim_granularity * p.sim_time,  # upstream's rule: of a second's turn
-            judged_at=p.heading_scoring_timestep if p.heading_scoring else None,
+            scored_at=p.heading_scoring_timestep if p.heading_scoring else None,
             stop_time_buffer=p.stop_time_buffer,
         )
 
@@ -231,7 +231,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
             ControlError: some are free, but lead nowhere.
         """
         p, motion = self._driven, self._motion(horizon)
-        at_once = replace(motion, horizon=min(horizon, _SHORT), accelerations=SUDDEN, judged_at=None)
+        at_once = replace(motion, horizon=min(horizon, _SHORT), accelerations=SUDDEN, scored_at=None)
         danger, ends = self._dangers(view, samples, motion, at_once, bare=bare)
         free = np.isfinite(danger)
         if not free.any():
@@ -298,7 +298,7 @@ class TrajectoryPlanner(SamplingPlanner[TrajectoryPlannerParams]):
         if p.escape_vel == 0.0:
             raise ControlError(_NOTHING_FREE)
         twist = Twist2D(p.escape_vel, 0.0, 0.0)
-        motion = replace(self._motion(p.sim_time), judged_at=None)
+        motion = replace(self._motion(p.sim_time), scored_at=None)
         if not self._can_drive(view, twist, motion):
             self._escape_from = None
             raise ControlError(f"{_NOTHING_FREE}, not even backwards")

@@ -185,8 +185,8 @@ def _detector(setup: Setup) -> Replay:
     topic = loaded.subscribers.camera_reading.topic
     folders = NetworkFolders(own=package_file("models"), darknet=package_folder("darknet_ros"))
     detector = choose_detector(loaded, folders).detector
-    is_told = "subscribers" in tree
-    return detector_replay.DetectorReplay(detector, topic if is_told else detector_replay.INPUTS[0].topic)
+    is_named = "subscribers" in tree
+    return detector_replay.DetectorReplay(detector, topic if is_named else detector_replay.INPUTS[0].topic)
 
 
 def _move_base(setup: Setup) -> Replay:

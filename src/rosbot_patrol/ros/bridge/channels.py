@@ -105,7 +105,7 @@ class Subscription:
         check_md5(info, cls)
         self._info = info
         self._send = send
-        self._told = False
+        self._has_warned = False
         self._old = find_old_type(info.message_type, info.md5, cls._md5sum)
         self._subscriber = rospy.Subscriber(info.name, raw_message(cls), self._callback, queue_size=QUEUE_SIZE)
 
@@ -118,8 +118,8 @@ class Subscription:
             data: bytes = message._buff
             self._send(self._info.topic_id, self._old.downgrade(data) if self._old else data)
         except ProtocolError as err:
-            if not self._told:
-                self._told = True
+            if not self._has_warned:
+                self._has_warned = True
                 log.warning("%s; such messages are dropped", err)
 
 

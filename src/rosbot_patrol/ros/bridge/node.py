@@ -56,7 +56,7 @@ class RosSide:
         self.server: SerialServer | None = None
         self.sensors = MotionSensors(sensor_timeout)
         self.sensors_lock = threading.Lock()
-        self._told = Complaints()
+        self._motion_log = Complaints()
         self.links = LinkTeller()
         self._publishers = Publishers()
         self._channels: dict[Client, dict[tuple[str, str], Any]] = {}
@@ -146,7 +146,7 @@ class RosSide:
             events = self.sensors.heard(sensor_id, client.address, now, move=move)
         for event in events:
             log.info("%s", event)
-        if move and self._told.may_speak(sensor_id, now):
+        if move and self._motion_log.may_speak(sensor_id, now):
             log.info("motion sensor %d: something moves", sensor_id)
 
     def _sender(self, client: Client) -> Any:

@@ -122,9 +122,9 @@ class CrashLife:
         """
         states = self._states[since:]
         own = [i for i, s in enumerate(states) if s.mission and s.room_id == room]
-        told = [states[i].verdict for i in own if states[i].verdict]
+        verdicts = [states[i].verdict for i in own if states[i].verdict]
         ended = bool(own) and any(s.state == PatrolState.IDLE for s in states[own[-1] :])
-        return str(told[-1]) if told and ended else ""
+        return str(verdicts[-1]) if verdicts and ended else ""
 
     def _kill(self, kill: Kill, call: Mapping[str, Any], since: int) -> None:
         with suppress(HouseError):

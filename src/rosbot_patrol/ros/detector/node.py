@@ -231,7 +231,7 @@ class _Console:
     def __init__(self) -> None:
         self._counted = 0
         self._since: float | None = None
-        self._told: tuple[str, ...] | None = None
+        self._printed: tuple[str, ...] | None = None
 
     def tell(self, found: Sequence[Detection], now: float) -> None:
         """Count a picture and print if it is due; called for each picture."""
@@ -240,11 +240,11 @@ class _Console:
         self._counted += 1
         seen = tuple(dict.fromkeys(one.name for one in found))
         waited = now - self._since
-        if waited < CONSOLE_PERIOD or (seen == self._told and waited < CONSOLE_REPEAT):
+        if waited < CONSOLE_PERIOD or (seen == self._printed and waited < CONSOLE_REPEAT):
             return
         objects = ", ".join(_by_class(found)) or "nothing"
         print(f"{self._counted / waited:.1f} pictures a second; seen: {objects}", flush=True)
-        self._counted, self._since, self._told = 0, now, seen
+        self._counted, self._since, self._printed = 0, now, seen
 
 
 def _by_class(found: Sequence[Detection]) -> list[str]:

@@ -129,10 +129,10 @@ def _read_key(timeout: float | None) -> str:
 
 def _wait_for_listener(sender: Sender) -> bool:
     """Wait for a subscriber; false if the program should end."""
-    told = False
+    is_printed = False
     while not sender.has_listener:
-        if not told:
-            told = True
+        if not is_printed:
+            is_printed = True
             print(f"Waiting for subscriber to connect to {sender.topic}", flush=True)
         if _read_key(0.2) == CTRL_C:
             return False

@@ -81,7 +81,7 @@ class Eyes:
         self._scans: Latest[LaserScanMsg] = Latest()
         self._check = ScanCheck("the collision guard lets the base creep only")
         self._mounts: dict[str, Pose2D] = {}
-        self._told = float("-inf")
+        self._logged_at = float("-inf")
         self._wake = wake
         self._ranges: dict[str, Latest[Range]] = {topic: Latest() for topic in params.range_topics}
         rospy.Subscriber("scan", LaserScanMsg, self._on_scan, queue_size=1, tcp_nodelay=True)
@@ -139,8 +139,8 @@ class Eyes:
         return self._mounts[frame]
 
     def _complain(self, text: str, *args: object) -> None:
-        if time.monotonic() - self._told > REPEAT_LOG:
-            self._told = time.monotonic()
+        if time.monotonic() - self._logged_at > REPEAT_LOG:
+            self._logged_at = time.monotonic()
             log.warning(text, *args)
 
     def limit(self, wish: Twist2D, current: float) -> Verdict:
@@ -185,7 +185,7 @@ class TwistMuxNode:
         self._stopped_at = float("-inf")
         self._cause = Cause.NONE
         self._blind = ""
-        self._told = float("-inf")
+        self._logged_at = float("-inf")
         self._subscribers: dict[str, rospy.Subscriber] = {}
         for source in params.topics:
             self._listen(source)
@@ -267,8 +267,8 @@ class TwistMuxNode:
             {"guard": verdict.reason or "free", "part of the wish": f"{verdict.scale:.2f}"},
         )
         cause = Cause.BLIND if self._blind else verdict.cause
-        if is_held and cause is not self._cause and time.monotonic() - self._told > REPEAT_LOG:
-            self._told = time.monotonic()
+        if is_held and cause is not self._cause and time.monotonic() - self._logged_at > REPEAT_LOG:
+            self._logged_at = time.monotonic()
             log.warning("%s is held back: %s", choice.source, verdict.reason)
         self._cause = cause
 

@@ -67,7 +67,7 @@ class AlertDesk:
         self._memory: Callable[[], None] | None = None
         self._memory_due = 0.0
         self._to_record = threading.Event()
-        self._told: dict[str, Incident] = {}
+        self._incidents: dict[str, Incident] = {}
         self._telling = threading.Lock()
         self._publisher = rospy.Publisher("patrol/alerts", Alert, queue_size=10)
 
@@ -90,7 +90,7 @@ class AlertDesk:
             log.error("the notice about %s cannot be looked for: %s", incident, err)
             return False
 
-    def told(self, incident: str) -> Notice | None:
+    def find_notice(self, incident: str) -> Notice | None:
         """The notice of an incident from before the restart, None if there is none."""
         try:
             return self._delayed.get(token(incident)) or self._post.find(token(incident))
@@ -209,7 +209,7 @@ class AlertDesk:
     def _delivered(self, delivery: Delivery) -> None:
         for notice_id in delivery.ids if delivery.delivered else ():
             with self._telling:  # so that "on disk" is published before "delivered"
-                incident = self._told.get(notice_id) or recall_incident(self._keeper.state_dir, notice_id)
+                incident = self._incidents.get(notice_id) or recall_incident(self._keeper.state_dir, notice_id)
                 if incident is not None:
                     self._publish(incident, transport=delivery.transport, location=delivery.where, text=delivery.text)
 
@@ -220,7 +220,7 @@ class AlertDesk:
         picture, note = self._picture(alarm)
         place = str(self._delayed.folder) if alarm.is_held else self._post.place
         with self._telling:
-            self._told[incident.id] = incident
+            self._incidents[incident.id] = incident
             is_on_disk = (self._hold if alarm.is_held else self._post.put)(
                 incident_notice(incident, picture, picture_note=note)
             )

@@ -192,12 +192,12 @@ class PatrolNode:
 
     def _recall_notice(self, mission_id: str) -> None:
         """Restore a notice that was written before a kill, if nothing else knows it."""
-        notice = self.desk.told(mission_id)
+        notice = self.desk.find_notice(mission_id)
         if notice is None:
             return
         why = dict(notice.facts).get("Why", "somebody was seen")
         until = notice.wall + HELD_MOST if self.desk.is_held(mission_id) else None
-        if self.manager.note_told(mission_id, why, held_until=until):
+        if self.manager.note_earlier_notice(mission_id, why, held_until=until):
             self._older[mission_id] = notice
 
     # -- step

@@ -56,7 +56,7 @@ class StopSwitch:
         self._stop, self._move_base, self._cmd_vel = stop, move_base, cmd_vel
         self._write_later = write_later
         self._lock = threading.Lock()
-        self._told = float("-inf")
+        self._repeated_at = float("-inf")
         self._topic = rospy.Publisher("e_stop", Bool, queue_size=5, latch=True)
         rospy.Subscriber("e_stop", Bool, self._on_topic, queue_size=10, tcp_nodelay=True)
         rospy.Service("patrol/emergency_stop", SetBool, self._on_service)
@@ -68,11 +68,11 @@ class StopSwitch:
 
     def step(self) -> None:
         """Repeat the stop message and the cancelling of goals while the stop is held."""
-        if self._stop.is_held and time.monotonic() - self._told > STOP_REPEAT:
+        if self._stop.is_held and time.monotonic() - self._repeated_at > STOP_REPEAT:
             self._hold()
 
     def _hold(self) -> None:
-        self._told = time.monotonic()
+        self._repeated_at = time.monotonic()
         self._topic.publish(Bool(data=True))
         self._cmd_vel.publish(Twist())
         self._move_base.cancel_all()
@@ -137,7 +137,7 @@ class ArmingDesk:
         self._arming, self._path, self._tell, self._write_later = arming, path, tell, write_later
         self._lock = threading.Lock()  # protects the mode; the step needs it, so nobody holds it during disk access
         self._keeping = threading.Lock()  # protects the file: one change after the other
-        self._told: Guarded | None = None
+        self._published: Guarded | None = None
         log.log(logging.WARNING if arming.mode == DISARMED else logging.INFO, "the mode is %s", arming.mode)
         self._publisher = rospy.Publisher("patrol/arming", ArmingMsg, queue_size=5, latch=True)
         CallerService("patrol/arm", Arm, self._on_service)
@@ -148,8 +148,8 @@ class ArmingDesk:
             wall = time.time()
             self._arming.follow(calls, wall)
             guarded = self._arming.step(wall)
-            if guarded != self._told:
-                self._told = guarded
+            if guarded != self._published:
+                self._published = guarded
                 self._publish(guarded, wall)
         return guarded
 

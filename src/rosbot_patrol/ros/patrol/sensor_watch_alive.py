@@ -22,12 +22,12 @@ class Neighbour:
 
     Args:
         silent_after: silence after which sensor_watch counts as dead or hanging [s].
-        told_after: duration of that after which the owner is told [s].
+        notice_after: duration of the silence after which the owner hears of it [s].
         health: health of the patrol.
     """
 
-    def __init__(self, silent_after: float, told_after: float, health: Health) -> None:
-        self._absence = Absence(silent_after, told_after)
+    def __init__(self, silent_after: float, notice_after: float, health: Health) -> None:
+        self._absence = Absence(silent_after, notice_after)
         self._health = health
         self._is_gone: bool | None = None
 

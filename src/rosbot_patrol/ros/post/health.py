@@ -63,13 +63,13 @@ class PostHealth:
             self._health.drop(part)
         self._spare_parts = set(found)
         for part, status in found.items():
-            level, text = judge(status)
+            level, text = level_and_text(status)
             self._health.set(part, level, text, {"waiting": status.waiting, "refused": status.refused})
 
     def _report_channels(self) -> None:
         statuses = self._dispatcher.statuses()
         for status in statuses:
-            level, text = judge(status)
+            level, text = level_and_text(status)
             self._set(status.name, level, text, {"waiting": status.waiting, "refused": status.refused})
         self._outbox_is(f"{self._who} delivers")
         state: list[object] = [(s.name, s.waiting, s.since, s.refused, s.error, s.refusal) for s in statuses]
@@ -102,7 +102,7 @@ class PostHealth:
         self._health.set(part, level, text, values)
 
 
-def judge(status: ChannelStatus) -> tuple[int, str]:
+def level_and_text(status: ChannelStatus) -> tuple[int, str]:
     """Level and sentence about a channel for /diagnostics."""
     if not status.waiting and status.refusal:
         return WARN, f"the last notice was refused for good: {status.refusal}"

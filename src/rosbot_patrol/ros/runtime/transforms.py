@@ -16,7 +16,7 @@ class _Listener(tf2_ros.TransformListener):
     """A listener that also records which node published each frame."""
 
     def __init__(self, buffer: tf2_ros.Buffer) -> None:
-        self.told: dict[str, tuple[str, str]] = {}  # frame: (its parent, name of the node that publishes it)
+        self.publishers: dict[str, tuple[str, str]] = {}  # frame: (its parent, name of the node that publishes it)
         super().__init__(buffer, tcp_nodelay=True)
 
     def callback(self, data: TFMessage) -> None:
@@ -24,7 +24,7 @@ class _Listener(tf2_ros.TransformListener):
         super().callback(data)
         who = data._connection_header.get("callerid", "")
         for each in data.transforms:
-            self.told[each.child_frame_id.lstrip("/")] = (each.header.frame_id.lstrip("/"), who)
+            self.publishers[each.child_frame_id.lstrip("/")] = (each.header.frame_id.lstrip("/"), who)
 
     def connected(self) -> set[str]:
         """Names of the nodes that publish transforms; rospy drops a connection as soon as its other end dies."""
@@ -45,8 +45,8 @@ class Transforms:
         """
         connected = self._listener.connected()
         frame, seen = frame.lstrip("/"), set[str]()
-        while frame in self._listener.told and frame not in seen:
-            parent, who = self._listener.told[frame]
+        while frame in self._listener.publishers and frame not in seen:
+            parent, who = self._listener.publishers[frame]
             if who and who not in connected:
                 return f"{who} has gone, which told where '{frame}' is in '{parent}'"
             seen.add(frame)

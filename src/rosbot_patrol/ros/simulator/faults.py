@@ -50,7 +50,7 @@ class FaultServices:
         self._ask = ask
         self._health = health
         self._seed = seed
-        self._told = -1
+        self._published = -1
         self._topic = rospy.Publisher("~faults", DiagnosticArray, queue_size=5, latch=True)
         rospy.Service("~set_fault", SetFault, self._set)
         rospy.Service("~clear_fault", ClearFault, self._clear)
@@ -60,9 +60,9 @@ class FaultServices:
         """Publish changes, and apply faults of the sensors' links; the simulation's thread calls it."""
         for sensor in self._engine.motion_sensors.restarted():
             self._clients[sensor].reboot()
-        if self._engine.faults.changes == self._told:
+        if self._engine.faults.changes == self._published:
             return
-        self._told = self._engine.faults.changes
+        self._published = self._engine.faults.changes
         for sensor, client in self._clients.items():
             client.set_link(_quality(self._engine.faults.link(sensor), self._seed + sensor))
         active = self._engine.faults.active

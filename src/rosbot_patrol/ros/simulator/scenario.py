@@ -44,7 +44,7 @@ class ScenarioRunner:
         self._watch_until = time.monotonic() + WATCH_WAIT if is_watched else None
         self._events: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._was = ""
-        self._told = rospy.Publisher("~scenario", String, queue_size=100, latch=True)
+        self._publisher = rospy.Publisher("~scenario", String, queue_size=100, latch=True)
         self._is_played = False
         self._player = ScenarioPlayer(scenario, engine, lambda sensor: clients[sensor].trigger(), self._tell)
         rospy.Subscriber("patrol/state", PatrolState, self._note, queue_size=50)
@@ -67,7 +67,7 @@ class ScenarioRunner:
 
     def _waits_for_its_watch(self, until: float) -> bool:
         is_late = time.monotonic() > until
-        if self._told.get_num_connections() == 0 and not is_late:
+        if self._publisher.get_num_connections() == 0 and not is_late:
             return True
         if is_late:
             log.warning("nobody watches the scenario after %.0f s: it is played all the same", WATCH_WAIT)
@@ -75,7 +75,7 @@ class ScenarioRunner:
         return False
 
     def _tell(self, text: str) -> None:
-        self._told.publish(String(text))
+        self._publisher.publish(String(text))
 
     def _note(self, state: PatrolState) -> None:
         if state.state == PatrolState.IDLE:

@@ -49,7 +49,7 @@ class ScenarioWatch:
             and visited >= set(self._expect.verdicts)
         )
 
-    def judge(self, narrator: Narrator) -> list[str]:
+    def failures(self, narrator: Narrator) -> list[str]:
         """One sentence per failed expectation."""
         outcome = Outcome(
             verdicts={m.room_id: m.verdict for m in narrator.missions if m.verdict},

@@ -104,7 +104,7 @@ class NarratorNode:
                 self._print(self._narrator.trigger(message.id))
 
     def _on_state(self, message: PatrolState) -> None:
-        told = Telling(
+        report = Telling(
             phase=message.state,
             why=message.why,
             mission=message.mission,
@@ -113,7 +113,7 @@ class NarratorNode:
             last_verdict=message.last_verdict,
         )
         with self._lock:
-            self._print(self._narrator.state(self._clock(), told))
+            self._print(self._narrator.state(self._clock(), report))
             if self._narrator.on_guard_at is not None and not self._hinted:
                 self._hinted = True
                 self._print([self.params.on_guard_hint] if self.params.on_guard_hint else [])
@@ -121,7 +121,7 @@ class NarratorNode:
     def _on_alert(self, message: Alert) -> None:
         if message.kind == Alert.VERDICT:
             return  # the state reports it
-        told = AlertTelling(
+        report = AlertTelling(
             id=message.id,
             room=f"room {message.room_id} ({message.room_name})",
             object_class=message.object_class,
@@ -131,7 +131,7 @@ class NarratorNode:
             location=message.location,
         )
         with self._lock:
-            self._print(self._narrator.alert(told))
+            self._print(self._narrator.alert(report))
 
     def _status(self) -> int | None:
         if self._scenario is not None:
@@ -146,7 +146,7 @@ class NarratorNode:
             if self._ended_at is None:
                 self._ended_at = self._clock()
             late = self._clock() - self._ended_at > self.params.delivery_wait
-            if not all(map(narrator.is_told, narrator.missions)):
+            if not all(map(narrator.is_complete, narrator.missions)):
                 return 5 if late else None
             expected = self.params.expect_verdict
             if expected and narrator.missions[-1].verdict != expected:
@@ -161,10 +161,10 @@ class NarratorNode:
             if not scenario.is_over(narrator):
                 return None
             self._ended_at = self._ended_at or self._clock()
-            if not all(map(narrator.is_told, narrator.missions)):
+            if not all(map(narrator.is_complete, narrator.missions)):
                 late = self._clock() - self._ended_at > self.params.delivery_wait
                 return 5 if late else None
-            found = scenario.judge(narrator)
+            found = scenario.failures(narrator)
             self._print(found or ["Everything came as the scenario expects."])
             return 7 if found else 0
 

@@ -80,10 +80,10 @@ class EspClient:
         self._key = key
         self._insist = insist
         self._source = (source, 0) if source else None
-        self._told = ""
+        self._logged_reason = ""
         self._stuck_after = stuck_after
         self._high_since = 0.0
-        self._stuck_told = False  # on this connection
+        self._is_stuck_logged = False  # on this connection
         self._lock = threading.Lock()
         self._motion = False
         self._pending = False  # a motion not sent yet
@@ -127,7 +127,7 @@ class EspClient:
             if rising:
                 self._pending = True
                 self._high_since = time.monotonic()
-            self._stuck_told = self._stuck_told and active
+            self._is_stuck_logged = self._is_stuck_logged and active
         if rising:
             self._wake()
 
@@ -205,7 +205,7 @@ class EspClient:
         prover = Prover(self.sensor_id, self._key) if self._key is not None else None
         session = DeviceSession([_TOPIC], prover=prover, insist=self._insist)
         self._line.begin(time.monotonic())
-        self._stuck_told = False
+        self._is_stuck_logged = False
         heartbeat_due = time.monotonic()
         while not self._stopping and not self._reboot:
             now = time.monotonic()
@@ -267,18 +267,18 @@ class EspClient:
     def _tell_stuck(self, session: DeviceSession, now: float) -> None:
         """Log a stuck output once per connection."""
         lasted = now - self._high_since
-        if self._motion and not self._stuck_told and lasted > self._stuck_after:
-            self._stuck_told = session.log(WARN, stuck_line(self.sensor_id, lasted))
+        if self._motion and not self._is_stuck_logged and lasted > self._stuck_after:
+            self._is_stuck_logged = session.log(WARN, stuck_line(self.sensor_id, lasted))
 
     def _note(self, events: list[DeviceEvent]) -> bool:
         """Process an event; returns whether to keep this connection."""
         for event in events:
             if isinstance(event, Configured):
                 self._connected.set()
-                self._told = ""
+                self._logged_reason = ""
             elif isinstance(event, NotTrusted):
-                if event.reason != self._told:  # log it once, as the next attempt will fail in the same way
-                    self._told = event.reason
+                if event.reason != self._logged_reason:  # log it once, as the next attempt will fail in the same way
+                    self._logged_reason = event.reason
                     log.warning("sensor %d: %s:%d: %s", self.sensor_id, self.host, self.port, event.reason)
                 return False
             elif isinstance(event, Unconfigured):

@@ -154,8 +154,8 @@ class RobotDescription:
             missing = next((name for name in names if name not in known), None)
             if missing is not None:
                 there = ", ".join(known) or "none"
-                told = f"drive.{side}_joints names '{missing}', which is no joint that moves (there: {there})"
-                raise WorldError(self.source, told)
+                problem = f"drive.{side}_joints names '{missing}', which is no joint that moves (there: {there})"
+                raise WorldError(self.source, problem)
         if set(left) & set(right):
             raise WorldError(self.source, f"'{min(set(left) & set(right))}' is named as a left and as a right joint")
 

@@ -310,9 +310,9 @@ def disappointments(expect: Expect, outcome: Outcome) -> list[str]:
     """One sentence for each failed expectation."""
     found = []
     for room, verdict in expect.verdicts.items():
-        told = outcome.verdicts.get(room)
-        if told != verdict:
-            was = f"it was {told}" if told else "no mission to it has ended"
+        ended_as = outcome.verdicts.get(room)
+        if ended_as != verdict:
+            was = f"it was {ended_as}" if ended_as else "no mission to it has ended"
             found.append(f"The verdict for room {room} should have been {verdict}; {was}.")
     if expect.missions is not None and outcome.missions != expect.missions:
         found.append(f"{count_of(expect.missions, 'mission')} should have ended; there were {outcome.missions}.")

@@ -96,8 +96,8 @@ class LostFiles:
         """
         is_the_same_everywhere = uri.startswith((*_SCHEMES, "http", "/", "file:///"))
         file = uri if is_the_same_everywhere else f"{place.path.parent}/{uri}"
-        told = str(error) if error.path == str(place.path) else str(place.error(str(error)))
-        self._sentences.setdefault(file, told)
+        sentence = str(error) if error.path == str(place.path) else str(place.error(str(error)))
+        self._sentences.setdefault(file, sentence)
         self._wanted[file] += 1
         self._parts[part] += 1
 
@@ -108,8 +108,8 @@ class LostFiles:
         """One sentence per file: its first user, the problem, and the number of further users."""
         more = {file: self._wanted[file] - 1 for file in self._sentences}
         return tuple(
-            told + (f" (wanted in {count_of(more[file], 'more place')})" if more[file] else "")
-            for file, told in self._sentences.items()
+            sentence + (f" (wanted in {count_of(more[file], 'more place')})" if more[file] else "")
+            for file, sentence in self._sentences.items()
         )
 
     def summary(self) -> str:

@@ -61,7 +61,7 @@ class SensorNet:
         self._params = params
         self._level = level
         self._sensors = {p.id: MotionSensor(params) for p in places}
-        self._told: dict[int, bool] = {}
+        self._reported: dict[int, bool] = {}
         self._restarted: list[int] = []
 
     def update(self, now: float, bodies: Iterable[WarmBody], sight: Sight) -> None:
@@ -76,14 +76,14 @@ class SensorNet:
 
     def changes(self, now: float) -> list[tuple[int, bool]]:
         """Id and level of each sensor with a changed output since the last call."""
-        changed = [(n, is_high) for n, is_high in self.levels(now).items() if is_high != self._told.get(n, False)]
-        self._told.update(changed)
+        changed = [(n, is_high) for n, is_high in self.levels(now).items() if is_high != self._reported.get(n, False)]
+        self._reported.update(changed)
         return changed
 
     def restart(self, sensor: int, now: float) -> None:
         """Restart a sensor: it warms up anew."""
         self._sensors[sensor] = MotionSensor(replace(self._params, prewarmed=False), now)
-        self._told.pop(sensor, None)
+        self._reported.pop(sensor, None)
         self._restarted.append(sensor)
 
     def restarted(self) -> list[int]:

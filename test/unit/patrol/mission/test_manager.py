@@ -272,7 +272,7 @@ def test_a_notice_that_is_newer_than_the_memory_confirms_its_mission(is_running)
         request = Request(room_id=2, id=plain["id"], wall=plain["called"])
         memory |= {"mission": None, "queue": [request_to_plain(request)]}
     again = World(PatrolManager(ROOMS, memory=memory), x=world.x)
-    assert again.manager.note_told(world.manager.mission.id, "a person was seen in room 2")
+    assert again.manager.note_earlier_notice(world.manager.mission.id, "a person was seen in room 2")
     again.run(lambda w: w.ended)
     assert (again.ended[0].verdict.value, again.ended[0].reason) == ("confirmed", "a person was seen in room 2")
     assert again.ended[0].sightings == 1
@@ -287,8 +287,8 @@ def test_a_held_notice_that_is_newer_than_the_memory_waits_for_the_entry_delay_o
     mission, wall = world.manager.mission.id, world.wall + 100.0
     guarded = Guarded(holds_until=wall + 5.0) if is_running else Guarded()
     again = World(PatrolManager(ROOMS, memory=world.manager.snapshot()), x=world.x, guarded=guarded)
-    assert again.manager.note_told(mission, "a person was seen", held_until=wall + 5.0)
-    assert not again.manager.note_told(mission, "a person was seen")
+    assert again.manager.note_earlier_notice(mission, "a person was seen", held_until=wall + 5.0)
+    assert not again.manager.note_earlier_notice(mission, "a person was seen")
     began = again.now
     again.run(lambda w: any(out.releases for out in w.all))
     (release,) = [release for out in again.all for release in out.releases]

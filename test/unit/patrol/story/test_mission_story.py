@@ -54,16 +54,16 @@ def test_a_whole_patrol():
     assert mission["seen"] == ["person"]
     assert mission["times"] == {"driving": 2.0, "looking": 9.0, "returning": 19.0, "end": 30.0}
     assert n.ended == 1
-    assert n.is_told(n.missions[0])
+    assert n.is_complete(n.missions[0])
 
 
 def test_a_confirmed_mission_is_told_only_with_its_mail():
     n = Narrator()
     n.state(1.0, state("driving"))
     n.state(2.0, state("idle", mission="", last="confirmed"))
-    assert not n.is_told(n.missions[0])
+    assert not n.is_complete(n.missions[0])
     n.alert(alert(delivered=True))
-    assert n.is_told(n.missions[0])
+    assert n.is_complete(n.missions[0])
 
 
 def test_a_mail_that_was_sent_says_to_whom():
