@@ -51,6 +51,7 @@ ROWS_INSIDE: dict[str, list[set[str]]] = {
         {"records"},
         {"calls", "guard", "visibility"},
         {"intruder"},
+        {"belief"},
         {"search", "story", "senses"},
         {"mission"},
     ],

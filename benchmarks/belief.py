@@ -1,0 +1,296 @@
+#!/usr/bin/env python3
+"""Compare the intruder decision in use with the belief, on the same recorded turns.
+
+    python3 benchmarks/belief.py RECORDS.jsonl.gz [--calibration NETWORK=FILE]... [--json FILE]
+
+The records come from benchmarks/record_turns.py. Each scene is decided twice for each network: by IntruderDecision with
+its second looks, and by Belief. Both see the full turn, then up to four looks from elsewhere that they choose among the
+recorded ones. The floor counts as seen. A person counts as visible with at least 1,000 pixels and 0.35 m in view.
+"""
+
+from __future__ import annotations
+
+import in_workspace  # first: it finds the interpreter
+
+# isort: split
+import argparse
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import yaml
+from person_place import HOUSES
+
+from rosbot_patrol.campaign.houses import house_files
+from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.params import load
+from rosbot_patrol.patrol.belief.belief import Belief, PictureView
+from rosbot_patrol.patrol.belief.calibration import CAUTIOUS, Calibration, read_calibration
+from rosbot_patrol.patrol.belief.recorded import Look, Scene, read_scenes
+from rosbot_patrol.patrol.belief.second_look import best_second_look
+from rosbot_patrol.patrol.house.floor import Floor, floor_of
+from rosbot_patrol.patrol.house.rooms import load_rooms
+from rosbot_patrol.patrol.intruder.decision import IntruderDecision
+from rosbot_patrol.patrol.intruder.exclusions import Exclusions
+from rosbot_patrol.patrol.intruder.second_looks import SecondLooks
+from rosbot_patrol.patrol.intruder.sightings import SightingsParams
+from rosbot_patrol.patrol.mission.params import ManagerParams
+from rosbot_patrol.patrol.records.inputs import Frame, Inputs
+from rosbot_patrol.patrol.records.mission import Verdict
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
+
+ROOT = Path(__file__).resolve().parent.parent
+LOOKS_MOST = 4
+SAME = 1.5  # a confirmation this near to the person is of them [m]
+TARGET = 1.2  # a recorded look this near to a place shows it [m]
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a decision made of a scene: verdict, places of the confirmed, pictures until the first, looks, why."""
+
+    verdict: Verdict
+    confirmed: tuple[Place | None, ...]
+    pictures: int
+    looks: int
+    why: str = ""
+
+
+class Old:
+    """The decision in use.
+
+    Args:
+        scene: to decide.
+        floor: of its map.
+        threshold: of the detector.
+        watch: how sure to be.
+    """
+
+    def __init__(self, scene: Scene, floor: Floor, threshold: float, watch: SightingsParams) -> None:
+        params = ManagerParams(watch=watch).intruder
+        rooms = load_rooms(house_files(scene.world, ROOT).rooms)
+        self._decision = IntruderDecision(rooms, params, Exclusions(floor=floor))
+        self._decision.start(0.0, ())
+        self._doubts, self._threshold = SecondLooks(3), threshold
+        self._tried: list[Look] = []
+        self.confirmed: list[Place | None] = []
+
+    def see(self, frame: Frame, look: Look) -> None:
+        """Take a picture."""
+        assert frame.eye is not None
+        assert frame.stamp is not None
+        boxes = tuple(box for box in frame.boxes if box.probability >= self._threshold)
+        frame = dataclasses.replace(frame, boxes=boxes)
+        for finding in self._decision.see(frame.stamp, Inputs(frames=(frame,), pose=frame.eye.pose), ()):
+            m = finding.seen.measured
+            self.confirmed.append((m.x, m.y) if m else None)
+        self._doubts.suspect(self._decision.doubtful)
+        self._doubts.set_too_near(self._decision.too_near)
+        self._doubts.look(frame.stamp, frame.eye, look.sight)
+
+    def choose(self, looks: Sequence[Look]) -> Look | None:
+        """The next look."""
+        for doubt in self._doubts.open():
+            for look in looks:
+                if look.target is not None and math.dist(look.target, (doubt.x, doubt.y)) < TARGET:
+                    doubt.visit(eye_of(look).pose)
+                    return look
+        return None
+
+    def verdict(self) -> tuple[Verdict, str]:
+        """The verdict."""
+        if self.confirmed:
+            return Verdict.CONFIRMED, ""
+        grave = self._doubts.grave()
+        why = grave[0].text if grave else self._doubts.unsure(False)
+        return (Verdict.UNVERIFIED, why) if why else (Verdict.CLEAR, "")
+
+
+class New:
+    """The belief.
+
+    Args:
+        scene: to decide.
+        floor: of its map.
+        threshold: of the detector.
+        calibration: of the network.
+    """
+
+    def __init__(self, scene: Scene, floor: Floor, threshold: float, calibration: Calibration) -> None:
+        self._belief = Belief(calibration, threshold=threshold, floor=floor)
+        self._belief.start(0.0)
+        self._scene = scene
+        self.confirmed: list[Place | None] = []
+
+    def see(self, frame: Frame, look: Look) -> None:
+        """Take a picture."""
+        for hypothesis in self._belief.see(frame, PictureView(look.sight, self._scene.is_dark)):
+            self.confirmed.append((float(hypothesis.place[0]), float(hypothesis.place[1])))
+
+    def choose(self, looks: Sequence[Look]) -> Look | None:
+        """The next look."""
+        for hypothesis in self._belief.open:
+            near = [k for k in looks if k.target and math.dist(k.target, hypothesis.place) < TARGET]
+            views = {
+                id(v): (v, k) for k in near for v in (Viewpoint(pose=eye_of(k).pose, turn=0.5, gain=0.0, way=1.0),)
+            }
+            best = best_second_look(self._belief, hypothesis, [v for v, _ in views.values()])
+            if best is not None:
+                hypothesis.second_looks.append(best.pose)
+                return views[id(best)][1]
+        return None
+
+    def verdict(self) -> tuple[Verdict, str]:
+        """The verdict."""
+        found = self._belief.verdict(floor_seen=True)
+        return found.verdict, found.why
+
+
+def eye_of(look: Look):
+    """The camera in the middle of a look."""
+    frames = next(iter(look.frames.values()))
+    eye = frames[len(frames) // 2].eye
+    assert eye is not None
+    return eye
+
+
+def decide(decision: Old | New, scene: Scene, network: str) -> Outcome:
+    """Run a decision on a scene."""
+    left, look, pictures, looks, first = list(scene.looks[1:]), scene.looks[0], 0, 0, 0
+    while True:
+        for frame in look.frames[network]:
+            pictures += 1
+            decision.see(frame, look)
+            first = first or (pictures if decision.confirmed else 0)
+        chosen = decision.choose(left) if looks < LOOKS_MOST and not decision.confirmed else None
+        if chosen is None:
+            break
+        left = [k for k in left if k is not chosen]
+        look, looks = chosen, looks + 1
+    verdict, why = decision.verdict()
+    return Outcome(verdict, tuple(decision.confirmed), first, looks, why)
+
+
+def is_visible(scene: Scene) -> bool:
+    """Whether enough of the person shows in the turn."""
+    shown, subject = scene.looks[0].shown, scene.subject
+    if not scene.has_person or shown is None or subject is None:
+        return False
+    sight = scene.looks[0].sight
+    high = (shown.top - shown.bottom) * math.dist((sight.x, sight.y), subject[:2])
+    return shown.pixels >= 1000 and high >= 0.35
+
+
+@dataclass
+class Row:
+    """Counts of one decision with one network."""
+
+    persons: int = 0
+    visible: int = 0
+    found: int = 0
+    found_visible: int = 0
+    false: int = 0
+    clear: int = 0
+    clear_visible: int = 0
+    unverified: int = 0
+    empty: int = 0
+    empty_unverified: int = 0
+    pictures: list[int] = field(default_factory=list)
+    looks: int = 0
+
+    def add(self, scene: Scene, outcome: Outcome) -> str:
+        """Count a scene; what went wrong, "" for nothing."""
+        here = scene.subject if scene.has_person else None
+        right = [p for p in outcome.confirmed if here is not None and (p is None or math.dist(p, here[:2]) <= SAME)]
+        wrong = len(outcome.confirmed) - len(right)
+        self.false += wrong > 0
+        self.looks += outcome.looks
+        if here is None:
+            self.empty += 1
+            self.empty_unverified += outcome.verdict is Verdict.UNVERIFIED
+            return "false" if wrong else ""
+        visible = is_visible(scene)
+        self.persons += 1
+        self.visible += visible
+        self.found += bool(right)
+        self.found_visible += bool(right) and visible
+        self.clear += outcome.verdict is Verdict.CLEAR
+        self.clear_visible += outcome.verdict is Verdict.CLEAR and visible
+        self.unverified += outcome.verdict is Verdict.UNVERIFIED
+        if right:
+            self.pictures.append(outcome.pictures)
+        return "false" if wrong else outcome.verdict.value if not right else ""
+
+    def text(self, name: str) -> str:
+        """A row of the table."""
+        until = f"{np.median(self.pictures):.0f}" if self.pictures else "-"
+        return (
+            f"| {name} | {self.found_visible} of {self.visible} | {self.found} of {self.persons} | {self.false} "
+            f"| {self.clear_visible} | {self.clear} | {self.unverified} | {self.empty_unverified} of {self.empty} "
+            f"| {until} | {self.looks} |"
+        )
+
+
+COLUMNS = (
+    "decision",
+    "visible persons confirmed",
+    "all persons",
+    "false",
+    "clear, visible",
+    "clear, any person",
+    "unverified",
+    "empty unverified",
+    "pictures",
+    "looks",
+)
+HEAD = f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("records", type=Path, nargs="+")
+    parser.add_argument("--calibration", action="append", default=[], metavar="NETWORK=FILE")
+    parser.add_argument("--errors", action="store_true", help="list what went wrong")
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    calibrations = {n: read_calibration(Path(f)) for n, f in (given.split("=", 1) for given in arguments.calibration)}
+    scenes = [scene for path in arguments.records for scene in read_scenes(path)]
+    in_workspace.require_figures(scenes, "the records hold no scene")
+    floors = {w: floor_of(read_map(ROOT / "maps" / f"{HOUSES[w]}_map.yaml")) for w in {s.world for s in scenes}}
+    figures: dict[str, float] = {}
+    tuned = load(SightingsParams, yaml.safe_load((ROOT / "config" / "tuned" / "watch.yaml").read_text())["watch"])
+    for network in scenes[0].looks[0].frames:
+        fitted = calibrations.get(network)
+        decisions: dict[str, Callable[[Scene], Old | New]] = {
+            "old, tuned": lambda s: Old(s, floors[s.world], 0.4, tuned),
+            "old, default": lambda s: Old(s, floors[s.world], 0.4, SightingsParams()),
+            "cautious, 0.1": lambda s: New(s, floors[s.world], 0.1, CAUTIOUS),
+        }
+        if fitted is not None:
+            for threshold in (0.4, 0.1):
+                decisions[f"new, {threshold}"] = lambda s, c=fitted, t=threshold: New(s, floors[s.world], t, c)
+        print(f"\n{network}: {len(scenes)} scenes\n\n{HEAD}")
+        for name, make in decisions.items():
+            row, errors = Row(), []
+            for scene in scenes:
+                outcome = decide(make(scene), scene, network)
+                wrong = row.add(scene, outcome)
+                if wrong:
+                    errors.append(f"    {scene.number} {scene.kind} visible={is_visible(scene)} {wrong}: {outcome.why}")
+            print(row.text(name))
+            if arguments.errors:
+                print("\n".join(errors))
+            key = f"{network} {name}"
+            figures |= {f"{key} confirmed": row.found_visible / max(row.visible, 1), f"{key} false": row.false}
+            figures |= {f"{key} clear_with_somebody": row.clear_visible}
+    if arguments.json:
+        arguments.json.write_text(json.dumps(figures, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

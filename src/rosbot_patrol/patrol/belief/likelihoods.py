@@ -1,0 +1,134 @@
+"""What one picture says about one place, as a log-likelihood ratio of a person against nobody.
+
+A score counts as far as the object may be a person: a box with the size of a pet, or with the depth of a poster, says
+little by its score, as networks take such things for persons. So with q, the probability that a person has such a size
+and depth, a box says q * score_ratio + log(q). What is so near that a pet looks alike is kept apart (`is_near`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from rosbot_patrol.patrol.belief.calibration import Calibration, Condition
+from rosbot_patrol.patrol.belief.params import BeliefParams
+from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
+
+_LEAST = 0.02  # smallest q: no single measurement excludes a person
+_NEAR_ERROR = 0.35  # [m] error of a place by the floor up to which it tells the size
+_EDGE = 3  # [px] distance from the image border at which a box counts as cut
+
+
+class Veto(Enum):
+    """Reason why something is no intruder; the value is the sentence."""
+
+    KNOWN = "it is a known object"
+    OUTSIDE = "it is outside of the floor that the map shows"
+    FLAT = "it is flat, a picture or a screen"
+    LARGE = "it is too large for a person"
+    PET = "it is as low as a pet"
+    SMALL = "it is too small for a person"
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a picture says about a place.
+
+    Attributes:
+        ratio: log-likelihood ratio.
+        is_near: the object is so near that it may be a pet as well.
+        veto: why it is likely no person, None if it may be one.
+    """
+
+    ratio: float
+    is_near: bool = False
+    veto: Veto | None = None
+
+
+class Likelihoods:
+    """Judges boxes, and the lack of them.
+
+    Args:
+        calibration: of the network.
+        params: sizes of persons.
+        threshold: of the detector; lower boxes never arrive.
+    """
+
+    def __init__(self, calibration: Calibration, params: BeliefParams, threshold: float) -> None:
+        self.calibration, self.params, self.threshold = calibration, params, threshold
+
+    def box(self, box: Box, eye: Eye, *, is_dark: bool = False) -> Evidence:
+        """Judge a box of a picture that was taken from `eye`."""
+        most = self.params.picture_most
+        at = Condition(box.height / eye.columns, is_cut(box, eye), is_dark)
+        ratio = min(max(self.calibration.box_ratio(box.probability, at), -most), most)
+        if self.is_near(box):
+            return Evidence(max(ratio, 0.0), is_near=True)
+        q, veto = possibility(box, self.params)
+        return Evidence(max(q * max(ratio, 0.0) + min(ratio, 0.0) + math.log(q), -most), veto=veto)
+
+    def miss(self, at: Condition, seen: float) -> Evidence:
+        """Judge a picture without a box at a place.
+
+        Args:
+            at: condition under which a person there would have been seen.
+            seen: probability that the place was in view.
+        """
+        return Evidence(max(self.calibration.miss_ratio(at, self.threshold, seen), -self.params.picture_most))
+
+    def is_near(self, box: Box) -> bool:
+        """Whether so little of it is in the picture that a person and a pet look alike: legs, or a part at its side."""
+        m, p = box.measured, self.params
+        if m is None or m.has_legs or not _has_size(m) or not (goes_on(box, m) or m.is_cut_aside):
+            return False
+        return m.top < p.person_top_min and m.width < p.lying_length
+
+
+def is_cut(box: Box, eye: Eye) -> bool:
+    """Whether the left or right image border cuts a box."""
+    return box.xmin <= _EDGE or box.xmax >= eye.columns - _EDGE
+
+
+def possibility(box: Box, params: BeliefParams) -> tuple[float, Veto | None]:
+    """Probability that a person has a box's size and depth, and what speaks against it; 1 if nothing is measured."""
+    m = box.measured
+    if m is None:
+        return 1.0, None
+    if m.is_flat:
+        return _LEAST, Veto.FLAT
+    if box.label != "person" or not _has_size(m):
+        return 1.0, None
+    shares = _shares(box, m, params)
+    veto = min(shares, key=lambda each: shares[each])
+    q = max(shares[veto], _LEAST)
+    return q, veto if q < 0.5 else None
+
+
+def _shares(box: Box, m: Measured, p: BeliefParams) -> dict[Veto, float]:
+    """Probability of the size under each limit, by a normal error of the measurement."""
+    error = 0.05 + 0.5 * m.error / max(m.away, 0.5) * max(m.top, 0.5)
+    shares = {
+        Veto.LARGE: min(_normal((p.person_top_max - m.top) / error), _normal((p.person_width_max - m.width) / error))
+    }
+    if goes_on(box, m) or m.is_cut_aside:  # the picture ends before the object does
+        return shares
+    lying = _normal((m.width - p.lying_length) / error)
+    shares[Veto.PET] = max(_normal((m.top - p.person_top_min) / error), lying)
+    shares[Veto.SMALL] = max(_normal((m.height - p.person_height_min) / error), lying)
+    return shares
+
+
+def _normal(z: float) -> float:
+    """Cumulative standard normal distribution."""
+    return 0.5 * (1.0 + math.erf(z / math.sqrt(2.0)))
+
+
+def _has_size(m: Measured) -> bool:
+    """Whether the distance is known well enough to know the size."""
+    return m.source != "floor" or m.error <= _NEAR_ERROR
+
+
+def goes_on(box: Box, m: Measured) -> bool:
+    """Whether the object may go on above the picture."""
+    return m.is_cut_above or (m.is_cut and box.ymin <= box.slack)

@@ -1,0 +1,58 @@
+"""From where to look again: the viewpoint with the greatest expected gain for each metre of way.
+
+The gain is the expected fall of the entropy of the most open hypothesis. What a look will say is not known, so each
+outcome (no box, or a score in one of the bins) counts with its probability under the present belief.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.belief.belief import Belief
+from rosbot_patrol.patrol.belief.calibration import Condition
+from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, entropy, probability
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
+
+_PICTURES = 12  # of a look
+_TURN = 1.5  # [m] of way that a look costs besides the drive
+
+
+def best_second_look(
+    belief: Belief, hypothesis: Hypothesis, candidates: Iterable[Viewpoint], columns_over_focal: float = 1.155
+) -> Viewpoint | None:
+    """The candidate with the greatest expected gain for its way; None if none is worth it.
+
+    Args:
+        belief: present.
+        hypothesis: to be looked at.
+        candidates: viewpoints with a free line to it.
+        columns_over_focal: width of the picture over the focal length.
+    """
+    priced = [
+        (expected_gain(belief, hypothesis, view.pose, columns_over_focal) / (view.way + _TURN), view)
+        for view in candidates
+    ]
+    priced = [(worth, view) for worth, view in priced if worth * (view.way + _TURN) >= belief.params.gain_least]
+    return max(priced, key=lambda pair: pair[0], default=(0.0, None))[1]
+
+
+def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_over_focal: float = 1.155) -> float:
+    """Expected fall of a hypothesis's entropy by a look from a place [nat]."""
+    calibration, p = belief.calibration, belief.params
+    _, away = hypothesis.from_place(eye)
+    if away > p.view_range or (away < p.whole_from and hypothesis.is_near_only):
+        return 0.0
+    cell = Condition(hypothesis.height / max(away, 0.3) / columns_over_focal).cell
+    side = hypothesis.find_side(eye, p)
+    pictures, total, now = (side.pictures, side.total, side.log_odds(calibration)) if side else (0, 0.0, 0.0)
+    odds = hypothesis.log_odds(calibration, p)
+    share = probability(odds)
+    after = 0.0
+    for person, nobody in zip(calibration.person[cell], calibration.nobody[cell], strict=True):
+        ratio = max(min(math.log(person / nobody), p.picture_most), -p.picture_most)
+        count = pictures + _PICTURES
+        told = (total + _PICTURES * ratio) / count * calibration.effective(count)
+        after += (share * person + (1.0 - share) * nobody) * entropy(probability(odds - now + told))
+    return entropy(share) - after
