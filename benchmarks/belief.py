@@ -26,6 +26,7 @@ import yaml
 from person_place import HOUSES
 
 from rosbot_patrol.campaign.houses import house_files
+from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.params import load
 from rosbot_patrol.patrol.belief.belief import Belief, PictureView
@@ -46,6 +47,7 @@ from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 ROOT = Path(__file__).resolve().parent.parent
 LOOKS_MOST = 4
 SAME = 1.5  # a confirmation this near to the person is of them [m]
+FAR, ASIDE = 4.0, 0.1  # or in their direction, at a wrong distance [m], [rad]
 TARGET = 1.2  # a recorded look this near to a place shows it [m]
 Place = tuple[float, float]
 
@@ -186,6 +188,17 @@ def is_visible(scene: Scene) -> bool:
     return shown.pixels >= 1000 and high >= 0.35
 
 
+def is_of(place: Place | None, person: Pose2D, scene: Scene) -> bool:
+    """Whether a place is that of the person, or lies behind or before them as seen from the robot."""
+    if place is None or math.dist(place, person[:2]) <= SAME:
+        return True
+    eyes = [eye_of(look).pose for look in scene.looks]
+    return math.dist(place, person[:2]) <= FAR and any(
+        abs(angle_difference(*(math.atan2(y - eye.y, x - eye.x) for x, y in (place, person[:2])))) <= ASIDE
+        for eye in eyes
+    )
+
+
 @dataclass
 class Row:
     """Counts of one decision with one network."""
@@ -206,14 +219,14 @@ class Row:
     def add(self, scene: Scene, outcome: Outcome) -> str:
         """Count a scene; what went wrong, "" for nothing."""
         here = scene.subject if scene.has_person else None
-        right = [p for p in outcome.confirmed if here is not None and (p is None or math.dist(p, here[:2]) <= SAME)]
+        right = [p for p in outcome.confirmed if here is not None and is_of(p, here, scene)]
         wrong = len(outcome.confirmed) - len(right)
         self.false += wrong > 0
         self.looks += outcome.looks
         if here is None:
             self.empty += 1
             self.empty_unverified += outcome.verdict is Verdict.UNVERIFIED
-            return "false" if wrong else ""
+            return "false" if wrong else "unverified" if outcome.verdict is Verdict.UNVERIFIED else ""
         visible = is_visible(scene)
         self.persons += 1
         self.visible += visible

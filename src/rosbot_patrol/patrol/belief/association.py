@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rosbot_patrol.patrol.belief.hypothesis import Hypothesis
 from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.records.inputs import Box, Eye
+from rosbot_patrol.patrol.visibility.coverage import Sight
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,7 @@ _TALL = 1.6  # [m] assumed height of an object that was not measured
 _FAR_ERROR = 1.5  # [m] error along the bearing of what the lidar and the map only bound
 _ASIDE = 0.04  # error across the bearing for each metre: half a body at 4 m
 _PART = 0.5  # [m] added for an object that the image border cuts: only a part of it was measured
+_BODY = 0.2  # [m] from the front of a body, where it ends a beam, to its middle
 _OVERLAP = 0.5  # share of the narrower box's columns that two boxes of one object have in common
 
 
@@ -35,8 +37,8 @@ class Located:
     spread: Array
 
 
-def locate(box: Box, eye: Eye) -> Located:
-    """Give a box a place and a covariance."""
+def locate(box: Box, eye: Eye, sight: Sight | None = None) -> Located:
+    """Give a box a place and a covariance; what was not measured stands before the end of the free way."""
     m = box.measured
     if m is not None:
         error = math.hypot(m.error, _PART if m.is_cut_aside else 0.0)
@@ -47,11 +49,20 @@ def locate(box: Box, eye: Eye) -> Located:
         away = math.hypot(place[0] - eye.pose.x, place[1] - eye.pose.y)
     else:
         focal = 0.5 * eye.columns / math.tan(0.5 * eye.width)
-        away = max(focal * _TALL / max(box.height, 1), 0.5)
+        away = max(min(focal * _TALL / max(box.height, 1), _reach(sight, bearing)), 0.5)
         along = 0.5 * away
         place = np.array([eye.pose.x + away * math.cos(bearing), eye.pose.y + away * math.sin(bearing)])
     turn = np.array([[math.cos(bearing), -math.sin(bearing)], [math.sin(bearing), math.cos(bearing)]])
     return Located(box, place, turn @ np.diag([along**2, (0.1 + _ASIDE * away) ** 2]) @ turn.T)
+
+
+def _reach(sight: Sight | None, bearing: float) -> float:
+    """Free way along a bearing and a body more [m], inf where nobody knows."""
+    if sight is None:
+        return math.inf
+    turn = (bearing - sight.first) * math.copysign(1.0, sight.step) % math.tau
+    beam = round(turn / abs(sight.step))
+    return float(sight.lengths[beam]) + _BODY if beam < len(sight.lengths) else math.inf
 
 
 def distinct(located: Sequence[Located], merge: float) -> list[Located]:

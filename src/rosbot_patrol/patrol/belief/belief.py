@@ -30,6 +30,7 @@ from rosbot_patrol.patrol.visibility.coverage import Sight
 Array = NDArray[np.float64]
 
 _BODY = 0.4  # [m] in front of a place its own body may end a beam
+_MOST = 60  # hypotheses
 _TRACK_ERROR = 0.2  # [m] error of a lidar track's place
 
 
@@ -103,7 +104,7 @@ class Belief:
             return []
         now = self._newest = frame.stamp
         boxes = [box for box in frame.boxes if box.label == "person" and box.probability >= self.likelihoods.threshold]
-        located = distinct([locate(box, frame.eye) for box in boxes], self.params.merge)
+        located = distinct([locate(box, frame.eye, view.sight) for box in boxes], self.params.merge)
         shown = []
         for each, known in zip(located, assign(self.hypotheses, located, now, self.params), strict=True):
             hypothesis = known or self._begin(each.place, each.spread, now)
@@ -111,9 +112,9 @@ class Belief:
             shown.append(hypothesis)
         for hypothesis in self.hypotheses:
             if not any(hypothesis is each for each in shown):
-                self._miss(hypothesis, frame.eye, view, now)
+                self._miss(hypothesis, frame.eye, view)
         self._merge()
-        self._forget(now)
+        self._forget()
         return [h for h in self.hypotheses if self._confirms(h)]
 
     def motion(self, tracks: Iterable[LidarTrack]) -> None:
@@ -127,7 +128,7 @@ class Belief:
                 known = self._begin(place, spread, track.at)
             elif track.at > known.at:
                 known.move(place, spread, track.at, self.params)
-            known.has_moved = True
+            known.moved = math.log(self.params.motion_ratio)
 
     def _begin(self, place: Array, spread: Array, now: float) -> Hypothesis:
         self._count += 1
@@ -140,7 +141,7 @@ class Belief:
         evidence = self.likelihoods.box(each.box, frame.eye, is_dark=view.is_dark)
         if hypothesis.boxes:
             hypothesis.move(each.place, each.spread, frame.stamp, self.params)
-        hypothesis.side(frame.eye.pose, self.params).add(evidence)
+        hypothesis.side(frame.eye.pose, self.params).add(evidence, self.calibration)
         hypothesis.boxes += 1
         hypothesis.seen_at = frame.stamp
         if evidence.veto is not None:
@@ -165,29 +166,34 @@ class Belief:
         within = self.params.outside_after + hypothesis.error
         return None if self.floor.nearest(self.floor.free, x, y, within) is not None else Veto.OUTSIDE
 
-    def _miss(self, hypothesis: Hypothesis, eye: Eye, view: PictureView, now: float) -> None:
-        seen = self._in_view(hypothesis, eye, view.sight, now)
+    def _miss(self, hypothesis: Hypothesis, eye: Eye, view: PictureView) -> None:
+        seen = self._in_view(hypothesis, eye, view.sight)
         if seen <= 0.0:
             return
         _, away = hypothesis.from_place(eye.pose)
         focal = 0.5 * eye.columns / math.tan(0.5 * eye.width)
         at = Condition(focal * hypothesis.height / max(away, 0.3) / eye.columns, is_dark=view.is_dark)
-        hypothesis.side(eye.pose, self.params).add(self.likelihoods.miss(at, seen))
+        hypothesis.side(eye.pose, self.params).add(self.likelihoods.miss(at, seen), self.calibration)
 
-    def _in_view(self, hypothesis: Hypothesis, eye: Eye, sight: Sight, now: float) -> float:
-        """Probability that its place was in view: the share of five points of its spread."""
-        values, axes = np.linalg.eigh(hypothesis.spread_at(now, self.params))
+    def _in_view(self, hypothesis: Hypothesis, eye: Eye, sight: Sight) -> float:
+        """Probability that its place was in view: the share of five points of its spread.
+
+        That it has walked on is left out: then it is seen elsewhere, or the lidar sees it move.
+        """
+        values, axes = np.linalg.eigh(hypothesis.spread)
         steps = axes * np.sqrt(np.maximum(values, 0.0))
         points = hypothesis.place + np.vstack((np.zeros(2), steps.T, -steps.T))
         dx, dy = points[:, 0] - eye.pose.x, points[:, 1] - eye.pose.y
         bearings, away = np.arctan2(dy, dx), np.hypot(dx, dy)
         aside = np.array([abs(angle_difference(float(bearing), eye.pose.yaw)) for bearing in bearings])
         shows = (aside <= 0.5 * eye.width - self.params.view_edge) & (away <= self.params.view_range)
-        shows &= away >= (self.params.whole_from if hypothesis.is_near_only or not hypothesis.boxes else 0.5)
+        side = hypothesis.find_side(eye.pose, self.params)
+        if side is not None and side.counts[1:].any():  # it was seen from there, over what ends the lidar's beam
+            return float(shows.mean())
         return float((shows & sight.reaches(bearings, away - _BODY)).mean())
 
     def _confirms(self, hypothesis: Hypothesis) -> bool:
-        if hypothesis.is_confirmed or hypothesis.veto is not None or not hypothesis.boxes:
+        if hypothesis.is_confirmed or hypothesis.place_veto is not None or not hypothesis.boxes:
             return False
         hypothesis.is_confirmed = self.posterior(hypothesis) >= self.params.confirmed_above
         return hypothesis.is_confirmed
@@ -206,29 +212,27 @@ class Belief:
     def _is_one(self, a: Hypothesis, b: Hypothesis) -> bool:
         return float(np.hypot(*(a.place - b.place))) < self.params.merge
 
-    def _forget(self, now: float) -> None:
-        p = self.params
-        self.hypotheses = [
-            h
-            for h in self.hypotheses
-            if h.is_confirmed or now - max(h.seen_at, h.at) <= p.forget_after or self.posterior(h) >= p.forget_below
-        ]
+    def _forget(self) -> None:
+        """Keep the most probable ones."""
+        if len(self.hypotheses) > _MOST:
+            kept = sorted(self.hypotheses, key=lambda h: (h.is_confirmed, self.posterior(h)), reverse=True)[:_MOST]
+            self.hypotheses = [h for h in self.hypotheses if any(h is each for each in kept)]
 
     # -- conclusions
 
     def posterior(self, hypothesis: Hypothesis) -> float:
         """Probability of a person at a hypothesis."""
-        return hypothesis.posterior(self.calibration, self.params)
+        return hypothesis.posterior(self.params)
 
     def why(self, hypothesis: Hypothesis) -> str:
         """One sentence about a hypothesis."""
-        return hypothesis.why(self.calibration, self.params)
+        return hypothesis.why(self.params)
 
     @property
     def open(self) -> Sequence[Hypothesis]:
         """Hypotheses that are neither confirmed nor below `clear_below`, the most probable first."""
         p = self.params
-        found = [h for h in self.hypotheses if not h.is_confirmed and h.veto is None]
+        found = [h for h in self.hypotheses if not h.is_confirmed and h.place_veto is None]
         return sorted((h for h in found if self.posterior(h) >= p.clear_below), key=self.posterior, reverse=True)
 
     def verdict(self, *, floor_seen: bool) -> Judgement:

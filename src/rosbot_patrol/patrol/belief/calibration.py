@@ -1,15 +1,15 @@
 """What a network's scores are worth: P(score | person) and P(score | nobody), fitted from pictures with boxes.
 
 A picture says one of several things about a place: no box, or a box with a score in one of the bins. Their
-probabilities depend on the size of the box, on whether the image border cuts it, and on the light. `rho` is the
-correlation of two pictures from one side. A network without a calibration uses `CAUTIOUS`.
+probabilities depend on the size of the box, on whether the image border cuts it, and on the light. Pictures from one
+side err alike: `rho_person` and `rho_nobody` are the correlations of what two of them say (see `hypothesis.Side`). A
+network without a calibration uses `CAUTIOUS`.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -60,41 +60,29 @@ class Calibration:
     Attributes:
         network: name.
         sha256: of cfg and weights, "" for the cautious one.
-        rho: correlation of two pictures from one side, 0 to 1.
+        rho_person, rho_nobody: correlation of two pictures from one side, between 0 and 1.
         person, nobody: probability of each outcome, shape SHAPE; the last axis sums to 1.
     """
 
     network: str
     sha256: str
-    rho: float
+    rho_person: float
+    rho_nobody: float
     person: Array
     nobody: Array
 
-    def box_ratio(self, score: float, at: Condition) -> float:
-        """Log-likelihood ratio of a box with a score, interpolated between the bins."""
-        ratios = np.log(self.person[at.cell][1:]) - np.log(self.nobody[at.cell][1:])
-        return float(np.interp(score, MIDDLES, ratios))
-
-    def miss_ratio(self, at: Condition, threshold: float, seen: float = 1.0) -> float:
-        """Log-likelihood ratio of no box above a threshold.
-
-        Args:
-            at: condition under which a person there would have been seen.
-            threshold: of the detector.
-            seen: probability that the place was in view.
-        """
-        missed, silent = (self.silence(at, threshold, is_person=each) for each in (True, False))
-        return math.log(1.0 - seen * (1.0 - missed)) - math.log(1.0 - seen * (1.0 - silent))
-
-    def silence(self, at: Condition, threshold: float, *, is_person: bool) -> float:
-        """Probability of no box above a threshold."""
-        shares = (self.person if is_person else self.nobody)[at.cell]
+    def chances(self, at: Condition, threshold: float, *, is_person: bool) -> Array:
+        """Probability of each outcome of a detector with a threshold; lower boxes count as none, shape (N,)."""
+        shares = (self.person if is_person else self.nobody)[at.cell].copy()
         below = np.clip((threshold - np.array(EDGES[:-1])) / np.diff(EDGES), 0.0, 1.0)
-        return float(shares[0] + (shares[1:] * below).sum())
+        shares[0] += (shares[1:] * below).sum()
+        shares[1:] *= 1.0 - below
+        return np.asarray(shares)
 
-    def effective(self, pictures: float) -> float:
-        """Number of independent pictures that correlated ones are worth: n / (1 + (n - 1) rho)."""
-        return pictures / (1.0 + (pictures - 1.0) * self.rho) if pictures > 0.0 else 0.0
+
+def outcome(score: float) -> int:
+    """Index of what a picture said: 0 for no box, else the bin of the score."""
+    return int(np.clip(np.searchsorted(EDGES, score, side="right"), 0, len(EDGES) - 1))
 
 
 def save_calibration(path: Path, calibration: Calibration) -> None:
@@ -103,7 +91,8 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
         "format": _FORMAT,
         "network": calibration.network,
         "sha256": calibration.sha256,
-        "rho": round(calibration.rho, 4),
+        "rho_person": round(calibration.rho_person, 4),
+        "rho_nobody": round(calibration.rho_nobody, 4),
         "edges": list(EDGES),
         "sizes": list(SIZES),
         "person": _rounded(calibration.person),
@@ -157,15 +146,15 @@ def _from_plain(tree: Any) -> Calibration:
         raise ValueError("it has another format")
     if tree["edges"] != list(EDGES) or tree["sizes"] != list(SIZES):
         raise ValueError("it has other bins")
-    rho, tables = float(tree["rho"]), []
+    rhos, tables = [float(tree[name]) for name in ("rho_person", "rho_nobody")], []
     for name in ("person", "nobody"):
         table = np.array(tree[name], np.float64)
         if table.shape != SHAPE or not (table > 0.0).all() or not np.allclose(table.sum(axis=-1), 1.0, atol=1e-3):
             raise ValueError(f"'{name}' holds no probabilities")
         tables.append(table)
-    if not 0.0 <= rho <= 1.0:
-        raise ValueError("rho is not between 0 and 1")
-    return Calibration(str(tree["network"]), str(tree["sha256"]), rho, *tables)
+    if not all(0.0 < rho < 1.0 for rho in rhos):
+        raise ValueError("a correlation is not between 0 and 1")
+    return Calibration(str(tree["network"]), str(tree["sha256"]), rhos[0], rhos[1], *tables)
 
 
 def network_sum(cfg: Path, weights: Path) -> str:
@@ -189,7 +178,7 @@ def _cautious() -> Calibration:
 
     person = table((0.7, 0.4, 0.25, 0.35), (1, 1, 2, 2, 3, 4, 4))
     nobody = table((0.99, 0.98, 0.97, 0.95), (40, 25, 15, 10, 6, 3, 1))
-    return Calibration("any", "", 0.7, person, nobody)
+    return Calibration("any", "", 0.8, 0.5, person, nobody)
 
 
 CAUTIOUS = _cautious()

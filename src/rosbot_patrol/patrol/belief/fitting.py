@@ -3,12 +3,14 @@
 P(score | person) is counted over the pictures that show a person, no box included. P(score | nobody) is counted over
 the places of a picture where nobody is: as many as boxes of a size fit side by side. Few data are smoothed towards
 coarser tables (Dirichlet), in the end towards the cautious one; correlated pictures count as fewer. The ratio of both
-is made to rise with the score (isotonic regression). `rho` is the intraclass correlation of the ratios of one side.
+is made to rise with the score (isotonic regression). The correlations are those under which the sides of the pictures
+are most likely, by the urn of `hypothesis.Side`.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
+import math
+from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -16,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.errors import DetectorError
-from rosbot_patrol.patrol.belief.calibration import CAUTIOUS, EDGES, SHAPE, Calibration, Condition
+from rosbot_patrol.patrol.belief.calibration import CAUTIOUS, SHAPE, Calibration, Condition, outcome
 
 Array = NDArray[np.float64]
 
@@ -24,6 +26,8 @@ _TYPICAL = (0.08, 0.18, 0.37, 0.75)  # height of a box of each size class over t
 _ASPECT = 0.4  # width of a person over the height
 _PRIOR = 2.0  # boxes that a coarser table's shares of the bins are worth
 _PRIOR_BOXES = 0.5  # boxes that its rate of boxes is worth
+_RHOS = tuple(k / 50.0 for k in range(1, 50))
+_RHO_LEAST = 0.3  # with nobody: few boxes are persistent, and those are too few to show in some hundred sides
 _FEWEST_GROUPS = 8  # sides with several pictures, to fit rho
 
 
@@ -49,11 +53,6 @@ class Samples:
         return sum(len(found) > 1 for found in self.persons.values()) >= _FEWEST_GROUPS
 
 
-def outcome(score: float) -> int:
-    """Index of what a picture said: 0 for no box, else the bin of the score."""
-    return int(np.clip(np.searchsorted(EDGES, score, side="right"), 0, len(EDGES) - 1))
-
-
 def places(size: int, *, is_cut: bool) -> float:
     """Number of places of a size class in one picture."""
     return 2.0 if is_cut else max(1.0 / (_ASPECT * _TYPICAL[size]) - 2.0, 1.0)
@@ -68,28 +67,44 @@ def fit(samples: Samples, network: str, sha256: str) -> Calibration:
     if not any(samples.persons.values()):
         raise DetectorError(f"'{network}' cannot be calibrated: no picture shows a person")
     if not samples.has_sides:
-        return _tables(samples, network, sha256, CAUTIOUS.rho, person_worth=1.0, nobody_worth=1.0)
-    first = _tables(samples, network, sha256, CAUTIOUS.rho, person_worth=0.3, nobody_worth=0.3)
-    persons, nobodies = _ratios(samples, first)
-    rho_person, rho_nobody = intraclass_correlation(persons), intraclass_correlation(nobodies)
-    rho = float(np.clip(0.5 * (rho_person + rho_nobody), 0.05, 0.95))
-    worth = [1.0 / (1.0 + (_mean_size(groups) - 1.0) * rho) for groups in (persons, nobodies)]
-    return _tables(samples, network, sha256, rho, person_worth=worth[0], nobody_worth=worth[1])
+        return _tables(samples, network, sha256, rhos=(CAUTIOUS.rho_person, CAUTIOUS.rho_nobody), worths=(1.0, 1.0))
+    first = _tables(samples, network, sha256, rhos=(CAUTIOUS.rho_person, CAUTIOUS.rho_nobody), worths=(0.3, 0.3))
+    persons = [[(first.person[at.cell], outcome(score)) for at, score in found] for found in samples.persons.values()]
+    silence = first.nobody[Condition(_TYPICAL[2]).cell]
+    nobodies = [
+        [(first.nobody[at.cell], outcome(score)) for at, score in samples.false.get(side, ())]
+        + [(silence, 0)] * samples.silent.get(side, 0)
+        for side in {**samples.false, **samples.silent}
+    ]
+    rhos = fit_rho(persons), max(fit_rho(nobodies), _RHO_LEAST)
+    worths = tuple(1.0 / (1.0 + (_mean_size(g) - 1.0) * rho) for g, rho in zip((persons, nobodies), rhos, strict=True))
+    return _tables(samples, network, sha256, rhos=rhos, worths=(worths[0], worths[1]))
 
 
-def intraclass_correlation(groups: Sequence[Sequence[float]]) -> float:
-    """Share of the variance that lies between groups (one-way analysis of variance), 0 to 1."""
-    kept = [np.asarray(group, np.float64) for group in groups if len(group) > 1]
-    total = sum(map(len, kept))
-    if len(kept) < 2 or total <= len(kept):
-        return CAUTIOUS.rho
-    mean = sum(float(group.sum()) for group in kept) / total
-    between = sum(len(group) * (float(group.mean()) - mean) ** 2 for group in kept) / (len(kept) - 1)
-    within = sum(float(((group - group.mean()) ** 2).sum()) for group in kept) / (total - len(kept))
-    size = (total - sum(len(group) ** 2 for group in kept) / total) / (len(kept) - 1)
-    if between + (size - 1.0) * within <= 0.0:
-        return CAUTIOUS.rho
-    return float(np.clip((between - within) / (between + (size - 1.0) * within), 0.0, 1.0))
+def fit_rho(sides: Sequence[Sequence[tuple[Array, int]]]) -> float:
+    """The correlation under which sides are most likely.
+
+    Args:
+        sides: of each picture of each side the probabilities of the outcomes, and the outcome.
+    """
+    groups = Counter(tuple((float(chances[0]), k > 0) for chances, k in side) for side in sides if len(side) > 1)
+    if len(groups) < 2:
+        return CAUTIOUS.rho_nobody
+
+    def likelihood(rho: float) -> float:
+        return sum(count * _log_likelihood(group, (1.0 - rho) / rho) for group, count in groups.items())
+
+    return max(_RHOS, key=likelihood)
+
+
+def _log_likelihood(side: Sequence[tuple[float, bool]], strength: float) -> float:
+    """Of one side's boxes by the urn: of each picture the probability of no box, and whether there was one."""
+    boxes, told = 0, 0.0
+    for n, (silence, is_box) in enumerate(side):
+        chance = (boxes + strength * (1.0 - silence)) / (n + strength)
+        told += math.log(chance if is_box else 1.0 - chance)
+        boxes += is_box
+    return told
 
 
 def rising(values: Array, weights: Array) -> Array:
@@ -104,41 +119,29 @@ def rising(values: Array, weights: Array) -> Array:
     return np.concatenate([np.full(int(count), value) for value, _, count in blocks])
 
 
-def _ratios(samples: Samples, calibration: Calibration) -> tuple[list[list[float]], list[list[float]]]:
-    def ratio(at: Condition, score: float) -> float:
-        return calibration.box_ratio(score, at) if score > 0.0 else calibration.miss_ratio(at, 0.0)
-
-    persons = [[ratio(*each) for each in found] for found in samples.persons.values()]
-    silence = calibration.miss_ratio(Condition(_TYPICAL[2]), 0.0)
-    nobodies = [
-        [ratio(*each) for each in samples.false.get(side, ())] + [silence] * samples.silent.get(side, 0)
-        for side in {*samples.false, *samples.silent}
-    ]
-    return persons, nobodies
-
-
-def _mean_size(groups: Iterable[Sequence[float]]) -> float:
+def _mean_size(groups: Iterable[Sequence[object]]) -> float:
     sizes = [len(group) for group in groups if group]
     return sum(sizes) / max(len(sizes), 1)
 
 
 def _tables(
-    samples: Samples, network: str, sha256: str, rho: float, *, person_worth: float, nobody_worth: float
+    samples: Samples, network: str, sha256: str, *, rhos: tuple[float, float], worths: tuple[float, float]
 ) -> Calibration:
+    """The tables of the calibration; correlated pictures are worth less than independent ones."""
     person, nobody = np.zeros(SHAPE), np.zeros(SHAPE)
     for found in samples.persons.values():
         for at, score in found:
-            person[at.cell][outcome(score)] += person_worth
+            person[at.cell][outcome(score)] += worths[0]
     for found in samples.false.values():
         for at, score in found:
-            nobody[at.cell][outcome(score)] += nobody_worth
+            nobody[at.cell][outcome(score)] += worths[1]
     for size, cut, dark in np.ndindex(*SHAPE[:3]):
-        seen = samples.pictures[dark] * places(size, is_cut=bool(cut)) * nobody_worth
+        seen = samples.pictures[dark] * places(size, is_cut=bool(cut)) * worths[1]
         nobody[size, cut, dark, 0] = max(seen - nobody[size, cut, dark, 1:].sum(), 0.0)
     person, nobody = _smooth(person, CAUTIOUS.person), _smooth(nobody, CAUTIOUS.nobody)
     for cell in np.ndindex(*SHAPE[:3]):
         _make_rising(person[cell], nobody[cell])
-    return Calibration(network, sha256, rho, person, nobody)
+    return Calibration(network, sha256, *rhos, person, nobody)
 
 
 def _smooth(counts: Array, prior: Array) -> Array:

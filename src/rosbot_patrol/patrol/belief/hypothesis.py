@@ -1,7 +1,8 @@
 """One hypothesis: somebody may be at a place, with the evidence for it by side of view.
 
-Pictures from one side err alike. A side's n pictures are worth n / (1 + (n - 1) rho) independent ones, so its log-odds
-are the mean of their log-likelihood ratios times that number. Sides are independent and add up.
+Three explanations compete: a person, a look-alike (a pet, a picture, a statue) and nobody. The scores tell the first
+two from the third, by `Side.score`; size and depth tell a person from a look-alike, by `Side.size`. Sides are
+independent and add up; pictures from one side are not, as the same view is misjudged again and again.
 """
 
 from __future__ import annotations
@@ -14,14 +15,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import Pose2D, angle_difference
-from rosbot_patrol.patrol.belief.calibration import Calibration
+from rosbot_patrol.geometry import Pose2D, angle_difference, distance
+from rosbot_patrol.patrol.belief.calibration import EDGES, Calibration
 from rosbot_patrol.patrol.belief.likelihoods import Evidence, Veto
 from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.records.inputs import Box
 
 Array = NDArray[np.float64]
 
+_SAME_EYE = 0.3  # [m] cameras this near to each other see the same side, wherever the object is
 _HEIGHT = 1.3  # [m] visible height that is expected before one was measured
 
 
@@ -29,37 +31,62 @@ _HEIGHT = 1.3  # [m] visible height that is expected before one was measured
 class Side:
     """Evidence from one side.
 
+    What its pictures say follows a Polya urn (`urn`): each outcome becomes likelier by those before. A second picture
+    that says the same adds little where pictures are much alike (rho near 1), and all where they are independent.
+
     Attributes:
-        bearing: from the place to the camera, in map [rad]; away: distance of the camera [m]; eye: its last pose.
-        pictures, total: number of pictures that tell, and sum of their ratios.
-        near_pictures, near_total: likewise of pictures that do not tell a person from a pet.
+        eye: the camera when the side was first seen from there.
+        counts: pictures with each outcome, as far as the place was in view.
+        score: log-likelihood ratio of the scores, of a person against nobody.
+        sizes, size_total: boxes, and sum of what their sizes say of a person against a look-alike.
     """
 
-    bearing: float
-    away: float
     eye: Pose2D
-    pictures: int = 0
-    total: float = 0.0
-    near_pictures: int = 0
-    near_total: float = 0.0
+    counts: Array = field(default_factory=lambda: np.zeros(len(EDGES)))
+    score: float = 0.0
+    sizes: int = 0
+    size_total: float = 0.0
 
-    def add(self, evidence: Evidence) -> None:
+    def add(self, evidence: Evidence, calibration: Calibration) -> None:
         """Take one picture's evidence."""
-        if evidence.is_near:
-            self.near_pictures += 1
-            self.near_total += evidence.ratio
-        else:
-            self.pictures += 1
-            self.total += evidence.ratio
+        self.score += self.told(evidence, calibration)
+        self.counts[evidence.outcome] += evidence.weight
+        if evidence.size is not None:
+            self.sizes += 1
+            self.size_total += evidence.size
 
-    def log_odds(self, calibration: Calibration) -> float:
-        """Evidence of the pictures that tell."""
-        return self.total / self.pictures * calibration.effective(self.pictures) if self.pictures else 0.0
+    def told(self, evidence: Evidence, calibration: Calibration) -> float:
+        """What a further picture would add to `score`."""
+        person, nobody = (
+            1.0 - evidence.weight * (1.0 - urn(self.counts, evidence.outcome, chances, rho))
+            for chances, rho in ((evidence.person, calibration.rho_person), (evidence.nobody, calibration.rho_nobody))
+        )
+        return math.log(person / nobody)
 
-    def near_log_odds(self, calibration: Calibration) -> float:
-        """Evidence of the pictures that do not tell a person from a pet."""
-        n = self.near_pictures
-        return self.near_total / n * calibration.effective(n) if n else 0.0
+    def size(self, params: BeliefParams) -> float:
+        """Log-likelihood ratio of all sizes; n correlated ones are worth n / (1 + (n - 1) rho)."""
+        return self.size_total / (1.0 + (self.sizes - 1.0) * params.size_rho) if self.sizes else 0.0
+
+
+def urn(counts: Array, outcome: int, chances: Array, rho: float) -> float:
+    """Probability of the next outcome by Polya's urn: first whether there is a box, then the bin of its score.
+
+    With the concentration s = (1 - rho) / rho an outcome of probability p has the probability (k + s p) / (n + s) after
+    k of n pictures with it.
+
+    Args:
+        counts: pictures with each outcome so far, shape (N,); the first is that without a box.
+        outcome: the next one.
+        chances: probability of each outcome, shape (N,).
+        rho: correlation of two pictures, between 0 and 1.
+    """
+    strength = (1.0 - rho) / rho
+    total, boxes, chance = float(counts.sum()), float(counts[1:].sum()), float(chances[1:].sum())
+    any_box = (boxes + strength * chance) / (total + strength)
+    if outcome == 0:
+        return 1.0 - any_box
+    share = float(chances[outcome]) / chance
+    return any_box * (float(counts[outcome]) + strength * share) / (boxes + strength)
 
 
 @dataclass
@@ -74,7 +101,7 @@ class Hypothesis:
         sides: evidence; boxes: pictures with a box of it.
         against, possible: boxes with each reason against a person, and boxes without one.
         place_veto: reason by its place, None if there is none.
-        has_moved: the lidar saw it move.
+        moved: log-likelihood ratio of its motion, 0 where the lidar saw none.
         is_confirmed: it was confirmed once, and stays so.
         second_looks: viewpoints that it was looked at from.
         best: the surest box; picture: stamp of its picture [s]; shown: all boxes of that picture.
@@ -91,7 +118,7 @@ class Hypothesis:
     against: Counter[Veto] = field(default_factory=Counter)
     possible: int = 0
     place_veto: Veto | None = None
-    has_moved: bool = False
+    moved: float = 0.0
     is_confirmed: bool = False
     second_looks: list[Pose2D] = field(default_factory=list)
     best: Box | None = None
@@ -106,45 +133,51 @@ class Hypothesis:
     @property
     def veto(self) -> Veto | None:
         """Reason why it is no intruder: by its place, or as most boxes speak against a person."""
-        if self.place_veto is not None or not self.against:
+        if self.place_veto is not None or self.against.total() <= self.possible:
             return self.place_veto
-        reason, count = self.against.most_common(1)[0]
-        return reason if self.against.total() > self.possible and count >= 1 else None
+        return self.against.most_common(1)[0][0]
 
     @property
     def is_near_only(self) -> bool:
         """Whether all boxes of it were too near to tell a person from a pet."""
-        return self.possible == 0 and not self.against and any(side.near_pictures for side in self.sides)
+        return self.boxes > 0 and self.possible == 0 and not self.against
 
-    def log_odds(self, calibration: Calibration, params: BeliefParams) -> float:
-        """Log-odds of a person there."""
-        told = sum(side.log_odds(calibration) for side in self.sides)
-        near = min(sum(side.near_log_odds(calibration) for side in self.sides), params.near_most)
-        moved = math.log(params.motion_ratio) if self.has_moved else 0.0
-        return params.prior_log_odds + told + near + moved
+    @property
+    def score(self) -> float:
+        """Log-likelihood ratio of what network and lidar say, of a person against nobody."""
+        return sum(side.score for side in self.sides) + self.moved
 
-    def posterior(self, calibration: Calibration, params: BeliefParams) -> float:
+    def size(self, params: BeliefParams) -> float:
+        """Log-likelihood ratio of size and depth, of a person against a look-alike."""
+        return sum(side.size(params) for side in self.sides)
+
+    def posterior(self, params: BeliefParams) -> float:
         """Probability of a person there."""
-        return probability(self.log_odds(calibration, params))
+        return posterior(self.score, self.size(params), params)
 
     def find_side(self, eye: Pose2D, params: BeliefParams) -> Side | None:
-        """The known side that a camera sees, None if it is another one."""
+        """The known side that a camera sees, None if it is another one.
+
+        Sides are told apart by the present place: a better place may show that two views are of one side.
+        """
         bearing, away = self.from_place(eye)
 
         def is_this(side: Side) -> bool:
-            near, far = sorted((side.away, away))
-            return abs(angle_difference(side.bearing, bearing)) <= params.side_angle and near > params.side_nearer * far
+            if distance(side.eye, eye) < _SAME_EYE:
+                return True
+            other, far = self.from_place(side.eye)
+            is_alike = min(far, away) > params.side_nearer * max(far, away)
+            return abs(angle_difference(other, bearing)) <= params.side_angle and is_alike
 
         found = filter(is_this, self.sides)
-        return min(found, key=lambda side: abs(angle_difference(side.bearing, bearing)), default=None)
+        return min(found, key=lambda side: distance(side.eye, eye), default=None)
 
     def side(self, eye: Pose2D, params: BeliefParams) -> Side:
         """The side that a camera sees, a new one if it is another."""
         found = self.find_side(eye, params)
         if found is None:
-            found = Side(*self.from_place(eye), eye)
+            found = Side(eye)
             self.sides.append(found)
-        found.eye = eye
         return found
 
     def from_place(self, eye: Pose2D) -> tuple[float, float]:
@@ -168,37 +201,47 @@ class Hypothesis:
     def absorb(self, other: Hypothesis, params: BeliefParams) -> None:
         """Take in another hypothesis of the same object."""
         for side in other.sides:
-            own = self.side(side.eye, params)
-            own.pictures, own.total = own.pictures + side.pictures, own.total + side.total
-            own.near_pictures += side.near_pictures
-            own.near_total += side.near_total
+            own = self.find_side(side.eye, params)
+            if own is None:
+                self.sides.append(side)
+            elif side.score > own.score:  # of two counts of one side, the one with more for it
+                self.sides[[each is own for each in self.sides].index(True)] = side
         self.boxes, self.possible = self.boxes + other.boxes, self.possible + other.possible
         self.against += other.against
-        self.has_moved |= other.has_moved
+        self.moved = max(self.moved, other.moved)
         self.is_confirmed |= other.is_confirmed
         self.seen_at = max(self.seen_at, other.seen_at)
 
-    def why(self, calibration: Calibration, params: BeliefParams) -> str:
+    def why(self, params: BeliefParams) -> str:
         """One sentence: what it is believed to be, and by what."""
         where = f"at about ({self.place[0]:.1f}, {self.place[1]:.1f})"
-        if self.veto is not None:
-            return f"what was seen {where} is no intruder: {self.veto.value}"
-        share = self.posterior(calibration, params)
-        said = [_said(side, calibration) for side in self.sides if side.pictures]
-        told = "; ".join(said) or ("it was too near to be told from a pet" if self.is_near_only else "no picture tells")
-        moved = "; the lidar saw it move" if self.has_moved else ""
-        return f"a person {where} with probability {share:.0%}: {told}{moved}"
+        share = self.posterior(params)
+        if self.place_veto is not None or (self.veto is not None and share < params.clear_below):
+            return f"what was seen {where} is no intruder: {self.veto.value if self.veto else ''}"
+        said = [_said(side, self.from_place(side.eye)[1]) for side in self.sides]
+        told = "; ".join(said) or "no picture tells"
+        size = f"; size and depth {self.size(params):+.1f}" if any(side.sizes for side in self.sides) else ""
+        near = "; it was too near to be told from a pet" if self.is_near_only else ""
+        moved = "; the lidar saw it move" if self.moved else ""
+        return f"a person {where} with probability {share:.0%}: {told}{size}{near}{moved}"
 
 
-def _said(side: Side, calibration: Calibration) -> str:
-    for_or_against = "for" if side.total > 0.0 else "against"
-    count = f"{side.pictures} picture{'s' if side.pictures > 1 else ''}"
-    return f"{count} from {side.away:.1f} m {for_or_against} it ({side.log_odds(calibration):+.1f})"
+def _said(side: Side, away: float) -> str:
+    boxes, silent = side.counts[1:].sum(), side.counts[0]
+    return f"{boxes:.0f} boxes and {silent:.0f} pictures without one from {away:.1f} m ({side.score:+.1f})"
 
 
-def probability(log_odds: float) -> float:
-    """Probability of log-odds."""
-    return 1.0 / (1.0 + math.exp(-max(min(log_odds, 500.0), -500.0)))
+def posterior(score: float, size: float, params: BeliefParams) -> float:
+    """Probability of a person, against a look-alike and nobody.
+
+    Args:
+        score: log-likelihood ratio of what the network says, with a person or a look-alike against nobody.
+        size: log-likelihood ratio of size and depth, of a person against a look-alike.
+        params: prior of each.
+    """
+    told = math.exp(min(score, 300.0))
+    person, other = params.prior * told, params.look_alikes * told * math.exp(min(max(-size, -300.0), 300.0))
+    return person / (person + other + 1.0 - params.prior - params.look_alikes)
 
 
 def entropy(share: float) -> float:

@@ -1,8 +1,8 @@
-"""What one picture says about one place, as a log-likelihood ratio of a person against nobody.
+"""What one picture says about one place: how likely it is with a person there, with nobody, and with a look-alike.
 
-A score counts as far as the object may be a person: a box with the size of a pet, or with the depth of a poster, says
-little by its score, as networks take such things for persons. So with q, the probability that a person has such a size
-and depth, a box says q * score_ratio + log(q). What is so near that a pet looks alike is kept apart (`is_near`).
+The score, or the lack of a box, tells a person from nobody. It does not tell a person from a pet, a poster or a statue:
+networks take those for persons. Size and depth do: with q, the probability that a person has such a size and depth,
+they say log(q / (1 - q)). What is so near that a pet looks alike says nothing.
 """
 
 from __future__ import annotations
@@ -11,11 +11,16 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from rosbot_patrol.patrol.belief.calibration import Calibration, Condition
+import numpy as np
+from numpy.typing import NDArray
+
+from rosbot_patrol.patrol.belief.calibration import Calibration, Condition, outcome
 from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 
-_LEAST = 0.02  # smallest q: no single measurement excludes a person
+Array = NDArray[np.float64]
+
+_LEAST = 0.02  # smallest q, and 1 less the largest: no single measurement is sure
 _NEAR_ERROR = 0.35  # [m] error of a place by the floor up to which it tells the size
 _EDGE = 3  # [px] distance from the image border at which a box counts as cut
 
@@ -36,12 +41,20 @@ class Evidence:
     """What a picture says about a place.
 
     Attributes:
-        ratio: log-likelihood ratio.
+        outcome: 0 for no box, else the bin of its score.
+        person, nobody: probability of each outcome, shape (N,).
+        size: log-likelihood ratio of size and depth, of a person against a look-alike; None where
+            there is no box, or it is too near to tell.
+        weight: probability that the place was in view.
         is_near: the object is so near that it may be a pet as well.
         veto: why it is likely no person, None if it may be one.
     """
 
-    ratio: float
+    outcome: int
+    person: Array
+    nobody: Array
+    size: float | None = None
+    weight: float = 1.0
     is_near: bool = False
     veto: Veto | None = None
 
@@ -60,13 +73,9 @@ class Likelihoods:
 
     def box(self, box: Box, eye: Eye, *, is_dark: bool = False) -> Evidence:
         """Judge a box of a picture that was taken from `eye`."""
-        most = self.params.picture_most
         at = Condition(box.height / eye.columns, is_cut(box, eye), is_dark)
-        ratio = min(max(self.calibration.box_ratio(box.probability, at), -most), most)
-        if self.is_near(box):
-            return Evidence(max(ratio, 0.0), is_near=True)
-        q, veto = possibility(box, self.params)
-        return Evidence(max(q * max(ratio, 0.0) + min(ratio, 0.0) + math.log(q), -most), veto=veto)
+        size, is_near, veto = self._size(box)
+        return Evidence(outcome(box.probability), *self.chances(at), size=size, is_near=is_near, veto=veto)
 
     def miss(self, at: Condition, seen: float) -> Evidence:
         """Judge a picture without a box at a place.
@@ -75,7 +84,22 @@ class Likelihoods:
             at: condition under which a person there would have been seen.
             seen: probability that the place was in view.
         """
-        return Evidence(max(self.calibration.miss_ratio(at, self.threshold, seen), -self.params.picture_most))
+        return Evidence(0, *self.chances(at), weight=seen)
+
+    def chances(self, at: Condition) -> tuple[Array, Array]:
+        """Probability of each outcome with a person and with nobody; their ratio is bounded by `picture_most`."""
+        person, nobody = (self.calibration.chances(at, self.threshold, is_person=each) for each in (True, False))
+        least = math.exp(-self.params.picture_most)
+        return np.maximum(person, least * nobody), np.maximum(nobody, least * person)
+
+    def _size(self, box: Box) -> tuple[float | None, bool, Veto | None]:
+        if self.is_near(box):
+            return None, True, None
+        found = possibility(box, self.params)
+        if found is None:
+            return self.params.unmeasured, False, None
+        q, veto = found
+        return math.log(q / (1.0 - q)), False, veto
 
     def is_near(self, box: Box) -> bool:
         """Whether so little of it is in the picture that a person and a pet look alike: legs, or a part at its side."""
@@ -90,24 +114,24 @@ def is_cut(box: Box, eye: Eye) -> bool:
     return box.xmin <= _EDGE or box.xmax >= eye.columns - _EDGE
 
 
-def possibility(box: Box, params: BeliefParams) -> tuple[float, Veto | None]:
-    """Probability that a person has a box's size and depth, and what speaks against it; 1 if nothing is measured."""
+def possibility(box: Box, params: BeliefParams) -> tuple[float, Veto | None] | None:
+    """Probability that a person has a box's size and depth, and what speaks against it; None if it is not measured."""
     m = box.measured
     if m is None:
-        return 1.0, None
+        return None
     if m.is_flat:
         return _LEAST, Veto.FLAT
-    if box.label != "person" or not _has_size(m):
-        return 1.0, None
+    if not _has_size(m):
+        return None
     shares = _shares(box, m, params)
     veto = min(shares, key=lambda each: shares[each])
-    q = max(shares[veto], _LEAST)
+    q = min(max(shares[veto], _LEAST), 1.0 - _LEAST)
     return q, veto if q < 0.5 else None
 
 
 def _shares(box: Box, m: Measured, p: BeliefParams) -> dict[Veto, float]:
-    """Probability of the size under each limit, by a normal error of the measurement."""
-    error = 0.05 + 0.5 * m.error / max(m.away, 0.5) * max(m.top, 0.5)
+    """Probability of the size under each limit, by the spread of bodies and the error of the distance."""
+    error = math.hypot(p.size_spread, m.error / max(m.away, 0.5) * max(m.top, 0.5))
     shares = {
         Veto.LARGE: min(_normal((p.person_top_max - m.top) / error), _normal((p.person_width_max - m.width) / error))
     }

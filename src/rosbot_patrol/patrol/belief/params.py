@@ -16,12 +16,16 @@ class BeliefParams:
     confirmed_above: float = param(0.98, lo=0.5, hi=1.0, doc="posterior above which a person is confirmed")
     clear_below: float = param(0.05, lo=0.0, hi=0.5, doc="posterior below which a place counts as empty")
     look_alikes: float = param(
-        0.02,
+        0.002,
         lo=1e-6,
-        hi=1.0,
-        doc="ratio of pets to persons near the camera; limits evidence that does not tell them apart",
+        hi=0.5,
+        doc="probability of a pet, a picture or the like at any one place that the network takes for a person",
     )
-    motion_ratio: float = param(20.0, lo=1.0, doc="odds that a moving object of the lidar is a person, over the prior")
+    size_rho: float = param(0.7, lo=0.0, hi=1.0, doc="correlation of the sizes measured in two images from one side")
+    unmeasured: float = param(
+        2.5, lo=0.0, doc="log-likelihood ratio of an image without a size: pets and pictures are mostly measured"
+    )
+    motion_ratio: float = param(20.0, lo=1.0, doc="likelihood ratio of an object that the lidar sees move")
     picture_most: float = param(6.0, lo=0.5, doc="maximum log-likelihood ratio of one picture")
     side_angle: float = param(
         0.6, unit="rad", lo=0.05, hi=3.1, doc="viewing directions this far apart count as separate sides"
@@ -39,6 +43,9 @@ class BeliefParams:
     person_top_min: float = param(
         0.9, unit="m", lo=0.0, doc="height of a top at which person and pet are equally likely"
     )
+    size_spread: float = param(
+        0.15, unit="m", lo=0.01, doc="standard deviation of the tops of large pets and of persons who crouch"
+    )
     person_top_max: float = param(2.3, unit="m", lo=0.5, doc="maximum height of a person's top")
     person_height_min: float = param(0.3, unit="m", lo=0.0, doc="minimum visible height of a person")
     person_width_max: float = param(2.2, unit="m", lo=0.5, doc="maximum width of a person")
@@ -49,15 +56,8 @@ class BeliefParams:
         1.0, unit="m", lo=0.0, doc="distance from the map's free floor beyond which a place is outside the house"
     )
     gain_least: float = param(0.02, unit="nat", lo=0.0, doc="minimum expected gain of a second look")
-    forget_below: float = param(0.001, lo=0.0, hi=1.0, doc="posterior below which an old hypothesis is dropped")
-    forget_after: float = param(30.0, unit="s", lo=0.0, doc="time after its last box until it may be dropped")
 
     @property
     def prior_log_odds(self) -> float:
         """Log-odds of the prior."""
         return math.log(self.prior / (1.0 - self.prior))
-
-    @property
-    def near_most(self) -> float:
-        """Maximum evidence of pictures that do not tell a person from a pet."""
-        return -math.log(self.look_alikes)

@@ -33,7 +33,7 @@ def add_scene(samples: Samples, scene: Scene, network: str) -> None:
             assert frame.eye is not None
             truth = scene.box_of(look, frame.eye)
             person = truth if scene.has_person else None
-            boxes = [box for box in frame.boxes if possibility(box, params)[0] >= 0.5]
+            boxes = [box for box in frame.boxes if (possibility(box, params) or (1.0,))[0] >= 0.5]
             side = (scene.number, number)
             _add_picture(samples, person, boxes, (scene.columns, scene.rows), is_dark=scene.is_dark, side=side)
             free = [box for box in boxes if truth is None or not _overlap(_corners(box), truth)]

@@ -6,13 +6,13 @@ outcome (no box, or a score in one of the bins) counts with its probability unde
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.belief.belief import Belief
 from rosbot_patrol.patrol.belief.calibration import Condition
-from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, entropy, probability
+from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, Side, entropy, posterior
+from rosbot_patrol.patrol.belief.likelihoods import Evidence
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
 _PICTURES = 12  # of a look
@@ -44,15 +44,18 @@ def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_o
     _, away = hypothesis.from_place(eye)
     if away > p.view_range or (away < p.whole_from and hypothesis.is_near_only):
         return 0.0
-    cell = Condition(hypothesis.height / max(away, 0.3) / columns_over_focal).cell
-    side = hypothesis.find_side(eye, p)
-    pictures, total, now = (side.pictures, side.total, side.log_odds(calibration)) if side else (0, 0.0, 0.0)
-    odds = hypothesis.log_odds(calibration, p)
-    share = probability(odds)
+    at = Condition(hypothesis.height / max(away, 0.3) / columns_over_focal)
+    person, nobody = belief.likelihoods.chances(at)
+    side = hypothesis.find_side(eye, p) or Side(eye)
+    size = hypothesis.size(p)
+    now = posterior(hypothesis.score, size, p)
     after = 0.0
-    for person, nobody in zip(calibration.person[cell], calibration.nobody[cell], strict=True):
-        ratio = max(min(math.log(person / nobody), p.picture_most), -p.picture_most)
-        count = pictures + _PICTURES
-        told = (total + _PICTURES * ratio) / count * calibration.effective(count)
-        after += (share * person + (1.0 - share) * nobody) * entropy(probability(odds - now + told))
-    return entropy(share) - after
+    for k, (one, none) in enumerate(zip(person, nobody, strict=True)):
+        if one <= 0.0:
+            continue
+        imagined = Side(eye, side.counts.copy())
+        for _ in range(_PICTURES):
+            imagined.add(Evidence(k, person, nobody), calibration)
+        seen = size + (p.unmeasured if k and not hypothesis.possible else 0.0)
+        after += (now * one + (1.0 - now) * none) * entropy(posterior(hypothesis.score + imagined.score, seen, p))
+    return entropy(now) - after
