@@ -30,6 +30,7 @@ from rosbot_patrol.patrol.visibility.coverage import Sight
 Array = NDArray[np.float64]
 
 _BODY = 0.4  # [m] in front of a place its own body may end a beam
+_VIEW_EDGE = 0.1  # [rad] at the image borders where a miss says nothing
 _MOST = 60  # hypotheses
 _TRACK_ERROR = 0.2  # [m] error of a lidar track's place
 
@@ -141,7 +142,7 @@ class Belief:
         evidence = self.likelihoods.box(each.box, frame.eye, is_dark=view.is_dark)
         if hypothesis.boxes:
             hypothesis.move(each.place, each.spread, frame.stamp, self.params)
-        hypothesis.side(frame.eye.pose, self.params).add(evidence, self.calibration)
+        hypothesis.take(frame.eye.pose, evidence, self.calibration, self.params)
         hypothesis.boxes += 1
         hypothesis.seen_at = frame.stamp
         if evidence.veto is not None:
@@ -173,7 +174,7 @@ class Belief:
         _, away = hypothesis.from_place(eye.pose)
         focal = 0.5 * eye.columns / math.tan(0.5 * eye.width)
         at = Condition(focal * hypothesis.height / max(away, 0.3) / eye.columns, is_dark=view.is_dark)
-        hypothesis.side(eye.pose, self.params).add(self.likelihoods.miss(at, seen), self.calibration)
+        hypothesis.take(eye.pose, self.likelihoods.miss(at, seen), self.calibration, self.params)
 
     def _in_view(self, hypothesis: Hypothesis, eye: Eye, sight: Sight) -> float:
         """Probability that its place was in view: the share of five points of its spread.
@@ -186,7 +187,7 @@ class Belief:
         dx, dy = points[:, 0] - eye.pose.x, points[:, 1] - eye.pose.y
         bearings, away = np.arctan2(dy, dx), np.hypot(dx, dy)
         aside = np.array([abs(angle_difference(float(bearing), eye.pose.yaw)) for bearing in bearings])
-        shows = (aside <= 0.5 * eye.width - self.params.view_edge) & (away <= self.params.view_range)
+        shows = (aside <= 0.5 * eye.width - _VIEW_EDGE) & (away <= self.params.view_range)
         side = hypothesis.find_side(eye.pose, self.params)
         if side is not None and side.counts[1:].any():  # it was seen from there, over what ends the lidar's beam
             return float(shows.mean())

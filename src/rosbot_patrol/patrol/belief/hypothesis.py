@@ -180,6 +180,17 @@ class Hypothesis:
             self.sides.append(found)
         return found
 
+    def take(self, eye: Pose2D, evidence: Evidence, calibration: Calibration, params: BeliefParams) -> None:
+        """Take what a picture from a camera says.
+
+        What gives false boxes from one side does so from others: with nobody there, a box from a new side is as likely
+        as `side_rho` times the share of pictures with one from the other sides, at least.
+        """
+        side = self.side(eye, params)
+        others = sum((each.counts for each in self.sides if each is not side), np.zeros(len(EDGES)))
+        share = float(others[1:].sum()) / (float(others.sum()) + 1.0)
+        side.add(evidence.with_false_boxes(params.side_rho * share), calibration)
+
     def from_place(self, eye: Pose2D) -> tuple[float, float]:
         """Bearing [rad] and distance [m] of a camera from the place."""
         dx, dy = eye.x - float(self.place[0]), eye.y - float(self.place[1])

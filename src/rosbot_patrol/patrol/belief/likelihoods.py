@@ -2,13 +2,14 @@
 
 The score, or the lack of a box, tells a person from nobody. It does not tell a person from a pet, a poster or a statue:
 networks take those for persons. Size and depth do: with q, the probability that a person has such a size and depth,
-they say log(q / (1 - q)). What is so near that a pet looks alike says nothing.
+they say log(q / (1 - q)). What is not measured, or so near that a pet looks
+alike, says nothing: it needs a second look.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -44,7 +45,7 @@ class Evidence:
         outcome: 0 for no box, else the bin of its score.
         person, nobody: probability of each outcome, shape (N,).
         size: log-likelihood ratio of size and depth, of a person against a look-alike; None where
-            there is no box, or it is too near to tell.
+            there is no box, or it is too near or too far off to be measured.
         weight: probability that the place was in view.
         is_near: the object is so near that it may be a pet as well.
         veto: why it is likely no person, None if it may be one.
@@ -57,6 +58,14 @@ class Evidence:
     weight: float = 1.0
     is_near: bool = False
     veto: Veto | None = None
+
+    def with_false_boxes(self, chance: float) -> Evidence:
+        """The same where nobody gives a box with a probability of at least `chance`."""
+        boxes = float(self.nobody[1:].sum())
+        if chance <= boxes:
+            return self
+        raised = np.concatenate(([1.0 - chance], self.nobody[1:] / boxes * chance))
+        return replace(self, nobody=raised)
 
 
 class Likelihoods:
@@ -97,7 +106,7 @@ class Likelihoods:
             return None, True, None
         found = possibility(box, self.params)
         if found is None:
-            return self.params.unmeasured, False, None
+            return None, False, None
         q, veto = found
         return math.log(q / (1.0 - q)), False, veto
 

@@ -21,10 +21,10 @@ class BeliefParams:
         hi=0.5,
         doc="probability of a pet, a picture or the like at any one place that the network takes for a person",
     )
-    size_rho: float = param(0.7, lo=0.0, hi=1.0, doc="correlation of the sizes measured in two images from one side")
-    unmeasured: float = param(
-        2.5, lo=0.0, doc="log-likelihood ratio of an image without a size: pets and pictures are mostly measured"
+    side_rho: float = param(
+        0.1, lo=0.0, hi=1.0, doc="correlation of false boxes at one place from two sides: a lamp is one from everywhere"
     )
+    size_rho: float = param(0.7, lo=0.0, hi=1.0, doc="correlation of the sizes measured in two images from one side")
     motion_ratio: float = param(20.0, lo=1.0, doc="likelihood ratio of an object that the lidar sees move")
     picture_most: float = param(6.0, lo=0.5, doc="maximum log-likelihood ratio of one picture")
     side_angle: float = param(
@@ -39,7 +39,6 @@ class BeliefParams:
     merge: float = param(0.7, unit="m", lo=0.0, doc="closer hypotheses are one, unless one picture shows both")
     whole_from: float = param(1.7, unit="m", lo=0.3, doc="distance from which a standing person shows whole")
     view_range: float = param(8.0, unit="m", lo=0.5, doc="range within which a missing box is evidence")
-    view_edge: float = param(0.1, unit="rad", lo=0.0, doc="margin at the image borders where a miss says nothing")
     person_top_min: float = param(
         0.9, unit="m", lo=0.0, doc="height of a top at which person and pet are equally likely"
     )

@@ -16,6 +16,7 @@ from rosbot_patrol.patrol.belief.likelihoods import Evidence
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
 _PICTURES = 12  # of a look
+_SIZE = 3.0  # log-likelihood ratio of a first size, for a person
 _TURN = 1.5  # [m] of way that a look costs besides the drive
 
 
@@ -56,6 +57,6 @@ def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_o
         imagined = Side(eye, side.counts.copy())
         for _ in range(_PICTURES):
             imagined.add(Evidence(k, person, nobody), calibration)
-        seen = size + (p.unmeasured if k and not hypothesis.possible else 0.0)
+        seen = size + (_SIZE if k and away >= p.whole_from and not any(s.sizes for s in hypothesis.sides) else 0.0)
         after += (now * one + (1.0 - now) * none) * entropy(posterior(hypothesis.score + imagined.score, seen, p))
     return entropy(now) - after
