@@ -178,7 +178,7 @@ def _cautious() -> Calibration:
 
     person = table((0.7, 0.4, 0.25, 0.35), (1, 1, 2, 2, 3, 4, 4))
     nobody = table((0.99, 0.98, 0.97, 0.95), (40, 25, 15, 10, 6, 3, 1))
-    return Calibration("any", "", 0.8, 0.5, person, nobody)
+    return Calibration("any", "", 0.8, 0.8, person, nobody)
 
 
 CAUTIOUS = _cautious()

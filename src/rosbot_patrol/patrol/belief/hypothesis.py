@@ -202,8 +202,12 @@ class Hypothesis:
         return self.spread + np.eye(2) * (walked / 3.0) ** 2
 
     def move(self, place: Array, spread: Array, now: float, params: BeliefParams) -> None:
-        """Take a measured place with its covariance (a Kalman update)."""
-        before = self.spread_at(now, params)
+        """Take a measured place with its covariance (a Kalman update).
+
+        A person who walks goes on in one direction: so the distance walked is one standard deviation here, not three.
+        """
+        walked = min(params.speed * max(now - self.at, 0.0), params.walked_most)
+        before = self.spread + np.eye(2) * walked**2
         gain = before @ np.linalg.inv(before + spread)
         self.place = self.place + gain @ (place - self.place)
         self.spread = (np.eye(2) - gain) @ before

@@ -99,7 +99,7 @@ class Likelihoods:
         """Probability of each outcome with a person and with nobody; their ratio is bounded by `picture_most`."""
         person, nobody = (self.calibration.chances(at, self.threshold, is_person=each) for each in (True, False))
         least = math.exp(-self.params.picture_most)
-        return np.maximum(person, least * nobody), np.maximum(nobody, least * person)
+        return _raised(person, least * nobody), _raised(nobody, least * person)
 
     def _size(self, box: Box) -> tuple[float | None, bool, Veto | None]:
         if self.is_near(box):
@@ -116,6 +116,12 @@ class Likelihoods:
         if m is None or m.has_legs or not _has_size(m) or not (goes_on(box, m) or m.is_cut_aside):
             return False
         return m.top < p.person_top_min and m.width < p.lying_length
+
+
+def _raised(chances: Array, least: Array) -> Array:
+    """Probabilities of boxes of at least so much; the rest is that of none."""
+    boxes = np.maximum(chances[1:], least[1:])
+    return np.concatenate(([1.0 - boxes.sum()], boxes))
 
 
 def is_cut(box: Box, eye: Eye) -> bool:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.belief.belief import Belief
 from rosbot_patrol.patrol.belief.calibration import Condition
-from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, Side, entropy, posterior
+from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, Side, entropy, posterior, urn
 from rosbot_patrol.patrol.belief.likelihoods import Evidence
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
@@ -51,12 +53,14 @@ def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_o
     size = hypothesis.size(p)
     now = posterior(hypothesis.score, size, p)
     after = 0.0
-    for k, (one, none) in enumerate(zip(person, nobody, strict=True)):
-        if one <= 0.0:
-            continue
+    for k in np.flatnonzero(person > 0.0):
+        one, none = (
+            urn(side.counts, int(k), chances, rho)
+            for chances, rho in ((person, calibration.rho_person), (nobody, calibration.rho_nobody))
+        )
         imagined = Side(eye, side.counts.copy())
         for _ in range(_PICTURES):
-            imagined.add(Evidence(k, person, nobody), calibration)
+            imagined.add(Evidence(int(k), person, nobody), calibration)
         seen = size + (_SIZE if k and away >= p.whole_from and not any(s.sizes for s in hypothesis.sides) else 0.0)
         after += (now * one + (1.0 - now) * none) * entropy(posterior(hypothesis.score + imagined.score, seen, p))
     return entropy(now) - after

@@ -1,0 +1,206 @@
+"""The belief over pictures and scans: birth, merge, veto, motion, verdict, second looks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from belief_pictures import EAST, SOUTH, WEST, Seen, box_of, eye_at, open_view
+from floors import TWO_ROOMS, drawn_floor
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.belief.belief import Belief
+from rosbot_patrol.patrol.belief.likelihoods import Veto
+from rosbot_patrol.patrol.belief.second_look import best_second_look, expected_gain
+from rosbot_patrol.patrol.intruder.exclusions import KnownObject
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
+from rosbot_patrol.patrol.records.inputs import Frame
+from rosbot_patrol.patrol.records.mission import Verdict
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
+
+
+def view(pose: Pose2D, way: float = 1.0) -> Viewpoint:
+    return Viewpoint(pose=pose, turn=0.5, gain=0.0, way=way)
+
+
+def track(x: float, y: float, at: float = 0.1, *, has_moved: bool = True) -> LidarTrack:
+    return LidarTrack(first=np.zeros((3, 2)), start=(x - 1.0, y), since=0.0, x=x, y=y, at=at, has_moved=has_moved)
+
+
+def test_a_person_is_confirmed_once_by_some_pictures() -> None:
+    seen = Seen()
+    assert seen.see(WEST, box_of(WEST)) == []
+    (found,) = seen.see(WEST, box_of(WEST), pictures=9)
+    assert found.place.tolist() == pytest.approx([0.0, 0.0], abs=0.05)
+    assert found.best is not None
+    judgement = seen.belief.verdict(floor_seen=False)
+    assert judgement.verdict is Verdict.CONFIRMED
+    assert judgement.of is found
+    assert "a person at about (" in judgement.why
+
+
+def test_an_empty_room_is_clear_if_its_floor_was_seen() -> None:
+    seen = Seen()
+    seen.see(WEST, pictures=20)
+    assert seen.belief.hypotheses == []
+    assert seen.belief.verdict(floor_seen=True).verdict is Verdict.CLEAR
+    assert seen.belief.verdict(floor_seen=False).verdict is Verdict.UNVERIFIED
+
+
+def test_a_miss_lowers() -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST))
+    before = seen.posterior
+    seen.see(WEST)
+    assert seen.posterior < before
+
+
+@pytest.mark.parametrize("yaw", [1.0, 3.0])
+def test_out_of_view_nothing_is_missed(yaw: float) -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST))
+    before = seen.posterior
+    seen.see(Pose2D(-3.0, 0.0, yaw), pictures=10)
+    assert seen.posterior == before
+
+
+def test_behind_something_nothing_is_missed() -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST))
+    before = seen.posterior
+    seen.see(SOUTH, pictures=10, length=1.5)
+    assert seen.posterior == before
+
+
+def test_one_false_box_from_each_of_two_sides_confirms_nobody() -> None:
+    seen = Seen()
+    for eye in (WEST, SOUTH, EAST):
+        assert seen.see(eye, box_of(eye, score=0.5)) == []
+        assert seen.see(eye, pictures=9) == []
+    assert not seen.only.is_confirmed
+
+
+def test_hypotheses_at_one_place_are_merged() -> None:
+    seen = Seen()
+    seen.see(WEST, replace(box_of(WEST, 0.0, 0.0), measured=None))
+    assert len(seen.belief.hypotheses) == 1
+    seen.belief.hypotheses.append(replace(seen.only, number=9, seen_at=-1.0, sides=[]))
+    seen.see(WEST)
+    assert seen.only.number == 1
+
+
+def test_two_of_one_picture_are_not_merged() -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST, 0.0, 0.3), box_of(WEST, 0.0, -0.3), pictures=10)
+    assert len(seen.belief.hypotheses) == 2
+    assert all(h.is_confirmed for h in seen.belief.hypotheses)
+
+
+def test_known_objects_are_vetoed() -> None:
+    seen = Seen(known=(KnownObject(x=0.0, y=0.0, name="statue"),))
+    assert seen.see(WEST, box_of(WEST), pictures=20) == []
+    assert seen.only.veto is Veto.KNOWN
+    assert seen.belief.verdict(floor_seen=True).verdict is Verdict.CLEAR
+
+
+def test_outside_is_vetoed() -> None:
+    seen = Seen(floor=drawn_floor(*TWO_ROOMS))
+    eye = Pose2D(2.0, 2.0, 0.0)
+    assert seen.see(eye, box_of(eye, 16.0, 2.0), pictures=20) == []
+    assert seen.only.veto is Veto.OUTSIDE
+    inside = Seen(floor=drawn_floor(*TWO_ROOMS))
+    assert len(inside.see(eye, box_of(eye, 6.0, 2.0), pictures=20)) == 1
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        Frame(boxes=(box_of(WEST),), eye=eye_at(WEST)),
+        Frame(stamp=1.0, boxes=(box_of(WEST),)),
+        Frame(stamp=1.0, boxes=(box_of(WEST),), eye=eye_at(WEST), is_same=True),
+        Frame(stamp=1.0, boxes=(box_of(WEST),), eye=eye_at(WEST), counts=False),
+        Frame(stamp=-1.0, boxes=(box_of(WEST),), eye=eye_at(WEST)),
+        Frame(stamp=1.0, boxes=(replace(box_of(WEST), label="dog"),), eye=eye_at(WEST)),
+        Frame(stamp=1.0, boxes=(replace(box_of(WEST), probability=0.05),), eye=eye_at(WEST)),
+    ],
+)
+def test_pictures_that_prove_nothing(frame: Frame) -> None:
+    belief = Belief()
+    belief.start(0.0)
+    assert belief.see(frame, open_view(WEST)) == []
+    assert belief.hypotheses == []
+
+
+def test_what_the_lidar_sees_move_is_open_until_the_camera_saw_it() -> None:
+    seen = Seen()
+    seen.belief.motion([track(0.0, 0.0), track(3.0, 3.0, has_moved=False)])
+    assert seen.belief.verdict(floor_seen=True).verdict is Verdict.UNVERIFIED
+    assert "the lidar saw it move" in seen.belief.verdict(floor_seen=True).why
+    seen.see(WEST, pictures=8)
+    seen.see(SOUTH, pictures=8)
+    assert seen.belief.verdict(floor_seen=True).verdict is Verdict.CLEAR
+
+
+def test_motion_makes_a_person_likelier() -> None:
+    still, moving = Seen(), Seen()
+    for seen in (still, moving):
+        seen.see(WEST, box_of(WEST, score=0.3))
+    moving.belief.motion([track(0.1, 0.0, 0.2)])
+    assert moving.posterior > still.posterior
+
+
+def test_start_forgets() -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST), pictures=10)
+    seen.belief.start(100.0)
+    assert seen.belief.hypotheses == []
+    assert seen.see(WEST, box_of(WEST), pictures=3) == []
+
+
+def test_the_number_of_hypotheses_is_bounded() -> None:
+    seen = Seen()
+    for k in range(100):
+        seen.see(WEST, box_of(WEST, 0.1 * k, 0.9 * (k % 3 - 1), score=0.15))
+    assert len(seen.belief.hypotheses) <= 60
+
+
+@given(st.lists(st.tuples(st.floats(-1.0, 2.0), st.floats(-1.0, 1.0), st.floats(0.05, 1.0)), max_size=12))
+def test_a_posterior_is_a_probability(boxes: list[tuple[float, float, float]]) -> None:
+    seen = Seen()
+    for x, y, score in boxes:
+        seen.see(WEST, box_of(WEST, x, y, score=score))
+    for h in seen.belief.hypotheses:
+        assert 0.0 <= seen.belief.posterior(h) <= 1.0
+        assert seen.belief.why(h)
+        assert np.linalg.eigvalsh(h.spread)[0] > 0.0
+
+
+def test_a_second_look_is_from_another_side_once_the_first_has_said_its_word() -> None:
+    seen = Seen()
+    for _ in range(8):
+        seen.see(WEST, box_of(WEST, score=0.15))
+        seen.see(WEST)
+    assert seen.belief.open
+    again, other = view(Pose2D(-2.8, 0.1, 0.0)), view(SOUTH)
+    assert best_second_look(seen.belief, seen.only, [again, other]) is other
+    assert expected_gain(seen.belief, seen.only, SOUTH) > expected_gain(seen.belief, seen.only, again.pose)
+
+
+def test_a_second_look_is_nearer_by_way_or_by_sight() -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST, score=0.3))
+    assert best_second_look(seen.belief, seen.only, [view(SOUTH, way=9.0), view(EAST)]).pose == EAST  # type: ignore[union-attr]
+    assert best_second_look(seen.belief, seen.only, []) is None
+    assert best_second_look(seen.belief, seen.only, [view(Pose2D(-20.0, 0.0, 0.0))]) is None
+
+
+def test_what_was_too_near_is_looked_at_from_farther_off() -> None:
+    seen = Seen()
+    near = Pose2D(-0.6, 0.0, 0.0)
+    seen.see(near, box_of(near, tall=0.5, is_cut_above=True), pictures=5)
+    assert seen.only.is_near_only
+    assert expected_gain(seen.belief, seen.only, Pose2D(0.0, 1.0, -1.57)) == 0.0
+    assert expected_gain(seen.belief, seen.only, SOUTH) > 0.0
