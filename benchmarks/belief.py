@@ -249,18 +249,8 @@ class Row:
         )
 
 
-COLUMNS = (
-    "decision",
-    "visible persons confirmed",
-    "all persons",
-    "false",
-    "clear, visible",
-    "clear, any person",
-    "unverified",
-    "empty unverified",
-    "pictures",
-    "looks",
-)
+COLUMNS = ("decision", "visible persons confirmed", "all persons", "false", "clear, visible", "clear, any person")
+COLUMNS += ("unverified", "empty unverified", "pictures", "looks")
 HEAD = f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}"
 
 

@@ -45,6 +45,7 @@ from rosbot_patrol.simulation.scene.matrices import from_pose2d
 from rosbot_patrol.simulation.sdf.world import load_world
 
 ROOT = Path(__file__).resolve().parent.parent
+MODEL = ROOT / "models" / "house"
 KINDS = ("nobody", "person", "hidden", "dark", "nobody", "person", "dog", "poster", "cat", "hidden")
 STEP_DEG = 4.3  # of a turn at 0.75 rad/s, ten pictures a second
 PERIOD = 0.1  # between two pictures [s]
@@ -103,7 +104,7 @@ class Stage:
         """How far one can look from here."""
         level = self.engine.level_scan()
         found = sight_of_scan(level.scan, compose(self.engine.pose, level.pose), self.floor, 8.0)
-        lengths = [round(float(length), 2) for length in found.lengths]
+        lengths = found.lengths.round(2).tolist()
         return {"x": found.x, "y": found.y, "first": found.first, "step": found.step, "lengths": lengths}
 
     def truth(self, subject: Pose2D | None) -> list[float] | None:
@@ -227,22 +228,15 @@ def put(stage: Stage, kind: str, place: Pose2D, rng: np.random.Generator, number
         posture = str(rng.choice(["", "", "", "sitting", "crouching", "creeping"])) if is_person else ""
         look = str(rng.choice([*LOOKS, "", "", ""])) if is_person else ""
         there = Pose2D(x, y, turned)
-        if not spawn(engine, model, look, there, posture):
+        try:
+            engine.population.spawn_actor(SUBJECT, model, look, there, posture=posture)
+        except WorldError:
             continue
         truth = stage.truth(there)
         if truth is not None and (kind != "hidden" or truth[4] > 300) and (kind != "person" or truth[4] > 500):
             return there
         engine.population.remove(SUBJECT)
     return None
-
-
-def spawn(engine: Engine, model: str, look: str, there: Pose2D, posture: str) -> bool:
-    """Put an actor somewhere; False if there is no room."""
-    try:
-        engine.population.spawn_actor(SUBJECT, model, look, there, posture=posture)
-    except WorldError:
-        return False
-    return True
 
 
 def draw_looks(
@@ -276,7 +270,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--network", action="append", default=[], metavar="NAME=CFG,WEIGHTS[,NAMES]")
     arguments = parser.parse_args()
-    networks = {"house": load_detector(*_house(), ["person", "fire hydrant"], threshold=LOWEST)}
+    networks = {
+        "house": load_detector(f"{MODEL}.cfg", f"{MODEL}.weights", ["person", "fire hydrant"], threshold=LOWEST)
+    }
     for given in arguments.network:
         name, files = given.split("=", 1)
         cfg, weights, *names = files.split(",")
@@ -294,10 +290,6 @@ def main() -> None:
                 sys.stderr.write(f"{world} {number} {kind}{'' if is_there else ': no room'}\n")
             stage.engine.close()
     in_workspace.require_figures([number], "no scene was recorded")
-
-
-def _house() -> tuple[str, str]:
-    return str(ROOT / "models" / "house.cfg"), str(ROOT / "models" / "house.weights")
 
 
 if __name__ == "__main__":
