@@ -133,7 +133,8 @@ def _plain(box: Box) -> dict[str, Any]:
     plain["probability"] = round(box.probability, 4)
     if box.measured is not None:
         kept = {k: round(v, 3) if isinstance(v, float) else v for k, v in plain["measured"].items()}
-        plain["measured"] = {k: v for k, v in kept.items() if v is not None and v is not False}
+        known = ("is_flat", "has_legs")  # False there is not the same as unknown
+        plain["measured"] = {k: v for k, v in kept.items() if v is not None and (v is not False or k in known)}
     return plain
 
 
