@@ -21,6 +21,7 @@ from rosbot_patrol.msg import PatrolState
 
 from rosbot_patrol.ros.campaign.house import House
 from rosbot_patrol.ros.campaign.mail_sink import kept_mails
+from rosbot_patrol.ros.campaign.ports import BRIDGES, free_port
 
 pytestmark = pytest.mark.system
 
@@ -64,7 +65,7 @@ class Speedometer:
 def test_whoever_dies_in_mid_drive_the_base_stands_and_the_patrol_goes_on(master: object, folder: Path) -> None:
     stood: dict[str, float] = {}
     speed = Speedometer()
-    with House(folder, rate=RATE, respawn_delay=2) as house:
+    with House(folder, rate=RATE, bridge_port=free_port(BRIDGES), respawn_delay=2) as house:
         house.wait_ready(90.0)
         house.trigger(ROOM)
         for victim in VICTIMS:

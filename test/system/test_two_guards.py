@@ -16,7 +16,7 @@ from rosbot_patrol.msg import PatrolState
 from rosbot_patrol.alerts.records.query import Query, find_incidents
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.ros.campaign.house import House
-from rosbot_patrol.ros.campaign.ports import free_port
+from rosbot_patrol.ros.campaign.ports import BRIDGES, free_port
 
 pytestmark = pytest.mark.system
 
@@ -34,7 +34,7 @@ class Guard:
 
     def __init__(self, folder: Path, ns: str, **arguments: object) -> None:
         self.ns, self.state_dir = ns, folder / ns / "state"
-        port = free_port()
+        port = free_port(BRIDGES)
         self.house = House(folder / ns, ns=ns, bridge_port=port, rate=2.0, **REDUCED, **arguments)
         bridge = ["rosbot_patrol", "esp_connector.launch"]
         self.bridge = House(folder / f"{ns}-bridge", *bridge, plain=True, __ns=ns, bridge_port=port)

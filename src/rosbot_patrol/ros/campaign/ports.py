@@ -6,13 +6,15 @@ import contextlib
 import random
 import socket
 
+BRIDGES = 3  # of the motion sensors of one house, on consecutive ports
 FIRST, END = 20000, 32768  # Linux assigns ports from END on to connections
 
 
-def free_port() -> int:
-    """Find a free port that Linux does not assign to a connection before the server listens."""
+def free_port(count: int = 1) -> int:
+    """Find consecutive free ports that Linux assigns to no connection before the server listens; returns the first."""
     while True:
-        port = random.SystemRandom().randrange(FIRST, END)
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            probe.bind(("", port))
-            return port
+        first = random.SystemRandom().randrange(FIRST, END - count)
+        with contextlib.ExitStack() as probes, contextlib.suppress(OSError):
+            for port in range(first, first + count):
+                probes.enter_context(socket.socket()).bind(("", port))
+            return first
