@@ -13,9 +13,12 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from rosbot_patrol.alerts.records.database import close_incident, insert_incident, transaction
-from rosbot_patrol.alerts.records.incident import Event, Incident, StoredFile
+from rosbot_patrol.alerts.records import chain
+from rosbot_patrol.alerts.records.chain_file import format_line
+from rosbot_patrol.alerts.records.files import CHAIN, FOLDER, RECORD
+from rosbot_patrol.alerts.records.incident import Event, Incident, StoredFile, incident_to_plain
 from rosbot_patrol.alerts.records.query import Query, find_incidents
+from rosbot_patrol.alerts.records.repair import repair
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.records.verify import verify
 
@@ -27,10 +30,21 @@ REPEATS = 31
 
 
 def measure(count: int = COUNT) -> dict[str, float]:
-    with tempfile.TemporaryDirectory() as folder, IncidentStore(Path(folder), wall=START) as store:
+    with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
-        fill(store, count)
+        fill(Path(folder) / FOLDER, count)
         print(f"{count} incidents made in {time.perf_counter() - began:.0f} s, {size_mb(Path(folder)):.0f} MB")
+        began = time.perf_counter()
+        store = IncidentStore(Path(folder), wall=START)
+        rebuilt = time.perf_counter() - began
+        print(f"index made anew in {rebuilt:.1f} s, {store.path.stat().st_size / 1e6:.0f} MB")
+        store.close_index()
+        began = time.perf_counter()
+        store = IncidentStore(Path(folder), wall=START)
+        print(f"opened with a sound index in {time.perf_counter() - began:.2f} s")
+        began = time.perf_counter()
+        repair(store, wall=START)
+        print(f"looked through for what a crash left in {time.perf_counter() - began:.2f} s")
         now = START + count * STEP
         middle = f"m{count // 2}"
         cases: dict[str, Callable[[], object]] = {
@@ -65,17 +79,22 @@ def measure(count: int = COUNT) -> dict[str, float]:
         done = verify(store, files=False)
         assert done.fits, done.problems
         print(f"verify without files: {time.perf_counter() - began:.1f} s")
+        store.close_index()
     return {"search_100k_ms": round(slowest, 2)}
 
 
-def fill(store: IncidentStore, count: int) -> None:
+def fill(folder: Path, count: int) -> None:
+    """Write the files of so many closed incidents."""
     dice = random.Random(1)
-    for first in range(0, count, 5000):
-        with transaction(store.connection, store.path):
-            for number in range(first, min(first + 5000, count)):
-                incident = make(number, dice)
-                insert_incident(store.connection, incident)
-                close_incident(store.connection, incident, incident.closed or 0.0)
+    links = [chain.make_link((0, chain.START), chain.BEGUN, "", START, chain.canonical({"wall": START}))]
+    for number in range(count):
+        incident = make(number, dice)
+        text = chain.canonical(incident_to_plain(incident))
+        (folder / incident.id).mkdir(parents=True)
+        (folder / incident.id / RECORD).write_text(text, "utf-8")
+        before = (links[-1].n, links[-1].hash)
+        links.append(chain.make_link(before, chain.RECORD, incident.id, incident.closed or 0.0, text))
+    (folder / CHAIN).write_bytes(b"".join(map(format_line, links)))
 
 
 def make(number: int, dice: random.Random) -> Incident:

@@ -203,13 +203,13 @@ class AlertError(PatrolError):
 
 
 class StoreError(PatrolError):
-    """The incidents' database or folder does not do what it should.
+    """The incidents' files or index do not do what they should.
 
     Args:
-        path: of the database or the file.
+        path: of the file or folder.
         problem: what is wrong with it.
         is_full: the disk has no room, or no more than it may use.
-        is_corrupt: the database is damaged and has to be set aside.
+        is_corrupt: the file is damaged, so that trying again is of no use.
     """
 
     def __init__(self, path: object, problem: str, *, is_full: bool = False, is_corrupt: bool = False) -> None:

@@ -82,10 +82,13 @@ def append_line(path: Path, line: bytes) -> None:
     handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
     try:
         size = os.fstat(handle).st_size
-        if os.write(handle, line) != len(line):
+        try:
+            if os.write(handle, line) != len(line):
+                raise OSError(errno.ENOSPC, "No space left on device", str(path))
+            os.fdatasync(handle)
+        except OSError:
             os.ftruncate(handle, size)
-            raise OSError(errno.ENOSPC, "No space left on device", str(path))
-        os.fdatasync(handle)
+            raise
     finally:
         os.close(handle)
     if is_new:

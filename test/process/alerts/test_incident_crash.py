@@ -5,8 +5,8 @@ import subprocess
 import sys
 import time
 
+from rosbot_patrol.alerts.records.opening import open_store
 from rosbot_patrol.alerts.records.repair import close_abandoned, repair
-from rosbot_patrol.alerts.records.salvage import open_store
 from rosbot_patrol.alerts.records.verify import verify
 
 KILLS = 15
@@ -17,7 +17,7 @@ from pathlib import Path
 from rosbot_patrol.alerts.records.incident import Event, Incident
 from rosbot_patrol.alerts.records.files import NewFile
 from rosbot_patrol.alerts.records.repair import close_abandoned, repair
-from rosbot_patrol.alerts.records.salvage import open_store
+from rosbot_patrol.alerts.records.opening import open_store
 
 def say(*words):
     print(*words, flush=True)
@@ -57,7 +57,7 @@ def write_and_kill(folder, number, seconds):
     return [tuple(line.split()) for line in lines[1:] if line.endswith("\n")]
 
 
-def test_a_kill_at_any_moment_leaves_a_database_that_verifies(quick_disk):
+def test_a_kill_at_any_moment_leaves_incidents_that_verify(quick_disk):
     dice = random.Random(7)
     said = []
     for number in range(KILLS):
@@ -68,7 +68,7 @@ def test_a_kill_at_any_moment_leaves_a_database_that_verifies(quick_disk):
         assert done.fits, done.problems
         repair(store, wall=1.0)
         _check_all_is_there(store, said)
-        store.close_database()
+        store.close_index()
     store, _ = open_store(quick_disk, wall=1.0)
     close_abandoned(store, [], wall=1.0)
     done = verify(store)

@@ -8,11 +8,13 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 
 from rosbot_patrol.alerts.pictures.jpeg import RawPicture
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams, EvidenceRing
+from rosbot_patrol.alerts.records import store as store_module
 from rosbot_patrol.alerts.records.files import NewFile
 from rosbot_patrol.alerts.records.incident import Event, Incident
 from rosbot_patrol.alerts.records.retention import RetentionParams
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.records.verify import verify
+from rosbot_patrol.errors import StoreError
 from rosbot_patrol.patrol.story.mission_log import Entry
 from rosbot_patrol.ros.patrol.incident_keeper import IncidentKeeper
 from rosbot_patrol.ros.runtime.diagnostics import ERROR, OK, WARN
@@ -187,17 +189,38 @@ def test_a_disk_that_is_gone_is_told_and_nothing_is_lost(house, caplog):
     assert house.health.told[-1][0] == OK
 
 
-def test_a_database_that_is_damaged_while_the_robot_runs_is_set_aside(house, caplog):
+def test_an_index_that_is_damaged_while_the_robot_runs_is_made_anew(house, caplog, monkeypatch):
+    house.mission("a")
+    house.keeper.step()
+    (house.folder / "incidents" / "index.sqlite").write_bytes(b"damaged!" * 2000)
+    house.mission("b")
+    with monkeypatch.context() as patch:  # SQLite notices it when its cache does not have the page
+        patch.setattr(store_module, "put_incident", fail)
+        for _ in range(3):
+            house.keeper.step()
+    assert house.health.told[-1][0] == ERROR
+    house.mission("c")
+    for _ in range(3):
+        house.keeper.step()
+    assert house.keeper.is_written
+    assert "it was made anew of the files: " in caplog.text
+    assert list(house.check()) == ["a", "b", "c"]
+    assert house.check()["b"].path == ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0))  # nothing twice
+
+
+def fail(*_of):
+    raise StoreError("index.sqlite", "database disk image is malformed", is_corrupt=True)
+
+
+def test_a_database_of_version_1_0_is_taken_over(house, caplog):
     house.mission("a")
     house.keeper.step()
     house.keeper._forget_store()
-    path = house.folder / "incidents.sqlite"
-    path.write_bytes(b"damaged" * 2000)
+    (house.folder / "incidents.sqlite").write_bytes(b"damaged" * 2000)
     house.mission("b")
     house.keeper.step()
     assert "it was set aside as incidents.sqlite.broken-" in caplog.text
-    assert list(house.check()) == ["b"]
-    assert len(list(house.folder.glob("incidents.sqlite.broken-*"))) == 1
+    assert list(house.check()) == ["a", "b"]
 
 
 @pytest.fixture

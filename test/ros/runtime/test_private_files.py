@@ -38,6 +38,7 @@ def make(folder, *names, of=0o644):
 OURS = (
     "outbox/status.json", "outbox/sent/000000000001-a.notice", "incidents/m1/best-1.jpg", "held/b.notice",
     "patrol.json", "calls.jsonl", "ignored.old.jsonl", "incidents.sqlite", "incidents.sqlite-wal",
+    "incidents.sqlite.imported", "incidents/chain.jsonl", "incidents/index.sqlite",
     "incidents.sqlite.broken-1", "alive", "incidents.reserve", "sensors.json", "stop.json.broken", "mail/new/a",
     "mail/cur/b", "mail/tmp/c", ".patrol.json.7.tmp",
 )  # fmt: skip

@@ -1,21 +1,35 @@
-"""The folders of incidents: one each, for pictures and reports. A file is whole or not there."""
+"""The folders of incidents: one each, for the record, pictures and reports. A file is whole or not there."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rosbot_patrol.alerts.records.database import errors_of
-from rosbot_patrol.alerts.records.incident import StoredFile, is_name
+from rosbot_patrol.alerts.records import chain
+from rosbot_patrol.alerts.records.disk_errors import errors_of
+from rosbot_patrol.alerts.records.incident import (
+    Incident,
+    StoredFile,
+    incident_from_plain,
+    incident_to_plain,
+    is_name,
+)
+from rosbot_patrol.errors import StoreError
 from rosbot_patrol.files import sync_folder, write_whole
 
+FOLDER = "incidents"
+CHAIN = "chain.jsonl"
+RECORD = "record.json"
 REPORT = "report.html"  # made of the record, not part of it
 
+_OWN = re.compile(r"record\.json.*|amendment-\d+\.json|report\.html")  # files that no record names
 _SCRATCH = re.compile(r"\..+\.tmp")
 
 
@@ -60,8 +74,21 @@ class IncidentFolder:
 
     def write(self, incident_id: str, files: Iterable[NewFile]) -> None:
         """Bring files to the disk, all of them before it returns. Raises StoreError, then some may be there."""
+        self._write(incident_id, {file.name: file.data for file in files})
+
+    def write_record(self, incident_id: str, incident: Incident) -> str:
+        """Replace the record of an incident; returns its text, the one that is hashed. Raises StoreError."""
+        text = chain.canonical(incident_to_plain(incident))
+        self._write(incident_id, {RECORD: text.encode("utf-8")})
+        return text
+
+    def write_amendment(self, incident_id: str, n: int, text: str) -> None:
+        """Keep the body of an amendment, link `n` of the chain. Raises StoreError."""
+        self._write(incident_id, {amendment_name(n): text.encode("utf-8")})
+
+    def _write(self, incident_id: str, files: Mapping[str, bytes]) -> None:
         folder = self.path(incident_id)
-        paths = [(self.path(incident_id, file.name), file.data) for file in files]
+        paths = [(self.path(incident_id, name), data) for name, data in files.items()]
         with errors_of(folder):
             is_new = not folder.exists()
             folder.mkdir(parents=True, exist_ok=True)
@@ -71,8 +98,52 @@ class IncidentFolder:
             if is_new:
                 sync_folder(self.root)
 
+    def text(self, incident_id: str, name: str = RECORD) -> str | None:
+        """The text of a record or an amendment; None if there is none.
+
+        Raises:
+            StoreError: it cannot be read; `is_corrupt` if it is no text.
+        """
+        path = self.path(incident_id, name)
+        with errors_of(path):
+            try:
+                return path.read_bytes().decode("utf-8")
+            except FileNotFoundError:
+                return None
+            except UnicodeDecodeError as err:
+                raise _senseless(path, err) from err
+
+    def record(self, incident_id: str) -> Incident | None:
+        """The record of an incident; None if there is none.
+
+        Raises:
+            StoreError: it cannot be read; `is_corrupt` if it makes no sense or is that of another incident.
+        """
+        text = self.text(incident_id)
+        return None if text is None else self.parse(incident_id, text)
+
+    def parse(self, incident_id: str, text: str) -> Incident:
+        """The record of a text. Raises StoreError, `is_corrupt`."""
+        path = self.path(incident_id, RECORD)
+        try:
+            incident = incident_from_plain(json.loads(text))
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as err:
+            raise _senseless(path, err) from err
+        if incident.id != incident_id:
+            raise StoreError(path, f"holds the record of {incident.id!r}; see 'incidents verify'", is_corrupt=True)
+        return incident
+
+    def set_aside(self, incident_id: str, wall: float) -> str:
+        """Rename a damaged record, so that a new one can take its place; returns the new name. Raises StoreError."""
+        path = self.path(incident_id, RECORD)
+        with errors_of(path):
+            aside = free_name(path, f"broken-{time_stamp(wall)}")
+            path.rename(aside)
+            sync_folder(path.parent)
+        return aside.name
+
     def names(self, incident_id: str) -> Iterator[str]:
-        """The files that are there, without those that a crash left half written (they are removed)."""
+        """The pictures that are there, without those that a crash left half written (they are removed)."""
         folder = self.path(incident_id)
         with errors_of(folder):
             if not folder.is_dir():
@@ -80,7 +151,7 @@ class IncidentFolder:
             for entry in sorted(folder.iterdir()):
                 if _SCRATCH.fullmatch(entry.name):
                     entry.unlink(missing_ok=True)
-                elif entry.is_file() and is_name(entry.name):
+                elif entry.is_file() and is_name(entry.name) and not is_own(entry.name):
                     yield entry.name
 
     def ids(self) -> set[str]:
@@ -113,3 +184,28 @@ class IncidentFolder:
         if hashlib.sha256(data).hexdigest() != file.sha256:
             return f"the file {file.name} is not the one that was kept: it was changed"
         return ""
+
+
+def amendment_name(n: int) -> str:
+    """The file with the body of an amendment, link `n` of the chain."""
+    return f"amendment-{n}.json"
+
+
+def is_own(name: str) -> bool:
+    """Whether the store itself keeps a file of this name in an incident's folder."""
+    return bool(_OWN.fullmatch(name))
+
+
+def time_stamp(wall: float) -> str:
+    """A time [s since 1970] for the name of a file."""
+    return time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(wall))
+
+
+def free_name(path: Path, ending: str) -> Path:
+    """A name beside a file that nothing has yet."""
+    names = (path.with_name(f"{path.name}.{ending}{more}") for more in ("", *(f"-{i}" for i in range(2, 1000))))
+    return next(name for name in names if not name.exists())
+
+
+def _senseless(path: Path, err: Exception) -> StoreError:
+    return StoreError(path, f"makes no sense: {err!r}; see 'incidents verify'", is_corrupt=True)

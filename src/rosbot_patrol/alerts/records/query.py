@@ -6,7 +6,8 @@ import sqlite3
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rosbot_patrol.alerts.records.database import clean, errors_of, person_tag, room_tag, verdict_tag
+from rosbot_patrol.alerts.records.disk_errors import errors_of
+from rosbot_patrol.alerts.records.index import clean, person_tag, room_tag, verdict_tag
 
 _NO_ROW = 1 << 62
 _ORDERED = "FROM incidents INDEXED BY incidents_in_order WHERE late = 0"

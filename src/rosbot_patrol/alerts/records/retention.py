@@ -14,7 +14,7 @@ from enum import Enum
 from pathlib import Path
 
 from rosbot_patrol.alerts.disk_reserve import DiskReserve
-from rosbot_patrol.alerts.records.database import errors_of
+from rosbot_patrol.alerts.records.disk_errors import errors_of
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.counts import count_of
 from rosbot_patrol.errors import StoreError
@@ -25,7 +25,8 @@ DAY = 86_400.0
 ALWAYS_KEPT = 100  # the newest of each verdict stay, however old
 AT_ONCE = 200  # removals in one go, so that other work is not held up
 _ORDER = (("clear",), ("unreachable", "unverified", ""), ("confirmed",))
-_RESERVE_BYTES = 2 * MB  # the database needs it to write down a removal
+_BYTES = "bytes + record_bytes"  # of the pictures and of the record
+_RESERVE_BYTES = 2 * MB  # the chain and the index need it to write down a removal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +66,7 @@ class Pruned:
 
     Attributes:
         ids: in order of removal.
-        bytes: size of their files and rows [bytes].
+        bytes: size of their files [bytes].
         reason: None if nothing had to go.
         why: the reason for people.
         is_done: nothing more has to go.
@@ -143,12 +144,12 @@ def _reserve(state_dir: Path) -> DiskReserve:
 def used_bytes(store: IncidentStore) -> int:
     """What all incidents take on the disk. Raises StoreError."""
     with errors_of(store.path):
-        files = store.connection.execute("SELECT total(bytes) FROM incidents").fetchone()[0]
+        files = store.connection.execute(f"SELECT total({_BYTES}) FROM incidents").fetchone()[0]
         pages, free, size = (
             int(store.connection.execute(f"PRAGMA {name}").fetchone()[0])
             for name in ("page_count", "freelist_count", "page_size")
         )
-        return int(files) + (pages - free) * size
+        return int(files) + store.chain.size + (pages - free) * size
 
 
 def free_bytes(folder: Path) -> int:
@@ -175,8 +176,6 @@ def _remove(store: IncidentStore, victims: Iterator[tuple[str, int]], most: int,
         store.remove(incident_id, wall=wall, why=cut.why)
         ids.append(incident_id)
         freed += size
-    if ids:
-        store.settle()
     return Pruned(ids=tuple(ids), bytes=freed, reason=cut.reason, why=cut.why, is_done=len(ids) < most)
 
 
@@ -211,7 +210,7 @@ def _closed_rows(
             "SELECT count(*) FROM incidents WHERE verdict=? AND closed IS NOT NULL", (verdict,)
         ).fetchone()[0]
         rows = store.connection.execute(
-            "SELECT wall, id, bytes FROM incidents WHERE verdict=? AND closed IS NOT NULL AND wall < ?"
+            f"SELECT wall, id, {_BYTES} AS bytes FROM incidents WHERE verdict=? AND closed IS NOT NULL AND wall < ?"
             " ORDER BY wall LIMIT ?",
             (verdict, before, max(min(most, count - spare), 0)),
         )

@@ -1,8 +1,12 @@
-"""Incidents on disk: a database and a folder each. What a call wrote is on the disk when it returns.
+"""Incidents on disk: a folder each, a chain, and an index. What a call wrote is on the disk when it returns.
 
-A file is written before the row that names it, and a record is closed after both: a crash between leaves a file that
-no row names, which `rosbot_patrol.alerts.records.repair` takes into the record. A removal is written to the chain
-before the files go: a crash between leaves files of a removed record, which go at the next start.
+The files are the truth. While a mission runs, `incidents/ID/record.json` is replaced whole by each call. A picture is
+written before the record that names it. On closing, the record is written first, then its link in `chain.jsonl`. A
+removal is written to the chain before the files go. `rosbot_patrol.alerts.records.repair` mends what a crash left in
+between.
+
+The index comes last. A call whose files are written does not fail because of it: the next call brings it up to date,
+and a start makes it anew if need be.
 
 One process writes records (the patrol); others may read, and prune. Not for several threads at once.
 """
@@ -10,6 +14,7 @@ One process writes records (the patrol); others may read, and prune. Not for sev
 from __future__ import annotations
 
 import json
+import logging
 import sqlite3
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -18,82 +23,98 @@ from pathlib import Path
 from typing import Any
 
 from rosbot_patrol.alerts.records import chain
-from rosbot_patrol.alerts.records.database import (
-    BUSY_TIMEOUT,
-    FOLDER,
-    WORDS,
-    append_link,
-    close_incident,
-    database_path,
-    errors_of,
-    head_of,
-    insert_event,
-    insert_file,
-    insert_incident,
-    open_for_reading,
-    open_for_writing,
-    record_from_json,
-    transaction,
-    update_incident,
-)
-from rosbot_patrol.alerts.records.files import IncidentFolder, NewFile
-from rosbot_patrol.alerts.records.incident import Event, Incident, StoredFile, is_name
+from rosbot_patrol.alerts.records.chain_file import ChainFile
+from rosbot_patrol.alerts.records.disk_errors import errors_of
+from rosbot_patrol.alerts.records.files import CHAIN, FOLDER, IncidentFolder, NewFile, amendment_name, is_own
+from rosbot_patrol.alerts.records.incident import Event, Incident, is_name
+from rosbot_patrol.alerts.records.index import NAME as INDEX
+from rosbot_patrol.alerts.records.index import put_incident, transaction
+from rosbot_patrol.alerts.records.indexing import Found, catch_up, open_for_reading, open_for_writing
 from rosbot_patrol.errors import StoreError
+
+log = logging.getLogger(__name__)
+
+MAX_EVENTS = 2000  # of one record
+OLD_DATABASE = "incidents.sqlite"  # of version 1.0, see rosbot_patrol.alerts.records.import_1_0
+
+
+def has_incidents(state_dir: Path) -> bool:
+    """Whether a folder holds incidents."""
+    return (state_dir / FOLDER / CHAIN).is_file()
 
 
 class IncidentStore:
     """The incidents of a folder.
 
     Args:
-        state_dir: holds the database and the incidents' folders.
-        wall: now, seconds since 1970, for the chain of a new database.
+        state_dir: holds the folder with the incidents.
+        wall: now, seconds since 1970, for a new chain.
         read_only: nothing is written, and nothing made.
+        why: for a new chain: why the one before it ended, "" if there was none.
+
+    Attributes:
+        found: what opening found in the files.
 
     Raises:
-        StoreError: the database cannot be used; `is_corrupt` where another begin at it would not help either (see
-            rosbot_patrol.alerts.records.salvage).
+        StoreError: the incidents cannot be used; `is_corrupt` if the chain holds no link that makes sense.
     """
 
-    def __init__(self, state_dir: Path, *, wall: float = 0.0, read_only: bool = False) -> None:
+    def __init__(self, state_dir: Path, *, wall: float = 0.0, read_only: bool = False, why: str = "") -> None:
         self.state_dir = state_dir
-        self.path, self.later_version = database_path(state_dir)
         self.folder = IncidentFolder(state_dir / FOLDER)
-        self.connection = (open_for_reading if read_only else open_for_writing)(self.path)
-        self._is_settled = read_only  # a kill may have left something in the WAL
-        if not read_only and self.head() == (0, chain.START):
-            with transaction(self.connection, self.path):
-                append_link(self.connection, chain.BEGUN, "", wall, {"wall": wall})
-            self.settle()
+        self.chain = ChainFile(self.folder.root / CHAIN)
+        self.path = self.folder.root / INDEX
+        self.found = Found()
+        self._unlisted: dict[str, tuple[Incident, int]] = {}  # open records that the index has to take yet
+        self._is_behind = False
+        self._connection: sqlite3.Connection | None = None
+        if read_only:
+            self._check()
+        else:
+            self._connection = self._open(wall, why)
+
+    def _check(self) -> None:
+        if self.chain.path.exists():
+            return
+        old = self.state_dir / OLD_DATABASE
+        if old.exists():
+            raise StoreError(old, "is of version 1.0; the patrol takes its incidents over when it starts")
+        raise StoreError(self.chain.path, "there is none; the patrol makes it when it starts")
+
+    def _open(self, wall: float, why: str) -> sqlite3.Connection:
+        with errors_of(self.folder.root):
+            self.folder.root.mkdir(parents=True, exist_ok=True)
+        with self.chain.locked(is_made=True):
+            cut = self.chain.cut_tail()
+            if cut:
+                self.found.said.append(
+                    f"{self.chain.path} ended in {cut} bytes of a link that was cut off; they are gone"
+                )
+            if self.chain.head() == (0, chain.START):
+                if self.chain.size:
+                    raise StoreError(self.chain.path, "holds no link that makes sense", is_corrupt=True)
+                body = {"wall": wall, "why": why} if why else {"wall": wall}
+                self.chain.append(chain.BEGUN, "", wall, chain.canonical(body))
+            return open_for_writing(self.folder, self.chain, self.found)
 
     def __enter__(self) -> IncidentStore:
         return self
 
     def __exit__(self, *_of: object) -> None:
-        self.close_database()
+        self.close_index()
 
-    def close_database(self) -> None:
-        """Let go of the file."""
-        with suppress(StoreError):  # the last one that closes it does the same
-            self.settle()
-        self.connection.close()
+    @property
+    def connection(self) -> sqlite3.Connection:
+        """The index. Raises StoreError."""
+        if self._connection is None:
+            self._connection = open_for_reading(self.folder, self.chain)
+        return self._connection
 
-    def settle(self) -> bool:
-        """Move finished records from the WAL into the database, so that the loss of a WAL does not lose them.
-
-        Returns:
-            Whether that is done; somebody who reads for long holds it up.
-
-        Raises:
-            StoreError: the disk does not take it.
-        """
-        if not self._is_settled:
-            with errors_of(self.path):
-                self.connection.execute("PRAGMA busy_timeout=0")  # do not wait for readers
-                try:
-                    self._is_settled = not self.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]
-                finally:
-                    self.connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT * 1000:.0f}")
-        return self._is_settled
+    def close_index(self) -> None:
+        """Let go of the index."""
+        if self._connection is not None:
+            with suppress(sqlite3.Error):
+                self._connection.close()
 
     # -- a record while its mission runs
 
@@ -101,11 +122,10 @@ class IncidentStore:
         """Open a record, unless the id is known already. Raises StoreError, or ValueError for a bad id."""
         if not is_name(incident.id):
             raise ValueError(f"{incident.id!r} is no id for an incident")
-        with transaction(self.connection, self.path):
-            insert_incident(self.connection, replace(incident, closed=None, events=(), files=()))
-            for event in incident.events:
-                insert_event(self.connection, incident.id, event)
-        self._is_settled = False
+        self._mend_index()
+        if self.folder.text(incident.id) is None:
+            events = _limited((), incident.events)
+            self._write_open(replace(incident, closed=None, events=events, files=()))
 
     def record(self, incident_id: str, *, add: Iterable[Event] = (), **changes: Any) -> None:
         """Add to an open record, all or nothing. Raises StoreError, also if it is not open.
@@ -115,22 +135,28 @@ class IncidentStore:
             add: events.
             changes: fields with a new value, such as `times`.
         """
-        with transaction(self.connection, self.path):
-            incident = self._open(incident_id)
-            if changes:
-                update_incident(self.connection, replace(incident, **changes))
-            for event in add:
-                insert_event(self.connection, incident_id, event)
+        self._mend_index()
+        kept = self._open_record(incident_id)
+        self._write_open(replace(kept, **changes, events=_limited(kept.events, tuple(add))))
 
     def add_files(self, incident_id: str, files: Iterable[NewFile]) -> None:
         """Keep files of an open record; a name that is known gets the new content. Raises StoreError, ValueError."""
         files = list(files)
-        self._open(incident_id)
+        for file in files:
+            if is_own(file.name):
+                raise ValueError(f"{file.name!r} is no name for a file of a record")
+        self._mend_index()
+        kept = self._open_record(incident_id)
+        if not files:
+            return
         self.folder.write(incident_id, files)
-        with transaction(self.connection, self.path):
-            self._open(incident_id)
-            for file in files:
-                insert_file(self.connection, incident_id, file.stored())
+        known = {file.name: file for file in kept.files}
+        self._write_open(replace(kept, files=tuple((known | {file.name: file.stored() for file in files}).values())))
+
+    def rewrite(self, incident: Incident) -> None:
+        """Replace an open record, after a crash. Raises StoreError."""
+        self._open_record(incident.id)
+        self._write_open(incident)
 
     def close(self, incident_id: str, *, wall: float, **changes: Any) -> Incident:
         """Complete a record: from here on it is in the chain, and never changed again.
@@ -146,82 +172,65 @@ class IncidentStore:
         Raises:
             StoreError: the disk does not take it, or there is no such record.
         """
-        kept = self.get(incident_id)
-        if kept is None:
-            raise StoreError(self.path, f"there is no incident '{incident_id}'")
-        if kept.closed is not None:
-            return kept
-        incident = replace(kept, **changes, closed=wall)
-        with transaction(self.connection, self.path):
-            close_incident(self.connection, incident, wall)
-        self._is_settled = False
-        self.settle()
-        return incident
+        with self.chain.locked():
+            self._update_index()
+            text = self.folder.text(incident_id)
+            if text is None:
+                raise StoreError(self.chain.path, f"there is no incident '{incident_id}'")
+            kept = self.folder.parse(incident_id, text)
+            if kept.closed is None:
+                kept = replace(kept, **changes, closed=wall)
+                text = self.folder.write_record(incident_id, kept)
+            elif self._is_linked(incident_id):
+                return kept
+            self.chain.append(chain.RECORD, incident_id, kept.closed or wall, text)
+            self._follow()
+        return kept
 
     # -- afterwards
 
     def amend(self, incident_id: str, *, wall: float, text: str, data: Mapping[str, Any] | None = None) -> None:
         """Add something to a closed record: to the chain, as the record itself stays. Raises StoreError."""
-        with transaction(self.connection, self.path):
-            row = self._row(incident_id)
-            if row is None or row["closed"] is None:
-                raise StoreError(self.path, f"there is no closed incident '{incident_id}' to add to")
-            body = {"text": text, "data": dict(data or {})}
-            append_link(self.connection, chain.AMENDMENT, incident_id, wall, body)
-            words = f"{row['words']} {text}"[:WORDS]
-            self.connection.execute("UPDATE incidents SET words=? WHERE id=?", (words, incident_id))
-        self._is_settled = False
-        self.settle()
+        with self.chain.locked():
+            self._update_index()
+            if not self._is_linked(incident_id):
+                raise StoreError(self.chain.path, f"there is no closed incident '{incident_id}' to add to")
+            body = chain.canonical({"text": text, "data": dict(data or {})})
+            self.folder.write_amendment(incident_id, self.head()[0] + 1, body)
+            self.chain.append(chain.AMENDMENT, incident_id, wall, body)
+            self._follow()
 
     def remove(self, incident_id: str, *, wall: float, why: str) -> None:
         """Forget a closed record and its files; its digest stays in the chain. Raises StoreError."""
-        with transaction(self.connection, self.path):
-            row = self._row(incident_id)
-            if row is None or row["closed"] is None:
-                raise StoreError(self.path, f"there is no closed incident '{incident_id}' to remove")
+        with self.chain.locked():
+            row = self._row(incident_id)  # on a full disk the index may be behind, and room is what is wanted
+            if row is None or row["link"] is None:
+                raise StoreError(self.chain.path, f"there is no closed incident '{incident_id}' to remove")
             body = {"why": why, "verdict": row["verdict"], "wall": row["wall"]}
-            append_link(self.connection, chain.REMOVAL, incident_id, wall, body)
-            self.connection.execute(
-                "UPDATE links SET body=NULL WHERE incident=? AND kind IN (?, ?)",
-                (incident_id, chain.RECORD, chain.AMENDMENT),
-            )
-            self.connection.execute("DELETE FROM incidents WHERE id=?", (incident_id,))
-        self._is_settled = False  # `settle` after the last one
+            self.chain.append(chain.REMOVAL, incident_id, wall, chain.canonical(body))
+            self._follow()
         self.folder.remove(incident_id)
-        with errors_of(self.path):
-            self.connection.execute("PRAGMA incremental_vacuum(64)").fetchall()
 
     # -- reading
 
     def get(self, incident_id: str) -> Incident | None:
         """A record, open or closed; None if there is none. Raises StoreError."""
-        with errors_of(self.path):
-            row = self._row(incident_id)
-            if row is None:
-                return None
-            if row["closed"] is not None:
-                body = self.connection.execute("SELECT body FROM links WHERE n=?", (row["link"],)).fetchone()
-                return record_from_json(self.path, incident_id, body["body"] if body else None)
-            incident = record_from_json(self.path, incident_id, row["record"])
-            return replace(incident, events=self._events(incident_id), files=self._files(incident_id))
+        return self.folder.record(incident_id) if is_name(incident_id) else None
 
     def amendments(self, incident_id: str) -> tuple[Event, ...]:
         """What was added to a closed record. Raises StoreError."""
-        with errors_of(self.path):
-            rows = self.connection.execute(
-                "SELECT wall, body FROM links WHERE incident=? AND kind=? AND body IS NOT NULL ORDER BY n",
-                (incident_id, chain.AMENDMENT),
-            ).fetchall()
-        bodies = [(row["wall"], json.loads(row["body"])) for row in rows]
-        return tuple(Event(wall=wall, kind="note", text=b["text"], data=b["data"]) for wall, b in bodies)
+        notes = []
+        for link in self._links(incident_id, chain.AMENDMENT):
+            body = self.folder.text(incident_id, amendment_name(link.n))
+            if body is not None:
+                path = self.folder.path(incident_id, amendment_name(link.n))
+                notes.append(_note(path, link.wall, body))
+        return tuple(notes)
 
     def link(self, incident_id: str) -> chain.Link | None:
-        """The link of a closed record. Raises StoreError."""
-        with errors_of(self.path):
-            row = self.connection.execute(
-                "SELECT * FROM links WHERE incident=? AND kind=? ORDER BY n LIMIT 1", (incident_id, chain.RECORD)
-            ).fetchone()
-        return chain.Link(**dict(row)) if row else None
+        """The link of a closed record, with the record's text as its body. Raises StoreError."""
+        links = self._links(incident_id, chain.RECORD)
+        return replace(links[-1], body=self.folder.text(incident_id)) if links else None
 
     def open_ids(self) -> tuple[str, ...]:
         """The records that are not closed, the oldest first. Raises StoreError."""
@@ -231,34 +240,64 @@ class IncidentStore:
 
     def head(self) -> tuple[int, str]:
         """Number and hash of the chain's last link; (0, START) before the first. Raises StoreError."""
-        with errors_of(self.path):
-            return head_of(self.connection)
+        return self.chain.head()
 
-    # -- rows
+    # -- files and rows
+
+    def _open_record(self, incident_id: str) -> Incident:
+        kept = self.get(incident_id)
+        if kept is None or kept.closed is not None:
+            state = "is closed" if kept else "is not there"
+            where = self.folder.root
+            raise StoreError(where, f"the incident '{incident_id}' {state}, so that nothing can be added to it")
+        return kept
+
+    def _write_open(self, incident: Incident) -> None:
+        text = self.folder.write_record(incident.id, incident)
+        self._unlisted[incident.id] = (incident, len(text))
+        self._follow()
+
+    def _follow(self) -> None:
+        """Bring the index up to date; a failure is for the next call, as the files are written."""
+        self._is_behind = True
+        try:
+            self._update_index()
+        except StoreError as err:
+            log.warning("the index of the incidents is behind: %s", err)
+
+    def _mend_index(self) -> None:
+        if self._is_behind:
+            self._update_index()
+
+    def _update_index(self) -> None:
+        with transaction(self.connection, self.path):
+            for incident, size in self._unlisted.values():
+                put_incident(self.connection, incident, size)
+            catch_up(self.connection, self.folder, self.chain, self.found)
+        self._unlisted.clear()
+        self._is_behind = False
 
     def _row(self, incident_id: str) -> sqlite3.Row | None:
-        row: sqlite3.Row | None = self.connection.execute(
-            "SELECT * FROM incidents WHERE id=?", (incident_id,)
-        ).fetchone()
+        with errors_of(self.path):
+            row: sqlite3.Row | None = self.connection.execute(
+                "SELECT * FROM incidents WHERE id=?", (incident_id,)
+            ).fetchone()
         return row
 
-    def _open(self, incident_id: str) -> Incident:
+    def _is_linked(self, incident_id: str) -> bool:
+        row = self._row(incident_id)
+        return row is not None and row["link"] is not None
+
+    def _links(self, incident_id: str, kind: str) -> list[chain.Link]:
         with errors_of(self.path):
-            row = self._row(incident_id)
-        if row is None or row["closed"] is not None:
-            state = "is closed" if row else "is not there"
-            raise StoreError(self.path, f"the incident '{incident_id}' {state}, so that nothing can be added to it")
-        return record_from_json(self.path, incident_id, row["record"])
-
-    def _events(self, incident_id: str) -> tuple[Event, ...]:
-        rows = self.connection.execute("SELECT * FROM events WHERE incident=? ORDER BY n", (incident_id,))
-        return tuple(
-            Event(wall=row["wall"], kind=row["kind"], text=row["text"], data=json.loads(row["data"])) for row in rows
-        )
-
-    def _files(self, incident_id: str) -> tuple[StoredFile, ...]:
-        rows = self.connection.execute("SELECT * FROM files WHERE incident=? ORDER BY rowid", (incident_id,))
-        return tuple(StoredFile(**{key: row[key] for key in row.keys() if key != "incident"}) for row in rows)  # noqa: SIM118
+            rows = self.connection.execute(
+                "SELECT n, start, stop FROM links WHERE incident=? AND kind=? ORDER BY n", (incident_id, kind)
+            ).fetchall()
+        found = [(row["n"], self.chain.line(row["start"], row["stop"]).link) for row in rows]
+        for n, link in found:
+            if link is None or link.n != n:
+                raise StoreError(self.chain.path, f"link {n} is not where it was; see 'incidents verify'")
+        return [link for _, link in found if link is not None]
 
 
 def recall_incident(state_dir: Path, incident_id: str) -> Incident | None:
@@ -268,3 +307,20 @@ def recall_incident(state_dir: Path, incident_id: str) -> Incident | None:
             return store.get(incident_id)
     except StoreError:
         return None
+
+
+def _limited(kept: tuple[Event, ...], more: tuple[Event, ...]) -> tuple[Event, ...]:
+    """The events of a record; the one after MAX_EVENTS says that there were more."""
+    events = kept + more
+    if len(kept) > MAX_EVENTS or len(events) <= MAX_EVENTS:
+        return kept if len(kept) > MAX_EVENTS else events
+    text = f"more than {MAX_EVENTS} events came; the others are not kept"
+    return (*events[:MAX_EVENTS], Event(wall=events[MAX_EVENTS].wall, kind="note", text=text))
+
+
+def _note(path: Path, wall: float, body: str) -> Event:
+    try:
+        tree = json.loads(body)
+        return Event(wall=wall, kind="note", text=tree["text"], data=tree["data"])
+    except (ValueError, TypeError, KeyError) as err:
+        raise StoreError(path, f"makes no sense: {err!r}; see 'incidents verify'") from err

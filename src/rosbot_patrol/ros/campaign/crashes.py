@@ -9,9 +9,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from rosbot_patrol.alerts.records.database import NAME
 from rosbot_patrol.alerts.records.incident import Incident
-from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.records.store import IncidentStore, has_incidents
 from rosbot_patrol.alerts.records.verify import verify
 from rosbot_patrol.campaign.crash_ledger import Books, Journal, KeptRecord, balance, everything_killed, next_patrol
 from rosbot_patrol.campaign.crash_plan import plan_crashes
@@ -107,7 +106,7 @@ class CrashCampaign:
 def kept_records(state_dir: Path) -> list[KeptRecord]:
     """The guard's records of its missions. Raises StoreError."""
     incidents: list[Incident | None] = []
-    if (state_dir / NAME).is_file():
+    if has_incidents(state_dir):
         with IncidentStore(state_dir, read_only=True) as store:
             ids = [row["id"] for row in store.connection.execute("SELECT id FROM incidents ORDER BY seq")]
             incidents = [store.get(name) for name in ids]
@@ -125,8 +124,8 @@ def kept_records(state_dir: Path) -> list[KeptRecord]:
 
 
 def _verified(state_dir: Path) -> str | None:
-    """Result of the database check, "" if all is well; None if there is nothing to check."""
-    if not (state_dir / NAME).is_file():
+    """Result of the check of the incidents, "" if all is well; None if there is nothing to check."""
+    if not has_incidents(state_dir):
         return None
     with IncidentStore(state_dir, read_only=True) as store:
         found = verify(store)

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from itertools import dropwhile
 from pathlib import Path
 
-from rosbot_patrol.alerts.records.database import NAME
 from rosbot_patrol.alerts.records.incident import Incident
-from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.records.store import IncidentStore, has_incidents
 from rosbot_patrol.campaign.floor import Floor
 from rosbot_patrol.campaign.houses import load_house
 from rosbot_patrol.campaign.plan import CONFIRMED, Patrol
@@ -201,7 +200,7 @@ def _from_view(there: Presence, heard: Recording) -> Times:
 
 def _kept(state_dir: Path, mission: str | None) -> Incident | None:
     """The guard's own record of a mission, None if there is none."""
-    if mission is None or not (state_dir / NAME).is_file():
+    if mission is None or not has_incidents(state_dir):
         return None
     try:
         with IncidentStore(state_dir, read_only=True) as store:

@@ -18,8 +18,7 @@ from rosbot_patrol.alerts.outbox.delayed_notices import DelayedNotices
 from rosbot_patrol.alerts.outbox.incident_notices import incident_notice, verdict_notice
 from rosbot_patrol.alerts.outbox.notice import Notice
 from rosbot_patrol.alerts.pictures.jpeg import LabelledBox, to_jpeg
-from rosbot_patrol.alerts.records.database import FOLDER
-from rosbot_patrol.alerts.records.files import NewFile
+from rosbot_patrol.alerts.records.files import FOLDER, NewFile
 from rosbot_patrol.alerts.records.incident import Event, Incident
 from rosbot_patrol.alerts.records.store import recall_incident
 from rosbot_patrol.alerts.safe_text import one_line, token

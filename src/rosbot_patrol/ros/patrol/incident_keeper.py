@@ -1,7 +1,7 @@
 """Keeper of the mission records, on a thread of its own: the patrol hands entries over and never waits.
 
 Entries are written in order. Refused writes are retried, and reported in the log and on /diagnostics. On a full disk
-the oldest clear incidents are removed first. A damaged database is set aside and a new one started.
+the oldest clear incidents are removed first. A damaged index is made anew of the files.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from rosbot_patrol.alerts.pictures.album import Album, Sighting
 from rosbot_patrol.alerts.pictures.ring import EvidenceParams
 from rosbot_patrol.alerts.records.files import REPORT, NewFile
 from rosbot_patrol.alerts.records.incident import Event, Incident
+from rosbot_patrol.alerts.records.opening import open_store
 from rosbot_patrol.alerts.records.query import Query, find_incidents
 from rosbot_patrol.alerts.records.repair import close_abandoned, repair
 from rosbot_patrol.alerts.records.retention import Pruned, RetentionParams, keep_reserve, make_room, prune
-from rosbot_patrol.alerts.records.salvage import open_store
 from rosbot_patrol.alerts.records.store import IncidentStore
 from rosbot_patrol.alerts.report.page import write_report
 from rosbot_patrol.counts import count_of
@@ -104,7 +104,7 @@ class IncidentKeeper:
     """Write entries and pictures into the incidents' store.
 
     Args:
-        state_dir: folder of the database and the incidents' folders.
+        state_dir: folder that holds the folder of the incidents.
         pictures: the camera's last pictures.
         health: receives the keeper's health.
         evidence, retention, records: parameters.
@@ -232,7 +232,6 @@ class IncidentKeeper:
             self._close(store, incident_id, self._closing[incident_id])
             del self._closing[incident_id]
         self._tidy(store)
-        store.settle()
         return _BUSY if self._looking or self._closing or self._album.is_waiting else _IDLE
 
     def _open(self) -> IncidentStore:
@@ -319,11 +318,12 @@ class IncidentKeeper:
 
     def _close(self, store: IncidentStore, incident_id: str, closing: _Closing) -> None:
         kept = store.get(incident_id)
-        if kept is None or kept.closed is not None:
+        if kept is None:
             return
         if closing.files is None:
             closing.files = [*self._album.finish(incident_id), *self._map.draw(kept)]
-        store.add_files(incident_id, closing.files)
+        if kept.closed is None:
+            store.add_files(incident_id, closing.files)
         incident = store.close(incident_id, wall=closing.wall)
         if incident.verdict in self._records.report_verdicts:
             write_report(store, incident)
@@ -358,7 +358,7 @@ class IncidentKeeper:
 
     def _forget_store(self) -> None:
         if self._store is not None:
-            self._store.close_database()
+            self._store.close_index()
         self._store = None
 
 

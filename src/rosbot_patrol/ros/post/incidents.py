@@ -21,7 +21,7 @@ from pathlib import Path
 
 from rosgraph.names import get_ros_namespace
 
-from rosbot_patrol.alerts.records.database import errors_of
+from rosbot_patrol.alerts.records.disk_errors import errors_of
 from rosbot_patrol.alerts.records.files import REPORT
 from rosbot_patrol.alerts.records.incident import NO_ROOM, VERDICTS, Incident, Place, clock_text, incident_to_plain
 from rosbot_patrol.alerts.records.query import Found, Query, find_incidents
@@ -49,10 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     use_private_umask()
     state_dir = state_folder(given.state_dir, get_ros_namespace())
     try:
-        IncidentStore(state_dir, read_only=True).close_database()  # no command makes a new one
+        IncidentStore(state_dir, read_only=True).close_index()  # no command makes a new one
         with IncidentStore(state_dir, wall=time.time(), read_only=given.command != "prune") as store:
-            if store.later_version:
-                print(f"(incidents.sqlite is of a later version; this is {store.path.name})", file=sys.stderr)
             status = given.run(store, given)
     except StoreError as err:
         print(f"incidents: {err}", file=sys.stderr)
@@ -205,7 +203,9 @@ def _cells(row: Found, person: _Person) -> tuple[str, ...]:
 def _get(store: IncidentStore, incident_id: str) -> Incident:
     incident = store.get(incident_id)
     if incident is None:
-        raise StoreError(store.path, f"there is no incident '{incident_id}'; 'incidents list' shows those there are")
+        raise StoreError(
+            store.folder.root, f"there is no incident '{incident_id}'; 'incidents list' shows those there are"
+        )
     return incident
 
 

@@ -66,14 +66,15 @@ def test_without_its_picture_it_says_so(tmp_path):
     assert "none" in dict(made.facts)["Picture"]
 
 
-@pytest.mark.parametrize("state", ["no database", "no record", "nobody in the record", "a damaged database"])
+@pytest.mark.parametrize("state", ["no records", "no record", "nobody in the record", "a damaged record"])
 def test_an_intruder_without_a_record_is_told_all_the_same_and_urgently(tmp_path, state):
     if state == "nobody in the record":
         keep(tmp_path, Incident(id=ID, wall=1.0, room_id=3, room_name="kitchen"))
-    elif state != "no database":
+    elif state != "no records":
         keep(tmp_path, Incident(id="other", wall=1.0, room_id=3, room_name="kitchen"))
-    if state == "a damaged database":
-        (tmp_path / "incidents.sqlite").write_bytes(b"damaged" * 5000)
+    if state == "a damaged record":
+        keep(tmp_path)
+        (tmp_path / "incidents" / ID / "record.json").write_bytes(b"damaged" * 5000)
     made = replacement(tmp_path, ID, 1.8e9)
     assert (made.id, made.kind, made.is_urgent) == (ID, "incident", True)
     assert "Somebody was seen" in made.text

@@ -1,12 +1,16 @@
-import dataclasses
-import sqlite3
+import errno
+import hashlib
+import shutil
 
 import pytest
 
 from rosbot_patrol.alerts.records import chain
+from rosbot_patrol.alerts.records.chain_file import ChainFile
 from rosbot_patrol.alerts.records.files import NewFile
 from rosbot_patrol.alerts.records.incident import Event, incident_from_plain, incident_to_plain
+from rosbot_patrol.alerts.records.query import Query, find_incidents
 from rosbot_patrol.alerts.records.store import IncidentStore
+from rosbot_patrol.alerts.records.verify import verify
 from rosbot_patrol.errors import StoreError
 
 ID = "20261121T010203Z-1"
@@ -69,7 +73,7 @@ def test_a_closed_record_takes_amendments_only(store, make_incident):
     ):
         with pytest.raises(StoreError, match="is closed"):
             write()
-    assert not (store.folder.root / ID).exists()
+    assert [path.name for path in (store.folder.root / ID).iterdir()] == ["record.json"]
     store.amend(ID, wall=4.0, text="it was the neighbour", data={"by": "owner"})
     assert store.get(ID) == before
     (added,) = store.amendments(ID)
@@ -88,14 +92,10 @@ def test_a_removed_record_leaves_its_digest(store, make_incident):
     assert store.get("a") is None
     assert not store.folder.path("a").exists()
     assert store.folder.read("b", "a.jpg") == b"jpeg"
-    rows = store.connection.execute("SELECT kind, body IS NULL FROM links ORDER BY n").fetchall()
-    assert [tuple(row) for row in rows] == [
-        ("begun", 0),
-        ("record", 1),
-        ("record", 0),
-        ("amendment", 1),
-        ("removal", 0),
-    ]
+    kinds = ["begun", "record", "record", "amendment", "removal"]
+    assert [line.link.kind for line in store.chain.lines()] == kinds
+    assert "age" in [line.link.body for line in store.chain.lines()][-1]
+    assert not list(store.folder.root.rglob("amendment*"))
 
 
 @pytest.mark.parametrize("name", ["../x", "", ".hidden", "a/b", "a\0b", "ü"])
@@ -117,7 +117,7 @@ def test_strange_texts_are_kept(store, make_incident):
 
 
 def test_too_many_events_are_not_all_kept(store, make_incident, monkeypatch):
-    monkeypatch.setattr("rosbot_patrol.alerts.records.database.MAX_EVENTS", 3)
+    monkeypatch.setattr("rosbot_patrol.alerts.records.store.MAX_EVENTS", 3)
     store.begin(make_incident())
     store.record(ID, add=[Event(wall=float(i), kind="sensor", text=str(i)) for i in range(9)])
     texts = [event.text for event in store.get(ID).events]
@@ -135,7 +135,7 @@ def test_the_chain_goes_on_from_program_to_program(quick_disk, make_incident):
             store.begin(make_incident(id=f"m{i}"))
             store.close(f"m{i}", wall=float(i))
     with IncidentStore(quick_disk) as store:
-        rows = [chain.Link(**dict(row)) for row in store.connection.execute("SELECT * FROM links ORDER BY n")]
+        rows = [line.link for line in store.chain.lines()]
     before = (0, chain.START)
     for link in rows:
         assert chain.link_problem(link, before) == ""
@@ -158,22 +158,84 @@ def test_reading_makes_nothing(quick_disk):
     assert list(quick_disk.iterdir()) == []
 
 
-def test_a_full_disk_is_said_as_such_and_the_record_stays_as_it_was(store, make_incident):
+def test_the_record_of_a_closed_one_is_the_text_that_the_chain_hashed(store, make_incident):
+    store.begin(make_incident(room_name="台所 \ud800"))
+    store.close(ID, wall=2.0)
+    data = (store.folder.path(ID, "record.json")).read_bytes()
+    assert hashlib.sha256(data).hexdigest() == store.link(ID).digest
+    assert store.link(ID).body.encode() == data
+
+
+@pytest.mark.parametrize("name", ["record.json", "amendment-3.json", "report.html", "record.json.broken-1"])
+def test_a_picture_cannot_take_the_place_of_a_record(store, make_incident, name):
     store.begin(make_incident())
-    pages = store.connection.execute("PRAGMA page_count").fetchone()[0]
-    store.connection.execute(f"PRAGMA max_page_count={pages}")
+    with pytest.raises(ValueError, match="is no name"):
+        store.add_files(ID, [picture(name=name)])
+    assert store.get(ID).files == ()
+
+
+def test_a_full_disk_is_said_as_such_and_the_record_stays_as_it_was(store, make_incident, monkeypatch):
+    store.begin(make_incident())
+    monkeypatch.setattr("rosbot_patrol.alerts.records.files.write_whole", refuse)
     with pytest.raises(StoreError) as caught:
         store.record(ID, add=[Event(wall=1.0, kind="note", text="x" * 100_000)])
     assert caught.value.is_full
     assert store.get(ID).events == ()
+    monkeypatch.undo()
     store.record(ID, add=[Event(wall=1.0, kind="note", text="small")])
+    assert len(store.get(ID).events) == 1
 
 
-def test_a_locked_database_waits_and_then_says_so(store, make_incident, quick_disk, monkeypatch):
-    other = sqlite3.connect(store.path, isolation_level=None)
-    other.execute("BEGIN IMMEDIATE")
-    store.connection.execute("PRAGMA busy_timeout=50")
-    with pytest.raises(StoreError, match="locked"):
-        store.begin(make_incident())
-    other.execute("ROLLBACK")
-    store.begin(dataclasses.replace(make_incident()))
+def refuse(*_of):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_closing_that_the_chain_refuses_is_completed_by_the_next_try(store, make_incident, monkeypatch):
+    store.begin(make_incident())
+    monkeypatch.setattr("rosbot_patrol.alerts.records.chain_file.append_line", refuse)
+    for _ in range(2):
+        with pytest.raises(StoreError, match="No space"):
+            store.close(ID, wall=2.0, verdict="clear")
+    monkeypatch.undo()
+    assert store.close(ID, wall=3.0, verdict="confirmed").closed == 2.0
+    assert store.get(ID).verdict == "clear"
+    assert (store.link(ID).wall, store.head()[0]) == (2.0, 2)
+    assert verify(store).fits
+
+
+def test_an_index_that_is_full_holds_up_the_next_call_and_doubles_nothing(store, make_incident):
+    store.begin(make_incident())
+    pages = store.connection.execute("PRAGMA page_count").fetchone()[0]
+    store.connection.execute(f"PRAGMA max_page_count={pages}")
+    store.record(ID, add=[Event(wall=1.0, kind="note", text=" ".join(f"word{i}" for i in range(900)))])
+    assert len(store.get(ID).events) == 1  # the file is written, the index is behind
+    with pytest.raises(StoreError) as caught:
+        store.record(ID, add=[Event(wall=2.0, kind="note", text="more")])
+    assert caught.value.is_full
+    assert len(store.get(ID).events) == 1
+    store.connection.execute("PRAGMA max_page_count=100000")
+    store.record(ID, add=[Event(wall=2.0, kind="note", text="more")])
+    assert [row.id for row in find_incidents(store.connection, store.path, Query(text="word33 more"))] == []
+    assert [row.id for row in find_incidents(store.connection, store.path, Query(text="word33"))] == [ID]
+    assert len(store.get(ID).events) == 2
+
+
+def test_a_chain_that_another_program_holds_is_waited_for_and_then_said(store, make_incident, monkeypatch):
+    monkeypatch.setattr("rosbot_patrol.alerts.records.chain_file.LOCK_TIMEOUT", 0.05)
+    store.begin(make_incident())
+    with (
+        ChainFile(store.chain.path).locked(),
+        pytest.raises(StoreError, match="locked"),
+    ):
+        store.close(ID, wall=2.0)
+    assert store.close(ID, wall=2.0).closed == 2.0
+
+
+def test_a_folder_that_vanishes_is_said(store, make_incident):
+    store.begin(make_incident())
+    shutil.rmtree(store.folder.root)
+    with pytest.raises(StoreError, match="is not there"):
+        store.record(ID, reason="x")
+    with pytest.raises(StoreError, match="No such file"):
+        store.close(ID, wall=2.0)
+    assert not store.folder.root.exists()
