@@ -1,7 +1,7 @@
 """A SHA-256 chain: each link names the digest of its content and the hash of the link before it.
 
 Whoever changes, removes or reorders something afterwards breaks the chain at that place. It holds no secret: somebody
-who can write the database can make the whole chain anew, so that a hash which left the robot (mails and reports carry
+who can write the files can make the whole chain anew, so that a hash which left the robot (mails and reports carry
 the record's) is what it is held against.
 """
 
@@ -25,7 +25,7 @@ class Link:
 
     Attributes:
         n: counts from 1, without gaps.
-        kind: BEGUN (the database), RECORD (an incident was closed), AMENDMENT (to a closed one), REMOVAL (by
+        kind: BEGUN (the chain), RECORD (an incident was closed), AMENDMENT (to a closed one), REMOVAL (by
             retention: the record's and the amendments' bodies are gone, their digests stay).
         incident: its id, "" if the link is about none.
         wall: when, seconds since 1970.
