@@ -76,10 +76,17 @@ class IncidentFolder:
         """Bring files to the disk, all of them before it returns. Raises StoreError, then some may be there."""
         self._write(incident_id, {file.name: file.data for file in files})
 
-    def write_record(self, incident_id: str, incident: Incident) -> str:
-        """Replace the record of an incident; returns its text, the one that is hashed. Raises StoreError."""
+    def write_record(self, incident: Incident, files: Iterable[NewFile] = ()) -> str:
+        """Replace the record of an incident, after some of its files.
+
+        Returns:
+            The text of the record, the one that is hashed.
+
+        Raises:
+            StoreError: the disk does not take it; then some of the files may be there.
+        """
         text = chain.canonical(incident_to_plain(incident))
-        self._write(incident_id, {RECORD: text.encode("utf-8")})
+        self._write(incident.id, {file.name: file.data for file in files} | {RECORD: text.encode("utf-8")})
         return text
 
     def write_amendment(self, incident_id: str, n: int, text: str) -> None:

@@ -215,7 +215,7 @@ def _copy_records(path: Path, store: IncidentStore, wall: float) -> int:
             copied += 1
         for incident in _open_records(old):
             if store.get(incident.id) is None:
-                store.folder.write_record(incident.id, incident)
+                store.folder.write_record(incident)
             copied += 1
     return copied
 

@@ -149,9 +149,8 @@ class IncidentStore:
         kept = self._open_record(incident_id)
         if not files:
             return
-        self.folder.write(incident_id, files)
-        known = {file.name: file for file in kept.files}
-        self._write_open(replace(kept, files=tuple((known | {file.name: file.stored() for file in files}).values())))
+        known = {file.name: file for file in kept.files} | {file.name: file.stored() for file in files}
+        self._write_open(replace(kept, files=tuple(known.values())), files)
 
     def rewrite(self, incident: Incident) -> None:
         """Replace an open record, after a crash. Raises StoreError."""
@@ -180,7 +179,7 @@ class IncidentStore:
             kept = self.folder.parse(incident_id, text)
             if kept.closed is None:
                 kept = replace(kept, **changes, closed=wall)
-                text = self.folder.write_record(incident_id, kept)
+                text = self.folder.write_record(kept)
             elif self._is_linked(incident_id):
                 return kept
             self.chain.append(chain.RECORD, incident_id, kept.closed or wall, text)
@@ -252,8 +251,8 @@ class IncidentStore:
             raise StoreError(where, f"the incident '{incident_id}' {state}, so that nothing can be added to it")
         return kept
 
-    def _write_open(self, incident: Incident) -> None:
-        text = self.folder.write_record(incident.id, incident)
+    def _write_open(self, incident: Incident, files: Iterable[NewFile] = ()) -> None:
+        text = self.folder.write_record(incident, files)
         self._unlisted[incident.id] = (incident, len(text))
         self._follow()
 
