@@ -45,8 +45,6 @@ _OTHERS = (
     "export",
     "catkin_make",
     "arduino-cli",
-    "grep",
-    "sha256sum",
 )
 PROGRAMS = frozenset(_ROS + _OTHERS)
 _MARKER = re.compile(
