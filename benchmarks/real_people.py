@@ -176,18 +176,22 @@ def figures(rows: dict[str, Row], pair: str) -> dict[str, float]:
     return named
 
 
+def rows_of(arguments: argparse.Namespace) -> list[tuple[str, str]]:
+    """Network and second opinion of each row."""
+    pair = [(default_of(arguments.network), arguments.second)] if arguments.second else []
+    return [*((name, "") for name in arguments.network), *pair]
+
+
 def measure(arguments: argparse.Namespace) -> dict[str, Row]:
     """Rows of all networks that are there."""
     import cv2
 
     rows: dict[str, Row] = {}
-    wanted = [(name, "") for name in arguments.network]
-    wanted += [(default_of(arguments.network), arguments.second)] if arguments.second else []
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.npy"
         somebody = next(one.pixels for one in read_set(arguments.people, "coco") if len(one.persons))
         np.save(picture, cv2.resize(somebody, (640, 480)))
-        for name, second in wanted:
+        for name, second in rows_of(arguments):
             row = measure_apart(arguments, name, second, picture)
             if row is not None:
                 rows[label(name, second)] = row
@@ -216,6 +220,9 @@ def main() -> None:
     if arguments.json:
         pair = label(default_of(arguments.network), arguments.second) if arguments.second else ""
         arguments.json.write_text(json.dumps(figures(rows, pair), indent=1) + "\n", encoding="utf-8")
+    missing = [label(*row) for row in rows_of(arguments) if label(*row) not in rows]
+    if missing:
+        sys.exit(f"real_people.py: no figures of: {', '.join(missing)}")
 
 
 if __name__ == "__main__":
