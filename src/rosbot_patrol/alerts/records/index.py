@@ -27,7 +27,7 @@ from rosbot_patrol.alerts.records.disk_errors import errors_of
 from rosbot_patrol.alerts.records.incident import Incident, Place
 from rosbot_patrol.errors import StoreError
 
-VERSION = 1
+VERSION = 2
 APPLICATION_ID = 0x52504958  # "RPIX"
 NAME = "index.sqlite"
 BUSY_TIMEOUT = 5.0  # [s] to wait for another writer
@@ -38,7 +38,7 @@ _ENDINGS = ("", "-wal", "-shm")
 
 _SCHEMA = """
 CREATE TABLE links (
-  n INTEGER PRIMARY KEY, kind TEXT NOT NULL, incident TEXT NOT NULL, start INTEGER NOT NULL, stop INTEGER NOT NULL,
+  start INTEGER PRIMARY KEY, stop INTEGER NOT NULL, n INTEGER NOT NULL, kind TEXT NOT NULL, incident TEXT NOT NULL,
   hash TEXT NOT NULL);
 CREATE INDEX links_incident ON links(incident);
 CREATE TABLE written (n INTEGER NOT NULL);
@@ -196,7 +196,7 @@ def put_incident(connection: sqlite3.Connection, incident: Incident, size: int, 
 
 def put_link(connection: sqlite3.Connection, line: Line, link: chain.Link) -> None:
     """Write where a link lies."""
-    values = (link.n, clean(link.kind), clean(link.incident), line.start, line.stop, clean(link.hash))
+    values = (line.start, line.stop, link.n, clean(link.kind), clean(link.incident), clean(link.hash))
     connection.execute("INSERT OR REPLACE INTO links VALUES (?, ?, ?, ?, ?, ?)", values)
     connection.execute("UPDATE written SET n=max(n, ?)", (link.n,))
 
@@ -211,7 +211,7 @@ def add_words(connection: sqlite3.Connection, incident_id: str, text: str) -> No
 
 def last_line(connection: sqlite3.Connection) -> tuple[int, str, int, int]:
     """Number, hash, start and stop of the last link that the index knows; zeros before the first."""
-    row = connection.execute("SELECT n, hash, start, stop FROM links ORDER BY stop DESC LIMIT 1").fetchone()
+    row = connection.execute("SELECT n, hash, start, stop FROM links ORDER BY start DESC LIMIT 1").fetchone()
     return tuple(row) if row else (0, chain.START, 0, 0)
 
 

@@ -290,7 +290,7 @@ class IncidentStore:
     def _links(self, incident_id: str, kind: str) -> list[chain.Link]:
         with errors_of(self.path):
             rows = self.connection.execute(
-                "SELECT n, start, stop FROM links WHERE incident=? AND kind=? ORDER BY n", (incident_id, kind)
+                "SELECT n, start, stop FROM links WHERE incident=? AND kind=? ORDER BY start", (incident_id, kind)
             ).fetchall()
         found = [(row["n"], self.chain.line(row["start"], row["stop"]).link) for row in rows]
         for n, link in found:

@@ -68,7 +68,7 @@ HARM = {
     "of another version": lambda folder: change(folder, "PRAGMA user_version=99"),
     "of another program": lambda folder: change(folder, "PRAGMA application_id=99"),
     "ahead of the chain": lambda folder: change(
-        folder, "INSERT INTO links VALUES (99, 'record', 'x', 99999, 100000, 'hash')"
+        folder, "INSERT INTO links VALUES (99999, 100000, 99, 'record', 'x', 'hash')"
     ),
     "of another chain": lambda folder: change(folder, "UPDATE links SET hash='another' WHERE n=8"),
 }
@@ -162,3 +162,21 @@ def test_one_record_needs_no_index(quick_disk, make_incident, monkeypatch):
     monkeypatch.setattr("rosbot_patrol.alerts.records.store.open_for_reading", fail)
     with IncidentStore(quick_disk, read_only=True) as store:
         assert store.get("m0").id == "m0"
+
+
+def test_a_write_looks_at_no_row_but_its_own(quick_disk, make_incident):
+    """Among 100,000 records a scan took 35 ms a write."""
+    with IncidentStore(quick_disk) as store:
+        store.begin(make_incident(id="m0"))
+        statements = []
+        store.connection.set_trace_callback(statements.append)
+        store.record("m0", add=[Event(wall=1.0, kind="note", text="x")])
+        store.close("m0", wall=2.0)
+        store.connection.set_trace_callback(None)
+        reads = [
+            words for words in statements if words.startswith(("SELECT", "UPDATE incidents", "INSERT INTO incidents "))
+        ]
+        assert len(reads) > 3
+        for words in reads:
+            plan = [row["detail"] for row in store.connection.execute(f"EXPLAIN QUERY PLAN {words}")]
+            assert not [step for step in plan if "TEMP B-TREE" in step], words
