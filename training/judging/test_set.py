@@ -157,6 +157,11 @@ def _folders(rng: np.random.Generator) -> Texture:
     return Texture(pixels, 0.8)
 
 
+def _wool(rng: np.random.Generator) -> Texture:
+    curls = np.abs(2.0 * smooth_noise(rng, 20, 20) - 1.0)
+    return grey(0.55 + 0.6 * np.sqrt(curls) * (0.9 + 0.1 * rng.random((SIDE, SIDE))), 0.3)
+
+
 _MAKERS: dict[str, Callable[[np.random.Generator], Texture]] = {
     "plaster": _concrete,
     "wood": _herringbone,
@@ -170,4 +175,5 @@ _MAKERS: dict[str, Callable[[np.random.Generator], Texture]] = {
     "denim": _knit,
     "books": _folders,
     "picture": unseen_picture,
+    "fur": _wool,
 }

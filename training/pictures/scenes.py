@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.simulation.actors.looks import HEIGHTS, LOOKS, RESERVED_HEIGHTS, Look, draw_look
-from rosbot_patrol.simulation.actors.people import POSTURES, Posture, hydrant_body, person_body, person_pose_parts
+from rosbot_patrol.simulation.actors.people import (
+    POSTURES,
+    Posture,
+    hip_height,
+    hydrant_body,
+    person_body,
+    person_pose_parts,
+)
 from rosbot_patrol.simulation.actors.pets import PETS, draw_pet, pet_body, pet_pose_parts
 from rosbot_patrol.simulation.render.egl import Light
 from rosbot_patrol.simulation.scene.scene import Body, Material, Matrix, Shape, Visual
@@ -70,12 +77,13 @@ class Scene:
 
 @dataclass
 class Actor:
-    """A person or a hydrant in a picture."""
+    """A person, pet or hydrant in a picture; `posture` is a person's."""
 
     body: Body
     pose: Matrix
     parts: Matrix | None
     extra: list[Body]
+    posture: str = ""
 
 
 def draw_room(rng: Rng, *, shapeless: float = 0.0) -> Scene:
@@ -195,7 +203,9 @@ def draw_actors(
     return actors
 
 
-def draw_person(rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool = False) -> Actor:
+def draw_person(
+    rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool = False, detailed: bool = True
+) -> Actor:
     """A person by chance; a reserved one has a height, colour, mask or posture that training never draws.
 
     Args:
@@ -204,6 +214,7 @@ def draw_person(rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool 
         pose: on the floor, in the world.
         reserved: such a one.
         low: sits or crouches more often.
+        detailed: has a detailed figure, not a plain one.
     """
     look = draw_look(rng) if rng.random() < 0.9 else _named(rng)
     posture: Posture = rng.choice(POSTURES, p=[0.45, 0.30, 0.25] if low else [0.80, 0.12, 0.08]).item()
@@ -211,12 +222,14 @@ def draw_person(rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool 
         look = draw_reserved(rng)
         posture = rng.choice(["standing", "creeping", "sitting", "crouching"], p=[0.55, 0.25, 0.1, 0.1]).item()
     walking = posture == "creeping" or bool(rng.random() < 0.55)
-    parts = person_pose_parts(look, float(rng.random()), walking, posture)
+    look = replace(look, detailed=detailed)
+    phase = float(rng.random())
+    parts = person_pose_parts(look, phase, walking, posture)
     extra: list[Body] = []
     if posture == "sitting" and rng.random() < 0.85:
-        seat = float(parts[0][2, 3]) - 0.09
+        seat = hip_height(look, phase, walking, posture) - 0.09
         extra.append(build(name + "_chair", chair(rng, seat), pose @ placed(-0.05, 0.0)))
-    return Actor(person_body(name, look), pose, parts, extra)
+    return Actor(person_body(name, look), pose, parts, extra, posture)
 
 
 def draw_reserved(rng: Rng) -> Look:

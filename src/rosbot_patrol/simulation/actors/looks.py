@@ -29,6 +29,7 @@ class Look:
         mask: colour of a mask over the whole head, or None; reserved for tests.
         legs: trousers, shorts or skirt; sleeves: long or short; loose: 0 tight to 1 wide clothes.
         coat: the top extends down over the thighs.
+        detailed: a figure of `actors/figure/`, with folds, face and fingers, instead of plain limbs.
     """
 
     name: str = "someone"
@@ -49,6 +50,7 @@ class Look:
     backpack: Colour | None = None
     top_texture: str = ""
     bottom_texture: str = ""
+    detailed: bool = True
 
 
 LOOKS: dict[str, Look] = {

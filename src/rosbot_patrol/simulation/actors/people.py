@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from rosbot_patrol.simulation.actors import people_meshes as parts
+from rosbot_patrol.simulation.actors.figure import person as detailed
 from rosbot_patrol.simulation.actors.looks import LOOKS, Colour, Look, draw_look, is_reserved, look_named
 from rosbot_patrol.simulation.scene.scene import Body, Collision, Material, Matrix, Shape, Visual
 
@@ -24,6 +25,7 @@ __all__ = [
     "LOOKS",
     "Look",
     "draw_look",
+    "hip_height",
     "hydrant_body",
     "is_reserved",
     "look_named",
@@ -35,6 +37,10 @@ __all__ = [
 def person_body(name: str, look: Look | None = None) -> Body:
     """Make a standing person at the world's origin; `person_pose_parts` moves the visuals."""
     look = look or LOOKS["visitor"]
+    if look.detailed:
+        return Body(
+            name=name, kind="person", static=False, visuals=detailed.visuals(look), collisions=_collisions(look)
+        )
     poses = person_pose_parts(look)
     visuals = tuple(
         Visual(shape=shape, pose=pose, material=Material(rgba=(*colour, 1.0), texture=texture))
@@ -52,8 +58,17 @@ def person_pose_parts(look: Look, phase: float = 0.0, walking: bool = False, pos
         walking: whether the legs walk; a creeping person walks stooped.
         posture: posture of the person; "creeping" is reserved for tests.
     """
+    if look.detailed:
+        return detailed.pose_parts(look, phase % 1.0, walking, posture)
     frames = _skeleton(look, _angles(phase % 1.0, walking, posture))
     return np.array([frames[joint] for joint in _joints(look)])
+
+
+def hip_height(look: Look, phase: float = 0.0, walking: bool = False, posture: Posture = "standing") -> float:
+    """Height of a person's hip joints above the floor [m]; the arguments are those of `person_pose_parts`."""
+    if look.detailed:
+        return detailed.hip_height(look, phase % 1.0, walking, posture)
+    return float(_skeleton(look, _angles(phase % 1.0, walking, posture))["pelvis"][2, 3])
 
 
 def hydrant_body(

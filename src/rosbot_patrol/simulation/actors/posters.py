@@ -5,11 +5,13 @@ The picture is the person's own body pressed flat: its colour and outline are a 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rosbot_patrol.simulation.actors.people import Look, person_body
 from rosbot_patrol.simulation.scene.matrices import from_xyz_rpy
-from rosbot_patrol.simulation.scene.scene import Body, Collision, Material, Matrix, Shape, Visual
+from rosbot_patrol.simulation.scene.scene import Body, Collision, Detail, Material, Matrix, Shape, Visual
 from rosbot_patrol.simulation.scene.shapes import triangles_of
 from rosbot_patrol.simulation.scene.slices import Slice, slice_bodies
 
@@ -38,9 +40,18 @@ def _pressed(look: Look) -> list[Visual]:
     for visual in person_body("person", look).visuals:
         vertices, faces = triangles_of(visual.shape)
         placed = vertices @ visual.pose[:3, :3].T + visual.pose[:3, 3]
-        shape = Shape(kind="mesh", vertices=placed * scale + shift, faces=faces)
+        detail = _printed(visual.shape.detail) if visual.shape.detail is not None else None
+        shape = Shape(kind="mesh", vertices=placed * scale + shift, faces=faces, detail=detail)
         parts.append(Visual(shape=shape, material=visual.material))
     return parts
+
+
+def _printed(detail: Detail) -> Detail:
+    """The details on paper: all face along x, with the light of the photograph in their colours."""
+    towards = detail.normals @ (0.8, 0.36, 0.48)
+    colours = detail.colours * (0.75 + 0.25 * np.clip(towards, -1.0, 1.0))[:, None]
+    normals = np.broadcast_to((1.0, 0.0, 0.0), detail.normals.shape)
+    return replace(detail, normals=normals, colours=colours, weights=np.zeros(len(normals)))
 
 
 class PosterFigure:

@@ -6,6 +6,7 @@ Gazebo classic, colours are in the display's colour space: a white face in full 
 
 from __future__ import annotations
 
+import itertools
 import logging
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,25 +16,14 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.render.shaders import sources
+from rosbot_patrol.simulation.render.vertices import MAX_PARTS, VERTEX, Triangles, placed, vertices_of
 from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, SceneRenderer
-from rosbot_patrol.simulation.scene.shapes import mesh_of
 from rosbot_patrol.simulation.scene.textures import SIDE, Texture, standard_textures
 from rosbot_patrol.simulation.sensors import picture_kernels as kernels
 
 log = logging.getLogger(__name__)
 
 Vec3 = tuple[float, float, float]
-MAX_PARTS = 48
-
-_VERTEX = np.dtype(
-    [
-        ("position", "<f4", 3),
-        ("normal", "<f4", 3),
-        ("uv", "<f4", 2),
-        ("colour", "<f4", 3),
-        ("part_layer_label", "<f4", 3),
-    ]
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +47,8 @@ class Light:
     sky: Vec3 = (0.72, 0.80, 0.90)
 
 
-_Arrays = tuple[NDArray[np.void], NDArray[np.int64]]
+_Programs = dict[tuple[bool, bool], Any]
+"""Program by whether it draws textures, and whether vertices have partners."""
 
 
 @dataclass
@@ -67,6 +58,7 @@ class _Drawn:
     corners: Any = None
     order: Any = None
     textured: bool = False
+    jointed: bool = False
     arrays: dict[Any, Any] = field(default_factory=dict)
 
     def release(self) -> None:
@@ -82,7 +74,7 @@ class _Item:
     visuals: Matrix
     label: int
     moving: bool
-    arrays: list[_Arrays]
+    arrays: list[Triangles]
     drawn: list[_Drawn]
 
 
@@ -105,9 +97,8 @@ class EglRenderer(SceneRenderer):
         self._target: tuple[tuple[int, int], Any, Any, Any] | None = None
         context = self._context
         self._programs = {
-            (lamp, textured): context.program(*sources(lamp=lamp, textured=textured))
-            for lamp in (False, True)
-            for textured in (False, True)
+            (lamp, textured, jointed): context.program(*sources(lamp=lamp, textured=textured, jointed=jointed))
+            for lamp, textured, jointed in itertools.product((False, True), repeat=3)
         }
         self._layers: dict[str, tuple[int, float]] = {}
         self._texture = self._upload(textures if textures is not None else standard_textures())
@@ -204,7 +195,7 @@ class EglRenderer(SceneRenderer):
         context.enable_only(context.DEPTH_TEST)
         buffer.clear(*self.light.sky, 0.0, depth=1.0)
         self._texture.use(0)
-        shading = {textured: self._programs[lamp, textured] for textured in (False, True)}
+        shading = {(t, j): program for (with_lamp, t, j), program in self._programs.items() if with_lamp == lamp}
         for program in shading.values():
             _set(program, "view", np.linalg.inv(world_from_optical).T)
             _set(program, "projection", _projection(intrinsics).T)
@@ -218,14 +209,19 @@ class EglRenderer(SceneRenderer):
         self._draw_still(shading)
         return buffer
 
-    def _draw_still(self, programs: dict[bool, Any]) -> None:
+    def _draw_still(self, programs: _Programs) -> None:
         if self._still is None:
-            arrays = [placed for item in self._items.values() if not item.moving for placed in _placed(item)]
-            self._still = self._buffers(arrays) if arrays else _Drawn()
+            every = [
+                arrays
+                for item in self._items.values()
+                if not item.moving
+                for arrays in placed(item.arrays, item.pose @ item.visuals)
+            ]
+            self._still = self._buffers(every) if every else _Drawn()
         self._parts[0] = np.eye(4)
         self._draw_array(self._still, programs)
 
-    def _draw_item(self, item: _Item, programs: dict[bool, Any]) -> None:
+    def _draw_item(self, item: _Item, programs: _Programs) -> None:
         if not item.drawn:
             item.drawn = [self._buffers(item.arrays[i : i + MAX_PARTS]) for i in range(0, len(item.arrays), MAX_PARTS)]
         world = item.pose @ item.visuals
@@ -234,14 +230,18 @@ class EglRenderer(SceneRenderer):
             self._parts[: len(some)] = some.transpose(0, 2, 1)
             self._draw_array(drawn, programs)
 
-    def _draw_array(self, drawn: _Drawn, programs: dict[bool, Any]) -> None:
+    def _draw_array(self, drawn: _Drawn, programs: _Programs) -> None:
         if drawn.corners is None:
             return
-        program = programs[drawn.textured]
+        program = programs[drawn.textured, drawn.jointed]
         if program not in drawn.arrays:
             drawn.arrays[program] = self._array(program, drawn)
         program["parts"].write(self._parts)
+        if drawn.jointed:  # closed surfaces: faces turned away are hidden
+            self._context.cull_face = "front"  # the projection is upside down
+            self._context.enable(self._context.CULL_FACE)
         drawn.arrays[program].render()
+        self._context.disable(self._context.CULL_FACE)
 
     def _set_light(self, program: Any, lamp: bool) -> None:
         light = self.light
@@ -252,18 +252,11 @@ class EglRenderer(SceneRenderer):
         if lamp:
             _set(program, "lamp_reach", np.array(1.0 / light.lamp_reach**2))
 
-    def _vertices(self, body: Body, index: int, label: int) -> _Arrays:
+    def _vertices(self, body: Body, index: int, label: int) -> Triangles:
         visual = body.visuals[index]
-        mesh = mesh_of(visual.shape)
-        layer, metres = self._layer(visual.material.texture)
-        vertices = np.zeros(len(mesh.positions), _VERTEX)
-        vertices["position"], vertices["normal"] = mesh.positions, mesh.normals
-        vertices["uv"] = mesh.uv / metres if metres > 0 else mesh.uv / mesh.span + 0.5
-        vertices["colour"] = visual.material.rgba[:3]
-        vertices["part_layer_label"] = (index % MAX_PARTS, layer, label / 255.0)
-        return vertices, mesh.faces
+        return vertices_of(visual, index % MAX_PARTS, self._layer(visual.material.texture), label)
 
-    def _buffers(self, parts: list[_Arrays]) -> _Drawn:
+    def _buffers(self, parts: list[Triangles]) -> _Drawn:
         starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
         vertices = np.concatenate([vertices for vertices, _ in parts])
         faces = np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=False)])
@@ -271,14 +264,14 @@ class EglRenderer(SceneRenderer):
             corners=self._context.buffer(vertices.tobytes()),
             order=self._context.buffer(np.ascontiguousarray(faces, "<i4").tobytes()),
             textured=bool(vertices["part_layer_label"][:, 1].any()),
+            jointed=bool(vertices["partner"].any()),
         )
 
     def _array(self, program: Any, drawn: _Drawn) -> Any:
         """Vertex array for one program: unused attributes are skipped."""
-        names = [name for name in _VERTEX.names or () if name in program]
+        names = [name for name in VERTEX.names or () if name in program]
         layout = " ".join(
-            f"{_VERTEX[name].shape[0]}f" if name in names else f"{_VERTEX[name].itemsize}x"
-            for name in _VERTEX.names or ()
+            f"{VERTEX[name].shape[0]}f" if name in names else f"{VERTEX[name].itemsize}x" for name in VERTEX.names or ()
         )
         return self._context.vertex_array(program, [(drawn.corners, layout, *names)], drawn.order)
 
@@ -353,18 +346,6 @@ def _open_context() -> Any:
         return moderngl.create_context(**settings)
     except Exception as err:  # moderngl raises plain Exception, its loader OSError and ImportError
         raise WorldError("EGL", f"OpenGL 3.3 without a display cannot be had: {err}") from err
-
-
-def _placed(item: _Item) -> list[_Arrays]:
-    placed = []
-    for (vertices, faces), visual in zip(item.arrays, item.visuals, strict=True):
-        matrix = item.pose @ visual
-        moved = vertices.copy()
-        moved["position"] = vertices["position"] @ matrix[:3, :3].T + matrix[:3, 3]
-        moved["normal"] = vertices["normal"] @ matrix[:3, :3].T
-        moved["part_layer_label"][:, 0] = 0
-        placed.append((moved, faces))
-    return placed
 
 
 def _projection(camera: Intrinsics) -> NDArray[np.float64]:

@@ -16,6 +16,9 @@ in vec3 position;
 in vec3 normal;
 in vec3 colour;
 in vec3 part_layer_label;
+#ifdef JOINTED
+in vec2 partner;
+#endif
 out vec3 v_colour;
 out vec3 v_light;
 flat out float v_label;
@@ -29,6 +32,9 @@ out vec3 v_normal;
 #endif
 void main() {
     mat4 placed = parts[int(part_layer_label.x)];
+#ifdef JOINTED
+    placed = placed * (1.0 - partner.y) + parts[int(partner.x)] * partner.y;
+#endif
     vec4 world = placed * vec4(position, 1.0);
     gl_Position = projection * (view * world);
     vec3 n = normalize(mat3(placed) * normal);
@@ -78,7 +84,8 @@ void main() {
 """
 
 
-def sources(*, lamp: bool, textured: bool) -> tuple[str, str]:
-    """Vertex and fragment program with or without a lamp, with textures or plain."""
-    head = "#version 330\n" + ("#define LAMP\n" if lamp else "") + ("#define TEXTURED\n" if textured else "")
+def sources(*, lamp: bool, textured: bool, jointed: bool) -> tuple[str, str]:
+    """Vertex and fragment program with or without a lamp, textures, and vertices that follow two parts."""
+    kinds = {"LAMP": lamp, "TEXTURED": textured, "JOINTED": jointed}
+    head = "#version 330\n" + "".join(f"#define {name}\n" for name, wanted in kinds.items() if wanted)
     return head + _VERTEX, head + _FRAGMENT

@@ -23,6 +23,28 @@ def identity() -> Matrix:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Detail:
+    """Details of a mesh's vertices, V in number, for the renderer.
+
+    A vertex with a partner moves with the weighted mean of two poses: its own visual's, and that of another visual of
+    the body. At a joint such visuals form one smooth surface. Only the OpenGL renderer uses colours and partners.
+
+    Attributes:
+        normals: unit normals, shape (V, 3).
+        colours: factors on the material's colour, shape (V, 3).
+        uv: place on the texture [m], shape (V, 2).
+        partners: index of the other visual in its body, -1 for none, shape (V,).
+        weights: weight of the other visual's pose, 0 to 1, shape (V,).
+    """
+
+    normals: NDArray[np.float64]
+    colours: NDArray[np.float64]
+    uv: NDArray[np.float64]
+    partners: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Shape:
     """A geometric primitive about its own origin.
 
@@ -31,6 +53,7 @@ class Shape:
             the cylindrical part along z), plane (x, y; normal +z), mesh (scale x, y, z).
         mesh: file of a mesh (stl, obj, dae), or None.
         vertices, faces: the triangles of a mesh, shapes (V, 3) and (F, 3), or None to read them from the file.
+        detail: normals, colours and joints of those vertices, or None.
     """
 
     kind: ShapeKind
@@ -38,6 +61,7 @@ class Shape:
     mesh: Path | None = None
     vertices: NDArray[np.float64] | None = None
     faces: NDArray[np.int64] | None = None
+    detail: Detail | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

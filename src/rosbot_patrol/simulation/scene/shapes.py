@@ -252,6 +252,9 @@ def _triangles(shape: Shape) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 def _free_mesh(shape: Shape) -> Mesh:
     vertices, faces = _triangles(shape)
+    if shape.detail is not None:
+        uv = shape.detail.uv
+        return Mesh(vertices, shape.detail.normals, uv, np.maximum(np.ptp(uv, axis=0), 1e-6) + 0.0 * uv, faces)
     if shape.mesh is not None:
         vertices, normals = sharp_normals(vertices, faces)
         faces = np.arange(len(vertices)).reshape(-1, 3)

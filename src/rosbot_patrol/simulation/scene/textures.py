@@ -124,6 +124,11 @@ def _picture(rng: np.random.Generator) -> Texture:
     return Texture(pixels, 0.0)
 
 
+def _fur(rng: np.random.Generator) -> Texture:
+    strands = 0.5 * smooth_noise(rng, 64, 16) + 0.5 * smooth_noise(rng, 32, 10)
+    return grey(0.72 + 0.35 * strands - 0.1 * smooth_noise(rng, 6, 6), 0.12)
+
+
 _MAKERS: dict[str, Callable[[np.random.Generator], Texture]] = {
     "plaster": _plaster,
     "wood": _wood,
@@ -137,6 +142,7 @@ _MAKERS: dict[str, Callable[[np.random.Generator], Texture]] = {
     "denim": _denim,
     "books": _books,
     "picture": _picture,
+    "fur": _fur,
 }
 
 NAMES = tuple(_MAKERS)

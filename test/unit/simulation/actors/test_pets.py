@@ -47,8 +47,8 @@ def test_parts_of_a_leg_stay_together(look: PetLook) -> None:
     for phase in np.linspace(0.0, 1.0, 25):
         spread = corners(look, float(phase), 1.0)
         for leg in range(4):
-            upper, lower, paw = spread[-12:][3 * leg : 3 * leg + 3]
-            for a, b in ((upper, lower), (lower, paw)):
+            upper, lower, hock, paw = spread[-16:][4 * leg : 4 * leg + 4]
+            for a, b in ((upper, lower), (lower, hock), (hock, paw)):
                 gap = np.linalg.norm(a[:, None] - b[None], axis=2).min()
                 assert gap < 0.035 * look.height
 
@@ -98,7 +98,7 @@ def test_legs_of_the_cut_are_where_the_camera_shows_them() -> None:
     look = PETS["dog"]["labrador"]
     for phase in (0.0, 0.3, 0.7):
         for row in legs_at(look, LIDAR, phase, 1.0):
-            points = np.vstack(corners(look, phase, 1.0)[-12:])
+            points = np.vstack(corners(look, phase, 1.0)[-16:])
             level = points[np.abs(points[:, 2] - LIDAR) < 0.06]
             assert np.hypot(level[:, 0] - row[0], level[:, 1] - row[1]).min() < 0.08
 
