@@ -95,7 +95,7 @@ def _skeleton(look: PetLook, phase: float, gait: float) -> dict[str, Matrix]:
     middle = h * (1.0 - 0.5 * look.depth)
     trunk = from_xyz_rpy((0.0, 0.0, middle), (0.0, math.pi / 2.0, 0.0))  # a loft's z is forward, its x is down
     chest = 0.5 * look.length * h
-    raised = 0.75 if look.model == "dog" else 0.95
+    raised = 1.0 if look.model == "dog" else 1.25
     nod = 0.05 * gait * math.sin(2.0 * turn)
     neck = from_xyz_rpy((0.88 * chest, 0.0, middle + 0.10 * h), (0.0, raised + nod, 0.0))
     head = neck @ from_xyz_rpy((0.0, 0.0, 0.26 * h), (0.0, -raised + 0.12 - 0.8 * nod, 0.0))

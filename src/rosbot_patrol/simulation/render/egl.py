@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.simulation.render.shaders import sources
+from rosbot_patrol.simulation.render.shadows import Shadows, shadow_of
 from rosbot_patrol.simulation.render.vertices import MAX_PARTS, VERTEX, Triangles, placed, vertices_of
 from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, SceneRenderer
 from rosbot_patrol.simulation.scene.textures import SIDE, Texture, standard_textures
@@ -76,6 +77,7 @@ class _Item:
     moving: bool
     arrays: list[Triangles]
     drawn: list[_Drawn]
+    shadow: Matrix | None
 
 
 class EglRenderer(SceneRenderer):
@@ -100,6 +102,7 @@ class EglRenderer(SceneRenderer):
             (lamp, textured, jointed): context.program(*sources(lamp=lamp, textured=textured, jointed=jointed))
             for lamp, textured, jointed in itertools.product((False, True), repeat=3)
         }
+        self._shadows = Shadows(context)
         self._layers: dict[str, tuple[int, float]] = {}
         self._texture = self._upload(textures if textures is not None else standard_textures())
         self._parts = np.tile(np.eye(4, dtype="<f4"), (MAX_PARTS, 1, 1))
@@ -123,7 +126,7 @@ class EglRenderer(SceneRenderer):
             raise WorldError(body.name, "is in the scene already")
         poses = np.array([v.pose for v in body.visuals], float).reshape(-1, 4, 4)
         arrays = [self._vertices(body, i, label) for i in range(len(body.visuals))]
-        self._items[body.name] = _Item(body, body.pose, poses, label, not body.static, arrays, [])
+        self._items[body.name] = _Item(body, body.pose, poses, label, not body.static, arrays, [], shadow_of(body))
         if body.static:
             self._forget_still()
 
@@ -207,7 +210,15 @@ class EglRenderer(SceneRenderer):
             if item.moving:
                 self._draw_item(item, shading)
         self._draw_still(shading)
+        self._draw_shadows(world_from_optical, intrinsics)
         return buffer
+
+    def _draw_shadows(self, world_from_optical: Matrix, intrinsics: Intrinsics) -> None:
+        places = [item.pose @ item.shadow for item in self._items.values() if item.shadow is not None]
+        if places:
+            _set(self._shadows.program, "view", np.linalg.inv(world_from_optical).T)
+            _set(self._shadows.program, "projection", _projection(intrinsics).T)
+            self._shadows.draw(places)
 
     def _draw_still(self, programs: _Programs) -> None:
         if self._still is None:

@@ -13,7 +13,7 @@ from rosbot_patrol.simulation.actors.people import POSTURES, hip_height, person_
 from rosbot_patrol.simulation.actors.pets import PETS, pet_body, pet_pose_parts
 from rosbot_patrol.simulation.render.egl import EglRenderer
 from rosbot_patrol.simulation.render.vertices import MAX_PARTS
-from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix
+from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, Shape, Visual
 
 CAMERA = np.array([[0, 0, 1, -3.0], [-1, 0, 0, 0], [0, -1, 0, 0.9], [0, 0, 0, 1.0]])
 CHANCE = [draw_look(np.random.default_rng(seed)) for seed in range(12)]
@@ -113,3 +113,24 @@ def test_nothing_is_seen_through_a_detailed_person() -> None:
             renderer.remove("p")
     finally:
         renderer.close()
+
+
+def test_a_shadow_darkens_the_floor_and_is_in_neither_depth_nor_labels() -> None:
+    floor = Body(name="floor", kind="floor", visuals=(Visual(shape=Shape(kind="plane", size=(20.0, 20.0))),))
+    person = person_body("p", Look())
+    pictures = []
+    for body in (person, replace(person, kind="object")):
+        renderer = EglRenderer()
+        try:
+            renderer.add(floor)
+            renderer.add(body, label=1)
+            colour, depth = renderer.render(CAMERA, Intrinsics(fy=450.0))
+            pictures.append((colour.astype(int), depth, renderer.labels().copy()))
+        finally:
+            renderer.close()
+    (with_shadow, depth, labels), (without, other_depth, other_labels) = pictures
+    assert (depth == other_depth).all()
+    assert (labels == other_labels).all()
+    darker = (without - with_shadow).max(axis=2)
+    assert darker.min() >= 0
+    assert (darker[labels == 0] > 20).sum() > 300

@@ -69,7 +69,7 @@ def top(look: Look, outfit: Outfit) -> list[Skin]:
     hips = 1.0 - ramp(rings, HIP + 0.02, WAIST + 0.035)
     blends = {"pelvis": np.repeat(hips[:, None], len(grid.angle), axis=1)}
     if look.coat:
-        blends = {**blends, **_thigh_weights(grid, h, 0.6)}
+        blends = {**blends, **_thigh_weights(grid, h, 0.9)}
     skins = [skin(grid, "torso", blends)]
     return [*skins, *([_collar(look, outfit, ease)] if outfit.collar else [])]
 
