@@ -85,12 +85,12 @@ def _trouser_leg(look: Look, outfit: Outfit, side: str, sign: float, end: float)
     inner = np.clip(-sign * np.sin(grid.angle), 0.0, 1.0)[None, :]
     k = outfit.seed + (0 if sign > 0 else 50)
     long = end < 0.24
-    grid.fold(Noise(k + 5, 5, 5), 0.0050 * (0.4 + loose) * (0.3 + bump(z, 0.45, 0.06)), around=1.0, along=1.3)
-    grid.fold(Noise(k + 6, 3, 13), 0.0060 * (0.6 + 0.6 * loose) * bump(z, KNEE - 0.01, 0.05), around=1.0, along=2.3)
+    grid.fold(Noise(k + 5, 5, 5), 0.0036 * (0.4 + loose) * (0.3 + bump(z, 0.45, 0.06)), around=1.0, along=1.3)
+    grid.fold(Noise(k + 6, 3, 13), 0.0048 * (0.6 + 0.6 * loose) * bump(z, KNEE - 0.01, 0.05), around=1.0, along=2.3)
     if long:
-        stack = 0.0075 * (0.5 + 0.7 * loose) * bump(z, 0.095, 0.05)
+        stack = 0.0060 * (0.5 + 0.7 * loose) * bump(z, 0.095, 0.05)
         grid.fold(Noise(k + 7, 3, 17), stack, around=1.0, along=3.0)
-        grid.fold(Noise(k + 8, 4, 7), 0.0035 * np.ones_like(z), around=1.0, along=1.3)
+        grid.fold(Noise(k + 8, 4, 7), 0.0018 * np.ones_like(z), around=1.0, along=1.3)
     grid.shade(1.0 - (0.45 * ramp(z, 0.40, 0.50) + 0.12) * inner)
     outer = bump(np.abs(grid.points[..., 0]) / h, 0.0, 0.006) * (np.sin(grid.angle) * sign > 0.3)
     grid.shade(1.0 - 0.28 * outer)
@@ -174,7 +174,7 @@ def _sleeve(look: Look, outfit: Outfit, side: str, sign: float, end: float) -> l
     grid = _arm_grid(look, sign, ease, heights, 12)
     z = heights[:, None]
     k = outfit.seed + (11 if sign > 0 else 61)
-    grid.fold(Noise(k, 3, 11), 0.0052 * (0.5 + look.loose) * (0.35 + bump(z, ELBOW, 0.05)), around=1.0, along=2.0)
+    grid.fold(Noise(k, 3, 11), 0.0042 * (0.5 + look.loose) * (0.35 + bump(z, ELBOW, 0.05)), around=1.0, along=2.0)
     grid.fold(Noise(k + 1, 4, 5), 0.0035 * (1.0 - ramp(z, 0.80, 0.82)), around=1.0, along=1.1)
     inner = np.clip(-sign * np.sin(grid.angle), 0.0, 1.0)[None, :]
     grid.shade(1.0 - (0.16 + 0.22 * ramp(z, 0.66, 0.78)) * inner)

@@ -138,6 +138,8 @@ def hips(look: Look, outfit: Outfit) -> Skin:
     grid.shade(1.0 - 0.45 * crotch * bump(grid.points[..., 1], 0.0, 0.06))
     fly = bump(grid.points[..., 1], 0.008, 0.007) * (np.cos(grid.angle) > 0.5) * ramp(z, 0.48, 0.51)
     grid.shade(1.0 - 0.30 * fly)
+    pocket = bump(np.abs(grid.points[..., 1]), 0.075, 0.045) * (np.cos(grid.angle) < -0.3)
+    grid.shade(1.0 - 0.25 * pocket * np.maximum(bump(z, 0.512, 0.005), bump(z, 0.470, 0.005)))
     cap(grid)
     cap(grid, top=True)
     turn = grid.points[:, :, 1]
