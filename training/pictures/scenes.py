@@ -204,7 +204,7 @@ def draw_actors(
 
 
 def draw_person(
-    rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool = False, detailed: bool = True
+    rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool = False, detailed: bool = False
 ) -> Actor:
     """A person by chance; a reserved one has a height, colour, mask or posture that training never draws.
 

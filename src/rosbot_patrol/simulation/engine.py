@@ -60,6 +60,11 @@ class EngineParams:
     camera: CameraParams = field(default_factory=CameraParams)
     motion: MotionSensorParams = field(default_factory=MotionSensorParams)
     seed: int = param(0, lo=0, doc="seed of all noise")
+    figures: str = param(
+        "plain",
+        choices=("plain", "detailed"),
+        doc="figures of people; detailed: with folds, face and hands, for networks that know real people",
+    )
 
 
 class Engine:
@@ -94,7 +99,9 @@ class Engine:
         for body in world.bodies:
             self._physics.add(body)
         self.ways = Ways(world.bodies)
-        self.population = Population(self.ways, self._physics, self.params.seed)
+        self.population = Population(
+            self.ways, self._physics, self.params.seed, detailed=self.params.figures == "detailed"
+        )
         self.faults = FaultBoard(self, doorways)
         self._robot: Equipment | None = None
         self._steps = 0

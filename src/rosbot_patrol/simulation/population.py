@@ -28,12 +28,14 @@ class Population:
         ways: static bodies, and the free paths of actors.
         physics: physics world that contains their bodies.
         seed: seed of looks and of wandering.
+        detailed: draw people with detailed figures.
     """
 
-    def __init__(self, ways: Ways, physics: Physics, seed: int) -> None:
+    def __init__(self, ways: Ways, physics: Physics, seed: int, *, detailed: bool = False) -> None:
         self._ways = ways
         self._physics = physics
         self._seed = seed
+        self._detailed = detailed
         self._walkers: dict[str, Walker] = {}
         self._doors: dict[str, Door] = {}
         self.boxes: dict[str, Body] = {}
@@ -98,7 +100,8 @@ class Population:
         """
         name = name or self._new_name(model)
         self._check(f"actor '{name}'", name, pose)
-        walker = Walker(name, model, look, pose, noise_of(self._seed, f"look of {name}"), posture=posture)
+        rng = noise_of(self._seed, f"look of {name}")
+        walker = Walker(name, model, look, pose, rng, posture=posture, detailed=self._detailed)
         self._physics.add(walker.body)
         self._physics.move(name, walker.matrix)
         if self._physics.blocker() == name:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -155,7 +156,9 @@ class _Cuts:
         return self._made[height]
 
 
-def make_figure(name: str, model: str, look: str, posture: str, rng: np.random.Generator) -> Figure:
+def make_figure(
+    name: str, model: str, look: str, posture: str, rng: np.random.Generator, *, detailed: bool = False
+) -> Figure:
     """Make the figure of an actor.
 
     Args:
@@ -164,22 +167,27 @@ def make_figure(name: str, model: str, look: str, posture: str, rng: np.random.G
         look: name of a person's or pet's look, "" for a random one.
         posture: posture of a person, "" for standing; other models only stand.
         rng: random generator of the look.
+        detailed: draw people, and those on posters, with detailed figures.
 
     Raises:
         WorldError: the model, look or posture is unknown.
     """
     held = _posture_named(name, posture)
     if model == "person":
-        return PersonFigure(name, look_named(look) if look else draw_look(rng), held)
+        return PersonFigure(name, _look(look, rng, detailed), held)
     if model not in MODELS:
         raise WorldError(f"actor '{name}'", f"is of the model '{model}', expected one of {', '.join(MODELS)}")
     if held != "standing":
         raise WorldError(f"actor '{name}'", f"cannot be '{posture}', a {model} only stands and walks")
     if model == "poster":
-        return PosterFigure(name, look_named(look) if look else draw_look(rng))
+        return PosterFigure(name, _look(look, rng, detailed))
     if model == "fire_hydrant":
         return HydrantFigure(name)
     return PetFigure(name, pet_named(model, look) if look else draw_pet(model, rng))
+
+
+def _look(name: str, rng: np.random.Generator, detailed: bool) -> Look:
+    return replace(look_named(name) if name else draw_look(rng), detailed=detailed)
 
 
 def _posture_named(actor: str, posture: str) -> Posture:

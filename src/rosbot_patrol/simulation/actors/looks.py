@@ -50,7 +50,7 @@ class Look:
     backpack: Colour | None = None
     top_texture: str = ""
     bottom_texture: str = ""
-    detailed: bool = True
+    detailed: bool = False
 
 
 LOOKS: dict[str, Look] = {

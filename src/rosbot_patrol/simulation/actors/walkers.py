@@ -60,18 +60,27 @@ class Walker:
         pose: initial pose.
         rng: random generator of the look.
         posture: posture of a person, "" for standing.
+        detailed: draw people, and those on posters, with detailed figures.
 
     Raises:
         WorldError: the model, look or posture is unknown.
     """
 
     def __init__(
-        self, name: str, model: str, look: str, pose: Pose2D, rng: np.random.Generator, *, posture: str = ""
+        self,
+        name: str,
+        model: str,
+        look: str,
+        pose: Pose2D,
+        rng: np.random.Generator,
+        *,
+        posture: str = "",
+        detailed: bool = False,
     ) -> None:
         self.name = name
         self.model = model
         self.pose = pose
-        self._figure = make_figure(name, model, look, posture, rng)
+        self._figure = make_figure(name, model, look, posture, rng, detailed=detailed)
         self._phase = 0.0
         self._pace = 0.0
         self._path: list[Pose2D] = []

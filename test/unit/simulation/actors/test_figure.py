@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.simulation.actors.looks import LOOKS, Look, draw_look
 from rosbot_patrol.simulation.actors.people import POSTURES, hip_height, person_body, person_pose_parts
 from rosbot_patrol.simulation.actors.pets import PETS, pet_body, pet_pose_parts
@@ -17,7 +18,7 @@ from rosbot_patrol.simulation.scene.scene import Body, Intrinsics, Matrix, Shape
 
 CAMERA = np.array([[0, 0, 1, -3.0], [-1, 0, 0, 0], [0, -1, 0, 0.9], [0, 0, 0, 1.0]])
 CHANCE = [draw_look(np.random.default_rng(seed)) for seed in range(12)]
-EVERYONE = [*LOOKS.values(), *CHANCE]
+EVERYONE = [replace(look, detailed=True) for look in (*LOOKS.values(), *CHANCE)]
 
 
 def blended(body: Body, poses: Matrix) -> list[np.ndarray]:
@@ -58,7 +59,7 @@ def test_every_vertex_has_a_unit_normal_a_colour_and_a_partner_of_its_body() -> 
 
 
 def test_a_leg_is_whole_at_the_knee_in_every_posture() -> None:
-    look = Look()
+    look = Look(detailed=True)
     body = person_body("p", look)
     rest = [visual.shape.vertices for visual in body.visuals]
     pairs = [
@@ -83,7 +84,7 @@ def test_people_are_as_tall_as_said_and_stand_on_their_soles() -> None:
 
 
 def test_the_same_look_is_the_same_person() -> None:
-    look = draw_look(np.random.default_rng(4))
+    look = replace(draw_look(np.random.default_rng(4)), detailed=True)
     one, other = person_body("p", look), person_body("p", replace(look))
     for a, b in zip(one.visuals, other.visuals, strict=True):
         assert np.array_equal(a.shape.vertices, b.shape.vertices)
@@ -117,7 +118,7 @@ def test_nothing_is_seen_through_a_detailed_person() -> None:
 
 def test_a_shadow_darkens_the_floor_and_is_in_neither_depth_nor_labels() -> None:
     floor = Body(name="floor", kind="floor", visuals=(Visual(shape=Shape(kind="plane", size=(20.0, 20.0))),))
-    person = person_body("p", Look())
+    person = person_body("p", Look(detailed=True))
     pictures = []
     for body in (person, replace(person, kind="object")):
         renderer = EglRenderer()
@@ -134,3 +135,14 @@ def test_a_shadow_darkens_the_floor_and_is_in_neither_depth_nor_labels() -> None
     darker = (without - with_shadow).max(axis=2)
     assert darker.min() >= 0
     assert (darker[labels == 0] > 20).sum() > 300
+
+
+@pytest.mark.parametrize("model", ["person", "poster"])
+def test_only_a_world_with_detailed_figures_has_them(build, model: str) -> None:
+    plain, detailed = build(), build(figures="detailed")
+    sizes = []
+    for engine in (plain, detailed):
+        engine.population.spawn_actor("somebody", model, "visitor", Pose2D(2.0, 0.0, 0.0))
+        (walker,) = engine.population.walkers
+        sizes.append(sum(len(v.shape.vertices) for v in walker.body.visuals if v.shape.vertices is not None))
+    assert sizes[1] > 2 * sizes[0]
