@@ -116,7 +116,7 @@ class Studio:
         actors = []
         if person:
             pose = placed(*spot, 0.0, float(self.rng.uniform(-np.pi, np.pi)))
-            actors.append(scenes.draw_person(self.rng, "someone", pose, self.reserved, detailed=self.detailed))
+            actors.append(scenes.draw_person(self.rng, "someone", pose, self.reserved, detailed=float(self.detailed)))
         other = scenes.find_spot(scene, camera, self.rng) if self.rng.random() < 0.4 else None
         if other is not None and self.rng.random() < 0.7:
             actors.append(scenes.draw_animal(self.rng, "pet", other))

@@ -64,6 +64,7 @@ def draw_case(
     *,
     reserved: bool = False,
     shapeless: float = 0.0,
+    detailed: float = 0.0,
 ) -> list[Actor]:
     """One of `CASES`: two people one before the other, legs right before the camera, somebody behind a thing or a pet,
     things one before the other and nobody, people far off, hydrants partly hidden, things cut by the picture's edge.
@@ -75,15 +76,15 @@ def draw_case(
         rng: chance.
         reserved: draw people that training never sees.
         shapeless: share of the things that are of no kind that has a name (`furniture.draw_thing`).
+        detailed: share of people with detailed figures.
 
     Returns:
         Who and what is there, of four attempts the one that found room for most; things and pets are nothing to find.
         Of the case "edge" the first: often nobody is to be there.
     """
     attempts = range(1 if case == "edge" else 4)
-    return max(
-        (_Drawing(scene, camera, rng, reserved=reserved, shapeless=shapeless).draw(case) for _ in attempts), key=len
-    )
+    made = (_Drawing(scene, camera, rng, reserved=reserved, shapeless=shapeless, detailed=detailed) for _ in attempts)
+    return max((drawing.draw(case) for drawing in made), key=len)
 
 
 def _to_edge(rng: Rng, half: float) -> float:
@@ -95,10 +96,17 @@ class _Drawing:
     """One attempt at a case: puts actors into a scene, and afterwards leaves the scene as it was."""
 
     def __init__(
-        self, scene: Scene, camera: tuple[float, float, float], rng: Rng, *, reserved: bool, shapeless: float
+        self,
+        scene: Scene,
+        camera: tuple[float, float, float],
+        rng: Rng,
+        *,
+        reserved: bool,
+        shapeless: float,
+        detailed: float,
     ) -> None:
         self._scene, self._camera, self._rng = scene, camera, rng
-        self._reserved, self._shapeless = reserved, shapeless
+        self._reserved, self._shapeless, self._detailed = reserved, shapeless, detailed
         self._view = reach(scene, *camera)
         self._actors: list[Actor] = []
 
@@ -176,7 +184,8 @@ class _Drawing:
         if kind == "any":
             kind = str(rng.choice(["thing", "pet", "hydrant"], p=[0.55, 0.3, 0.15]))
         if kind == "person":
-            actors.append(draw_person(rng, name, pose, self._reserved, low=bool(rng.random() < 0.5)))
+            low = bool(rng.random() < 0.5)
+            actors.append(draw_person(rng, name, pose, self._reserved, low=low, detailed=self._detailed))
         elif kind == "hydrant":
             actors.append(draw_hydrant(rng, name, pose, self._reserved))
         elif kind == "pet":

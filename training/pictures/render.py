@@ -47,11 +47,18 @@ _FORWARD = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1.0]]
 
 
 class Studio:
-    """A renderer with textures of training, drawn anew for every shard, or with those that only tests have."""
+    """A renderer with textures of training, drawn anew for every shard, or with those that only tests have.
 
-    def __init__(self, world: World | None, *, unseen: bool = False) -> None:
+    Args:
+        world: the house of a share of the scenes, or None.
+        unseen: take the textures of the tests.
+        detailed: share of people with detailed figures.
+    """
+
+    def __init__(self, world: World | None, *, unseen: bool = False, detailed: float = 0.0) -> None:
         self.world = world
         self.unseen = unseen
+        self.detailed = detailed
         self.shapeless = 0.0 if unseen else SHAPELESS
         self.renderer: EglRenderer | None = None
 
@@ -135,9 +142,11 @@ class Studio:
     ) -> tuple[NDArray[Any], list[list[Any]], NDArray[Any]]:
         assert self.renderer is not None
         if case:
-            actors = draw_case(case, scene, camera, rng, reserved=test, shapeless=self.shapeless)
+            actors = draw_case(
+                case, scene, camera, rng, reserved=test, shapeless=self.shapeless, detailed=self.detailed
+            )
         else:
-            actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets, hard=hard)
+            actors = scenes.draw_actors(scene, camera, rng, reserved=test, pets=pets, hard=hard, detailed=self.detailed)
         for i, actor in enumerate(actors):
             self.renderer.add(actor.body, label=i + 1)
             self.renderer.move(actor.body.name, actor.pose)
@@ -265,13 +274,23 @@ def _poster(painter: EglRenderer, look: Look, rng: np.random.Generator) -> Textu
 
 @dataclass(frozen=True)
 class _Job:
-    """A shard to be drawn: its file, the seed, the house, whether it is for tests, and what `Studio.shard` is told."""
+    """A shard to be drawn.
+
+    Attributes:
+        target: its file.
+        seed: of all chance.
+        house: the world's file, or None.
+        test: whether it is for tests.
+        told: what `Studio.shard` is told.
+        detailed: share of people with detailed figures.
+    """
 
     target: Path
     seed: tuple[int, int, int]
     house: Path | None
     test: bool
     told: dict[str, Any]
+    detailed: float
 
 
 def _work(job: _Job) -> str:
@@ -280,15 +299,15 @@ def _work(job: _Job) -> str:
     if os.nice(0) < 5:
         os.nice(5)
     cv2.setNumThreads(1)
-    studio = studio_of(job.house, unseen=job.test)
+    studio = studio_of(job.house, unseen=job.test, detailed=job.detailed)
     write_shard(job.target, *studio.shard([*job.seed], PER_SHARD, test=job.test, **job.told))
     return job.target.name
 
 
 @functools.cache
-def studio_of(house: Path | None, *, unseen: bool = False) -> Studio:
+def studio_of(house: Path | None, *, unseen: bool = False, detailed: float = 0.0) -> Studio:
     """This process's studio for the world of that file, or for rooms by chance."""
-    return Studio(load_world(house) if house else None, unseen=unseen)
+    return Studio(load_world(house) if house else None, unseen=unseen, detailed=detailed)
 
 
 def write_shard(target: Path, pictures: NDArray[Any], boxes: NDArray[Any], masks: NDArray[Any]) -> None:
@@ -311,7 +330,7 @@ def _jobs(
         options.folder / f"{name}-{k:04d}{JPEGS if options.jpeg else '.npy'}"
         for k in range(math.ceil(pictures / PER_SHARD))
     ]
-    return [_Job(target, (seed, k, int(test)), house, test, told) for k, target in enumerate(targets)]
+    return [_Job(target, (seed, k, int(test)), house, test, told, options.detailed) for k, target in enumerate(targets)]
 
 
 def _jobs_of_kinds(options: argparse.Namespace) -> list[_Job]:
@@ -347,6 +366,7 @@ def main() -> None:
     parser.add_argument("--pets", type=float, default=0.0, help="share of the pictures with cats or dogs")
     parser.add_argument("--hard", type=float, default=0.0, help="share of people behind things, of pets nearby")
     parser.add_argument("--cases", type=float, default=0.0, help="share that is a case of cases.CASES")
+    parser.add_argument("--detailed", type=float, default=0.0, help="share of people with detailed figures")
     parser.add_argument("--jpeg", action="store_true", help="keep the pictures as jpegs, a seventh as large")
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--set", choices=SETS, help="draw these pictures of the tests, which test_set.py lays down")

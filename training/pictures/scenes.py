@@ -166,6 +166,7 @@ def draw_actors(
     reserved: bool = False,
     pets: float = 0.0,
     hard: float = 0.0,
+    detailed: float = 0.0,
 ) -> list[Actor]:
     """People and hydrants before a camera, where there is room for them; often none at all.
 
@@ -176,6 +177,7 @@ def draw_actors(
         reserved: draw people that training never sees.
         pets: share of the views with a cat or a dog, or two, as well; they come last and are nothing to be found.
         hard: that share of people stands behind furniture, sits or crouches, and of pets right before the camera.
+        detailed: share of people with detailed figures.
     """
     people = int(rng.choice([0, 1, 2, 3, 4], p=[0.30, 0.47, 0.14, 0.06, 0.03]))
     hydrants = int(rng.choice([0, 1, 2], p=[0.76, 0.20, 0.04]))
@@ -187,7 +189,7 @@ def draw_actors(
             continue
         pose = placed(*spot, 0.0, float(rng.uniform(-np.pi, np.pi)))
         if i < people:
-            actors.append(draw_person(rng, f"actor{i}", pose, reserved, low=is_hard))
+            actors.append(draw_person(rng, f"actor{i}", pose, reserved, low=is_hard, detailed=detailed))
         else:
             actors.append(draw_hydrant(rng, f"actor{i}", pose, reserved))
         if not (i < people and rng.random() < 0.25):
@@ -204,7 +206,7 @@ def draw_actors(
 
 
 def draw_person(
-    rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool = False, detailed: bool = False
+    rng: Rng, name: str, pose: Matrix, reserved: bool, *, low: bool = False, detailed: float = 0.0
 ) -> Actor:
     """A person by chance; a reserved one has a height, colour, mask or posture that training never draws.
 
@@ -214,7 +216,7 @@ def draw_person(
         pose: on the floor, in the world.
         reserved: such a one.
         low: sits or crouches more often.
-        detailed: has a detailed figure, not a plain one.
+        detailed: probability of a detailed figure, instead of a plain one.
     """
     look = draw_look(rng) if rng.random() < 0.9 else _named(rng)
     posture: Posture = rng.choice(POSTURES, p=[0.45, 0.30, 0.25] if low else [0.80, 0.12, 0.08]).item()
@@ -222,7 +224,7 @@ def draw_person(
         look = draw_reserved(rng)
         posture = rng.choice(["standing", "creeping", "sitting", "crouching"], p=[0.55, 0.25, 0.1, 0.1]).item()
     walking = posture == "creeping" or bool(rng.random() < 0.55)
-    look = replace(look, detailed=detailed)
+    look = replace(look, detailed=detailed >= 1.0 or (detailed > 0.0 and bool(rng.random() < detailed)))
     phase = float(rng.random())
     parts = person_pose_parts(look, phase, walking, posture)
     extra: list[Body] = []

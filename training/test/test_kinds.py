@@ -16,7 +16,7 @@ WORLDS = Path(__file__).parents[2] / "worlds"
 
 def jobs_of(pictures: int, seed: int) -> list:
     options = argparse.Namespace(
-        folder=Path("data"), jpeg=True, set=None, kinds=True, pictures=pictures, seed=seed, worlds=WORLDS
+        folder=Path("data"), jpeg=True, set=None, kinds=True, pictures=pictures, seed=seed, worlds=WORLDS, detailed=0.0
     )
     return render._jobs_asked_for(options)
 

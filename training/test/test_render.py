@@ -10,7 +10,7 @@ from rosbot_patrol.simulation.actors.people import person_body, person_pose_part
 from rosbot_patrol.simulation.actors.pets import draw_pet, pet_body, pet_pose_parts
 from rosbot_patrol.simulation.render.egl import EglRenderer, Light
 from training.learning.mixing import FURNITURE
-from training.pictures import overlay, patterns, render, visibility
+from training.pictures import overlay, patterns, render, scenes, visibility
 from training.pictures.furniture import box, build, placed
 from training.pictures.labels import COLUMNS, column
 from training.pictures.scenes import Actor, Scene
@@ -175,3 +175,12 @@ def test_contrast_needs_only_what_lies_around_the_figure(place, monkeypatch: pyt
 
 def test_nobody_stands_out_of_nothing() -> None:
     assert visibility.contrast(np.zeros((288, 384, 3), np.uint8), np.zeros((480, 640), bool)) == 0.0
+
+
+@pytest.mark.parametrize(("share", "fewest", "most"), [(0.0, 0, 0), (0.5, 5, 15), (1.0, 20, 20)])
+def test_a_share_of_the_people_has_detailed_figures(share: float, fewest: int, most: int) -> None:
+    drawn = [
+        scenes.draw_person(np.random.default_rng(seed), "p", placed(0, 0), False, detailed=share) for seed in range(20)
+    ]
+    detailed = sum(any(v.shape.detail is not None for v in actor.body.visuals) for actor in drawn)
+    assert fewest <= detailed <= most

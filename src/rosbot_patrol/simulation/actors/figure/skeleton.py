@@ -6,6 +6,8 @@ joint's frame is parallel to the body's. Lengths are shares of the height (Drill
 
 from __future__ import annotations
 
+import functools
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,8 +123,9 @@ def _plus(pair: Pair, more: float) -> Pair:
     return pair[0] + more, pair[1] + more
 
 
+@functools.lru_cache(maxsize=256)
 def rest_joints(height: float, build: float) -> dict[str, Vector]:
-    """Positions of the joints at rest [m], shape (3,) each."""
+    """Positions of the joints at rest [m], shape (3,) each; cached, not to be changed."""
     hip, shoulder = HIP_WIDTH * (0.75 + 0.25 * build), SHOULDER_WIDTH * (0.75 + 0.25 * build)
     shares = {"pelvis": (0.0, 0.0, HIP), "torso": (-0.004, 0.0, WAIST), "head": (-0.008, 0.0, NECK)}
     for side, sign in SIDES:
@@ -136,8 +139,12 @@ def rest_joints(height: float, build: float) -> dict[str, Vector]:
     return {name: height * np.array(share) for name, share in shares.items()}
 
 
+@functools.lru_cache(maxsize=64)
 def body_from_rest(height: float, build: float, angles: Angles) -> dict[str, Matrix]:
-    """For each joint the motion from rest to the posture, in the body's frame, with the lower sole on the floor."""
+    """For each joint the motion from rest to the posture, in the body's frame, with the lower sole on the floor.
+
+    Somebody who stands still costs nothing: the result is cached, and must not be changed.
+    """
     rest = rest_joints(height, build)
     pelvis = _about(rest["pelvis"], pitch=0.3 * angles.lean, roll=angles.tilt)
     torso = pelvis @ _about(rest["torso"], pitch=0.7 * angles.lean, roll=-1.3 * angles.tilt, yaw=angles.twist)
@@ -174,11 +181,11 @@ def _sole(foot: Matrix, ankle: Vector) -> float:
 
 def _about(joint: Vector, *, pitch: float = 0.0, roll: float = 0.0, yaw: float = 0.0) -> Matrix:
     """Rotation about a joint: first the yaw, then the pitch, then the roll."""
-    (cp, sp), (cr, sr), (cy, sy) = ((np.cos(a), np.sin(a)) for a in (pitch, roll, yaw))
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    (cp, sp), (cr, sr), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (pitch, roll, yaw))
     matrix = np.eye(4)
-    matrix[:3, :3] = about_x @ about_y @ about_z
-    matrix[:3, 3] = joint - matrix[:3, :3] @ joint
+    rotation = matrix[:3, :3]  # roll about x, after pitch about y, after yaw about z
+    rotation[0] = cp * cy, -cp * sy, sp
+    rotation[1] = sr * sp * cy + cr * sy, cr * cy - sr * sp * sy, -sr * cp
+    rotation[2] = sr * sy - cr * sp * cy, cr * sp * sy + sr * cy, cr * cp
+    matrix[:3, 3] = joint - rotation @ joint
     return matrix

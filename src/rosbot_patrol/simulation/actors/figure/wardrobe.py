@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import zlib
 from dataclasses import dataclass
 
@@ -40,6 +41,7 @@ class Outfit:
     collar: bool
 
 
+@functools.lru_cache(maxsize=256)
 def outfit_of(look: Look) -> Outfit:
     """Draw the outfit from the look's own values."""
     seed = zlib.crc32(repr((look.height, look.build, look.top, look.bottom, look.skin, look.hair_style)).encode())
