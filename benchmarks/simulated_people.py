@@ -12,7 +12,8 @@ a person. Every network sees the same pictures.
 - simulated_found: share of the persons whom a box of the class `person` overlaps by an IoU of 0.4 or more.
 - simulated_empty_boxes: pictures without a person in which the network has a box of a person.
 
-Without `--network` the networks are the one in `models/` and, where it is, yolo-fastest-1.1-xl in `../shared/people`.
+Without `--network` the networks are the one in `models/` and, where they are, ssdlite and yolo-fastest-1.1-xl of
+`../shared/people`. `--network ssdlite` is that one, any other a darknet file with its weights and coco.names beside it.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # training/ is not part of the installed package
 
-from rosbot_patrol.detection.detector import DarknetDetector, load_detector, read_names  # noqa: E402
+from rosbot_patrol.detection.detector import Detector, load_detector, read_names  # noqa: E402
+from rosbot_patrol.detection.ssdlite import load_ssdlite  # noqa: E402
+from rosbot_patrol.errors import DetectorError  # noqa: E402
 from rosbot_patrol.images.encodings import Picture  # noqa: E402
 from rosbot_patrol.simulation.render.egl import EglRenderer  # noqa: E402
 from rosbot_patrol.simulation.scene.textures import standard_textures  # noqa: E402
@@ -183,7 +186,7 @@ class Result:
     found: list[bool]
 
 
-def judge(name: str, detector: DarknetDetector, shots: list[Shot]) -> Result:
+def judge(name: str, detector: Detector, shots: list[Shot]) -> Result:
     """Run a network on all shots."""
     boxes = []
     for shot in shots:
@@ -202,14 +205,18 @@ def _iou(box: tuple[int, int, int, int], others: NDArray[Any]) -> NDArray[Any]:
     return shares
 
 
-def load_networks(wanted: list[str]) -> dict[str, DarknetDetector]:
+def load_networks(wanted: list[str]) -> dict[str, Detector]:
     """The networks to judge, by name."""
     if not wanted:
         settings = yaml.safe_load((ROOT / "models/house.yaml").read_text(encoding="utf-8"))["yolo_model"]
         wanted = [f"{ROOT / 'models/house.cfg'}:{settings['threshold']['value']}"]
+        wanted += ["ssdlite"] if _has_ssdlite() else []
         wanted += [f"{PUBLIC}:{PUBLIC_THRESHOLD}"] if PUBLIC.exists() else []
-    networks = {}
+    networks: dict[str, Detector] = {}
     for text in wanted:
+        if text == "ssdlite":
+            networks[text] = load_ssdlite()
+            continue
         file, _, threshold = text.partition(":")
         cfg = Path(file)
         names = ["person", "fire hydrant"] if cfg.stem == "house" else _names(cfg)
@@ -217,6 +224,15 @@ def load_networks(wanted: list[str]) -> dict[str, DarknetDetector]:
             str(cfg), str(cfg.with_suffix(".weights")), names, threshold=float(threshold or 0.3)
         )
     return networks
+
+
+def _has_ssdlite() -> bool:
+    try:
+        load_ssdlite()
+    except DetectorError as err:
+        print(f"without ssdlite: {err}")
+        return False
+    return True
 
 
 def _names(cfg: Path) -> list[str]:
