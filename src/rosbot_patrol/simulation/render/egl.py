@@ -25,6 +25,7 @@ from rosbot_patrol.simulation.sensors import picture_kernels as kernels
 log = logging.getLogger(__name__)
 
 Vec3 = tuple[float, float, float]
+_SHADOWS_SEEN = 15.0  # farther shadows are too small to be seen [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,11 +215,13 @@ class EglRenderer(SceneRenderer):
         return buffer
 
     def _draw_shadows(self, world_from_optical: Matrix, intrinsics: Intrinsics) -> None:
+        eye_from_world = np.linalg.inv(world_from_optical)
         places = [item.pose @ item.shadow for item in self._items.values() if item.shadow is not None]
-        if places:
-            _set(self._shadows.program, "view", np.linalg.inv(world_from_optical).T)
+        seen = [place for place in places if -1.0 < eye_from_world[2] @ place[:, 3] < _SHADOWS_SEEN]
+        if seen:
+            _set(self._shadows.program, "view", eye_from_world.T)
             _set(self._shadows.program, "projection", _projection(intrinsics).T)
-            self._shadows.draw(places)
+            self._shadows.draw(seen)
 
     def _draw_still(self, programs: _Programs) -> None:
         if self._still is None:
