@@ -189,7 +189,7 @@ def is_visible(scene: Scene) -> bool:
 
 
 def is_of(place: Place | None, person: Pose2D, scene: Scene) -> bool:
-    """Whether a place is that of the person, or lies behind or before them as seen from the robot."""
+    """Whether a place is the person's, or lies in the same direction from the robot."""
     if place is None or math.dist(place, person[:2]) <= SAME:
         return True
     eyes = [eye_of(look).pose for look in scene.looks]

@@ -25,7 +25,7 @@ LOCK_TIMEOUT = 5.0  # longest wait for another writer [s]
 
 _TAIL = 65_536  # bytes at the end of the file that are searched first for the last link
 _PAUSE = 0.02  # between attempts to get the lock [s]
-_BODIES = (chain.BEGUN, chain.REMOVAL)  # kinds of links whose body is small and stands in the line
+_BODIES = (chain.BEGUN, chain.REMOVAL)  # kinds of links with their small body in the line
 _TEXTS = ("kind", "incident", "digest", "previous", "hash")
 
 

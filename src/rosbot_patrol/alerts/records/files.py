@@ -124,7 +124,7 @@ class IncidentFolder:
         """The record of an incident; None if there is none.
 
         Raises:
-            StoreError: it cannot be read; `is_corrupt` if it makes no sense or is that of another incident.
+            StoreError: it cannot be read; `is_corrupt` if it makes no sense or belongs to another incident.
         """
         text = self.text(incident_id)
         return None if text is None else self.parse(incident_id, text)

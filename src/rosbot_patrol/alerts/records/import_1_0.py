@@ -14,7 +14,7 @@ import os
 import shutil
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -115,14 +115,13 @@ def _open(path: Path, *, is_checked: bool = True) -> sqlite3.Connection:
     """A connection that writes nothing. Raises StoreError, `is_corrupt` for any but a sound database of 1.0."""
     with errors_of(path):
         uri = f"{path.absolute().as_uri()}?mode=ro"
-        old = sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
-        try:
+        with ExitStack() as undo:
+            old = sqlite3.connect(uri, uri=True, isolation_level=None, check_same_thread=False)
+            undo.callback(old.close)
             old.row_factory = sqlite3.Row
             if is_checked:
                 _check(old, path)
-        except BaseException:
-            old.close()
-            raise
+            undo.pop_all()
     return old
 
 

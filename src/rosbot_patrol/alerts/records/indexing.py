@@ -94,7 +94,7 @@ def _make_anew(files: IncidentFolder, links: ChainFile, found: Found, written: i
         raise
     connection.close()
     with errors_of(path):
-        remove_index(path)  # with its WAL, which must not be taken for that of the new one
+        remove_index(path)  # with its WAL: SQLite would apply it to the new file
         scratch.replace(path)
         sync_folder(files.root)
     return count

@@ -5,8 +5,8 @@ written before the record that names it. On closing, the record is written first
 removal is written to the chain before the files go. `rosbot_patrol.alerts.records.repair` mends what a crash left in
 between.
 
-The index comes last. A call whose files are written does not fail because of it: the next call brings it up to date,
-and a start makes it anew if need be.
+The index comes last. If it cannot be written, the call still succeeds, as the files hold everything. The next call then
+brings the index up to date; a start makes it anew if need be.
 
 One process writes records (the patrol); others may read, and prune. Not for several threads at once.
 """
