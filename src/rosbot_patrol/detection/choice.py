@@ -15,6 +15,7 @@ from pathlib import Path
 
 from rosbot_patrol.detection.catalogue import CATALOGUE, REAL_CAMERA, check_file
 from rosbot_patrol.detection.detector import Detector, load_detector
+from rosbot_patrol.detection.identity import network_sum
 from rosbot_patrol.detection.params import DarknetParams
 from rosbot_patrol.detection.quality import describe_quality
 from rosbot_patrol.detection.second_opinion import UNSURE, WEAK, SecondOpinion
@@ -52,12 +53,16 @@ class Choice:
     Args:
         detector: the detector.
         network: its name, as `network:=` takes it.
+        sha256: of its cfg and weights, "" if it has none.
+        threshold: of its boxes.
         second: name of the network that gives the second opinion, "" for none.
         passed_over: a sentence for each wanted or better network that is not ready.
     """
 
     detector: Detector
     network: str
+    sha256: str = ""
+    threshold: float = 0.0
     second: str = ""
     passed_over: tuple[str, ...] = ()
 
@@ -136,9 +141,9 @@ def _check_download(name: str, settings: DarknetParams, folders: NetworkFolders)
 def _load(params: DarknetParams, folders: NetworkFolders) -> Choice:
     """Load the network of these settings, and the one for a second opinion."""
     threshold = params.yolo_model.threshold.value
-    network = params.network if params.network in _MODULES else Path(params.network_files(str(folders.own))[0]).stem
     if not params.second_opinion:
-        return Choice(detector=_make(params, folders, threshold), network=network)
+        return _choice(_make(params, folders, threshold), params, folders)
+    network = _name(params, folders)
     other = network_settings(params.second_opinion, params, folders)
     if other.network == "auto":
         raise ParamError("second_opinion", "is auto, expected the name of a network")
@@ -150,10 +155,23 @@ def _load(params: DarknetParams, folders: NetworkFolders) -> Choice:
     except DetectorError as err:
         problem = f"no second opinion by {params.second_opinion}: {err}"
         log.warning(problem)
-        return Choice(detector=_make(params, folders, threshold), network=network, passed_over=(problem,))
+        alone = _choice(_make(params, folders, threshold), params, folders)
+        return dataclasses.replace(alone, passed_over=(problem,))
     first = _make(params, folders, min(UNSURE, threshold))
     both = SecondOpinion(first, second, threshold=threshold, second_threshold=other_threshold)
-    return Choice(detector=both, network=network, second=params.second_opinion)
+    return dataclasses.replace(_choice(both, params, folders), second=params.second_opinion)
+
+
+def _name(params: DarknetParams, folders: NetworkFolders) -> str:
+    return params.network if params.network in _MODULES else Path(params.network_files(str(folders.own))[0]).stem
+
+
+def _choice(detector: Detector, params: DarknetParams, folders: NetworkFolders) -> Choice:
+    """A detector with what is known of its network, whose files could be loaded."""
+    has_files = params.network not in _MODULES
+    sha256 = network_sum(*map(Path, params.network_files(str(folders.own)))) if has_files else ""
+    threshold = params.yolo_model.threshold.value
+    return Choice(detector=detector, network=_name(params, folders), sha256=sha256, threshold=threshold)
 
 
 def _make(params: DarknetParams, folders: NetworkFolders, threshold: float) -> Detector:

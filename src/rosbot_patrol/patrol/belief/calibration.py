@@ -8,7 +8,6 @@ network without a calibration uses `CAUTIOUS`.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -114,31 +113,9 @@ def read_calibration(path: Path) -> Calibration:
     try:
         return _from_plain(json.loads(path.read_text(encoding="utf-8")))
     except OSError as err:
-        raise DetectorError(f"the calibration {path} cannot be read: {err.strerror}; {_REST}") from err
+        raise DetectorError(f"the calibration {path} cannot be read: {err.strerror}") from err
     except (ValueError, KeyError, TypeError) as err:
-        raise DetectorError(f"{path} is no calibration of a network ({err}); {_REST}") from err
-
-
-def load_calibration(path: Path, network: str, sha256: str) -> Calibration:
-    """Read the calibration of a network.
-
-    Args:
-        path: of the file.
-        network: name of the network that runs.
-        sha256: of its cfg and weights.
-
-    Raises:
-        DetectorError: as `read_calibration`, or it is that of another network.
-    """
-    found = read_calibration(path)
-    if found.sha256 != sha256:
-        raise DetectorError(
-            f"the calibration {path} is of the network '{found.network}' with other weights than '{network}'; {_REST}"
-        )
-    return found
-
-
-_REST = "the cautious calibration is used: make one with scripts/calibrate_network"
+        raise DetectorError(f"{path} is no calibration of a network ({err})") from err
 
 
 def _from_plain(tree: Any) -> Calibration:
@@ -155,17 +132,6 @@ def _from_plain(tree: Any) -> Calibration:
     if not all(0.0 < rho < 1.0 for rho in rhos):
         raise ValueError("a correlation is not between 0 and 1")
     return Calibration(str(tree["network"]), str(tree["sha256"]), rhos[0], rhos[1], *tables)
-
-
-def network_sum(cfg: Path, weights: Path) -> str:
-    """sha256 of a network's cfg and weights, one after the other; raises DetectorError if one cannot be read."""
-    found = hashlib.sha256()
-    for path in (cfg, weights):
-        try:
-            found.update(path.read_bytes())
-        except OSError as err:
-            raise DetectorError(f"the network file {path} cannot be read: {err.strerror}") from err
-    return found.hexdigest()
 
 
 def _cautious() -> Calibration:

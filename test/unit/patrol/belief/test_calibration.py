@@ -17,12 +17,12 @@ from rosbot_patrol.patrol.belief.calibration import (
     CAUTIOUS,
     EDGES,
     Condition,
-    load_calibration,
-    network_sum,
     outcome,
+    read_calibration,
     save_calibration,
 )
 from rosbot_patrol.patrol.belief.fitting import Samples, fit, fit_rho, rising
+from rosbot_patrol.patrol.belief.networks import find_calibration
 from rosbot_patrol.patrol.belief.samples import add_photograph
 from rosbot_patrol.patrol.records.inputs import Box
 
@@ -43,18 +43,11 @@ def photographs(seen: float, *, rho: float = 0.0, pictures: int = 400, seed: int
 def test_round_trip(tmp_path: Path) -> None:
     path = tmp_path / "test.json"
     save_calibration(path, calibration())
-    found = load_calibration(path, "test", "sum")
+    found = read_calibration(path)
     assert found.network == "test"
     assert (found.rho_person, found.rho_nobody) == (0.6, 0.3)
     np.testing.assert_allclose(found.person, calibration().person, atol=1e-8)
     np.testing.assert_allclose(found.nobody, calibration().nobody, atol=1e-8)
-
-
-def test_another_network_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "test.json"
-    save_calibration(path, calibration())
-    with pytest.raises(DetectorError, match="is of the network 'test' with other weights than 'yolo'; the cautious"):
-        load_calibration(path, "yolo", "another sum")
 
 
 @pytest.mark.parametrize(
@@ -63,8 +56,8 @@ def test_another_network_is_refused(tmp_path: Path) -> None:
 def test_garbage_is_refused_in_a_sentence(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bad.json"
     path.write_text(text)
-    with pytest.raises(DetectorError, match=r"bad\.json is no calibration of a network .*cautious calibration is used"):
-        load_calibration(path, "test", "sum")
+    with pytest.raises(DetectorError, match=r"bad\.json is no calibration of a network"):
+        read_calibration(path)
 
 
 @pytest.mark.parametrize(("key", "value"), [("rho_person", 1.5), ("rho_nobody", "x"), ("person", [1.0]), ("sizes", [])])
@@ -74,23 +67,30 @@ def test_a_bad_value_is_refused(tmp_path: Path, key: str, value: object) -> None
     tree = json.loads(path.read_text()) | {key: value}
     path.write_text(json.dumps(tree))
     with pytest.raises(DetectorError, match="is no calibration"):
-        load_calibration(path, "test", "sum")
+        read_calibration(path)
 
 
 def test_a_file_that_is_gone(tmp_path: Path) -> None:
     with pytest.raises(DetectorError, match="cannot be read: No such file"):
-        load_calibration(tmp_path / "gone.json", "test", "sum")
-    with pytest.raises(DetectorError, match=r"the network file .* cannot be read"):
-        network_sum(tmp_path / "a.cfg", tmp_path / "a.weights")
+        read_calibration(tmp_path / "gone.json")
 
 
-def test_the_sum_is_of_both_files(tmp_path: Path) -> None:
-    cfg, weights = tmp_path / "a.cfg", tmp_path / "a.weights"
-    cfg.write_bytes(b"[net]")
-    weights.write_bytes(b"1")
-    first = network_sum(cfg, weights)
-    weights.write_bytes(b"2")
-    assert network_sum(cfg, weights) != first
+def test_a_network_is_found_by_its_sum_or_by_name(tmp_path: Path) -> None:
+    save_calibration(tmp_path / "test.json", calibration())
+    gone = tmp_path / "gone"
+    assert find_calibration([gone, tmp_path], "another name", "sum").network == "test"
+    assert find_calibration([tmp_path], "test").sha256 == "sum"
+
+
+def test_a_network_without_one_is_told_in_a_sentence(tmp_path: Path) -> None:
+    save_calibration(tmp_path / "test.json", calibration())
+    (tmp_path / "bad.json").write_text("{}")
+    with pytest.raises(DetectorError) as raised:
+        find_calibration([tmp_path], "test", "another sum")
+    said = str(raised.value)
+    assert said.startswith("there is no calibration of the network 'test'; ")
+    assert "bad.json is no calibration of a network" in said
+    assert "test.json is of other weights" in said
 
 
 @pytest.mark.parametrize(("score", "index"), [(0.0, 0), (0.049, 0), (0.05, 1), (0.5, 4), (0.95, 7), (1.0, 7)])
