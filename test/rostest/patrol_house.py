@@ -126,6 +126,7 @@ class House:
     def start_patrol(self, wait=True, inside=(), **params):
         values = {
             "path_to_params": str(ROOT / "params" / "room_points.yaml"),
+            "network": "house",  # the boxes of this test are as sure as its own
             "state_dir": str(self.folder / "state"),
             "maildir": str(self.folder / "mail"),
             "transport": "maildir",

@@ -138,7 +138,7 @@ def test_the_patrol_decides_the_same(sim_ros: Ros, tmp_path: Path) -> None:
     which = f"topic != '/motion_trigger' or t.to_sec() < {FIRST}"
     subprocess.run(["rosbag", "filter", str(BAGS / "patrol.bag"), str(first), which], check=True, capture_output=True)
     mine = {"path_to_params": str(BAGS / "patrol_rooms.yaml"), "state_dir": str(tmp_path / "state"), "image_topic": ""}
-    mail = {"maildir": str(tmp_path / "mail"), "transport": "maildir"}
+    mail = {"maildir": str(tmp_path / "mail"), "transport": "maildir", "network": "house"}
     parameters(sim_ros, "patrol", "patrolling_node", **mine, **mail)
     base = Process(["/usr/bin/python3", str(HERE / "bag_move_base.py")], sim_ros.env)
     sim_ros.processes.append(base)

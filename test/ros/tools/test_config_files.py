@@ -22,7 +22,6 @@ from rosbot_patrol.params import load
 from rosbot_patrol.patrol.guard.arming import load_rules
 from rosbot_patrol.patrol.guard.schedule import load_schedule
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.patrol.intruder.sightings import SightingsParams
 from rosbot_patrol.planning.local_planners.trajectory_planner import TrajectoryPlannerParams
 from rosbot_patrol.planning.registry import make_global_planner
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
@@ -117,9 +116,13 @@ def test_networks_of_darknet_ros(name: str) -> None:
 
 
 def test_patrol() -> None:
-    tree = given("rosbot_patrol.launch", "patrolling_node")
-    assert load(SightingsParams, tree["watch"], name="/patrolling_node/watch/").frames == 5
-    load_flat(NodeParams, tree)
+    load_flat(NodeParams, given("rosbot_patrol.launch", "patrolling_node"))
+
+
+@pytest.mark.parametrize(("arguments", "threshold"), [([], 0.4), (["network:=yolo-fastest-1.1-xl"], 0.1)])
+def test_the_patrol_weighs_weak_boxes_of_networks_for_a_real_camera(arguments: list[str], threshold: float) -> None:
+    tree = given("rosbot_patrol.launch", "darknet_ros", *arguments)
+    assert load(DarknetParams, tree, name="/darknet_ros/").yolo_model.threshold.value == threshold
 
 
 @pytest.mark.parametrize(

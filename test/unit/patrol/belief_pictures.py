@@ -11,6 +11,7 @@ from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.belief.belief import Belief, PictureView
 from rosbot_patrol.patrol.belief.calibration import EDGES, SHAPE, Calibration
 from rosbot_patrol.patrol.belief.hypothesis import Hypothesis
+from rosbot_patrol.patrol.belief.networks import Network
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, Measured
 from rosbot_patrol.patrol.visibility.coverage import Sight
 
@@ -26,6 +27,11 @@ def calibration(*, rho_person: float = 0.6, rho_nobody: float = 0.3) -> Calibrat
     tables = [np.broadcast_to(row / row.sum(), SHAPE).copy() for row in (person, nobody)]
     assert len(person) == len(EDGES)
     return Calibration("test", "sum", rho_person, rho_nobody, *tables)
+
+
+def good_network() -> Network:
+    """A network that a manager may run with."""
+    return Network(calibration(), 0.06)
 
 
 def eye_at(pose: Pose2D) -> Eye:
@@ -75,12 +81,15 @@ class Seen:
         self.now = 0.0
 
     def see(self, eye: Pose2D, *boxes: Box, pictures: int = 1, **given: object) -> list[Hypothesis]:
+        """Look from a place; whom that confirms."""
         found = []
         view = open_view(eye, length=given.pop("length", 12.0), is_dark=given.pop("is_dark", False))  # type: ignore[arg-type]
         for _ in range(pictures):
             self.now += 0.1
             frame = Frame(stamp=self.now, eye=eye_at(eye), boxes=boxes, **given)  # type: ignore[arg-type]
-            found += self.belief.see(frame, view)
+            before = [each for each in self.belief.hypotheses if each.is_confirmed]
+            shown = self.belief.see(self.now, frame, view)
+            found += [h for h in shown if h.is_confirmed and not any(h is each for each in before)]
         return found
 
     @property

@@ -3,6 +3,8 @@
 import dataclasses
 import math
 
+from belief_pictures import good_network
+
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalLink, GoalState
 from rosbot_patrol.patrol.house.rooms import Room, Rooms
@@ -18,7 +20,7 @@ PERSON = Box(label="person", probability=0.9, xmin=10, ymin=10, xmax=60, ymax=20
 
 class World:
     def __init__(self, manager=None, **given):
-        self.manager = manager or PatrolManager(ROOMS)
+        self.manager = manager or PatrolManager(ROOMS, network=good_network)
         self.now, self.x, self.yaw = 100.0, 0.0, 0.0
         self.speed = 2.0
         self.link = GoalLink(is_up=True)

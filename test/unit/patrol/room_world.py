@@ -6,13 +6,14 @@ import dataclasses
 import math
 from collections.abc import Callable
 
+from belief_pictures import good_network
 from floors import drawn_floor, points, scan_over, sight_from
 
 from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.goal import GoalLink, GoalState
 from rosbot_patrol.patrol.house.regions import RoomRegions, part_rooms
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.intruder.exclusions import Exclusions
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 from rosbot_patrol.patrol.mission.manager import ManagerParams, PatrolManager
 from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame, Inputs, Measured, ScanView
 from rosbot_patrol.patrol.records.mission import Phase
@@ -58,7 +59,7 @@ class World:
         *,
         params: ManagerParams | None = None,
         eyes: SightParams | None = None,
-        exclusions: Exclusions | None = None,
+        known: tuple[KnownObject, ...] = (),
         memory: dict | None = None,
         camera: bool = True,
         refused: Callable[[Pose2D], bool] = lambda pose: False,
@@ -71,7 +72,8 @@ class World:
             params,
             views=self.views,
             viewpoints=self.views.fallback_viewpoints,
-            exclusions=exclusions,
+            known=known,
+            network=good_network,
             memory=memory,
         )
         self.people, self.camera, self.refused = people, camera, refused

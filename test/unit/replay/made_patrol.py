@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from belief_pictures import good_network
 from made_bag import NOETIC, Maker, write_bag
 from rosbags.typesys import get_types_from_msg
 
@@ -72,7 +73,9 @@ class RecordedWorld(World):
 
     def __init__(self, **given: Any) -> None:
         views = RoomSearch(NODE)
-        super().__init__(PatrolManager(ROOMS, views=views, viewpoints=views.fallback_viewpoints), **given)
+        super().__init__(
+            PatrolManager(ROOMS, network=good_network, views=views, viewpoints=views.fallback_viewpoints), **given
+        )
         self._make = Maker()
         self.messages: list[tuple[float, str, Any]] = []
         self._ended = 0

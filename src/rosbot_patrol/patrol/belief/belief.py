@@ -8,22 +8,23 @@ confirms; all below `clear_below` with the floor seen is clear; anything else is
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rosbot_patrol.geometry import angle_difference
+from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.patrol.belief.association import Located, assign, distinct, locate
 from rosbot_patrol.patrol.belief.calibration import CAUTIOUS, Calibration, Condition
 from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, nearest
-from rosbot_patrol.patrol.belief.likelihoods import Likelihoods, Veto
+from rosbot_patrol.patrol.belief.likelihoods import Likelihoods, Veto, is_plausible
 from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.house.floor import Floor
-from rosbot_patrol.patrol.intruder.exclusions import KnownObject
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
-from rosbot_patrol.patrol.records.inputs import Eye, Frame
+from rosbot_patrol.patrol.records.inputs import Box, Eye, Frame
 from rosbot_patrol.patrol.records.mission import Verdict
 from rosbot_patrol.patrol.visibility.coverage import Sight
 
@@ -33,6 +34,9 @@ _BODY = 0.4  # [m] in front of a place its own body may end a beam
 _VIEW_EDGE = 0.1  # [rad] at the image borders where a miss says nothing
 _MOST = 60  # hypotheses
 _TRACK_ERROR = 0.2  # [m] error of a lidar track's place
+_FEWEST = 2  # boxes that confirm: one picture may be spoilt
+_EPISODE = 1.0  # [s] without a box, after which a box without a place is of something else
+_NOWHERE = Eye(pose=Pose2D(0.0, 0.0, 0.0), width=1.047)  # stands for a camera whose pose is unknown
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,11 @@ class PictureView:
     """What could be seen in a picture.
 
     Attributes:
-        sight: free way around the camera.
+        sight: free way around the camera, None if unknown: then a missing box tells nothing.
         is_dark: the picture is dark.
     """
 
-    sight: Sight
+    sight: Sight | None = None
     is_dark: bool = False
 
 
@@ -72,6 +76,10 @@ class Belief:
         threshold: of the detector.
         known: objects that look like somebody.
         floor: of the map, None if unknown.
+        classes: that alarm; boxes of other classes are left out.
+
+    Attributes:
+        hypotheses: all, in order of their numbers.
     """
 
     def __init__(
@@ -82,10 +90,12 @@ class Belief:
         threshold: float = 0.1,
         known: tuple[KnownObject, ...] = (),
         floor: Floor | None = None,
+        classes: Sequence[str] = ("person",),
     ) -> None:
         self.params = params or BeliefParams()
-        self.calibration, self.known, self.floor = calibration, known, floor
+        self.known, self.floor = known, floor
         self.likelihoods = Likelihoods(calibration, self.params, threshold)
+        self._classes = tuple(classes)
         self.hypotheses: list[Hypothesis] = []
         self._count = 0
         self._newest = -math.inf
@@ -96,27 +106,72 @@ class Belief:
 
     # -- evidence
 
-    def see(self, frame: Frame, view: PictureView) -> list[Hypothesis]:
-        """Take a picture; returns the hypotheses that it confirms.
+    def see(self, now: float, frame: Frame, view: PictureView) -> list[Hypothesis]:
+        """Take a picture; returns the hypotheses that it shows, and those that it confirms.
 
-        A picture without a place, from before the newest one, or equal to the one before it adds nothing.
+        One that is older than the newest, equal to the one before it, or not measured yet adds nothing.
+
+        Args:
+            now: steady time [s], for a picture without a stamp.
+            frame: boxes, and the camera then.
+            view: what could be seen.
         """
-        if frame.eye is None or frame.stamp is None or frame.stamp <= self._newest or frame.is_same or not frame.counts:
+        if frame.is_same or not frame.counts or (frame.stamp is not None and frame.stamp <= self._newest):
             return []
-        now = self._newest = frame.stamp
-        boxes = [box for box in frame.boxes if box.label == "person" and box.probability >= self.likelihoods.threshold]
-        located = distinct([locate(box, frame.eye, view.sight) for box in boxes], self.params.merge)
+        at = now if frame.stamp is None else frame.stamp
+        self._newest = self._newest if frame.stamp is None else frame.stamp
+        boxes = self.plausible(frame)
+        if frame.eye is None:
+            shown = self._see_unplaced(at, boxes, frame)
+        else:
+            shown = self._see_placed(at, boxes, frame, frame.eye, view)
+        confirmed = [h for h in self.hypotheses if self._confirms(h)]
+        return [h for h in self.hypotheses if any(h is each for each in (*shown, *confirmed))]
+
+    def plausible(self, frame: Frame) -> list[Box]:
+        """Boxes of a picture that may show somebody by class, score and shape."""
+        least = self.likelihoods.threshold
+        return [b for b in frame.boxes if b.label in self._classes and b.probability >= least and is_plausible(b)]
+
+    def _see_placed(
+        self, at: float, boxes: Sequence[Box], frame: Frame, eye: Eye, view: PictureView
+    ) -> list[Hypothesis]:
         shown = []
-        for each, known in zip(located, assign(self.hypotheses, located, now, self.params), strict=True):
-            hypothesis = known or self._begin(each.place, each.spread, now)
-            self._take(hypothesis, each, frame, view)
-            shown.append(hypothesis)
+        for label in self._classes:
+            of_class = [locate(box, eye, view.sight) for box in boxes if box.label == label]
+            located = distinct(of_class, self.params.merge)
+            before = [h for h in self.hypotheses if h.is_placed and h.label == label]
+            for each, known in zip(located, assign(before, located, at, self.params), strict=True):
+                hypothesis = known or self._begin(each.place, each.spread, at, label)
+                self._take(hypothesis, each, frame, view, at)
+                shown.append(hypothesis)
+        numbers = {each.number for each in shown}
+        for each_shown in shown:
+            each_shown.together |= numbers - {each_shown.number}
         for hypothesis in self.hypotheses:
-            if not any(hypothesis is each for each in shown):
-                self._miss(hypothesis, frame.eye, view)
+            if hypothesis.is_placed and not any(hypothesis is each for each in shown):
+                self._miss(hypothesis, eye, view)
         self._merge()
         self._forget()
-        return [h for h in self.hypotheses if self._confirms(h)]
+        return shown
+
+    def _see_unplaced(self, at: float, boxes: Sequence[Box], frame: Frame) -> list[Hypothesis]:
+        """Take a picture whose place is unknown: of each class one hypothesis, for as long as pictures show it."""
+        over = [h for h in self.hypotheses if not h.is_placed and not h.is_confirmed and at - h.seen_at > _EPISODE]
+        self.hypotheses = [h for h in self.hypotheses if not any(h is each for each in over)]
+        shown, view = [], PictureView()
+        for label in self._classes:
+            of_class = [box for box in boxes if box.label == label]
+            known = next((h for h in self.hypotheses if not h.is_placed and h.label == label), None)
+            if of_class:
+                known = known or self._begin(np.zeros(2), np.eye(2), at, label, is_placed=False)
+                surest = max(of_class, key=lambda box: box.probability)
+                self._take(known, Located(surest, known.place, known.spread), frame, view, at)
+                shown.append(known)
+            elif known is not None and known.last is not None:
+                miss = self.likelihoods.miss(Condition(known.last.height / _NOWHERE.columns), 1.0)
+                known.take(_NOWHERE.pose, miss, self.likelihoods.calibration, self.params)
+        return shown
 
     def motion(self, tracks: Iterable[LidarTrack]) -> None:
         """Take what the lidar follows: something that moves may be a person."""
@@ -124,44 +179,51 @@ class Belief:
             if not track.has_moved:
                 continue
             place, spread = np.array([track.x, track.y]), np.eye(2) * _TRACK_ERROR**2
-            apart, known = nearest(self.hypotheses, track.x, track.y)
+            persons = [h for h in self.hypotheses if h.is_placed and h.label == "person"]
+            apart, known = nearest(persons, track.x, track.y)
             if known is None or apart > self.params.merge + self.params.gate * _TRACK_ERROR:
                 known = self._begin(place, spread, track.at)
             elif track.at > known.at:
                 known.move(place, spread, track.at, self.params)
             known.moved = math.log(self.params.motion_ratio)
 
-    def _begin(self, place: Array, spread: Array, now: float) -> Hypothesis:
+    def _begin(
+        self, place: Array, spread: Array, now: float, label: str = "person", *, is_placed: bool = True
+    ) -> Hypothesis:
         self._count += 1
-        self.hypotheses.append(Hypothesis(self._count, place.copy(), spread.copy(), now))
-        return self.hypotheses[-1]
+        begun = Hypothesis(self._count, place.copy(), spread.copy(), now, label=label, is_placed=is_placed)
+        self.hypotheses.append(begun)
+        return begun
 
-    def _take(self, hypothesis: Hypothesis, each: Located, frame: Frame, view: PictureView) -> None:
-        assert frame.eye is not None
-        assert frame.stamp is not None
-        evidence = self.likelihoods.box(each.box, frame.eye, is_dark=view.is_dark)
-        if hypothesis.boxes:
-            hypothesis.move(each.place, each.spread, frame.stamp, self.params)
-        hypothesis.take(frame.eye.pose, evidence, self.calibration, self.params)
+    def _take(self, hypothesis: Hypothesis, each: Located, frame: Frame, view: PictureView, at: float) -> None:
+        eye = frame.eye or _NOWHERE
+        evidence = self.likelihoods.box(each.box, eye, is_dark=view.is_dark)
+        if hypothesis.boxes and hypothesis.is_placed:
+            hypothesis.move(each.place, each.spread, at, self.params)
+        hypothesis.take(eye.pose, evidence, self.likelihoods.calibration, self.params)
         hypothesis.boxes += 1
-        hypothesis.seen_at = frame.stamp
+        hypothesis.seen_at, hypothesis.last = at, each.box
+        hypothesis.scores.append(each.box.probability)
         if evidence.veto is not None:
             hypothesis.against[evidence.veto] += 1
         elif not evidence.is_near:
             hypothesis.possible += 1
         m = each.box.measured
+        hypothesis.measured = m or hypothesis.measured
         if m is not None and not evidence.is_near and not m.is_cut_aside:
             hypothesis.height = m.height
         if hypothesis.best is None or each.box.probability > hypothesis.best.probability:
             hypothesis.best, hypothesis.shown = each.box, frame.boxes
-            hypothesis.picture = frame.stamp if frame.picture is None else frame.picture
+            hypothesis.picture = at if frame.picture is None else frame.picture
         hypothesis.place_veto = self._place_veto(hypothesis, each)
 
     def _place_veto(self, hypothesis: Hypothesis, each: Located) -> Veto | None:
         x, y = float(hypothesis.place[0]), float(hypothesis.place[1])
         m = each.box.measured
-        if m is not None and any(known.is_at(m) and known.label in ("", "person") for known in self.known):
-            return Veto.KNOWN
+        for known in self.known if m is not None else ():
+            if known.label in ("", hypothesis.label) and m is not None and known.is_at(m):
+                hypothesis.known = f"{known.name} at ({known.x:.1f}, {known.y:.1f})"
+                return Veto.KNOWN
         if self.floor is None or m is None or m.source == "floor":
             return None
         within = self.params.outside_after + hypothesis.error
@@ -174,13 +236,16 @@ class Belief:
         _, away = hypothesis.from_place(eye.pose)
         focal = 0.5 * eye.columns / math.tan(0.5 * eye.width)
         at = Condition(focal * hypothesis.height / max(away, 0.3) / eye.columns, is_dark=view.is_dark)
-        hypothesis.take(eye.pose, self.likelihoods.miss(at, seen), self.calibration, self.params)
+        miss = self.likelihoods.miss(at, seen, is_near=away < self.params.whole_from)
+        hypothesis.take(eye.pose, miss, self.likelihoods.calibration, self.params)
 
-    def _in_view(self, hypothesis: Hypothesis, eye: Eye, sight: Sight) -> float:
+    def _in_view(self, hypothesis: Hypothesis, eye: Eye, sight: Sight | None) -> float:
         """Probability that its place was in view: the share of five points of its spread.
 
         That it has walked on is left out: then it is seen elsewhere, or the lidar sees it move.
         """
+        if sight is None:
+            return 0.0
         values, axes = np.linalg.eigh(hypothesis.spread)
         steps = axes * np.sqrt(np.maximum(values, 0.0))
         points = hypothesis.place + np.vstack((np.zeros(2), steps.T, -steps.T))
@@ -194,7 +259,7 @@ class Belief:
         return float((shows & sight.reaches(bearings, away - _BODY)).mean())
 
     def _confirms(self, hypothesis: Hypothesis) -> bool:
-        if hypothesis.is_confirmed or hypothesis.place_veto is not None or not hypothesis.boxes:
+        if hypothesis.is_confirmed or hypothesis.place_veto is not None or hypothesis.boxes < _FEWEST:
             return False
         hypothesis.is_confirmed = self.posterior(hypothesis) >= self.params.confirmed_above
         return hypothesis.is_confirmed
@@ -211,6 +276,8 @@ class Belief:
         self.hypotheses = kept
 
     def _is_one(self, a: Hypothesis, b: Hypothesis) -> bool:
+        if not (a.is_placed and b.is_placed) or a.label != b.label:
+            return False
         return float(np.hypot(*(a.place - b.place))) < self.params.merge
 
     def _forget(self) -> None:
@@ -229,12 +296,24 @@ class Belief:
         """One sentence about a hypothesis."""
         return hypothesis.why(self.params)
 
+    def may_be_somebody(self, hypothesis: Hypothesis) -> bool:
+        """Whether a hypothesis is not known to be nobody."""
+        return hypothesis.place_veto is None and self.posterior(hypothesis) >= self.params.clear_below
+
+    @property
+    def vetoes(self) -> Counter[str]:
+        """Reasons why boxes showed no intruder, and how many boxes."""
+        found: Counter[str] = Counter()
+        for hypothesis in self.hypotheses:
+            if hypothesis.veto is not None:
+                found[hypothesis.veto_text] += hypothesis.boxes
+        return found
+
     @property
     def open(self) -> Sequence[Hypothesis]:
         """Hypotheses that are neither confirmed nor below `clear_below`, the most probable first."""
-        p = self.params
-        found = [h for h in self.hypotheses if not h.is_confirmed and h.place_veto is None]
-        return sorted((h for h in found if self.posterior(h) >= p.clear_below), key=self.posterior, reverse=True)
+        found = [h for h in self.hypotheses if not h.is_confirmed and self.may_be_somebody(h)]
+        return sorted(found, key=self.posterior, reverse=True)
 
     def verdict(self, *, floor_seen: bool) -> Judgement:
         """What can be said of the room.

@@ -1,13 +1,17 @@
 """One hypothesis: somebody may be at a place, with the evidence for it by side of view.
 
 Three explanations compete: a person, a look-alike (a pet, a picture, a statue) and nobody. The scores tell the first
-two from the third, by `Side.score`; size and depth tell a person from a look-alike, by `Side.size`. Sides are
-independent and add up; pictures from one side are not, as the same view is misjudged again and again.
+two from the third; size and depth tell a person from a look-alike, by `Side.size`. A look-alike from near, where a part
+of it is in view, looks like a person to every network. Seen whole, it does so to some networks only: where the network
+gives it no box, that is no wonder, while a person would have got one. So what was seen from near (`Side.near`) and of
+the whole (`Side.whole`) is kept apart. Sides are independent and add up; pictures from one side are not, as the same
+view is misjudged again and again.
 """
 
 from __future__ import annotations
 
 import math
+import statistics
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -19,7 +23,7 @@ from rosbot_patrol.geometry import Pose2D, angle_difference, distance
 from rosbot_patrol.patrol.belief.calibration import EDGES, Calibration
 from rosbot_patrol.patrol.belief.likelihoods import Evidence, Veto
 from rosbot_patrol.patrol.belief.params import BeliefParams
-from rosbot_patrol.patrol.records.inputs import Box
+from rosbot_patrol.patrol.records.inputs import Box, Measured
 
 Array = NDArray[np.float64]
 
@@ -37,31 +41,41 @@ class Side:
     Attributes:
         eye: the camera when the side was first seen from there.
         counts: pictures with each outcome, as far as the place was in view.
-        score: log-likelihood ratio of the scores, of a person against nobody.
+        near, whole: log-likelihood ratio of what pictures from near and of the whole say, of a person against nobody.
         sizes, size_total: boxes, and sum of what their sizes say of a person against a look-alike.
     """
 
     eye: Pose2D
     counts: Array = field(default_factory=lambda: np.zeros(len(EDGES)))
-    score: float = 0.0
+    near: float = 0.0
+    whole: float = 0.0
     sizes: int = 0
     size_total: float = 0.0
 
     def add(self, evidence: Evidence, calibration: Calibration) -> None:
         """Take one picture's evidence."""
-        self.score += self.told(evidence, calibration)
+        told = self.told(evidence, calibration)
+        if evidence.is_near:
+            self.near += told
+        else:
+            self.whole += told
         self.counts[evidence.outcome] += evidence.weight
         if evidence.size is not None:
             self.sizes += 1
             self.size_total += evidence.size
 
     def told(self, evidence: Evidence, calibration: Calibration) -> float:
-        """What a further picture would add to `score`."""
+        """What a further picture would add to `near` or `whole`."""
         person, nobody = (
             1.0 - evidence.weight * (1.0 - urn(self.counts, evidence.outcome, chances, rho))
             for chances, rho in ((evidence.person, calibration.rho_person), (evidence.nobody, calibration.rho_nobody))
         )
         return math.log(person / nobody)
+
+    @property
+    def score(self) -> float:
+        """Log-likelihood ratio of all pictures, of a person against nobody."""
+        return self.near + self.whole
 
     def size(self, params: BeliefParams) -> float:
         """Log-likelihood ratio of all sizes; n correlated ones are worth n / (1 + (n - 1) rho)."""
@@ -93,17 +107,22 @@ def urn(counts: Array, outcome: int, chances: Array, rho: float) -> float:
 class Hypothesis:
     """Somebody may be there.
 
+    Without a place, size and depth tell nothing, and no look-alike competes.
+
     Attributes:
         number: of it, from 1 on.
+        label: object class; is_placed: pictures of it tell where it is.
         place: x, y in map [m], shape (2,); spread: its covariance [m2], shape (2, 2); at: time of both [s].
         height: visible height when last measured [m].
         seen_at: time of the last picture with a box of it [s].
+        together: numbers of those that one picture showed with it.
         sides: evidence; boxes: pictures with a box of it.
         against, possible: boxes with each reason against a person, and boxes without one.
-        place_veto: reason by its place, None if there is none.
+        place_veto: reason by its place, None if there is none; known: name of the known object there.
         moved: log-likelihood ratio of its motion, 0 where the lidar saw none.
         is_confirmed: it was confirmed once, and stays so.
         second_looks: viewpoints that it was looked at from.
+        scores: of its boxes; last: the newest one; measured: its newest measured place and size.
         best: the surest box; picture: stamp of its picture [s]; shown: all boxes of that picture.
     """
 
@@ -111,16 +130,23 @@ class Hypothesis:
     place: Array
     spread: Array
     at: float
+    label: str = "person"
+    is_placed: bool = True
     height: float = _HEIGHT
     seen_at: float = -math.inf
+    together: set[int] = field(default_factory=set)
     sides: list[Side] = field(default_factory=list)
     boxes: int = 0
     against: Counter[Veto] = field(default_factory=Counter)
     possible: int = 0
     place_veto: Veto | None = None
+    known: str = ""
     moved: float = 0.0
     is_confirmed: bool = False
     second_looks: list[Pose2D] = field(default_factory=list)
+    scores: list[float] = field(default_factory=list)
+    last: Box | None = None
+    measured: Measured | None = None
     best: Box | None = None
     picture: float = -math.inf
     shown: tuple[Box, ...] = ()
@@ -138,22 +164,39 @@ class Hypothesis:
         return self.against.most_common(1)[0][0]
 
     @property
+    def veto_text(self) -> str:
+        """The reason as a sentence, "" if there is none."""
+        return "" if self.veto is None else f"it is {self.known}" if self.veto is Veto.KNOWN else self.veto.value
+
+    @property
     def is_near_only(self) -> bool:
         """Whether all boxes of it were too near to tell a person from a pet."""
         return self.boxes > 0 and self.possible == 0 and not self.against
 
     @property
-    def score(self) -> float:
-        """Log-likelihood ratio of what network and lidar say, of a person against nobody."""
-        return sum(side.score for side in self.sides) + self.moved
+    def near(self) -> float:
+        """Log-likelihood ratio of views from near and of motion, which person and pet have in common."""
+        return sum(side.near for side in self.sides) + self.moved
+
+    @property
+    def whole(self) -> float:
+        """Log-likelihood ratio of views of the whole."""
+        return sum(side.whole for side in self.sides)
+
+    @property
+    def probability(self) -> float:
+        """Median of the scores of its boxes, 0 without boxes."""
+        return statistics.median_low(self.scores) if self.scores else 0.0
 
     def size(self, params: BeliefParams) -> float:
         """Log-likelihood ratio of size and depth, of a person against a look-alike."""
+        if not self.is_placed:
+            return math.inf
         return sum(side.size(params) for side in self.sides)
 
     def posterior(self, params: BeliefParams) -> float:
         """Probability of a person there."""
-        return posterior(self.score, self.size(params), params)
+        return posterior(self.near, self.whole, self.size(params), params)
 
     def find_side(self, eye: Pose2D, params: BeliefParams) -> Side | None:
         """The known side that a camera sees, None if it is another one.
@@ -222,6 +265,8 @@ class Hypothesis:
             elif side.score > own.score:  # of two counts of one side, the one with more for it
                 self.sides[[each is own for each in self.sides].index(True)] = side
         self.boxes, self.possible = self.boxes + other.boxes, self.possible + other.possible
+        self.scores += other.scores
+        self.together |= other.together
         self.against += other.against
         self.moved = max(self.moved, other.moved)
         self.is_confirmed |= other.is_confirmed
@@ -229,16 +274,17 @@ class Hypothesis:
 
     def why(self, params: BeliefParams) -> str:
         """One sentence: what it is believed to be, and by what."""
-        where = f"at about ({self.place[0]:.1f}, {self.place[1]:.1f})"
+        where = f"at about ({self.place[0]:.1f}, {self.place[1]:.1f})" if self.is_placed else "somewhere in view"
         share = self.posterior(params)
         if self.place_veto is not None or (self.veto is not None and share < params.clear_below):
-            return f"what was seen {where} is no intruder: {self.veto.value if self.veto else ''}"
+            return f"what was seen {where} is no intruder: {self.veto_text}"
         said = [_said(side, self.from_place(side.eye)[1]) for side in self.sides]
         told = "; ".join(said) or "no picture tells"
-        size = f"; size and depth {self.size(params):+.1f}" if any(side.sizes for side in self.sides) else ""
+        is_sized = math.isfinite(self.size(params)) and any(side.sizes for side in self.sides)
+        size = f"; size and depth {self.size(params):+.1f}" if is_sized else ""
         near = "; it was too near to be told from a pet" if self.is_near_only else ""
         moved = "; the lidar saw it move" if self.moved else ""
-        return f"a person {where} with probability {share:.0%}: {told}{size}{near}{moved}"
+        return f"a {self.label} {where} with probability {share:.0%}: {told}{size}{near}{moved}"
 
 
 def _said(side: Side, away: float) -> str:
@@ -246,17 +292,26 @@ def _said(side: Side, away: float) -> str:
     return f"{boxes:.0f} boxes and {silent:.0f} pictures without one from {away:.1f} m ({side.score:+.1f})"
 
 
-def posterior(score: float, size: float, params: BeliefParams) -> float:
+def posterior(near: float, whole: float, size: float, params: BeliefParams) -> float:
     """Probability of a person, against a look-alike and nobody.
 
+    A look-alike seen whole fools the network, or it does not, with equal chances.
+
     Args:
-        score: log-likelihood ratio of what the network says, with a person or a look-alike against nobody.
+        near: log-likelihood ratio of views from near and of motion, of a person or look-alike against nobody.
+        whole: log-likelihood ratio of views of the whole, of a person against nobody.
         size: log-likelihood ratio of size and depth, of a person against a look-alike.
         params: prior of each.
     """
-    told = math.exp(min(score, 300.0))
-    person, other = params.prior * told, params.look_alikes * told * math.exp(min(max(-size, -300.0), 300.0))
-    return person / (person + other + 1.0 - params.prior - params.look_alikes)
+    logs = (
+        math.log(params.prior) + near + whole,
+        math.log(0.5 * params.look_alikes) + near + whole - size,
+        math.log(0.5 * params.look_alikes) + near,
+        math.log(1.0 - params.prior - params.look_alikes),
+    )
+    most = max(logs)
+    shares = [math.exp(each - most) for each in logs]
+    return shares[0] / sum(shares)
 
 
 def entropy(share: float) -> float:

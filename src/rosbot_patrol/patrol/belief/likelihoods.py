@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 _LEAST = 0.02  # smallest q, and 1 less the largest: no single measurement is sure
 _NEAR_ERROR = 0.35  # [m] error of a place by the floor up to which it tells the size
+_LOWEST = 16  # [px] height below which a box shows nothing
+_SHAPES = 0.15, 8.0  # height over width that a box of an object can have
 _EDGE = 3  # [px] distance from the image border at which a box counts as cut
 
 
@@ -86,14 +88,15 @@ class Likelihoods:
         size, is_near, veto = self._size(box)
         return Evidence(outcome(box.probability), *self.chances(at), size=size, is_near=is_near, veto=veto)
 
-    def miss(self, at: Condition, seen: float) -> Evidence:
+    def miss(self, at: Condition, seen: float, *, is_near: bool = False) -> Evidence:
         """Judge a picture without a box at a place.
 
         Args:
             at: condition under which a person there would have been seen.
             seen: probability that the place was in view.
+            is_near: so near that only a part of somebody there would have been in view.
         """
-        return Evidence(0, *self.chances(at), weight=seen)
+        return Evidence(0, *self.chances(at), weight=seen, is_near=is_near)
 
     def chances(self, at: Condition) -> tuple[Array, Array]:
         """Probability of each outcome with a person and with nobody; their ratio is bounded by `picture_most`."""
@@ -102,7 +105,8 @@ class Likelihoods:
         return _raised(person, least * nobody), _raised(nobody, least * person)
 
     def _size(self, box: Box) -> tuple[float | None, bool, Veto | None]:
-        if self.is_near(box):
+        is_flat = box.measured is not None and box.measured.is_flat
+        if self.is_near(box) and not is_flat:
             return None, True, None
         found = possibility(box, self.params)
         if found is None:
@@ -113,7 +117,13 @@ class Likelihoods:
     def is_near(self, box: Box) -> bool:
         """Whether so little of it is in the picture that a person and a pet look alike: legs, or a part at its side."""
         m, p = box.measured, self.params
-        if m is None or m.has_legs or not _has_size(m) or not (goes_on(box, m) or m.is_cut_aside):
+        if (
+            box.label != "person"
+            or m is None
+            or m.has_legs
+            or not _has_size(m)
+            or not (goes_on(box, m) or m.is_cut_aside)
+        ):
             return False
         return m.top < p.person_top_min and m.width < p.lying_length
 
@@ -122,6 +132,13 @@ def _raised(chances: Array, least: Array) -> Array:
     """Probabilities of boxes of at least so much; the rest is that of none."""
     boxes = np.maximum(chances[1:], least[1:])
     return np.concatenate(([1.0 - boxes.sum()], boxes))
+
+
+def is_plausible(box: Box) -> bool:
+    """Whether a box has a score and a shape that an object can have."""
+    if not 0.0 < box.probability <= 1.0 or box.width <= 0 or box.height < _LOWEST:
+        return False
+    return _SHAPES[0] <= box.height / box.width <= _SHAPES[1]
 
 
 def is_cut(box: Box, eye: Eye) -> bool:
@@ -136,6 +153,8 @@ def possibility(box: Box, params: BeliefParams) -> tuple[float, Veto | None] | N
         return None
     if m.is_flat:
         return _LEAST, Veto.FLAT
+    if box.label != "person":  # things come in all sizes
+        return None if m.is_cut_aside else (1.0 - _LEAST, None)
     if not _has_size(m):
         return None
     shares = _shares(box, m, params)

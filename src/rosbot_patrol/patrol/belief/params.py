@@ -13,7 +13,7 @@ class BeliefParams:
     """Parameters of the belief."""
 
     prior: float = param(0.01, lo=1e-6, hi=0.5, doc="probability of a person at any one place, before anything is seen")
-    confirmed_above: float = param(0.98, lo=0.5, hi=1.0, doc="posterior above which a person is confirmed")
+    confirmed_above: float = param(0.95, lo=0.5, hi=1.0, doc="posterior above which a person is confirmed")
     clear_below: float = param(0.05, lo=0.0, hi=0.5, doc="posterior below which a place counts as empty")
     look_alikes: float = param(
         0.002,
@@ -22,7 +22,7 @@ class BeliefParams:
         doc="probability of a pet, a picture or the like at any one place that the network takes for a person",
     )
     side_rho: float = param(
-        0.1, lo=0.0, hi=1.0, doc="correlation of false boxes at one place from two sides: a lamp is one from everywhere"
+        0.3, lo=0.0, hi=1.0, doc="correlation of false boxes at one place from two sides: a lamp is one from everywhere"
     )
     size_rho: float = param(0.7, lo=0.0, hi=1.0, doc="correlation of the sizes measured in two images from one side")
     motion_ratio: float = param(20.0, lo=1.0, doc="likelihood ratio of an object that the lidar sees move")

@@ -15,6 +15,7 @@ from rosbot_patrol.patrol.belief.belief import Belief
 from rosbot_patrol.patrol.belief.calibration import Condition
 from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, Side, entropy, posterior, urn
 from rosbot_patrol.patrol.belief.likelihoods import Evidence
+from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
 _PICTURES = 12  # of a look
@@ -43,15 +44,16 @@ def best_second_look(
 
 def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_over_focal: float = 1.155) -> float:
     """Expected fall of a hypothesis's entropy by a look from a place [nat]."""
-    calibration, p = belief.calibration, belief.params
+    calibration, p = belief.likelihoods.calibration, belief.params
     _, away = hypothesis.from_place(eye)
     if away > p.view_range or (away < p.whole_from and hypothesis.is_near_only):
         return 0.0
     at = Condition(hypothesis.height / max(away, 0.3) / columns_over_focal)
     person, nobody = belief.likelihoods.chances(at)
     side = hypothesis.find_side(eye, p) or Side(eye)
-    size = hypothesis.size(p)
-    now = posterior(hypothesis.score, size, p)
+    is_near = away < p.whole_from
+    size, more = hypothesis.size(p), 0.0 if is_near or side.sizes else _size_of_another_side(hypothesis, p)
+    now = hypothesis.posterior(p)
     after = 0.0
     for k in np.flatnonzero(person > 0.0):
         one, none = (
@@ -60,7 +62,15 @@ def expected_gain(belief: Belief, hypothesis: Hypothesis, eye: Pose2D, columns_o
         )
         imagined = Side(eye, side.counts.copy())
         for _ in range(_PICTURES):
-            imagined.add(Evidence(int(k), person, nobody), calibration)
-        seen = size + (_SIZE if k and away >= p.whole_from and not any(s.sizes for s in hypothesis.sides) else 0.0)
-        after += (now * one + (1.0 - now) * none) * entropy(posterior(hypothesis.score + imagined.score, seen, p))
+            imagined.add(Evidence(int(k), person, nobody, is_near=is_near), calibration)
+        then = posterior(
+            hypothesis.near + imagined.near, hypothesis.whole + imagined.whole, size + (more if k else 0.0), p
+        )
+        after += (now * one + (1.0 - now) * none) * entropy(then)
     return entropy(now) - after
+
+
+def _size_of_another_side(hypothesis: Hypothesis, params: BeliefParams) -> float:
+    """Log-likelihood ratio of size that a new side will likely give: that of the known ones."""
+    known = [side.size(params) for side in hypothesis.sides if side.sizes]
+    return sum(known) / len(known) if known else _SIZE

@@ -15,8 +15,23 @@ from typing import Any
 
 from rosbot_patrol import params
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.patrol.intruder.exclusions import KnownObject
+from rosbot_patrol.patrol.records.inputs import Measured
 from rosbot_patrol.yaml_files import read_mapping
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownObject:
+    """Something that stands in the house and looks like somebody: place in map [m], reach [m], what it is."""
+
+    x: float
+    y: float
+    radius: float = 0.5
+    name: str = "a known object"
+    label: str = ""
+
+    def is_at(self, measured: Measured) -> bool:
+        """Whether a place may be its own."""
+        return math.hypot(measured.x - self.x, measured.y - self.y) <= self.radius + min(measured.error, 0.5)
 
 
 def _not_finite(value: float) -> str | None:

@@ -64,7 +64,6 @@ class LidarTrack:
         first: its points in map when it was first seen [m], shape (N, 2); start: their middle; since: when [s].
         x, y: where it is in map [m]; at: when it was seen last [s]; looks: how often.
         has_moved: it is some way from where it was first seen, and the lidar looks through that place.
-        shown: pictures of it in a row that show nobody (see `pets_seen_whole`).
     """
 
     first: Array
@@ -75,7 +74,6 @@ class LidarTrack:
     at: float
     looks: int = 1
     has_moved: bool = False
-    shown: int = 0
 
 
 class LidarMotion:

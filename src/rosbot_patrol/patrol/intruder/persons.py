@@ -7,7 +7,7 @@ whose place is not known is the one that was seen last.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from rosbot_patrol.params import param
@@ -32,6 +32,7 @@ class Persons:
     def __init__(self, params: PersonsParams | None = None) -> None:
         self.params = params or PersonsParams()
         self.met: list[Person] = []
+        self._by_key: dict[int, Person] = {}
 
     def recall(self, places: Iterable[tuple[float, float] | None], now: float) -> None:
         """Those met before the program ended, as if they had been seen now."""
@@ -44,26 +45,36 @@ class Persons:
         """Where each was last."""
         return [None if p.x is None or p.y is None else (p.x, p.y) for p in self.met]
 
-    def note(self, now: float, measured: Measured | None) -> tuple[Person, bool]:
-        """Somebody was confirmed; who it is, and whether for the first time."""
-        person = self._who(now, measured)
+    def note(
+        self, now: float, measured: Measured | None, key: int | None = None, apart: Collection[int] = ()
+    ) -> tuple[Person, bool]:
+        """Somebody was confirmed; who it is, and whether for the first time.
+
+        Args:
+            now: steady time [s].
+            measured: where, None if unknown.
+            key: sightings with the same key are known to be of the same person.
+            apart: keys of those who were in the same picture once.
+        """
+        person = self._by_key.get(key) if key is not None else None
+        person = person or self._who(now, measured, [self._by_key[k] for k in apart if k in self._by_key])
         is_new = person is None
         if person is None:
             person = Person(number=len(self.met) + 1, x=None, y=None, error=math.inf, at=now)
             self.met.append(person)
+        if key is not None:
+            self._by_key[key] = person
         if measured is not None and (measured.error <= 2.0 * person.error or now - person.at > 1.0):
             person.x, person.y, person.error = measured.x, measured.y, measured.error
         person.at = now
         person.sightings += 1
         return person, is_new
 
-    def _who(self, now: float, measured: Measured | None) -> Person | None:
-        if not self.met:
-            return None
-        latest = max(self.met, key=lambda person: person.at)
+    def _who(self, now: float, measured: Measured | None, others: Sequence[Person]) -> Person | None:
+        left = [person for person in self.met if not any(person is other for other in others)]
         if measured is None:
-            return latest
-        may_be = [person for person in self.met if self._gap(now, person, measured) <= 0.0]
+            return max(left, key=lambda person: person.at, default=None)
+        may_be = [person for person in left if self._gap(now, person, measured) <= 0.0]
         return min(may_be, key=lambda person: _apart(person, measured), default=None)
 
     def _gap(self, now: float, person: Person, measured: Measured) -> float:

@@ -24,15 +24,16 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rosbot_patrol.geometry import distance
+from rosbot_patrol.patrol.belief.decision import IntruderDecision
+from rosbot_patrol.patrol.belief.networks import Network
 from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.intruder.decision import IntruderDecision
-from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.frozen_camera import FrozenCamera
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 from rosbot_patrol.patrol.mission.agenda import Agenda
 from rosbot_patrol.patrol.mission.interruptions import (
     EmergencyHold,
@@ -71,7 +72,8 @@ class PatrolManager:
         needs_camera: pictures come in, so that a silent camera can be told.
         views: what was seen of a room, and from where to see the rest.
         viewpoints: further poses that show a room whose own point cannot be reached.
-        exclusions: what cannot be an intruder.
+        known: objects that look like somebody.
+        network: gives the network that runs, asked at the begin of each mission.
     """
 
     def __init__(
@@ -83,7 +85,8 @@ class PatrolManager:
         needs_camera: bool = True,
         views: Views | None = None,
         viewpoints: Viewpoints | None = None,
-        exclusions: Exclusions | None = None,
+        known: tuple[KnownObject, ...] = (),
+        network: Callable[[], Network] = Network,
     ) -> None:
         self.params = params = params or ManagerParams()
         kept = memory_from_plain(memory or {}, rooms)
@@ -94,7 +97,7 @@ class PatrolManager:
             needs_camera=needs_camera,
             views=views or OneTurn(),
             viewpoints=viewpoints,
-            decision=IntruderDecision(rooms, params.intruder, exclusions or Exclusions()),
+            decision=IntruderDecision(rooms, params.intruder, known, network),
             notices=NoticeGate(kept.held),
             status=StatusReports(agenda.queue, kept.last_verdict),
         )

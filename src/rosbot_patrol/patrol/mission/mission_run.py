@@ -6,8 +6,8 @@ import dataclasses
 import logging
 
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.belief.decision import Finding, IntruderDecision
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.intruder.decision import Finding, IntruderDecision
 from rosbot_patrol.patrol.mission.drive import OtherPoses
 from rosbot_patrol.patrol.mission.look_around import LookParts
 from rosbot_patrol.patrol.mission.notices import NoticeGate
@@ -83,7 +83,7 @@ class MissionRun:
         """Count what is seen from now on; steady time [s]."""
         self.mission.started = now
         self._parts.decision.start(now, self.mission.people)
-        self._parts.views.start(self.mission)
+        self._parts.views.start(self.mission, self._parts.decision.belief)
 
     def step(self, now: float, inputs: Inputs, out: Commands, *, passed: float) -> Place | None:
         """Go on; where the mission ended, None while it runs.
@@ -95,10 +95,10 @@ class MissionRun:
             passed: time since the last step [s].
         """
         self._count(passed, inputs)
-        self._look_for_intruders(now, inputs, out)
         if self.mission.phase is not Phase.RETURNING:
             self._parts.views.see(now, inputs)
             self.mission.share_seen = self._parts.views.share()
+        self._look_for_intruders(now, inputs, out)
         if self._follow_somebody(now, inputs, out):
             return None
         return self._take(self._phase.step(now, inputs), now, inputs, out)
@@ -184,12 +184,10 @@ class MissionRun:
     # -- intruders
 
     def _look_for_intruders(self, now: float, inputs: Inputs, out: Commands) -> None:
-        decision, views = self._parts.decision, self._parts.views
-        for finding in decision.see(now, inputs, views.harmless()):
+        decision = self._parts.decision
+        for finding in decision.see(now, inputs, self._parts.views.tracks()):
             self._note(finding, inputs, out)
             out.people = tuple(decision.met)
-        views.suspect(decision.doubtful)
-        views.step_back(decision.too_near)
 
     def _note(self, finding: Finding, inputs: Inputs, out: Commands) -> None:
         mission, seen = self.mission, finding.seen

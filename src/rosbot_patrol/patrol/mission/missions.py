@@ -102,7 +102,7 @@ class Missions:
             run.decide(Verdict.UNVERIFIED, f"{mission.room.title} was not looked at")
         level = logging.INFO if place.kind is Whereabouts.HOME else logging.WARNING
         log.log(level, "the mission to %s is over, %s", mission.room.title, place.text)
-        out.suspects += status_text.weak_sightings(self.parts.decision.weak_sightings)
+        out.suspects += status_text.hypotheses(self.parts.decision.belief)
         self._close(mission, out)
         self.run = None
         self.ready.at_rest = f"{ON_GUARD}, {place.text}; {status_text.verdict(mission)}"

@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from rosbot_patrol.params import param
+from rosbot_patrol.patrol.belief.decision import IntruderParams
+from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.calls.queue import PriorityParams
 from rosbot_patrol.patrol.guard.battery import BatteryParams, check_battery
 from rosbot_patrol.patrol.intruder.camera_tracking import CameraTrackingParams
-from rosbot_patrol.patrol.intruder.decision import IntruderParams
-from rosbot_patrol.patrol.intruder.exclusions import ExclusionParams
 from rosbot_patrol.patrol.intruder.persons import PersonsParams
-from rosbot_patrol.patrol.intruder.sightings import SightingsParams
-from rosbot_patrol.patrol.intruder.weak_sightings import WeakSightingParams
 from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.search.look import LookParams
 from rosbot_patrol.patrol.search.survey import SightParams
@@ -57,8 +55,7 @@ class ManagerParams(BehaviourParams):
     drive: DriveParams = DriveParams()
     look: LookParams = LookParams()
     spin: SpinParams = SpinParams()
-    watch: SightingsParams = SightingsParams()
-    suspects: WeakSightingParams = WeakSightingParams()
+    belief: BeliefParams = BeliefParams()
     people: PersonsParams = PersonsParams()
     track: CameraTrackingParams = CameraTrackingParams()
     priorities: PriorityParams = PriorityParams()
@@ -69,8 +66,7 @@ class ManagerParams(BehaviourParams):
         """What the intruder decision is made with."""
         return IntruderParams(
             alarm_classes=self.alarm_classes,
-            watch=self.watch,
-            suspects=self.suspects,
+            belief=self.belief,
             people=self.people,
             track=self.track,
         )
@@ -78,7 +74,7 @@ class ManagerParams(BehaviourParams):
 
 @dataclass(frozen=True, kw_only=True)
 class NodeParams(BehaviourParams, SightParams):
-    """The node's own parameters; mail, drive, look, turn and sightings have their own declarations."""
+    """The node's own parameters; mail, drive, look and turn have their own declarations."""
 
     path_to_params: str = param(doc="points file (the tutorial's name)")
     sensors: str = param("", doc="sensors file; empty or missing: a sensor's id is the number of its room")
@@ -95,10 +91,14 @@ class NodeParams(BehaviourParams, SightParams):
     )
     schedule: str = param("", doc="file of the scheduled rounds; empty: none")
     arming: str = param("", doc="file of the arming modes; empty: every mode guards all rooms, without delays")
+    network: str = param(
+        "", doc="network whose calibration counts; empty: the one that darknet_ros names in its parameter `running`"
+    )
+    calibrations: str = param(
+        "", doc="folder of files of scripts/calibrate_network, which come before the shipped ones; empty: none"
+    )
     known_objects: str = param("", doc="file of objects that look like a person (patrol/known_objects); empty: none")
-    watch: SightingsParams = SightingsParams()
-    suspects: WeakSightingParams = WeakSightingParams()
-    judge: ExclusionParams = ExclusionParams()
+    belief: BeliefParams = BeliefParams()
     track: CameraTrackingParams = CameraTrackingParams()
     people: PersonsParams = PersonsParams()
     eyes: EyesTopics = EyesTopics()
@@ -127,8 +127,7 @@ def manager_params(node: NodeParams, load: Callable[[type[Any]], Any], prefix: s
         drive=load(DriveParams),
         look=load(LookParams),
         spin=load(SpinParams),
-        watch=node.watch,
-        suspects=node.suspects,
+        belief=node.belief,
         people=node.people,
         track=node.track,
     )

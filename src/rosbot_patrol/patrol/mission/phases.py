@@ -7,8 +7,8 @@ from typing import ClassVar, Protocol
 
 from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.goal import Goal
+from rosbot_patrol.patrol.belief.decision import IntruderDecision
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.decision import IntruderDecision
 from rosbot_patrol.patrol.mission.drive import DriveParams, OtherPoses, Trip, WayHome, end_of_way_home
 from rosbot_patrol.patrol.mission.look_around import LookAround, LookParts
 from rosbot_patrol.patrol.mission.views import Views
@@ -143,7 +143,7 @@ class LookingAround:
     def _ruling(self, problem: str) -> Ruling:
         problem = problem or self._views.blind()
         if not problem:
-            clear = status_text.clear(self._mission, self._look.turned_deg, self._decision.refusals)
+            clear = status_text.clear(self._mission, self._look.turned_deg, self._decision.belief.vetoes)
             return Ruling(Verdict.CLEAR, clear)
         moved = self._views.moved()
         also = f"; {moved}" if moved else ""

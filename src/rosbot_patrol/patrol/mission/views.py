@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.patrol.belief.belief import Belief
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.close_ups import SeenAt
-from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission
 from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
@@ -20,20 +20,19 @@ Viewpoints = Callable[[Room, Inputs], Sequence[Pose2D]]
 class Views(Protocol):
     """What has been seen of a room, and from where to see the rest."""
 
-    def start(self, mission: Mission) -> None:
-        """Begin a mission, or go on with one after a restart: `mission.views_done` lists the viewpoints done."""
+    def start(self, mission: Mission, belief: Belief) -> None:
+        """Begin a mission, or go on with one after a restart: `mission.views_done` lists the viewpoints done.
+
+        Args:
+            mission: whose room.
+            belief: of it; what it leaves open is looked at again.
+        """
 
     def see(self, now: float, inputs: Inputs) -> None:
         """Take in one step of the drive to the room or of the look."""
 
-    def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
-        """Take in everything that looks like a person from too few sides."""
-
-    def step_back(self, doubtful: Sequence[SeenAt]) -> None:
-        """Take in everything that is too near to tell a person from a pet."""
-
-    def harmless(self) -> Sequence[SeenAt]:
-        """Things that move in the room and are no persons."""
+    def tracks(self) -> Sequence[LidarTrack]:
+        """What the lidar follows."""
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
         """The next viewpoint, None if the room is seen well enough or no viewpoint is left."""
@@ -57,20 +56,18 @@ class Views(Protocol):
 class OneTurn:
     """`Views` of a look that ends with its one turn."""
 
-    def start(self, mission: Mission) -> None:
-        """Nothing to remember."""
+    def __init__(self) -> None:
+        self._belief: Belief | None = None
+
+    def start(self, mission: Mission, belief: Belief) -> None:
+        """Only what the belief leaves open can be told."""
+        self._belief = belief
 
     def see(self, now: float, inputs: Inputs) -> None:
         """Nothing to see."""
 
-    def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
-        """There is no other side."""
-
-    def step_back(self, doubtful: Sequence[SeenAt]) -> None:
-        """There is no other place."""
-
-    def harmless(self) -> Sequence[SeenAt]:
-        """Nobody knows."""
+    def tracks(self) -> Sequence[LidarTrack]:
+        """Nothing is followed."""
         return ()
 
     def next(self, inputs: Inputs) -> Viewpoint | None:
@@ -86,8 +83,9 @@ class OneTurn:
         return None
 
     def blind(self) -> str:
-        """Nobody measures."""
-        return ""
+        """The floor is not measured: only what may be somebody keeps the room from being clear."""
+        doubts = self._belief.open if self._belief is not None else ()
+        return self._belief.why(doubts[0]) if self._belief is not None and doubts else ""
 
     def is_seen(self) -> bool:
         """Nobody measures."""

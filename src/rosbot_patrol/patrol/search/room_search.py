@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from rosbot_patrol.geometry import Pose2D, angle_difference, wrap_angle
-from rosbot_patrol.patrol.house.floor import Mask
+from rosbot_patrol.patrol.belief.belief import Belief
+from rosbot_patrol.patrol.belief.hypothesis import Hypothesis
+from rosbot_patrol.patrol.belief.second_look import best_second_look
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.close_ups import SeenAt
-from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion
-from rosbot_patrol.patrol.intruder.pets_seen_whole import PetsSeenWhole
-from rosbot_patrol.patrol.intruder.second_looks import SecondLook, SecondLooks
-from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
+from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotion, LidarTrack
 from rosbot_patrol.patrol.records.inputs import Inputs
 from rosbot_patrol.patrol.records.mission import Mission
 from rosbot_patrol.patrol.search.survey import Ground, SightParams, Survey
@@ -27,6 +25,7 @@ VIEW_WIDTH = 1.047  # [rad] until a camera has told its own
 _STAY = 1.5  # [s] somebody half hidden shows well in one picture and hardly in the next
 _STAY_NEAR = 3.0  # [s] a pet rests for some seconds before it goes on
 _SWEEP = 0.5  # [rad] past what looks a little like a person
+_LOOKS = 4  # second looks at one hypothesis
 _LATE = 0.15  # [rad] a turn that should have begun this far back begins where the robot stands
 
 
@@ -36,7 +35,7 @@ class _Search:
 
     Attributes:
         survey: what was seen, None until the map comes; has_eye: a camera tells what it sees.
-        doubts, harmless: things that are worth a second look, and things that are not.
+        belief: who may be there.
         now, began: steady time of the last step, and of the end of the first viewpoint, inf before [s].
         views, second_looks: viewpoints chosen; tried: where [m].
         calls: of the room's sensor; called_at: when it or the lidar last told of motion [s].
@@ -44,9 +43,8 @@ class _Search:
     """
 
     mission: Mission
-    doubts: SecondLooks
+    belief: Belief
     calls: int
-    harmless: PetsSeenWhole = field(default_factory=PetsSeenWhole)
     survey: Survey | None = None
     has_eye: bool = False
     now: float = 0.0
@@ -74,12 +72,10 @@ class RoomSearch:
 
     # -- Views
 
-    def start(self, mission: Mission) -> None:
+    def start(self, mission: Mission, belief: Belief) -> None:
         """Begin with a room; viewpoints done before a restart count as seen, by the map."""
         self._lidar_motion.start()
-        self._started = _Search(
-            mission=mission, doubts=SecondLooks(self.params.coverage.seen_in), calls=mission.triggers
-        )
+        self._started = _Search(mission=mission, belief=belief, calls=mission.triggers)
 
     @property
     def _search(self) -> _Search:
@@ -110,25 +106,10 @@ class RoomSearch:
             search.has_eye, self._width = True, frame.eye.width
             sight = sight or survey.sight(inputs, frame.eye)
             survey.coverage.look(frame.eye, sight, search.now)
-            for box in frame.boxes:
-                if box.doubt is not None:
-                    search.doubts.add_far(box.label, *box.doubt)
-            search.doubts.look(frame.stamp, frame.eye, sight)
-            if inputs.scan is not None:
-                stamp = inputs.scan.scan.stamp
-                search.harmless.look(stamp, frame.eye, sight, frame.boxes, self._lidar_motion.tracks)
 
-    def suspect(self, doubtful: Sequence[WeakSighting]) -> None:
-        """Look at what seems to be a person from another side."""
-        self._search.doubts.suspect(doubtful)
-
-    def step_back(self, doubtful: Sequence[SeenAt]) -> None:
-        """Look from farther off at what is too near to tell a person from a pet."""
-        self._search.doubts.set_too_near(doubtful)
-
-    def harmless(self) -> Sequence[SeenAt]:
-        """Things that move, were shown whole and are no persons."""
-        return self._search.harmless.sightings
+    def tracks(self) -> Sequence[LidarTrack]:
+        """What the lidar follows."""
+        return self._lidar_motion.tracks
 
     def share(self) -> float | None:
         """Share of the room's floor that was seen, None without a map of it or a camera."""
@@ -142,12 +123,9 @@ class RoomSearch:
         search, share = self._started, self.share()
         if search is None:
             return ""
-        doubts = search.survey.doubts_here(search.doubts.grave()) if search.survey is not None else []
+        doubts = search.belief.open if search.survey is None else search.survey.doubts_here(search.belief.open)
         if doubts:
-            return doubts[0].text
-        unsure = search.doubts.unsure(bool(self._lidar_motion.text()))
-        if unsure:
-            return unsure
+            return search.belief.why(doubts[0])
         is_enough = share is None or share >= self.params.clear_share
         return "" if is_enough else f"only {share:.0%} of its floor could be seen"
 
@@ -244,29 +222,22 @@ class RoomSearch:
     # -- second looks
 
     def _second_look(self, search: _Search, survey: Survey, pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
-        """A viewpoint for the first doubt that has one."""
-        search.doubts.follow((track.x, track.y) for track in self._lidar_motion.tracks if track.has_moved)
-        doubts = survey.doubts_here(search.doubts.open())
-        if not doubts:
-            return None
+        """A viewpoint for the most probable open hypothesis that has one."""
+        doubts = [each for each in survey.doubts_here(search.belief.open) if each.is_placed]
         # Finally ignore live obstacles: move_base may find a way that this planner does not see.
         blocked = survey.blocked(inputs), None
         for doubt in doubts:
-            manners = [(stands, span) for stands in blocked for span in doubt.spans]
-            views = (_view_of(doubt, pose, survey.planner, stands, span) for stands, span in manners)
-            found = next(filter(None, views), None)
-            if found is None:
+            if len(doubt.second_looks) >= _LOOKS:
                 continue
-            doubt.visit(found.pose)
-            log.info(
-                "something like a %s at (%.1f, %.1f) is to be looked at from (%.1f, %.1f)",
-                doubt.label,
-                doubt.x,
-                doubt.y,
-                found.pose.x,
-                found.pose.y,
-            )
-            return _with_sweep(doubt, found)
+            x, y = float(doubt.place[0]), float(doubt.place[1])
+            tried = tuple((at.x, at.y) for at in doubt.second_looks)
+            for stands in blocked:
+                candidates = survey.planner.views_of(pose, x, y, stands=stands, tried=tried)
+                found = best_second_look(search.belief, doubt, candidates, 2.0 * math.tan(0.5 * self._width))
+                if found is not None:
+                    doubt.second_looks.append(found.pose)
+                    log.info("%s is to be looked at from (%.1f, %.1f)", search.belief.why(doubt), *found.pose[:2])
+                    return _with_sweep(doubt, found)
         return None
 
     # -- for a room whose own point cannot be reached
@@ -298,17 +269,9 @@ class RoomSearch:
             search.survey = Survey(search.mission, self._ground, p, self._width)
 
 
-def _view_of(
-    doubt: SecondLook, pose: Pose2D, planner: ViewpointPlanner, stands: Mask | None, span: Mapping[str, float]
-) -> Viewpoint | None:
-    return planner.view_of(pose, doubt.x, doubt.y, stands=stands, seen_from=doubt.seen_from, tried=doubt.tried, **span)
-
-
-def _with_sweep(doubt: SecondLook, view: Viewpoint) -> Viewpoint:
+def _with_sweep(doubt: Hypothesis, view: Viewpoint) -> Viewpoint:
     """The viewpoint with its stay, and a sweep over what looks a little like a person: each picture differs."""
-    if doubt.is_near:
+    if doubt.is_near_only:
         return replace(view, stay=_STAY_NEAR)
-    if not doubt.seen_from:
-        return view
     first = view.pose._replace(yaw=wrap_angle(view.pose.yaw - _SWEEP / 2.0))
     return replace(view, pose=first, turn=_SWEEP, stay=_STAY)

@@ -10,18 +10,18 @@ import numpy as np
 
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.params import param
+from rosbot_patrol.patrol.belief.hypothesis import Hypothesis
 from rosbot_patrol.patrol.house.floor import Mask
 from rosbot_patrol.patrol.house.regions import RoomRegions
-from rosbot_patrol.patrol.intruder.close_ups import BEYOND
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarMotionParams, LidarTrack, off_the_map
-from rosbot_patrol.patrol.intruder.second_looks import SecondLook
 from rosbot_patrol.patrol.records.inputs import Eye, Inputs
 from rosbot_patrol.patrol.records.mission import Mission
-from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Sight, sight_of_scan, sight_on_map
+from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Sight, free_way, sight_on_map
 from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams, ViewpointPlanner
 from rosbot_patrol.scan import scan_points
 
 _ROBOT = 0.25  # [m] minimum distance of a viewpoint from anything that stands off the map
+_BEYOND = 0.8  # [m] beyond a wall that something stands before it may be measured
 _RECALLED = 12  # pictures that a full turn before a restart stands for
 
 
@@ -81,20 +81,21 @@ class Survey:
 
     def sight(self, inputs: Inputs, eye: Eye) -> Sight:
         """How far one can look from a camera: by the scan, or by the map if there is none."""
-        floor, reach = self._house.floor, self._params.coverage.view_range
-        if inputs.scan is None:
-            return sight_on_map(floor, eye.pose.x, eye.pose.y, reach)
-        return sight_of_scan(inputs.scan.scan, inputs.scan.map_from_laser, floor, reach)
+        return free_way(self._house.floor, inputs.scan, eye, self._params.coverage.view_range)
 
     def has_motion(self, tracks: Iterable[LidarTrack], stamp: float) -> bool:
         """Whether something that moved is in the room at a time [s]."""
         moving = (track for track in tracks if track.has_moved and track.at >= stamp)
         return any(self._house.room_at(track.x, track.y) == self.mission.room.id for track in moving)
 
-    def doubts_here(self, doubts: Iterable[SecondLook]) -> list[SecondLook]:
-        """The doubts in the room, or right in front of the robot."""
+    def doubts_here(self, doubts: Iterable[Hypothesis]) -> list[Hypothesis]:
+        """The hypotheses in the room, those that were only seen from right before them, and those without a place."""
         room = self.mission.room.id
-        return [d for d in doubts if d.is_near or self._house.room_at(*self._before_walls(d)) == room]
+        return [
+            each
+            for each in doubts
+            if each.is_near_only or not each.is_placed or self._house.room_at(*self.before_walls(each)) == room
+        ]
 
     def wanted(self) -> tuple[Mask, float | None]:
         """Floor that is worth a viewpoint, and the area that one has to show of it at least [m2], None by default."""
@@ -124,12 +125,13 @@ class Survey:
         radius = self._params.viewpoints.hideout
         return self._house.floor.open_to(unseen, radius) if radius > 0.0 else np.zeros(unseen.shape, bool)
 
-    def _before_walls(self, doubt: SecondLook) -> tuple[float, float]:
-        """The place of a doubt, moved before the wall if it was measured beyond one."""
-        if not doubt.seen_from:
-            return doubt.x, doubt.y
-        eye = doubt.seen_from[-1]
-        return self._house.floor.before((eye.x, eye.y), doubt.x, doubt.y, BEYOND)
+    def before_walls(self, doubt: Hypothesis) -> tuple[float, float]:
+        """The place of a hypothesis, moved before the wall if it was measured beyond one."""
+        x, y = float(doubt.place[0]), float(doubt.place[1])
+        if not doubt.sides:
+            return x, y
+        eye = doubt.sides[-1].eye
+        return self._house.floor.before((eye.x, eye.y), x, y, _BEYOND)
 
     def _recall_turn(self, pose: Pose2D, width: float) -> None:
         p = self._params.coverage

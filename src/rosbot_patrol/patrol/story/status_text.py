@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from rosbot_patrol.counts import count_of
+from rosbot_patrol.patrol.belief.belief import Belief
 from rosbot_patrol.patrol.calls.queue import MissionQueue
 from rosbot_patrol.patrol.house.rooms import Room
-from rosbot_patrol.patrol.intruder.weak_sightings import WeakSighting
 from rosbot_patrol.patrol.records.commands import Commands, Report
 from rosbot_patrol.patrol.records.findings import Confirmation
 from rosbot_patrol.patrol.records.inputs import Guarded
@@ -60,17 +60,9 @@ def clear(mission: Mission, turned_deg: float, refusals: Mapping[str, int]) -> s
     return ", ".join(parts)
 
 
-def weak_sightings(found: Iterable[WeakSighting]) -> tuple[str, ...]:
-    """What looked like somebody, for the record: where, how surely, from which sides."""
-    texts = []
-    for suspect in found:
-        sides = [
-            f"{count_of(len(side.scores), 'picture')} at {side.score:.2f} from ({side.eye.x:.1f}, {side.eye.y:.1f})"
-            for side in suspect.sides
-        ]
-        about = f"{suspect.label} at ({suspect.x:.2f}, {suspect.y:.2f})"
-        texts.append(f"{about}{', told' * suspect.is_confirmed}: {'; '.join(sides)}")
-    return tuple(texts)
+def hypotheses(belief: Belief) -> tuple[str, ...]:
+    """What looked like somebody, for the record: where, how surely, by what."""
+    return tuple(belief.why(each) for each in belief.hypotheses if each.boxes)
 
 
 def phase_text(mission: Mission) -> str:

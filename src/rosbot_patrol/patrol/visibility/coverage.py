@@ -20,6 +20,7 @@ from rosbot_patrol.geometry import Pose2D, wrap_angles
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Array, Floor, Mask
 from rosbot_patrol.patrol.records.inputs import Eye as Eye
+from rosbot_patrol.patrol.records.inputs import ScanView
 from rosbot_patrol.scan import LaserScan
 
 _FRAY = (
@@ -108,6 +109,13 @@ def sight_of_scan(scan: LaserScan, map_from_laser: Pose2D, floor: Floor, reach: 
     walls = by_map.lengths[np.rint(turned / by_map.step).astype(np.int64) % len(by_map.lengths)]
     lengths = np.where(scan.is_hit, np.minimum(np.where(scan.is_hit, scan.ranges, 0.0), walls + _FRAY), walls)
     return Sight(at.x, at.y, at.yaw + scan.angle_min, scan.angle_increment, np.minimum(lengths, reach))
+
+
+def free_way(floor: Floor, view: ScanView | None, eye: Eye, reach: float) -> Sight:
+    """How far one can look from a camera: by the scan, or by the map if there is none."""
+    if view is None:
+        return sight_on_map(floor, eye.pose.x, eye.pose.y, reach)
+    return sight_of_scan(view.scan, view.map_from_laser, floor, reach)
 
 
 class Coverage:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rosbot_patrol.geometry import Pose2D, wrap_angles
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.maps.ways import steps_over
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.house.floor import Array, Floor, Mask
@@ -21,10 +21,8 @@ from rosbot_patrol.patrol.visibility.coverage import CoverageParams, sight_on_ma
 _FAR = math.inf
 _ROOMY = 0.6  # so far from all that the map shows nothing low that it does not show is met: the feet of a chair [m]
 _TIGHT = 0.8  # what a viewpoint nearer to things is worth against one that is not
-_STEP = 0.2  # from so far aside a picture differs [m]
-_STEPS = 2.0  # from so many times the spacing of the viewpoints it differs well
-_IN_VAIN = 2  # viewpoints on another side that showed nothing are enough
-_NEARER = 0.7  # where there is no other side, so much nearer than before is a second look
+_SECTOR = 0.4  # [rad] width of a direction of second looks
+_RING = 1.0  # [m] likewise of a distance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,13 +59,6 @@ class ViewpointParams:
         0.22, unit="m", lo=0.05, doc="half the width of the narrowest gap on a route to a viewpoint"
     )
     viewpoint_spacing: float = param(0.4, unit="m", lo=0.1, doc="grid spacing of candidate viewpoints")
-    other_side: float = param(
-        0.8,
-        unit="rad",
-        lo=0.0,
-        hi=3.1,
-        doc="minimum change of viewing direction for a second look at something like a person",
-    )
     doorway_depth: float = param(1.0, unit="m", lo=0.0, doc="maximum distance of a viewpoint outside the room")
 
 
@@ -152,101 +143,54 @@ class ViewpointPlanner:
         """Another place to look into a room from whose own point cannot be reached."""
         return self.next(start, room, room, width=width, tried=tried)
 
-    def view_of(
+    def views_of(
         self,
         start: Pose2D,
         x: float,
         y: float,
         *,
         stands: Mask | None = None,
-        seen_from: Sequence[Pose2D] = (),
         tried: Sequence[tuple[float, float]] = (),
-        nearest: float = 1.5,
-        most: float = 3.5,
-    ) -> Viewpoint | None:
-        """The nearest viewpoint with a free line to a place, None if there is none.
+        nearest: float = 1.0,
+        most: float = 4.5,
+    ) -> list[Viewpoint]:
+        """Viewpoints with a free line to a place, from each direction and distance the one with the shortest way.
 
         Args:
             start: where the robot is, in map.
             x: of the place [m].
             y: of the place [m].
             stands: as for `next`.
-            seen_from: poses that showed it: the viewpoint shows another side, or at least more, or a step aside.
-            tried: viewpoints that were in vain; after two of them a step aside is enough.
+            tried: viewpoints that were chosen before; their surroundings are left out.
             nearest: minimum distance from the place [m].
             most: maximum distance [m].
         """
         floor, ways = self.floor, self.ways(start, stands)
         sight = sight_on_map(floor, *self._before(x, y), most)
-        there = np.ones(floor.info.shape, bool)
-        bearings, distances, _ = visible(floor, there, sight, self._coverage)
-        open_ = (sight.reaches(bearings, distances) & (distances >= nearest) & (distances <= most)).reshape(there.shape)
-        good = open_ & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
+        bearings, distances, _ = visible(floor, np.ones(floor.info.shape, bool), sight, self._coverage)
+        open_ = sight.reaches(bearings, distances) & (distances >= nearest) & (distances <= most)
+        good = open_.reshape(ways.shape) & (floor.clearance >= self.params.viewpoint_clearance) & (ways < _FAR)
         if stands is not None:
             good &= ~stands
-        untried = good & ~floor.mark_near(np.array(tried), self.params.viewpoint_spacing) if tried else good
-        if seen_from:
-            good = self._anew(good, untried, distances.reshape(good.shape), seen_from, x=x, y=y, tried=tried)
-        else:
-            good = untried
-        return self._nearest_view(good, ways, x, y) if good.any() else None
+        if tried:
+            good &= ~floor.mark_near(np.array(tried), self.params.viewpoint_spacing)
+        iy, ix = np.nonzero(good)
+        if not len(iy):
+            return []
+        sectors = np.floor(bearings.reshape(good.shape)[good] / _SECTOR).astype(np.int64)
+        rings = np.floor(distances.reshape(good.shape)[good] / _RING).astype(np.int64)
+        costs = ways[good] / np.where(floor.clearance[good] >= _ROOMY, 1.0, _TIGHT)
+        order = np.argsort(costs, kind="stable")
+        _, first = np.unique(np.stack((sectors[order], rings[order])), axis=1, return_index=True)
+        return [self._facing(int(ix[k]), int(iy[k]), x, y, float(ways[iy[k], ix[k]])) for k in order[first]]
 
-    def _nearest_view(self, good: Mask, ways: Array, x: float, y: float) -> Viewpoint:
-        """The view of a place from the good cell with the shortest way, a roomy one if there is any."""
-        roomy = good & (self.floor.clearance >= _ROOMY)
-        good = roomy if roomy.any() else good
-        iy, ix = np.unravel_index(int(np.where(good, ways, _FAR).argmin()), good.shape)
-        at = self.floor.info.centre_of(int(ix), int(iy))
-        yaw = math.atan2(y - at[1], x - at[0])
-        return Viewpoint(pose=Pose2D(*at, yaw), turn=0.0, gain=0.0, way=float(ways[iy, ix]))
+    def _facing(self, ix: int, iy: int, x: float, y: float, way: float) -> Viewpoint:
+        at = self.floor.info.centre_of(ix, iy)
+        return Viewpoint(pose=Pose2D(*at, math.atan2(y - at[1], x - at[0])), turn=0.0, gain=0.0, way=way)
 
     def _is_tight(self, x: float, y: float) -> bool:
         ix, iy = self.floor.info.cell_of(x, y)
         return bool(self.floor.clearance[iy, ix] < _ROOMY)
-
-    def _anew(
-        self,
-        good: Mask,
-        untried: Mask,
-        distances: Array,
-        eyes: Sequence[Pose2D],
-        *,
-        x: float,
-        y: float,
-        tried: Sequence[tuple[float, float]],
-    ) -> Mask:
-        """Of some floor what shows another side of a place than some poses; else more of it; else from a step away.
-
-        A detector that is unsure of one picture is often sure of the next, taken from a step away.
-        """
-        before = min(math.hypot(eye.x - x, eye.y - y) for eye in eyes)
-        choices = untried & self._is_aside_of_all(eyes, x, y), untried & (distances <= _NEARER * before)
-        if len(tried) < _IN_VAIN:
-            for found in choices:
-                if found.any():
-                    return found
-        return self._a_step_from([*(eye[:2] for eye in eyes), *tried], good)
-
-    def _a_step_from(self, places: Sequence[tuple[float, float]], good: Mask) -> Mask:
-        """Of some floor what lies well away from some places, or as far as there is, which may be too little."""
-        xs, ys = self.floor.centres(*np.meshgrid(np.arange(good.shape[1]), np.arange(good.shape[0])))
-        off = np.min([np.hypot(xs - from_x, ys - from_y) for from_x, from_y in places], axis=0)
-        farthest = float(off[good].max(initial=0.0))
-        step = min(_STEPS * self.params.viewpoint_spacing, farthest)
-        return good & (off >= step) if step >= _STEP else np.zeros_like(good)
-
-    def _is_aside_of_all(self, eyes: Sequence[Pose2D], x: float, y: float) -> Mask:
-        """The floor from which a place shows another side than from any of some poses."""
-        sides = [self._is_aside(math.atan2(eye.y - y, eye.x - x), x, y) for eye in eyes]
-        mask: Mask = np.logical_and.reduce(sides)
-        return mask
-
-    def _is_aside(self, bearing: float, x: float, y: float) -> Mask:
-        """The floor that lies in another direction from a place than a bearing in map [rad]."""
-        ix, iy = np.meshgrid(np.arange(self.floor.info.shape[1]), np.arange(self.floor.info.shape[0]))
-        xs, ys = self.floor.centres(ix, iy)
-        mask: Mask = np.abs(wrap_angles(np.arctan2(ys - y, xs - x) - bearing)) > self.params.other_side
-        return mask
 
     def _before(self, x: float, y: float) -> tuple[float, float]:
         """The floor before a wall on which something hangs."""

@@ -16,8 +16,9 @@ import math
 from collections.abc import Collection, Iterable
 from typing import Any
 
+from rosbot_patrol.patrol.belief.networks import Network
 from rosbot_patrol.patrol.house.rooms import Rooms
-from rosbot_patrol.patrol.intruder.exclusions import Exclusions
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import ManagerParams, NodeParams
 from rosbot_patrol.patrol.records.inputs import Battery, Guarded, Inputs
@@ -84,7 +85,8 @@ class PatrolReplay:
         node: the node's own parameters; params: the manager's; frames: tf frames.
         rooms: rooms of the points file.
         sensors: rooms by the sensors' ids.
-        exclusions: rejects detections that cannot be an intruder.
+        known: objects that look like somebody.
+        network: whose boxes the bag holds.
         static: transforms that the bag lacks.
     """
 
@@ -99,11 +101,12 @@ class PatrolReplay:
         *,
         rooms: Rooms,
         sensors: SensorList,
-        exclusions: Exclusions,
+        known: tuple[KnownObject, ...] = (),
+        network: Network,
         static: Iterable[Edge] = (),
     ) -> None:
         self._node, self._params, self._frames = node, params, frames
-        self._rooms, self._exclusions = rooms, exclusions
+        self._rooms, self._known, self._network = rooms, known, network
         self._sensor_rooms = SensorRooms(sensors)
         self._tree = TransformTree()
         for edge in static:
@@ -134,7 +137,8 @@ class PatrolReplay:
             needs_camera=CAMERA in names,
             views=views,
             viewpoints=views.fallback_viewpoints,
-            exclusions=self._exclusions,
+            known=self._known,
+            network=lambda: self._network,
         )
 
     def hear(self, name: str, now: float, content: Any) -> None:

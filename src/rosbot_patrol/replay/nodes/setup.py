@@ -16,8 +16,8 @@ from rosbot_patrol.errors import ParamError
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.maps.map_io import read_map
 from rosbot_patrol.package_files import package_file, package_folder, read_move_base
+from rosbot_patrol.patrol.belief.networks import Network, find_calibration
 from rosbot_patrol.patrol.house.rooms import load_rooms
-from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.patrol.mission.params import NodeParams, manager_params
 from rosbot_patrol.patrol.senses.params import InputParams
@@ -174,9 +174,16 @@ def _patrol(setup: Setup) -> Replay:
         frames,
         rooms=rooms,
         sensors=load_sensors(node.sensors, names, rooms_source=str(rooms.source)),
-        exclusions=Exclusions(node.judge, load_known(node.known_objects)),
+        known=load_known(node.known_objects),
+        network=_network(node),
         static=setup.static,
     )
+
+
+def _network(node: NodeParams) -> Network:
+    """The network of the bag's boxes: the shipped one, unless the parameters name another."""
+    own = [Path(node.calibrations).expanduser()] if node.calibrations else []
+    return Network(find_calibration([*own, package_file("config/calibrations")], node.network or "house"))
 
 
 def _detector(setup: Setup) -> Replay:
@@ -207,7 +214,7 @@ NODES: dict[str, Node] = {
     "amcl": Node("config/tuned/amcl.yaml", _amcl, amcl_replay.FIELDS, amcl_replay.INPUTS),
     "darknet_ros": Node("models/house.yaml", _detector, detector_replay.FIELDS, detector_replay.INPUTS),
     "move_base": Node("config/tuned", _move_base, move_base_replay.FIELDS, move_base_replay.INPUTS),
-    "patrol_robot": Node("config/tuned/watch.yaml", _patrol, patrol_log.FIELDS, patrol_replay.INPUTS),
+    "patrol_robot": Node("", _patrol, patrol_log.FIELDS, patrol_replay.INPUTS),
     "serial_node": Node("", _serial, serial_replay.FIELDS, serial_replay.INPUTS),
     "slam_gmapping": Node("config/gmapping.yaml", _gmapping, gmapping_replay.FIELDS, gmapping_replay.INPUTS),
 }

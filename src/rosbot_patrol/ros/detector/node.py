@@ -42,6 +42,7 @@ from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.ros.detector.action import CheckForObjects
 from rosbot_patrol.ros.detector.camera import Camera
 from rosbot_patrol.ros.detector.display import display_problem
+from rosbot_patrol.ros.detector.running_network import announce
 from rosbot_patrol.ros.detector.standby import Standby
 from rosbot_patrol.ros.messages.images import picture_to_msg
 from rosbot_patrol.ros.runtime import diagnostics
@@ -199,6 +200,7 @@ class DarknetNode:
         level = diagnostics.WARN if choice.passed_over else diagnostics.OK
         text = "; ".join([choice.describe(), *choice.passed_over])
         self._health.set("network", level, text, {"network": choice.network, "runtime": choice.detector.runtime})
+        announce(choice)  # the patrol looks up what the scores of this network are worth
 
     def _report(self, found: Sequence[Detection], seconds: float) -> None:
         values = {"milliseconds": f"{seconds * 1e3:.1f}", "objects": len(found), "runtime": self._detector.runtime}

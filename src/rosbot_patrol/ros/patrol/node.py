@@ -39,7 +39,6 @@ from rosbot_patrol.patrol.guard.arming import Arming, ArmingRules, load_rules, r
 from rosbot_patrol.patrol.guard.emergency import EmergencyStop
 from rosbot_patrol.patrol.guard.schedule import Schedule, load_schedule
 from rosbot_patrol.patrol.house.rooms import Rooms, load_rooms
-from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.known_objects import load_known
 from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import NodeParams
@@ -53,6 +52,7 @@ from rosbot_patrol.patrol.senses.params import InputParams
 from rosbot_patrol.patrol.senses.senses import PatrolSenses
 from rosbot_patrol.patrol.senses.sensor_rooms import SensorRooms
 from rosbot_patrol.patrol.story.mission_log import MissionLog
+from rosbot_patrol.ros.detector.running_network import RunningNetwork
 from rosbot_patrol.ros.patrol.action import PatrolActions
 from rosbot_patrol.ros.patrol.alert_desk import AlertDesk
 from rosbot_patrol.ros.patrol.calls import CallDesk
@@ -124,7 +124,8 @@ class PatrolNode:
             needs_camera=self.pictures.is_wanted,
             views=views,
             viewpoints=views.fallback_viewpoints,
-            exclusions=Exclusions(self.params.judge, load_known(self.params.known_objects)),
+            known=load_known(self.params.known_objects),
+            network=RunningNetwork(self.params.network, self.params.calibrations, self.health),
         )
         how_many, how_often = count_of(len(rooms), "room"), count_of(len(rounds), "round")
         log.info("%s in %s, %s in the schedule", how_many, rooms.source, how_often)

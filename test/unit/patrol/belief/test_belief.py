@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from belief_pictures import EAST, SOUTH, WEST, Seen, box_of, eye_at, open_view
+from belief_pictures import EAST, SOUTH, WEST, Seen, box_of, calibration, eye_at, open_view
 from floors import TWO_ROOMS, drawn_floor
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.belief.belief import Belief
+from rosbot_patrol.patrol.belief.belief import Belief, PictureView
 from rosbot_patrol.patrol.belief.likelihoods import Veto
 from rosbot_patrol.patrol.belief.second_look import best_second_look, expected_gain
-from rosbot_patrol.patrol.intruder.exclusions import KnownObject
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject
 from rosbot_patrol.patrol.intruder.lidar_motion import LidarTrack
 from rosbot_patrol.patrol.records.inputs import Frame
 from rosbot_patrol.patrol.records.mission import Verdict
@@ -118,8 +118,6 @@ def test_outside_is_vetoed() -> None:
 @pytest.mark.parametrize(
     "frame",
     [
-        Frame(boxes=(box_of(WEST),), eye=eye_at(WEST)),
-        Frame(stamp=1.0, boxes=(box_of(WEST),)),
         Frame(stamp=1.0, boxes=(box_of(WEST),), eye=eye_at(WEST), is_same=True),
         Frame(stamp=1.0, boxes=(box_of(WEST),), eye=eye_at(WEST), counts=False),
         Frame(stamp=-1.0, boxes=(box_of(WEST),), eye=eye_at(WEST)),
@@ -130,7 +128,7 @@ def test_outside_is_vetoed() -> None:
 def test_pictures_that_prove_nothing(frame: Frame) -> None:
     belief = Belief()
     belief.start(0.0)
-    assert belief.see(frame, open_view(WEST)) == []
+    assert belief.see(1.0, frame, open_view(WEST)) == []
     assert belief.hypotheses == []
 
 
@@ -204,3 +202,50 @@ def test_what_was_too_near_is_looked_at_from_farther_off() -> None:
     assert seen.only.is_near_only
     assert expected_gain(seen.belief, seen.only, Pose2D(0.0, 1.0, -1.57)) == 0.0
     assert expected_gain(seen.belief, seen.only, SOUTH) > 0.0
+
+
+def test_without_a_place_a_person_is_confirmed_by_pictures_in_a_row() -> None:
+    """A robot whose camera has no pose: only for as long as pictures show it, and nothing tells a pet."""
+    belief = Belief(calibration(), threshold=0.06)
+    belief.start(0.0)
+    box, shown = replace(box_of(WEST), measured=None), []
+    for k in range(8):
+        shown = belief.see(0.1 * k, Frame(boxes=(box,)), PictureView())
+    assert [each.is_confirmed for each in shown] == [True]
+    assert belief.why(shown[0]).startswith("a person somewhere in view with probability")
+
+
+def test_without_a_place_scattered_boxes_are_nobody() -> None:
+    belief = Belief(calibration(), threshold=0.06)
+    belief.start(0.0)
+    box = replace(box_of(WEST, score=0.3), measured=None)
+    for k in range(200):
+        belief.see(0.1 * k, Frame(boxes=(box,) if k % 15 == 0 else ()), PictureView())
+    assert not any(each.is_confirmed for each in belief.hypotheses)
+
+
+def test_things_of_other_classes_are_no_smaller_persons() -> None:
+    hydrant = replace(box_of(WEST, tall=0.6), label="fire hydrant")
+    flat = replace(box_of(WEST, tall=0.6, is_flat=True), label="fire hydrant")
+    for box, is_confirmed in ((hydrant, True), (flat, False)):
+        seen = Seen(classes=("person", "fire hydrant"))
+        seen.see(WEST, box, pictures=8)
+        assert seen.only.label == "fire hydrant"
+        assert seen.only.is_confirmed == is_confirmed
+    assert Seen().see(WEST, hydrant, pictures=8) == []
+
+
+def test_a_known_object_is_named() -> None:
+    seen = Seen(known=(KnownObject(x=0.0, y=0.0, name="the statue", label="person"),))
+    seen.see(WEST, box_of(WEST), pictures=8)
+    assert seen.belief.vetoes == {"it is the statue at (0.0, 0.0)": 8}
+    assert not seen.only.is_confirmed
+
+
+def test_a_pet_from_near_that_shows_no_person_from_afar_is_nobody() -> None:
+    near, seen = Pose2D(-0.8, 0.0, 0.0), Seen()
+    seen.see(near, box_of(near, tall=0.5, is_cut_above=True), pictures=40)
+    assert 0.5 < seen.posterior < seen.belief.params.confirmed_above
+    for eye in (SOUTH, EAST, WEST):
+        seen.see(eye, pictures=10)
+    assert seen.posterior < seen.belief.params.clear_below

@@ -39,15 +39,22 @@ def whole(*sides: Side) -> Hypothesis:
 
 
 def test_posterior_by_hand() -> None:
-    odds = 0.01 * math.exp(5.0) / (0.002 * math.exp(5.0 - 3.0) + 0.988)
-    assert posterior(5.0, 3.0, PARAMS) == pytest.approx(odds / (1.0 + odds))
-    assert posterior(0.0, 0.0, PARAMS) == pytest.approx(PARAMS.prior)
-    assert posterior(1e6, 1e6, PARAMS) == pytest.approx(1.0)
-    assert posterior(-1e6, -1e6, PARAMS) == pytest.approx(0.0)
+    other = 0.001 * math.exp(2.0 + 5.0 - 3.0) + 0.001 * math.exp(2.0)
+    odds = 0.01 * math.exp(2.0 + 5.0) / (other + 0.988)
+    assert posterior(2.0, 5.0, 3.0, PARAMS) == pytest.approx(odds / (1.0 + odds))
+    assert posterior(0.0, 0.0, 0.0, PARAMS) == pytest.approx(PARAMS.prior)
+    assert posterior(1e6, 1e6, 1e6, PARAMS) == pytest.approx(1.0)
+    assert posterior(-1e6, -1e6, -1e6, PARAMS) == pytest.approx(0.0)
+    assert posterior(0.0, 1e6, math.inf, PARAMS) == pytest.approx(1.0)
 
 
 def test_without_a_size_a_look_alike_is_as_good_an_explanation() -> None:
-    assert posterior(50.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.012)
+    assert posterior(50.0, 0.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.012)
+    assert posterior(0.0, 50.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.011)
+
+
+def test_a_pet_that_looked_alike_from_near_and_whole_does_not_is_no_person() -> None:
+    assert posterior(20.0, -10.0, 0.0, PARAMS) < 1e-3
 
 
 def test_urn_by_hand() -> None:
@@ -176,10 +183,10 @@ def test_absorbing_counts_a_side_once() -> None:
     a, b = whole(side_of(0.9)), whole(side_of(0.9, 0.9))
     a.absorb(b, PARAMS)
     assert len(a.sides) == 1
-    assert a.score == pytest.approx(side_of(0.9, 0.9).score)
-    other = whole(Side(EAST, score=2.0))
+    assert a.whole == pytest.approx(side_of(0.9, 0.9).score)
+    other = whole(Side(EAST, whole=2.0))
     a.absorb(other, PARAMS)
-    assert a.score == pytest.approx(side_of(0.9, 0.9).score + 2.0)
+    assert a.whole == pytest.approx(side_of(0.9, 0.9).score + 2.0)
 
 
 def test_entropy() -> None:

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from rosbot_patrol.errors import ParamError
-from rosbot_patrol.patrol.intruder.exclusions import KnownObject
-from rosbot_patrol.patrol.intruder.known_objects import load_known
+from rosbot_patrol.patrol.intruder.known_objects import KnownObject, load_known
 
 
 def write(folder: Path, text: str) -> Path:

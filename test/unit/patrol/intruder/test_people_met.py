@@ -60,3 +60,19 @@ def test_of_two_who_may_be_it_the_nearer_is() -> None:
     assert people.note(30.0, at(4.0))[0].number == 2
     assert people.note(30.1, at(0.0))[0].number == 1
     assert len(people.met) == 2
+
+
+def test_one_hypothesis_is_one_person_however_badly_it_is_measured() -> None:
+    people = Persons()
+    first, _ = people.note(0.0, at(1.0, 1.0), key=7)
+    again, is_new = people.note(0.1, at(6.0, 1.0), key=7)
+    assert again is first
+    assert not is_new
+    assert people.note(0.2, at(9.0, 9.0), key=8)[1]
+
+
+def test_who_was_in_one_picture_with_somebody_is_another() -> None:
+    people = Persons()
+    people.note(0.0, at(1.0), key=7)
+    assert people.note(5.0, at(4.0), key=8, apart={7})[1]
+    assert not people.note(5.0, at(4.2), key=9)[1]

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from belief_pictures import good_network
 from patrol_world import ROOMS, World, looking, phase
 
 from rosbot_patrol.goal import GoalLink, GoalState
@@ -251,7 +252,7 @@ def test_a_killed_patrol_goes_on_with_mission_and_queue(moment):
         world.triggers = [3]
     world.step()
     memory = world.manager.snapshot()
-    again = World(PatrolManager(ROOMS, memory=memory), person_when=world.person_when, x=world.x)
+    again = World(PatrolManager(ROOMS, network=good_network, memory=memory), person_when=world.person_when, x=world.x)
     again.run(lambda w: len(w.ended) == len(rooms))
     assert [m.room.id for m in again.ended] == rooms
     assert again.ended[0].id == memory["mission"]["id"]
@@ -271,7 +272,7 @@ def test_a_notice_that_is_newer_than_the_memory_confirms_its_mission(is_running)
         plain = memory["mission"]
         request = Request(room_id=2, id=plain["id"], wall=plain["called"])
         memory |= {"mission": None, "queue": [request_to_plain(request)]}
-    again = World(PatrolManager(ROOMS, memory=memory), x=world.x)
+    again = World(PatrolManager(ROOMS, network=good_network, memory=memory), x=world.x)
     assert again.manager.note_earlier_notice(world.manager.mission.id, "a person was seen in room 2")
     again.run(lambda w: w.ended)
     assert (again.ended[0].verdict.value, again.ended[0].reason) == ("confirmed", "a person was seen in room 2")
@@ -286,7 +287,9 @@ def test_a_held_notice_that_is_newer_than_the_memory_waits_for_the_entry_delay_o
     world.run(looking)
     mission, wall = world.manager.mission.id, world.wall + 100.0
     guarded = Guarded(holds_until=wall + 5.0) if is_running else Guarded()
-    again = World(PatrolManager(ROOMS, memory=world.manager.snapshot()), x=world.x, guarded=guarded)
+    again = World(
+        PatrolManager(ROOMS, network=good_network, memory=world.manager.snapshot()), x=world.x, guarded=guarded
+    )
     assert again.manager.note_earlier_notice(mission, "a person was seen", held_until=wall + 5.0)
     assert not again.manager.note_earlier_notice(mission, "a person was seen")
     began = again.now
@@ -298,7 +301,7 @@ def test_a_held_notice_that_is_newer_than_the_memory_waits_for_the_entry_delay_o
 
 @pytest.mark.parametrize("memory", [{"count": "x"}, {"count": 1}, {"count": 1, "queue": 5, "mission": 3}, {"a": None}])
 def test_memory_that_makes_no_sense_is_said_and_dropped(memory, caplog):
-    manager = PatrolManager(ROOMS, memory=memory)
+    manager = PatrolManager(ROOMS, network=good_network, memory=memory)
     assert manager.mission is None
     assert "makes no sense" in caplog.text
     assert World(manager).mission(1).verdict.value == "clear"
@@ -307,7 +310,7 @@ def test_memory_that_makes_no_sense_is_said_and_dropped(memory, caplog):
 def test_memory_of_a_room_that_is_gone():
     queue = [request_to_plain(Request(room_id=room)) for room in (9, 1)]
     memory = {"count": 3, "queue": queue, "mission": None, "last_verdict": "clear", "held": {}}
-    manager = PatrolManager(ROOMS, memory=memory)
+    manager = PatrolManager(ROOMS, network=good_network, memory=memory)
     assert manager.queue.rooms == (1,)
 
 
@@ -347,7 +350,7 @@ def test_it_stands_still_to_confirm_what_may_be_an_intruder():
 
 
 def test_alarm_classes_are_a_parameter():
-    manager = PatrolManager(ROOMS, ManagerParams(alarm_classes=["cat"]))
+    manager = PatrolManager(ROOMS, ManagerParams(alarm_classes=["cat"]), network=good_network)
     assert World(manager, person_when=looking).mission(1).verdict.value == "clear"
 
 

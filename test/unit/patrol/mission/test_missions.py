@@ -5,6 +5,7 @@ import json
 import math
 
 import pytest
+from belief_pictures import good_network
 from patrol_world import ROOMS, World, looking, phase
 
 from rosbot_patrol.errors import ParamError
@@ -105,7 +106,7 @@ def test_one_sensors_mission_is_not_put_back_for_another():
 
 
 def test_without_preemption_a_round_goes_on():
-    world = World(PatrolManager(ROOMS, ManagerParams(priorities=PriorityParams(preempt=False))))
+    world = World(PatrolManager(ROOMS, ManagerParams(priorities=PriorityParams(preempt=False)), network=good_network))
     world.requests = ask(1)
     world.run(driving_to(1))
     world.triggers = [2]
@@ -290,7 +291,11 @@ def test_an_orderly_end_gives_every_call_its_verdict():
 
 
 def test_a_room_whose_point_cannot_be_reached_is_looked_at_from_elsewhere():
-    world = World(PatrolManager(ROOMS, viewpoints=lambda room, inputs: [Pose2D(room.pose.x + 1.0, 0.0, 0.0)]))
+    world = World(
+        PatrolManager(
+            ROOMS, network=good_network, viewpoints=lambda room, inputs: [Pose2D(room.pose.x + 1.0, 0.0, 0.0)]
+        )
+    )
     world.refuse = {20.0}
     mission = world.mission(2)
     assert mission.verdict is Verdict.CLEAR
@@ -300,7 +305,9 @@ def test_a_room_whose_point_cannot_be_reached_is_looked_at_from_elsewhere():
 
 
 def test_a_room_that_cannot_be_reached_at_all_is_unreachable():
-    world = World(PatrolManager(ROOMS, viewpoints=lambda *_: [Pose2D(21.0, 0, 0), Pose2D(22.0, 0, 0)]))
+    world = World(
+        PatrolManager(ROOMS, network=good_network, viewpoints=lambda *_: [Pose2D(21.0, 0, 0), Pose2D(22.0, 0, 0)])
+    )
     world.refuse = {20.0, 21.0, 22.0}
     mission = world.mission(2)
     assert mission.verdict is Verdict.UNREACHABLE
@@ -313,19 +320,13 @@ class TwoViews:
     def __init__(self):
         self.mission = None
 
-    def start(self, mission):
+    def start(self, mission, belief):
         self.mission = mission
 
     def see(self, now, inputs):
         pass
 
-    def suspect(self, doubtful):
-        pass
-
-    def step_back(self, doubtful):
-        pass
-
-    def harmless(self):
+    def tracks(self):
         return ()
 
     def next(self, inputs):
@@ -347,12 +348,12 @@ class TwoViews:
 
 
 def test_a_respawn_in_mid_look_goes_on_with_the_viewpoint_that_was_not_done():
-    world = World(PatrolManager(ROOMS, views=TwoViews()))
+    world = World(PatrolManager(ROOMS, network=good_network, views=TwoViews()))
     world.triggers = [1]
     world.run(lambda w: looking(w) and w.x > 11.0)
     memory = json.loads(json.dumps(world.manager.snapshot()))
     assert memory["mission"]["phase"] == "looking"
-    again = World(PatrolManager(ROOMS, views=TwoViews(), memory=memory), x=world.x)
+    again = World(PatrolManager(ROOMS, network=good_network, views=TwoViews(), memory=memory), x=world.x)
     again.run(lambda w: w.ended)
     assert [g.pose.x for g in again.goals] == [12.0, 0.0]
     assert len(again.ended[0].views_done) == 2
@@ -521,7 +522,7 @@ def test_a_notice_waits_for_the_entry_delay(disarms):
     world.run(lambda w: w.notices)
     assert world.notices[0].is_held
     memory = json.loads(json.dumps(world.manager.snapshot()))
-    again = World(PatrolManager(ROOMS, memory=memory), x=world.x, now=world.now)
+    again = World(PatrolManager(ROOMS, network=good_network, memory=memory), x=world.x, now=world.now)
     again.guarded = DISARMED if disarms else world.guarded
     again.run(lambda w: any(out.releases for out in w.all))
     (release,) = [release for out in again.all for release in out.releases]
@@ -559,7 +560,7 @@ def test_what_was_called_for_too_long_ago_is_reported_not_followed():
     world.triggers = [1, 2]
     world.run(looking)
     memory = world.manager.snapshot()
-    again = World(PatrolManager(ROOMS, memory=memory), wall=world.wall + 13 * 3600.0)
+    again = World(PatrolManager(ROOMS, network=good_network, memory=memory), wall=world.wall + 13 * 3600.0)
     again.triggers = [3]
     run(again, 1.0)
     assert [(m.room.id, m.verdict) for m in again.ended] == [(2, Verdict.UNVERIFIED), (1, Verdict.UNVERIFIED)]
@@ -573,6 +574,6 @@ def test_a_mission_keeps_its_record_over_a_restart():
     run(world, 1.0)
     mission = world.manager.mission
     memory = json.loads(json.dumps(world.manager.snapshot()))
-    kept = PatrolManager(ROOMS, memory=memory).mission
+    kept = PatrolManager(ROOMS, network=good_network, memory=memory).mission
     fields = [f.name for f in dataclasses.fields(mission) if f.name not in ("started", "best")]
     assert {name: getattr(kept, name) for name in fields} == {name: getattr(mission, name) for name in fields}

@@ -3,6 +3,7 @@
 import dataclasses
 
 import pytest
+from belief_pictures import good_network
 from patrol_world import PERSON, ROOMS, World, phase
 
 from rosbot_patrol.alerts.records.incident import NO_ROOM, Incident
@@ -127,4 +128,7 @@ def test_it_outlives_the_program(x):
     for name in ("place_room", "is_outside"):  # a file of an earlier version
         del plain[name]
     assert mission_from_plain(plain, ROOMS).place_room is None
-    assert PatrolManager(ROOMS, memory=world.manager.snapshot()).mission.place_room == mission.place_room
+    assert (
+        PatrolManager(ROOMS, network=good_network, memory=world.manager.snapshot()).mission.place_room
+        == mission.place_room
+    )

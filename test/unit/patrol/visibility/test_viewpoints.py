@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from floors import TWO_ROOMS, drawn_floor, points
 
-from rosbot_patrol.geometry import Pose2D
+from rosbot_patrol.geometry import Pose2D, wrap_angle
 from rosbot_patrol.patrol.house.regions import part_rooms
 from rosbot_patrol.patrol.visibility.coverage import Coverage, CoverageParams, Eye, sight_on_map
 from rosbot_patrol.patrol.visibility.viewpoints import ViewpointParams, ViewpointPlanner
@@ -144,10 +144,10 @@ def test_what_no_way_leads_to_is_not_reached() -> None:
     assert reached.any()
     assert xs.max() < 1.5
     assert np.isinf(planner.ways(start)[~reached]).all()
-    assert planner.view_of(start, 2.5, 1.5, nearest=0.1, most=1.0) is None  # floor there is, but no way to it
+    assert planner.views_of(start, 2.5, 1.5, nearest=0.1, most=1.0) == []  # floor there is, but no way to it
 
 
-def test_a_second_look_is_from_where_there_is_room_to_turn() -> None:
+def test_second_looks_are_from_all_around_and_from_where_there_is_room_to_turn() -> None:
     floor = drawn_floor(
         *(
             "#" * 20,
@@ -157,48 +157,23 @@ def test_a_second_look_is_from_where_there_is_room_to_turn() -> None:
             "#" * 20,
         )
     )
-    planner = ViewpointPlanner(floor)
-    for start in ((3.7, 3.2), (4.2, 2.6), (4.8, 3.3)):  # beside the post
-        view = planner.view_of(Pose2D(*start, 0.0), 6.5, 3.2)
-        assert view is not None
-        ix, iy = floor.info.cell_of(*view.pose[:2])
-        assert floor.clearance[iy, ix] >= 0.6
+    start, place = Pose2D(3.7, 3.2, 0.0), (6.5, 3.2)  # beside the post
+    views = ViewpointPlanner(floor).views_of(start, *place)
+    bearings = [math.atan2(view.pose.y - place[1], view.pose.x - place[0]) for view in views]
+    assert max(bearings) - min(bearings) > 5.0
+    assert all(0.8 <= math.dist(view.pose[:2], place) <= 4.7 for view in views)
+    turned = [wrap_angle(b + math.pi - v.pose.yaw) for b, v in zip(bearings, views, strict=True)]
+    assert np.abs(turned).max() < 1e-6
+    cells = [floor.info.cell_of(*view.pose[:2]) for view in views]
+    assert np.mean([floor.clearance[iy, ix] >= 0.6 for ix, iy in cells]) > 0.7
     narrow = drawn_floor("#" * 12, "#..........#", "#..........#", "#" * 12)
-    assert ViewpointPlanner(narrow).view_of(Pose2D(0.9, 1.0, 0.0), 4.0, 1.0) is not None
+    assert ViewpointPlanner(narrow).views_of(Pose2D(0.9, 1.0, 0.0), 4.0, 1.0)
 
 
-def test_a_second_look_that_no_other_side_allows_is_from_nearer_or_from_a_step_away() -> None:
-    floor = drawn_floor(
-        "##############",
-        "#.........####",
-        "#.........####",
-        "#..###########",
-        "#............#",
-        "#............#",
-        "##############",
-    )  # somebody at the end of the upper dead end
-    start, eye, place = Pose2D(1.0, 2.2, 0.0), Pose2D(1.2, 2.5, 0.0), (4.3, 2.5)
-
-    def seen(nearest: float, **given: object) -> Pose2D:
-        found = ViewpointPlanner(floor).view_of(start, *place, seen_from=(eye,), nearest=nearest, **given)
-        assert found is not None
-        assert abs(found.pose.yaw) < 0.5
-        return found.pose
-
-    assert math.dist(seen(1.0)[:2], place) <= 0.7 * 3.1
-    away = seen(2.5)  # no nearer: a step aside
-    assert 0.35 < math.dist(away[:2], eye[:2]) < 1.0
-    again = seen(2.5, tried=(away[:2],))
-    assert math.dist(again[:2], away[:2]) > 0.35
-    assert math.dist(again[:2], eye[:2]) > 0.35
-
-
-def test_a_step_away_is_as_far_as_there_is_room() -> None:
+def test_a_viewpoint_that_was_tried_or_is_blocked_is_left_out() -> None:
     floor = drawn_floor("#########", "#.......#", "#.......#", "#..######", "#########")
-    planner, eye, place = ViewpointPlanner(floor), Pose2D(1.0, 1.5, 0.0), (3.6, 1.5)
-    for room, has_one in ((0.3, True), (0.1, False)):
-        stands = ~floor.mark_near(np.array([eye[:2]]), room)
-        view = planner.view_of(eye, *place, seen_from=(eye,), nearest=2.0, stands=stands)
-        assert (view is not None) == has_one
-        if view is not None:
-            assert 0.2 <= math.dist(view.pose[:2], eye[:2]) <= 0.45
+    planner, start, place = ViewpointPlanner(floor), Pose2D(1.0, 1.5, 0.0), (3.6, 1.5)
+    tried = [view.pose[:2] for view in planner.views_of(start, *place)]
+    again = planner.views_of(start, *place, tried=tried)
+    assert all(math.dist(view.pose[:2], at) >= 0.4 - 0.1 for view in again for at in tried)
+    assert planner.views_of(start, *place, stands=np.ones(floor.info.shape, bool)) == []

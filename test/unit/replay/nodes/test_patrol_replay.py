@@ -15,7 +15,7 @@ from made_patrol import POINTS, RecordedWorld, looking
 
 from rosbot_patrol.errors import BagError
 from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.patrol.intruder.sightings import Sightings
+from rosbot_patrol.patrol.belief.belief import Belief
 from rosbot_patrol.replay.bags.bag import Bag
 from rosbot_patrol.replay.bags.raw_ros1 import read_goal, read_result
 from rosbot_patrol.replay.nodes import patrol as patrol_replay
@@ -106,7 +106,7 @@ def test_a_planted_fault_is_caught_and_named(tmp_path: Path, monkeypatch: pytest
     path, _ = recorded(tmp_path, lambda w: w.mission(2), person_when=in_room_2)
     stored = replayed(path)
     assert compare(stored, replayed(path), FIELDS) == []
-    monkeypatch.setattr(Sightings, "add", lambda self, now, frame: ())  # nobody is believed any more
+    monkeypatch.setattr(Belief, "see", lambda self, now, frame, view: [])  # nobody is believed any more
     differences = {each.name: each.text for each in compare(stored, replayed(path), FIELDS)}
     assert "1 of 1 stored rows are missing" in differences["notices.rows"]
     assert "(stored confirmed, now " in differences["verdicts.verdict"]
