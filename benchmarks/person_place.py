@@ -20,15 +20,16 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from watch import CLASSES, LOOKS, draw_places, make_engine
+from places import CLASSES, LOOKS, draw_places, make_engine
 
 from rosbot_patrol.detection.detector import load_detector
 from rosbot_patrol.errors import WorldError
 from rosbot_patrol.geometry import Pose2D, transform_points
 from rosbot_patrol.images.encodings import Picture
 from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.patrol.belief.likelihoods import possibility
+from rosbot_patrol.patrol.belief.params import BeliefParams
 from rosbot_patrol.patrol.house.floor import floor_of
-from rosbot_patrol.patrol.intruder.exclusions import Exclusions
 from rosbot_patrol.patrol.intruder.lidar_motion import off_the_map
 from rosbot_patrol.patrol.intruder.measure import Depth, Lens, View, measure
 from rosbot_patrol.patrol.records.inputs import Box, Measured
@@ -106,13 +107,12 @@ def main() -> None:
     told: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     for house in HOUSES:
         stage = Stage(house)
-        exclusions = Exclusions(floor=stage.floor)
         for kind in KINDS:
             for place in draw_places(stage.engine, rng, arguments.number):
                 there = put(stage, kind, place, rng)
                 if there is None:
                     continue
-                tell(stage, exclusions, kind, there, errors=errors, told=told[kind])
+                tell(stage, kind, there, errors=errors, told=told[kind])
                 stage.engine.population.remove("it")
         stage.engine.close()
     report(errors, told, arguments.json)
@@ -120,7 +120,6 @@ def main() -> None:
 
 def tell(
     stage: Stage,
-    exclusions: Exclusions,
     kind: str,
     there: Pose2D,
     *,
@@ -137,7 +136,8 @@ def tell(
         return
     best = max(people, key=lambda box: box.probability)
     with_depth, without = measure(best, view, depth, off), measure(best, view, None, off)
-    refusal = exclusions.refusal(with_depth)
+    found = possibility(with_depth, BeliefParams())
+    refusal = found[1].value if found is not None and found[1] is not None else ""
     told[refusal or "taken for an intruder"] += 1
     if kind == "person":
         for m in (with_depth.measured, without.measured):

@@ -2,12 +2,12 @@
 """Record turns of the robot for the benchmark of the intruder decision: boxes of several networks, poses, truth.
 
     python3 benchmarks/record_turns.py FILE.jsonl.gz [--worlds house,office] [--scenes N] [--seed N]
-        [--network NAME=CFG,WEIGHTS[,NAMES]]...
+        [--figures detailed] [--network NAME=CFG,WEIGHTS[,NAMES]]...
 
 Each scene is one place of the robot and one subject: nobody, a person, a person in the dark, a half hidden person, a
 dog, a cat or a poster. The robot turns once with a picture every 4.3 degrees, as at 10 Hz, and then looks at the
 subject, and at what looked most like a person, from up to four other places each. The records need no renderer:
-`benchmarks/belief.py` compares decisions on them and `scripts/calibrate_network` fits a network's calibration.
+`benchmarks/watch.py` decides on them and `scripts/calibrate_network` fits a network's calibration.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from typing import IO, Any
 import cv2
 import numpy as np
 from person_place import HOUSES
-from watch import LOOKS, draw_places, is_inside, make_engine
+from places import LOOKS, draw_places, is_inside, make_engine
 
 from rosbot_patrol.detection.detector import DarknetDetector, load_detector
 from rosbot_patrol.errors import WorldError
@@ -61,11 +61,12 @@ class Stage:
     Args:
         world: of HOUSES.
         networks: by name.
+        figures: plain or detailed people.
     """
 
-    def __init__(self, world: str, networks: dict[str, DarknetDetector]) -> None:
+    def __init__(self, world: str, networks: dict[str, DarknetDetector], figures: str) -> None:
         self.world, self.networks = world, networks
-        self.engine: Engine = make_engine(load_world(ROOT / "worlds" / f"{world}.world"))
+        self.engine: Engine = make_engine(load_world(ROOT / "worlds" / f"{world}.world"), figures)
         self.floor: Floor = floor_of(read_map(ROOT / "maps" / f"{HOUSES[world]}_map.yaml"))
         k = self.engine.params.camera.intrinsics
         self.lens = Lens(fx=k.fx, fy=k.fy, cx=k.cx, cy=k.cy, width=k.width, height=k.height)
@@ -269,6 +270,7 @@ def main() -> None:
     parser.add_argument("--worlds", default="house,office", help="of " + ", ".join(HOUSES))
     parser.add_argument("--scenes", type=int, default=20, help="in each world")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--figures", choices=("plain", "detailed"), default="plain")
     parser.add_argument("--network", action="append", default=[], metavar="NAME=CFG,WEIGHTS[,NAMES]")
     arguments = parser.parse_args()
     networks = {
@@ -282,7 +284,7 @@ def main() -> None:
     rng, number = np.random.default_rng(arguments.seed), 1000 * arguments.seed
     with gzip.open(arguments.file, "wt", encoding="utf-8") as file:
         for world in arguments.worlds.split(","):
-            stage = Stage(world, networks)
+            stage = Stage(world, networks, arguments.figures)
             kinds = (KINDS[i % len(KINDS)] for i in range(arguments.scenes))
             places = draw_places(stage.engine, rng, arguments.scenes)
             for kind, place in zip(kinds, places, strict=True):

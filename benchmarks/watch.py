@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Error rates of the sightings: false alarms in an empty house, and people missed, over full turns at random places.
+"""What the guard decides on recorded turns, with each network: who is found, false alarms, empty rooms.
 
-    benchmarks/watch.py [--world FILE] [--turns N] [--weights FILE] [--json FILE]
+    python3 benchmarks/watch.py RECORDS.jsonl.gz [--calibration NETWORK=FILE]... [--json FILE]
 
-The robot is put at N places of the house and turns once, with a picture every 3 degrees, as at 10 Hz. Each picture goes
-through jpeg, the network and the sightings, exactly as in the nodes, but without ROS and as fast as possible. Every
-turn is made twice: with nobody, and with a person (with a look or posture that training never drew) 1 to 6 m away.
-Several settings are judged on the same boxes; the first is the one in config/tuned/watch.yaml.
+The records come from benchmarks/record_turns.py. The belief sees the full turn, then up to four looks from elsewhere
+that it chooses among the recorded ones. It is tried with the network's calibration at two thresholds of the detector,
+and with the cautious calibration. The floor counts as seen. A person counts as visible with at least 1,000 pixels and
+0.35 m in view.
 """
 
 from __future__ import annotations
@@ -15,194 +15,232 @@ import in_workspace  # first: it finds the interpreter
 
 # isort: split
 import argparse
-import dataclasses
 import json
 import math
-import os
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-import cv2
 import numpy as np
-import yaml
+from person_place import HOUSES
 
-from rosbot_patrol.detection.detector import DarknetDetector, load_detector
-from rosbot_patrol.errors import WorldError
-from rosbot_patrol.geometry import Pose2D
-from rosbot_patrol.images.encodings import Picture
-from rosbot_patrol.params import load
-from rosbot_patrol.patrol.intruder.sightings import Sightings, SightingsParams
-from rosbot_patrol.patrol.records.inputs import Box, Frame
-from rosbot_patrol.simulation.engine import Engine, EngineParams
-from rosbot_patrol.simulation.render.egl import make_renderer
-from rosbot_patrol.simulation.robot.description import load_robot
-from rosbot_patrol.simulation.sdf.world import World, load_world
+from rosbot_patrol.geometry import Pose2D, angle_difference
+from rosbot_patrol.maps.map_io import read_map
+from rosbot_patrol.patrol.belief.belief import Belief, PictureView
+from rosbot_patrol.patrol.belief.calibration import CAUTIOUS, Calibration, read_calibration
+from rosbot_patrol.patrol.belief.recorded import Look, Scene, read_scenes
+from rosbot_patrol.patrol.belief.second_look import best_second_look
+from rosbot_patrol.patrol.house.floor import Floor, floor_of
+from rosbot_patrol.patrol.records.inputs import Frame
+from rosbot_patrol.patrol.records.mission import Verdict
+from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
 ROOT = Path(__file__).resolve().parent.parent
-CLASSES = ("person", "fire hydrant")
-LOOKS = ("intruder_test_balaclava", "intruder_test_violet", "intruder_test_orchid")
-STEP_DEG = 3.0
-PERIOD = 0.1
+LOOKS_MOST = 4
+SAME = 1.5  # a confirmation this near to the person is of them [m]
+FAR, ASIDE = 4.0, 0.1  # or in their direction, at a wrong distance [m], [rad]
+TARGET = 1.2  # a recorded look this near to a place shows it [m]
+Place = tuple[float, float]
 
 
-def make_engine(world: World) -> Engine:
-    """Make the world with the ROSbot at the origin."""
-    engine = Engine(world, EngineParams(seed=1), make_renderer=lambda: make_renderer("egl"))
-    engine.spawn_robot(load_robot(ROOT / "urdf" / "rosbot.urdf"))
-    return engine
+@dataclass(frozen=True)
+class Outcome:
+    """What a decision made of a scene: verdict, places of the confirmed, pictures until the first, looks, why."""
+
+    verdict: Verdict
+    confirmed: tuple[Place | None, ...]
+    pictures: int
+    looks: int
+    why: str = ""
 
 
-def is_inside(engine: Engine, place: Pose2D) -> bool:
-    """Whether a robot can stand and turn there, with walls around it."""
-    try:
-        engine.carry(place)
-    except WorldError:
+class Decision:
+    """The belief on one scene.
+
+    Args:
+        scene: to decide.
+        floor: of its map.
+        threshold: of the detector.
+        calibration: of the network.
+    """
+
+    def __init__(self, scene: Scene, floor: Floor, threshold: float, calibration: Calibration) -> None:
+        self._belief = Belief(calibration, threshold=threshold, floor=floor)
+        self._belief.start(0.0)
+        self._scene = scene
+        self._told: set[int] = set()
+        self.confirmed: list[Place | None] = []
+
+    def see(self, frame: Frame, look: Look) -> None:
+        """Take a picture."""
+        for hypothesis in self._belief.see(frame.stamp or 0.0, frame, PictureView(look.sight, self._scene.is_dark)):
+            if hypothesis.is_confirmed and hypothesis.number not in self._told:
+                self._told.add(hypothesis.number)
+                self.confirmed.append((float(hypothesis.place[0]), float(hypothesis.place[1])))
+
+    def choose(self, looks: Sequence[Look]) -> Look | None:
+        """The next look."""
+        for hypothesis in self._belief.open:
+            near = [k for k in looks if k.target and math.dist(k.target, hypothesis.place) < TARGET]
+            views = {
+                id(v): (v, k) for k in near for v in (Viewpoint(pose=eye_of(k).pose, turn=0.5, gain=0.0, way=1.0),)
+            }
+            best = best_second_look(self._belief, hypothesis, [v for v, _ in views.values()])
+            if best is not None:
+                hypothesis.second_looks.append(best.pose)
+                return views[id(best)][1]
+        return None
+
+    def verdict(self) -> tuple[Verdict, str]:
+        """The verdict."""
+        found = self._belief.verdict(floor_seen=True)
+        return found.verdict, found.why
+
+
+def eye_of(look: Look):
+    """The camera in the middle of a look."""
+    frames = next(iter(look.frames.values()))
+    eye = frames[len(frames) // 2].eye
+    assert eye is not None
+    return eye
+
+
+def decide(decision: Decision, scene: Scene, network: str) -> Outcome:
+    """Run a decision on a scene."""
+    left, look, pictures, looks, first = list(scene.looks[1:]), scene.looks[0], 0, 0, 0
+    while True:
+        for frame in look.frames[network]:
+            pictures += 1
+            decision.see(frame, look)
+            first = first or (pictures if decision.confirmed else 0)
+        chosen = decision.choose(left) if looks < LOOKS_MOST and not decision.confirmed else None
+        if chosen is None:
+            break
+        left = [k for k in left if k is not chosen]
+        look, looks = chosen, looks + 1
+    verdict, why = decision.verdict()
+    return Outcome(verdict, tuple(decision.confirmed), first, looks, why)
+
+
+def is_visible(scene: Scene) -> bool:
+    """Whether enough of the person shows in the turn."""
+    shown, subject = scene.looks[0].shown, scene.subject
+    if not scene.has_person or shown is None or subject is None:
         return False
-    ranges = engine.scan().ranges
-    return bool(ranges.min() > 0.35 and np.isfinite(ranges).mean() > 0.9)
+    sight = scene.looks[0].sight
+    high = (shown.top - shown.bottom) * math.dist((sight.x, sight.y), subject[:2])
+    return shown.pixels >= 1000 and high >= 0.35
 
 
-def draw_places(engine: Engine, rng: np.random.Generator, count: int) -> Iterator[Pose2D]:
-    """Draw random places."""
-    segments = engine.ways.cut(engine.robot.lidar_height).segments.reshape(-1, 2)
-    low, high = segments.min(axis=0), segments.max(axis=0)
-    while count:
-        x, y = rng.uniform(low, high)
-        place = Pose2D(float(x), float(y), float(rng.uniform(-math.pi, math.pi)))
-        if is_inside(engine, place):
-            count -= 1
-            yield place
-
-
-def place_person(engine: Engine, place: Pose2D, rng: np.random.Generator, looks: list[str]) -> bool:
-    """Place a person visible to the robot there; False if no place was found."""
-    engine.carry(place)
-    level = engine.level_scan()
-    scan = level.scan
-    for _ in range(40):
-        beam = int(rng.integers(len(scan.ranges)))
-        far = min(float(scan.ranges[beam]), 6.5) - 0.5
-        if far < 1.0:
-            continue
-        reach = float(rng.uniform(1.0, far))
-        bearing = place.yaw + level.pose.yaw + scan.angle_min + beam * scan.angle_increment
-        spot = Pose2D(place.x + reach * math.cos(bearing), place.y + reach * math.sin(bearing), rng.uniform(-3, 3))
-        near = scan.ranges[np.arange(beam - 8, beam + 9) % len(scan.ranges)]
-        if near.min() < reach + 0.3:
-            continue
-        posture = str(rng.choice(["", "", "creeping", "sitting", "crouching"]))
-        try:
-            engine.population.spawn_actor("person_there", "person", str(rng.choice(looks)), spot, posture=posture)
-        except WorldError:
-            continue
+def is_of(place: Place | None, person: Pose2D, scene: Scene) -> bool:
+    """Whether a place is the person's, or lies in the same direction from the robot."""
+    if place is None or math.dist(place, person[:2]) <= SAME:
         return True
-    return False
+    eyes = [eye_of(look).pose for look in scene.looks]
+    return math.dist(place, person[:2]) <= FAR and any(
+        abs(angle_difference(*(math.atan2(y - eye.y, x - eye.x) for x, y in (place, person[:2])))) <= ASIDE
+        for eye in eyes
+    )
 
 
-def turn(engine: Engine, detector: DarknetDetector, place: Pose2D) -> list[Frame]:
-    """Boxes of a full turn, with the first half metre of arc repeated."""
-    frames = []
-    for i in range(round(360.0 / STEP_DEG) + 6):
-        engine.carry(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
-        engine.step()
-        colour = engine.picture(depth=False).colour
-        coded = cv2.imencode(".jpg", colour[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 80])[1]
-        seen = np.ascontiguousarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)[:, :, ::-1])
-        boxes = tuple(
-            Box(label=d.name, probability=d.probability, xmin=d.xmin, ymin=d.ymin, xmax=d.xmax, ymax=d.ymax)
-            for d in detector.detect(Picture(seen, "rgb8"))
+@dataclass
+class Row:
+    """Counts of one decision with one network."""
+
+    persons: int = 0
+    visible: int = 0
+    found: int = 0
+    found_visible: int = 0
+    false: int = 0
+    clear: int = 0
+    clear_visible: int = 0
+    unverified: int = 0
+    empty: int = 0
+    empty_unverified: int = 0
+    pictures: list[int] = field(default_factory=list)
+    looks: int = 0
+
+    def add(self, scene: Scene, outcome: Outcome) -> str:
+        """Count a scene; what went wrong, "" for nothing."""
+        here = scene.subject if scene.has_person else None
+        right = [p for p in outcome.confirmed if here is not None and is_of(p, here, scene)]
+        wrong = len(outcome.confirmed) - len(right)
+        self.false += wrong > 0
+        self.looks += outcome.looks
+        if here is None:
+            self.empty += 1
+            self.empty_unverified += outcome.verdict is Verdict.UNVERIFIED
+            return "false" if wrong else "unverified" if outcome.verdict is Verdict.UNVERIFIED else ""
+        visible = is_visible(scene)
+        self.persons += 1
+        self.visible += visible
+        self.found += bool(right)
+        self.found_visible += bool(right) and visible
+        self.clear += outcome.verdict is Verdict.CLEAR
+        self.clear_visible += outcome.verdict is Verdict.CLEAR and visible
+        self.unverified += outcome.verdict is Verdict.UNVERIFIED
+        if right:
+            self.pictures.append(outcome.pictures)
+        return "false" if wrong else outcome.verdict.value if not right else ""
+
+    def text(self, name: str) -> str:
+        """A row of the table."""
+        until = f"{np.median(self.pictures):.0f}" if self.pictures else "-"
+        return (
+            f"| {name} | {self.found_visible} of {self.visible} | {self.found} of {self.persons} | {self.false} "
+            f"| {self.clear_visible} | {self.clear} | {self.unverified} | {self.empty_unverified} of {self.empty} "
+            f"| {until} | {self.looks} |"
         )
-        frames.append(Frame(stamp=(i + 1) * PERIOD, boxes=boxes))
-    return frames
 
 
-def judge(params: SightingsParams, frames: list[Frame]) -> str:
-    """Class that the sightings confirm on those pictures, "" for none."""
-    watch = Sightings(CLASSES, params)
-    watch.start(0.0)
-    for frame in frames:
-        assert frame.stamp is not None
-        found = watch.add(frame.stamp, frame)
-        if found:
-            return found[0].label
-    return ""
-
-
-def settings(weights_free: SightingsParams) -> dict[str, SightingsParams]:
-    """The shipped setting, and alternatives."""
-    others = [(3, 5, 0.5), (3, 5, 0.65), (4, 6, 0.7), (5, 6, 0.7), (5, 6, 0.8)]
-    named = {f"shipped: {weights_free.frames} of {weights_free.window} at {weights_free.min_score}": weights_free}
-    for frames, window, score in others:
-        changed = dataclasses.replace(weights_free, frames=frames, window=window, min_score=score)
-        named[f"{frames} of {window} at {score}"] = changed
-    return named
+COLUMNS = (
+    "calibration, threshold",
+    "visible persons confirmed",
+    "all persons",
+    "false",
+    "clear, visible",
+    "clear, any person",
+)
+COLUMNS += ("clear, any person", "unverified", "empty unverified", "pictures", "looks")
+HEAD = f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--world", default=str(ROOT / "worlds" / "house.world"))
-    parser.add_argument("--turns", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--threshold", type=float, default=0.4, help="the detector's, as models/house.yaml")
-    parser.add_argument("--cfg", default=str(ROOT / "models" / "house.cfg"))
-    parser.add_argument("--weights", default=str(ROOT / "models" / "house.weights"))
-    parser.add_argument("--looks", default=",".join(LOOKS), help="of the persons")
-    parser.add_argument("--pictures", type=Path, help="folder for a picture of each false alarm")
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("records", type=Path, nargs="+")
+    parser.add_argument("--calibration", action="append", default=[], metavar="NETWORK=FILE")
+    parser.add_argument("--errors", action="store_true", help="list what went wrong")
+    parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
-    rng = np.random.default_rng(arguments.seed)
-    tuned = yaml.safe_load((ROOT / "config" / "tuned" / "watch.yaml").read_text(encoding="utf-8"))["watch"]
-    chosen = settings(load(SightingsParams, tuned))
-    detector = load_detector(arguments.cfg, arguments.weights, list(CLASSES), threshold=arguments.threshold)
-    engine = make_engine(load_world(arguments.world))
-    looks = arguments.looks.split(",")
-    false = dict.fromkeys(chosen, 0)
-    found = dict.fromkeys(chosen, 0)
-    turns = persons = pictures = boxes = 0
-    for place in draw_places(engine, rng, arguments.turns):
-        frames = turn(engine, detector, place)
-        turns += 1
-        pictures += len(frames)
-        boxes += sum(len(f.boxes) for f in frames)
-        for name, params in chosen.items():
-            false[name] += bool(judge(params, frames))
-        if arguments.pictures and any(judge(p, frames) for p in chosen.values()):
-            save(engine, place, frames, arguments.pictures)
-        if place_person(engine, place, rng, looks):
-            persons += 1
-            frames = turn(engine, detector, place)
-            for name, params in chosen.items():
-                found[name] += judge(params, frames) == "person"
-            engine.population.remove("person_there")
-        sys.stderr.write(f"\r{turns} of {arguments.turns} places ")
-    engine.close()
-    in_workspace.require_figures(range(turns), "no place was looked from")
-    print(f"\n{os.cpu_count()} cores; {turns} turns in the empty house, {pictures} pictures with {boxes} false boxes")
-    print(f"\n| watch | false alarms, {turns} turns | persons found, {persons} turns |\n|---|---|---|")
-    for name in chosen:
-        print(f"| {name} | {false[name]} | {found[name]} |")
-    first = next(iter(chosen))
-    figures = {
-        "false_alarms_per_turn": false[first] / max(turns, 1),
-        "persons_found": found[first] / max(persons, 1),
-        "false_boxes_per_picture": boxes / max(pictures, 1),
-    }
+    calibrations = {n: read_calibration(Path(f)) for n, f in (given.split("=", 1) for given in arguments.calibration)}
+    scenes = [scene for path in arguments.records for scene in read_scenes(path)]
+    in_workspace.require_figures(scenes, "the records hold no scene")
+    floors = {w: floor_of(read_map(ROOT / "maps" / f"{HOUSES[w]}_map.yaml")) for w in {s.world for s in scenes}}
+    figures: dict[str, float] = {}
+    for network in scenes[0].looks[0].frames:
+        fitted = calibrations.get(network)
+        decisions: dict[str, Callable[[Scene], Decision]] = {
+            "cautious, 0.4": lambda s: Decision(s, floors[s.world], 0.4, CAUTIOUS),
+        }
+        if fitted is not None:
+            for threshold in (0.4, 0.1):
+                decisions[f"fitted, {threshold}"] = lambda s, c=fitted, t=threshold: Decision(s, floors[s.world], t, c)
+        print(f"\n{network}: {len(scenes)} scenes\n\n{HEAD}")
+        for name, make in decisions.items():
+            row, errors = Row(), []
+            for scene in scenes:
+                outcome = decide(make(scene), scene, network)
+                wrong = row.add(scene, outcome)
+                if wrong:
+                    errors.append(f"    {scene.number} {scene.kind} visible={is_visible(scene)} {wrong}: {outcome.why}")
+            print(row.text(name))
+            if arguments.errors:
+                print("\n".join(errors))
+            key = f"{network} {name}"
+            figures |= {f"{key} confirmed": row.found_visible / max(row.visible, 1), f"{key} false": row.false}
+            figures |= {f"{key} clear_with_somebody": row.clear_visible}
     if arguments.json:
-        Path(arguments.json).write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
-
-
-def save(engine: Engine, place: Pose2D, frames: list[Frame], folder: Path) -> None:
-    """Save the picture with the most probable false box of a turn."""
-    i = max(range(len(frames)), key=lambda k: max((b.probability for b in frames[k].boxes), default=0.0))
-    engine.carry(Pose2D(place.x, place.y, place.yaw + math.radians(i * STEP_DEG)))
-    colour = engine.picture(depth=False).colour[:, :, ::-1].copy()
-    for box in frames[i].boxes:
-        cv2.rectangle(colour, (box.xmin, box.ymin), (box.xmax, box.ymax), (0, 0, 255), 2)
-        text = f"{box.label} {box.probability:.2f}"
-        cv2.putText(colour, text, (box.xmin, max(box.ymin - 4, 12)), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 255), 1)
-    folder.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(folder / f"{place.x:.2f}_{place.y:.2f}.jpg"), colour)
+        arguments.json.write_text(json.dumps(figures, indent=1) + "\n")
 
 
 if __name__ == "__main__":
