@@ -191,7 +191,13 @@ class Reader:
         elif command.typed.startswith("scripts/"):
             _wait_for(lambda: "On guard" in output.read_text() or process.poll() is not None, "its house", 120.0)
         else:
-            _wait_for(lambda: bool(_nodes() - before) or process.poll() is not None, f"the node of {command.where}")
+            try:
+                _wait_for(lambda: bool(_nodes() - before) or process.poll() is not None, f"the node of {command.where}")
+            except AssertionError as err:
+                there = subprocess.run(
+                    ["ps", "-eo", "pid,ppid,stat,wchan:20,etimes,args"], capture_output=True, text=True
+                )
+                raise AssertionError(f"{err}; it said:\n{output.read_text()}\n{there.stdout}") from err
             time.sleep(1.0)  # its subscriptions
         assert process.poll() is None, f"{command.where}: it ended by itself: {command.text}\n{output.read_text()}"
 
