@@ -139,6 +139,12 @@ class Settings:
     houses: tuple[str, ...]
     kind: str = "patrols"
     faults: bool = False
+    network: str = "house"
+    figures: str = "plain"
+
+
+_LATER: dict[str, Any] = {"faults": False, "network": "house", "figures": "plain"}
+"""Settings that folders of earlier campaigns lack, as those ran."""
 
 
 class CampaignFolder:
@@ -161,7 +167,7 @@ class CampaignFolder:
         now = json.loads(json.dumps(asdict(settings)))
         if begun is None:
             write_json(path, now)
-        elif (begun := {"faults": False, **begun}) != now:  # a folder from before there were faults
+        elif (begun := {**_LATER, **begun}) != now:
             differs = ", ".join(f"{k} {begun.get(k)}, not {v}" for k, v in now.items() if begun.get(k) != v)
             raise ParamError(str(folder), f"holds a campaign of another kind ({differs}): name another folder")
 

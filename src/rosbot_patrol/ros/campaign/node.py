@@ -2,6 +2,7 @@
 
     rosrun rosbot_patrol campaign FOLDER --patrols 60
     rosrun rosbot_patrol campaign FOLDER --patrols 100 --faults    # something breaks in every other one
+    rosrun rosbot_patrol campaign FOLDER --network yolo-fastest-1.1-xl --figures detailed    # one for real cameras
     rosrun rosbot_patrol campaign FOLDER --only 17        # one of them again
     rosrun rosbot_patrol campaign FOLDER --crash 200      # patrols in which programs are killed
 
@@ -35,7 +36,7 @@ from rosbot_patrol.files import write_atomic
 from rosbot_patrol.ros.campaign.crash import CrashLife
 from rosbot_patrol.ros.campaign.crashes import CrashCampaign
 from rosbot_patrol.ros.campaign.house import HouseError
-from rosbot_patrol.ros.campaign.patrol import play
+from rosbot_patrol.ros.campaign.patrol import Eyes, play
 from rosbot_patrol.ros.campaign.runner import Job, Runner, own_space, raise_loopback
 
 KEPT_FOR_GOOD = (RESULT, PLAN, "scenario.yaml", "mail")  # files kept of a patrol without deviations
@@ -62,6 +63,8 @@ def options(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--crash", type=int, metavar="KILLS", help="kill programs instead, so often; see docs/campaign.md"
     )
+    parser.add_argument("--network", default="house", help="that looks for people, as network:= takes it")
+    parser.add_argument("--figures", default="plain", choices=("plain", "detailed"), help="of simulated people")
     parser.add_argument("--faults", action="store_true", help="something breaks in every other patrol")
     parser.add_argument("--life", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # run inside its own network and process space
@@ -75,9 +78,14 @@ class Campaign:
     def __init__(self, given: argparse.Namespace) -> None:
         self._given = given
         self._root = package_root()
-        self._folder = CampaignFolder(
-            given.folder.resolve(), Settings(seed=given.seed, houses=tuple(given.houses), faults=given.faults)
+        settings = Settings(
+            seed=given.seed,
+            houses=tuple(given.houses),
+            faults=given.faults,
+            network=given.network,
+            figures=given.figures,
         )
+        self._folder = CampaignFolder(given.folder.resolve(), settings)
         self._floors: dict[str, tuple[HouseFiles, Floor]] = {}
         self._began = time.monotonic()
         self._here = 0
@@ -109,6 +117,7 @@ class Campaign:
         patrol = self._plan(number)
         write_atomic(folder / PLAN, json.dumps(patrol.to_plain(), indent=1).encode())
         command = [sys.executable, sys.argv[0], "--one", str(folder), "--timeout", str(self._given.timeout)]
+        command += ["--network", self._given.network, "--figures", self._given.figures]
         return Job(str(number), command + ["--space"] * space, folder / "campaign.log", self._given.timeout)
 
     def _plan(self, number: int) -> Patrol:
@@ -166,15 +175,20 @@ class Campaign:
     def command(self, result: Result) -> str:
         """Command that repeats a patrol."""
         houses = f" --houses {' '.join(self._given.houses)}" if tuple(self._given.houses) != HOUSES else ""
-        folder, faults = f"again-{result.number}", " --faults" if self._given.faults else ""
-        return f"rosrun rosbot_patrol campaign {folder} --seed {result.seed}{houses}{faults} --only {result.number}"
+        given, usual = self._given, options([])
+        folder, more = f"again-{result.number}", houses + " --faults" * given.faults
+        more += f" --network {given.network}" * (given.network != usual.network)
+        more += f" --figures {given.figures}" * (given.figures != usual.figures)
+        return f"rosrun rosbot_patrol campaign {folder} --seed {result.seed}{more} --only {result.number}"
 
     def _write(self) -> None:
         results = self._folder.results()
         folder = self._folder.folder
         table = markdown_table(HEADINGS, map(row, results))
         write_atomic(folder / "results.md", f"{table}\n\n{summary(results)}\n\n{self._failures(results)}\n".encode())
-        subtitle = f"seed {self._given.seed}, houses {', '.join(self._given.houses)}, {os.cpu_count()} cores"
+        given = self._given
+        eyes = f"network {given.network}, {given.figures} people"
+        subtitle = f"seed {given.seed}, houses {', '.join(given.houses)}, {eyes}, {os.cpu_count()} cores"
         write_atomic(folder / "index.html", page(results, self.command, subtitle=subtitle).encode())
         write_atomic(folder / "results.json", json.dumps(figures(results), indent=1).encode())
 
@@ -186,7 +200,7 @@ def in_its_space(given: argparse.Namespace) -> int:
     status = 0
     try:
         if given.one:
-            play(given.one, package_root(), given.timeout)
+            play(given.one, package_root(), given.timeout, Eyes(network=given.network, figures=given.figures))
         else:
             CrashLife(given.folder, package_root(), given.seed, given.crash).run()
     except HouseError as err:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,27 @@ MAIL = 20.0  # longest wait for a mail after the mission [s]
 NEXT = 1.0  # simulated time after a mission in which a waiting one has begun [s]
 
 
-def play(folder: Path, root: Path, limit: float) -> Result:
+@dataclass(frozen=True, kw_only=True)
+class Eyes:
+    """What the guard looks with, and at.
+
+    Attributes:
+        network: that looks for people.
+        figures: of the simulated people, plain or detailed.
+    """
+
+    network: str = "house"
+    figures: str = "plain"
+
+
+def play(folder: Path, root: Path, limit: float, eyes: Eyes) -> Result:
     """Run the patrol planned in a folder.
 
     Args:
         folder: with the plan; receives the result, mails, state and log.
         root: of the package.
         limit: for all of it [s] of real time.
+        eyes: network and figures.
     """
     patrol = patrol_from_plain(json.loads((folder / PLAN).read_text(encoding="utf-8")))
     file = folder / "scenario.yaml"
@@ -43,6 +58,8 @@ def play(folder: Path, root: Path, limit: float) -> Result:
         "rate": 0,
         "teleop": "false",
         "house": patrol.house,
+        "network": eyes.network,
+        "figures": eyes.figures,
     }
     house = House(folder, "rosbot_patrol", "scenario.launch", seed=patrol.scenario["seed"], **arguments)
     problem = ""
