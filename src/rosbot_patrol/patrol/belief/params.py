@@ -16,7 +16,7 @@ class BeliefParams:
     confirmed_above: float = param(0.95, lo=0.5, hi=1.0, doc="posterior above which a person is confirmed")
     clear_below: float = param(0.05, lo=0.0, hi=0.5, doc="posterior below which a place counts as empty")
     look_alikes: float = param(
-        0.002,
+        0.004,
         lo=1e-6,
         hi=0.5,
         doc="probability of a pet, a picture or the like at any one place that the network takes for a person",

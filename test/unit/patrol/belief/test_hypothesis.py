@@ -39,8 +39,8 @@ def whole(*sides: Side) -> Hypothesis:
 
 
 def test_posterior_by_hand() -> None:
-    other = 0.001 * math.exp(2.0 + 5.0 - 3.0) + 0.001 * math.exp(2.0)
-    odds = 0.01 * math.exp(2.0 + 5.0) / (other + 0.988)
+    other = 0.002 * math.exp(2.0 + 5.0 - 3.0) + 0.002 * math.exp(2.0)
+    odds = 0.01 * math.exp(2.0 + 5.0) / (other + 0.986)
     assert posterior(2.0, 5.0, 3.0, PARAMS) == pytest.approx(odds / (1.0 + odds))
     assert posterior(0.0, 0.0, 0.0, PARAMS) == pytest.approx(PARAMS.prior)
     assert posterior(1e6, 1e6, 1e6, PARAMS) == pytest.approx(1.0)
@@ -49,8 +49,8 @@ def test_posterior_by_hand() -> None:
 
 
 def test_without_a_size_a_look_alike_is_as_good_an_explanation() -> None:
-    assert posterior(50.0, 0.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.012)
-    assert posterior(0.0, 50.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.011)
+    assert posterior(50.0, 0.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.014)
+    assert posterior(0.0, 50.0, 0.0, PARAMS) == pytest.approx(0.01 / 0.012)
 
 
 def test_a_pet_that_looked_alike_from_near_and_whole_does_not_is_no_person() -> None:
