@@ -25,6 +25,7 @@ _FAR_ERROR = 1.5  # [m] error along the bearing of what the lidar and the map on
 _ASIDE = 0.04  # error across the bearing for each metre: half a body at 4 m
 _PART = 0.5  # [m] added for an object that the image border cuts: only a part of it was measured
 _BODY = 0.2  # [m] from the front of a body, where it ends a beam, to its middle
+_INSIDE = 0.85  # share of the smaller box that lies in the larger one if it is a part of its object
 _OVERLAP = 0.5  # share of the narrower box's columns that two boxes of one object have in common
 
 
@@ -65,19 +66,35 @@ def _reach(sight: Sight | None, bearing: float) -> float:
     return float(sight.lengths[beam]) + _BODY if beam < len(sight.lengths) else math.inf
 
 
-def distinct(located: Sequence[Located], merge: float) -> list[Located]:
-    """The boxes of one picture, of several boxes around one object only the surest."""
+def distinct(located: Sequence[Located], params: BeliefParams) -> list[Located]:
+    """The boxes of one picture, of several boxes around one object only the surest.
+
+    A box that was not measured may stand where any other stands that it overlaps: then the measured one counts. A box
+    inside another is a part of its object, whatever is measured there.
+    """
     kept: list[Located] = []
-    for each in sorted(located, key=lambda item: -item.box.probability):
-        if not any(_is_same(each, other, merge) for other in kept):
+    for each in sorted(located, key=lambda item: (item.box.measured is None, -item.box.probability)):
+        if not any(_is_same(each, other, params) for other in kept):
             kept.append(each)
     return kept
 
 
-def _is_same(a: Located, b: Located, merge: float) -> bool:
-    common = min(a.box.xmax, b.box.xmax) - max(a.box.xmin, b.box.xmin)
-    overlaps = common > _OVERLAP * min(a.box.width, b.box.width)
-    return overlaps and float(np.hypot(*(a.place - b.place))) < merge
+def overlap(a: Box, b: Box) -> bool:
+    """Whether two boxes share so many columns that they may be of one object."""
+    return min(a.xmax, b.xmax) - max(a.xmin, b.xmin) > _OVERLAP * min(a.width, b.width)
+
+
+def _is_same(a: Located, b: Located, params: BeliefParams) -> bool:
+    apart = a.place - b.place
+    gap = math.sqrt(float(apart @ np.linalg.solve(a.spread + b.spread, apart)))
+    is_near = float(np.hypot(*apart)) < params.merge or gap <= params.gate
+    return _is_inside(a.box, b.box) or (overlap(a.box, b.box) and is_near)
+
+
+def _is_inside(a: Box, b: Box) -> bool:
+    wide, high = min(a.xmax, b.xmax) - max(a.xmin, b.xmin), min(a.ymax, b.ymax) - max(a.ymin, b.ymin)
+    smaller = min(a.width * a.height, b.width * b.height)
+    return wide > 0 and high > 0 and wide * high > _INSIDE * smaller
 
 
 def assign(

@@ -11,12 +11,13 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rosbot_patrol.geometry import Pose2D, angle_difference
-from rosbot_patrol.patrol.belief.association import Located, assign, distinct, locate
+from rosbot_patrol.patrol.belief.association import Located, assign, distinct, locate, overlap
 from rosbot_patrol.patrol.belief.calibration import CAUTIOUS, Calibration, Condition
 from rosbot_patrol.patrol.belief.hypothesis import Hypothesis, nearest
 from rosbot_patrol.patrol.belief.likelihoods import Likelihoods, Veto, is_plausible
@@ -139,15 +140,16 @@ class Belief:
         shown = []
         for label in self._classes:
             of_class = [locate(box, eye, view.sight) for box in boxes if box.label == label]
-            located = distinct(of_class, self.params.merge)
+            located = distinct(of_class, self.params)
             before = [h for h in self.hypotheses if h.is_placed and h.label == label]
             for each, known in zip(located, assign(before, located, at, self.params), strict=True):
                 hypothesis = known or self._begin(each.place, each.spread, at, label)
                 self._take(hypothesis, each, frame, view, at)
                 shown.append(hypothesis)
-        numbers = {each.number for each in shown}
-        for each_shown in shown:
-            each_shown.together |= numbers - {each_shown.number}
+        for a, b in combinations(shown, 2):
+            if a.last is not None and b.last is not None and not overlap(a.last, b.last):
+                a.together.add(b.number)
+                b.together.add(a.number)
         for hypothesis in self.hypotheses:
             if hypothesis.is_placed and not any(hypothesis is each for each in shown):
                 self._miss(hypothesis, eye, view)
@@ -265,12 +267,15 @@ class Belief:
         return hypothesis.is_confirmed
 
     def _merge(self) -> None:
-        """Make one of hypotheses at one place, unless the same picture shows both."""
+        """Make one of hypotheses at one place, unless a picture showed them side by side."""
         kept: list[Hypothesis] = []
         for hypothesis in self.hypotheses:
-            near = [k for k in kept if k.seen_at != hypothesis.seen_at and self._is_one(k, hypothesis)]
+            near = [k for k in kept if hypothesis.number not in k.together and self._is_one(k, hypothesis)]
             if near:
                 near[0].absorb(hypothesis, self.params)
+                for other in self.hypotheses:
+                    if hypothesis.number in other.together:
+                        other.together.add(near[0].number)
             else:
                 kept.append(hypothesis)
         self.hypotheses = kept

@@ -115,7 +115,7 @@ class Hypothesis:
         place: x, y in map [m], shape (2,); spread: its covariance [m2], shape (2, 2); at: time of both [s].
         height: visible height when last measured [m].
         seen_at: time of the last picture with a box of it [s].
-        together: numbers of those that one picture showed with it.
+        together: numbers of those that one picture showed beside it.
         sides: evidence; boxes: pictures with a box of it.
         against, possible: boxes with each reason against a person, and boxes without one.
         place_veto: reason by its place, None if there is none; known: name of the known object there.

@@ -89,12 +89,12 @@ def test_something_too_far_to_be_measured_has_about_a_place() -> None:
 def test_two_boxes_around_one_body_are_one() -> None:
     whole, chest = box_of(EAST, score=0.9), box_of(EAST, score=0.5, tall=0.8)
     located = [locate(box, eye_at(EAST)) for box in (chest, whole)]
-    assert [each.box for each in distinct(located, PARAMS.merge)] == [whole]
+    assert [each.box for each in distinct(located, PARAMS)] == [whole]
 
 
 def test_two_persons_beside_each_other_are_two() -> None:
     located = [locate(box_of(WEST, 0.0, y), eye_at(WEST)) for y in (-0.3, 0.3)]
-    assert len(distinct(located, PARAMS.merge)) == 2
+    assert len(distinct(located, PARAMS)) == 2
 
 
 @given(st.floats(-2.0, 3.0), st.floats(-1.0, 1.0), st.floats(0.0, 20.0))

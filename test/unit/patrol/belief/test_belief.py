@@ -249,3 +249,26 @@ def test_a_pet_from_near_that_shows_no_person_from_afar_is_nobody() -> None:
     for eye in (SOUTH, EAST, WEST):
         seen.see(eye, pictures=10)
     assert seen.posterior < seen.belief.params.clear_below
+
+
+def test_two_boxes_around_one_person_are_one_person() -> None:
+    """One measured well, one that reaches to the wall behind: another place at first, the same in the end."""
+    seen = Seen()
+    whole = box_of(WEST)
+    bust = replace(whole, probability=0.5, ymax=whole.ymin + 60)
+    behind = replace(bust, measured=replace(bust.measured, x=1.5, error=0.3))
+    seen.see(WEST, whole, behind, pictures=4)
+    seen.see(WEST, whole, replace(bust, measured=None), pictures=4)
+    for eye in (SOUTH, EAST):
+        seen.see(eye, box_of(eye), pictures=6)
+    assert [h.is_confirmed for h in seen.belief.hypotheses if h.is_confirmed] == [True]
+    assert not any(h.together for h in seen.belief.hypotheses)
+
+
+def test_two_side_by_side_are_two() -> None:
+    seen = Seen()
+    seen.see(WEST, box_of(WEST, y=0.6), box_of(WEST, y=-0.6), pictures=8)
+    a, b = seen.belief.hypotheses
+    assert (a.together, b.together) == ({b.number}, {a.number})
+    assert a.is_confirmed
+    assert b.is_confirmed
