@@ -13,7 +13,7 @@ import rospy
 from sensor_msgs.msg import Image
 
 from rosbot_patrol.ros.patrol import pictures as patrol_images
-from rosbot_patrol.ros.patrol.pictures import PictureRing, is_black
+from rosbot_patrol.ros.patrol.pictures import PictureRing, is_black, mean_of
 
 
 @pytest.mark.parametrize("shape", [(480, 640, 3), (240, 320), (1, 1)])
@@ -53,3 +53,10 @@ def test_a_camera_that_hangs_shows_the_same_picture(monkeypatch: pytest.MonkeyPa
     assert not ring.is_same(None)
     ring.stop()
     assert not ring.is_same(3.0)
+
+
+def test_the_mean_of_a_picture_is_of_all_of_it() -> None:
+    half = np.zeros((480, 640, 3), np.uint8)
+    half[:240] = 200
+    assert mean_of(half.tobytes()) == pytest.approx(100.0, abs=3.0)
+    assert mean_of(b"") == 0.0

@@ -126,7 +126,7 @@ class IntruderDecision:
         for frame in inputs.frames:
             if frame.stamp is not None and now - frame.stamp > _OLDEST:
                 continue
-            shown = self.belief.see(now, frame, PictureView(self._sight(inputs, frame.eye)))
+            shown = self.belief.see(now, frame, PictureView(self._sight(inputs, frame.eye), frame.is_dark))
             findings += [self._find(now, each, inputs.house) for each in shown if each.is_confirmed]
             somebody = [each for each in shown if each.last in frame.boxes and self.belief.may_be_somebody(each)]
             is_early = not frame.counts and bool(self.belief.plausible(frame))  # it cannot be judged yet

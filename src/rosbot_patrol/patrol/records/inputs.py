@@ -110,6 +110,7 @@ class Frame:
         boxes: empty if nothing was detected.
         eye: the camera then, None if its pose or lens is unknown.
         counts: False if its boxes could not be measured yet and therefore prove nothing.
+        is_dark: the picture shows little light.
         is_same: the picture equals the previous one byte for byte: the camera hangs, or has no noise in a still room.
         picture: stamp of the camera's picture [s], None if it equals `stamp`.
     """
@@ -119,6 +120,7 @@ class Frame:
     eye: Eye | None = None
     counts: bool = True
     is_same: bool = False
+    is_dark: bool = False
     picture: float | None = None
 
 

@@ -44,7 +44,7 @@ from rosbot_patrol.patrol.mission.manager import PatrolManager
 from rosbot_patrol.patrol.mission.params import NodeParams
 from rosbot_patrol.patrol.mission.resume import PatrolStore
 from rosbot_patrol.patrol.records.commands import Commands, OwnerMessage
-from rosbot_patrol.patrol.records.inputs import Box, Inputs
+from rosbot_patrol.patrol.records.inputs import Box, Frame, Inputs
 from rosbot_patrol.patrol.records.mission import Phase
 from rosbot_patrol.patrol.records.request import Origin, Request
 from rosbot_patrol.patrol.search.room_search import RoomSearch
@@ -221,12 +221,17 @@ class PatrolNode:
         known = self.inputs.take(time_now, guarded, self._stop_switch.why, is_busy=is_busy)
         return dataclasses.replace(
             known,
-            frames=tuple(dataclasses.replace(f, is_same=self.pictures.is_same(f.stamp)) for f in known.frames),
+            frames=tuple(self._about(frame) for frame in known.frames),
             requests=known.requests + self._rounds(time_now, known),
             link=self.move_base.link(),
             camera_at=self.pictures.seen_at,
             camera_changed_at=self.pictures.changed_at,
         )
+
+    def _about(self, frame: Frame) -> Frame:
+        """A frame with what its picture tells besides the boxes."""
+        is_same = self.pictures.is_same(frame.stamp)
+        return dataclasses.replace(frame, is_same=is_same, is_dark=self.pictures.is_dark)
 
     def _rounds(self, time_now: float, known: Inputs) -> tuple[Request, ...]:
         """Rooms of the due rounds; checked once a second."""

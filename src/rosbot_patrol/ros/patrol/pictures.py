@@ -18,6 +18,7 @@ from rosbot_patrol.alerts.pictures.ring import EvidenceParams, EvidenceRing
 from rosbot_patrol.ros.runtime.node import now
 
 _SAMPLED = 211  # one byte of this many is checked: 4,367 of a picture of 640 x 480
+_DARK = 40  # of 255: mean of a picture in little light
 _BLACK = 12  # of 255: a covered camera's noise stays below
 _MB = 1_000_000
 
@@ -40,6 +41,7 @@ class PictureRing:
         self._seen_at = self._changed_at = float("-inf")
         self._same: deque[float] = deque(maxlen=200)  # stamps of pictures equal to their predecessors
         self._same_since: float | None = None  # stamp of the first of the present series
+        self._is_dark = False
 
     @property
     def is_wanted(self) -> bool:
@@ -62,6 +64,11 @@ class PictureRing:
             if self._same_since is not None and (stamp is None or stamp >= self._same_since):
                 return True
             return stamp is not None and any(abs(stamp - same) <= 0.002 for same in self._same)
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether the newest picture shows little light."""
+        return self._is_dark
 
     def start(self) -> None:
         """Start collecting, if it has not started."""
@@ -119,9 +126,16 @@ class PictureRing:
             else:
                 self._same.append(picture.stamp)
                 self._same_since = picture.stamp if self._same_since is None else self._same_since
+            self._is_dark = mean_of(data) < _DARK
             if not is_black(data):
                 self._seen_at = now()
             self._ring.add(picture)
+
+
+def mean_of(data: bytes) -> float:
+    """Mean of some samples of a picture's bytes, 0 to 255."""
+    samples = data[::_SAMPLED]
+    return sum(samples) / max(len(samples), 1)
 
 
 def is_black(data: bytes) -> bool:
