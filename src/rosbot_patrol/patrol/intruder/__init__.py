@@ -1,1 +1,1 @@
-"""Whether the camera shows an intruder."""
+"""What boxes and scans measure (places, sizes, legs, motion), and who was met."""
