@@ -127,7 +127,7 @@ class IntruderDecision:
             if frame.stamp is not None and now - frame.stamp > _OLDEST:
                 continue
             shown = self.belief.see(now, frame, PictureView(self._sight(inputs, frame.eye), frame.is_dark))
-            findings += [self._find(now, each, inputs.house) for each in shown if each.is_confirmed]
+            findings += [self._find(now, each, inputs.house, frame.eye) for each in shown if each.is_confirmed]
             somebody = [each for each in shown if each.last in frame.boxes and self.belief.may_be_somebody(each)]
             is_early = not frame.counts and bool(self.belief.plausible(frame))  # it cannot be judged yet
             self._showing.append((now, bool(somebody) or is_early))
@@ -148,10 +148,11 @@ class IntruderDecision:
         """Persons who were confirmed."""
         return self._persons.met
 
-    def _find(self, now: float, hypothesis: Hypothesis, house: RoomRegions | None) -> Finding:
+    def _find(self, now: float, hypothesis: Hypothesis, house: RoomRegions | None, eye: Eye | None) -> Finding:
         seen = _confirmation(hypothesis, self.belief.posterior(hypothesis))
         key = hypothesis.number if hypothesis.is_placed else None
-        person, is_new = self._persons.note(now, seen.measured, key, hypothesis.together)
+        pose = None if eye is None else eye.pose
+        person, is_new = self._persons.note(now, seen.measured, key, hypothesis.together, eye=pose)
         room, is_outside = self._room_at(person, house)
         person.label, person.room = seen.label, room.title if room else ""
         return Finding(

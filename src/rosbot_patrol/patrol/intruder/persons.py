@@ -1,7 +1,8 @@
 """Who was met on a mission: the same person once, another one as another.
 
-Somebody who is seen again near where they were last seen, or as far off as they can have walked, is the same. Somebody
-whose place is not known is the one that was seen last.
+Somebody who is seen again near where they were last seen, or as far off as they can have walked, is the same. So is
+somebody in the same direction: their distance may have been measured wrongly. Who was in one picture beside another is
+never the same. Somebody whose place is not known is the one that was seen last.
 """
 
 from __future__ import annotations
@@ -10,9 +11,12 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
+from rosbot_patrol.geometry import Pose2D, angle_difference
 from rosbot_patrol.params import param
 from rosbot_patrol.patrol.records.findings import Person
 from rosbot_patrol.patrol.records.inputs import Measured
+
+_IN_LINE = 0.1  # [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +50,13 @@ class Persons:
         return [None if p.x is None or p.y is None else (p.x, p.y) for p in self.met]
 
     def note(
-        self, now: float, measured: Measured | None, key: int | None = None, apart: Collection[int] = ()
+        self,
+        now: float,
+        measured: Measured | None,
+        key: int | None = None,
+        apart: Collection[int] = (),
+        *,
+        eye: Pose2D | None = None,
     ) -> tuple[Person, bool]:
         """Somebody was confirmed; who it is, and whether for the first time.
 
@@ -55,9 +65,10 @@ class Persons:
             measured: where, None if unknown.
             key: sightings with the same key are known to be of the same person.
             apart: keys of those who were in the same picture once.
+            eye: the camera in map, None if unknown.
         """
         person = self._by_key.get(key) if key is not None else None
-        person = person or self._who(now, measured, [self._by_key[k] for k in apart if k in self._by_key])
+        person = person or self._who(now, measured, [self._by_key[k] for k in apart if k in self._by_key], eye)
         is_new = person is None
         if person is None:
             person = Person(number=len(self.met) + 1, x=None, y=None, error=math.inf, at=now)
@@ -70,11 +81,13 @@ class Persons:
         person.sightings += 1
         return person, is_new
 
-    def _who(self, now: float, measured: Measured | None, others: Sequence[Person]) -> Person | None:
+    def _who(
+        self, now: float, measured: Measured | None, others: Sequence[Person], eye: Pose2D | None
+    ) -> Person | None:
         left = [person for person in self.met if not any(person is other for other in others)]
         if measured is None:
             return max(left, key=lambda person: person.at, default=None)
-        may_be = [person for person in left if self._gap(now, person, measured) <= 0.0]
+        may_be = [p for p in left if self._gap(now, p, measured) <= 0.0 or _is_in_line(eye, p, measured)]
         return min(may_be, key=lambda person: _apart(person, measured), default=None)
 
     def _gap(self, now: float, person: Person, measured: Measured) -> float:
@@ -84,6 +97,14 @@ class Persons:
             return 0.0
         walked = min(p.walking_speed * (now - person.at), p.walked_most)
         return _apart(person, measured) - p.same_person - walked - min(measured.error, 1.0) - min(person.error, 1.0)
+
+
+def _is_in_line(eye: Pose2D | None, person: Person, measured: Measured) -> bool:
+    """Whether a camera sees a place in the direction of a person."""
+    if eye is None or person.x is None or person.y is None:
+        return False
+    known = math.atan2(person.y - eye.y, person.x - eye.x)
+    return abs(angle_difference(known, math.atan2(measured.y - eye.y, measured.x - eye.x))) < _IN_LINE
 
 
 def _apart(person: Person, measured: Measured) -> float:

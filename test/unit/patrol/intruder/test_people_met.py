@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from rosbot_patrol.geometry import Pose2D
 from rosbot_patrol.patrol.intruder.persons import Persons
 from rosbot_patrol.patrol.records.inputs import Measured
 
@@ -76,3 +77,12 @@ def test_who_was_in_one_picture_with_somebody_is_another() -> None:
     people.note(0.0, at(1.0), key=7)
     assert people.note(5.0, at(4.0), key=8, apart={7})[1]
     assert not people.note(5.0, at(4.2), key=9)[1]
+
+
+def test_one_in_the_same_direction_is_the_same_unless_they_were_seen_beside_each_other() -> None:
+    eye = Pose2D(0.0, 0.0, 0.0)
+    people = Persons()
+    people.note(0.0, at(5.0, 0.4), key=1, eye=eye)
+    assert not people.note(0.5, at(8.0, 0.5), key=2, eye=eye)[1]
+    assert people.note(0.6, at(8.0, 3.0), key=3, eye=eye)[1]
+    assert people.note(0.7, at(11.5, 0.9), key=4, apart={1, 2, 3}, eye=eye)[1]
