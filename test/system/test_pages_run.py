@@ -191,13 +191,9 @@ class Reader:
         elif command.typed.startswith("scripts/"):
             _wait_for(lambda: "On guard" in output.read_text() or process.poll() is not None, "its house", 120.0)
         else:
-            try:
-                _wait_for(lambda: bool(_nodes() - before) or process.poll() is not None, f"the node of {command.where}")
-            except AssertionError as err:
-                there = subprocess.run(
-                    ["ps", "-eo", "pid,ppid,stat,wchan:20,etimes,args"], capture_output=True, text=True
-                )
-                raise AssertionError(f"{err}; it said:\n{output.read_text()}\n{there.stdout}") from err
+            # rosrun asks catkin_find four times, which takes long while two houses take all of both cores
+            is_there = f"the node of {command.where}"
+            _wait_for(lambda: bool(_nodes() - before) or process.poll() is not None, is_there, 120.0)
             time.sleep(1.0)  # its subscriptions
         assert process.poll() is None, f"{command.where}: it ended by itself: {command.text}\n{output.read_text()}"
 
