@@ -31,7 +31,7 @@ VICTIMS = ("move_base", "amcl", "map_server")
 STANDS_WITHIN = 0.5  # [s] of simulated time, by ground truth at 20 Hz
 STANDS_FOR = 4  # so many messages of 20 Hz on end: after that the patrol may turn the camera, which is its own wish
 FAST, STANDING = 0.25, 0.01  # [m/s]
-RATE = 2.0
+PATIENCE = 180.0  # [s] of wall time: the clock waits for the nodes, and they for a free core
 
 
 class Speedometer:
@@ -65,26 +65,26 @@ class Speedometer:
 def test_whoever_dies_in_mid_drive_the_base_stands_and_the_patrol_goes_on(master: object, folder: Path) -> None:
     stood: dict[str, float] = {}
     speed = Speedometer()
-    with House(folder, rate=RATE, bridge_port=free_port(BRIDGES), respawn_delay=2) as house:
+    with House(folder, rate=0, bridge_port=free_port(BRIDGES), respawn_delay=2) as house:
         house.wait_ready(90.0)
         house.trigger(ROOM)
         for victim in VICTIMS:
-            house.wait(speed.is_fast, 60.0, f"the robot driving, to kill {victim}")
+            house.wait(speed.is_fast, PATIENCE, f"the robot driving, to kill {victim}")
             assert house.state is not None
             assert house.state.state == PatrolState.DRIVING
             pid = house.pids()[f"/{victim}"]
-            house.wait(speed.is_fast, 60.0, "the robot driving still")
+            house.wait(speed.is_fast, PATIENCE, "the robot driving still")
             killed = speed.heard[-1][0]
             os.kill(pid, signal.SIGKILL)
             time.sleep(1.2)  # it is not back yet
             stood[victim] = speed.stood_after(killed)
         house.spawn("burglar", *INTRUDER_AT)
-        house.wait(lambda: bool(house.alerts), 60.0, "the alert")
+        house.wait(lambda: bool(house.alerts), PATIENCE, "the alert")
         os.kill(house.pids()["/patrolling_node"], signal.SIGKILL)
-        house.wait(lambda: house.state.state == PatrolState.LOOKING, 60.0, f"the arrival in room {ROOM}")
+        house.wait(lambda: house.state.state == PatrolState.LOOKING, PATIENCE, f"the arrival in room {ROOM}")
         assert house.pose is not None
         assert math.dist(house.pose[:2], ROOM_POINT) < 0.3
-        house.wait(lambda: house.state.state == PatrolState.RETURNING, 60.0, "the end of the look around")
+        house.wait(lambda: house.state.state == PatrolState.RETURNING, PATIENCE, "the end of the look around")
         assert house.state.verdict == "confirmed"
         house.wait(lambda: bool(kept_mails([house.maildir / "new"])), 20.0, "the mail")
         assert len(kept_mails([house.maildir / "new"])) == 1

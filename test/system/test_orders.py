@@ -59,7 +59,7 @@ def test_the_emergency_stop_holds_whoever_wants_to_drive_and_modes_decide_who_is
         speeds.append(math.hypot(message.twist.twist.linear.x, message.twist.twist.angular.z))
 
     subscriber = rospy.Subscriber("/ground_truth/odom", Odometry, hear)
-    with House(folder, rate=2.0, bridge_port=free_port(BRIDGES)) as house:
+    with House(folder, rate=1.0, bridge_port=free_port(BRIDGES)) as house:
         house.wait_ready(90.0)
 
         house.trigger(ROOM)

@@ -258,7 +258,7 @@ def _wait_for(condition: object, what: str, timeout: float = 30.0) -> None:
 @pytest.fixture
 def reader(master: object, folder: Path, request: pytest.FixtureRequest) -> Iterator[Reader]:
     is_long = request.node.get_closest_marker("long") is not None  # it waits for missions
-    reading = Reader(folder, rate=0.0 if is_long else 2.0)
+    reading = Reader(folder, rate=0.0 if is_long else 1.0)
     yield reading
     reading.leave()
 
