@@ -1,4 +1,4 @@
-"""DESIGN.md section 3: which way imports go, and that only rosbot_patrol.ros knows ROS."""
+"""Which way imports go (docs/architecture.md), and that only rosbot_patrol.ros knows ROS."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_imports_go_down_only(path: Path) -> None:
     own = package_of(path)
     if own == "__init__":
         return
-    assert own in ROW_OF, f"{own} has no row in DESIGN.md section 3 and in this test"
+    assert own in ROW_OF, f"{own} has no row in docs/architecture.md and in this test"
     for name, line, _ in imports(path):
         if not name.startswith("rosbot_patrol."):
             continue

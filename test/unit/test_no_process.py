@@ -1,4 +1,4 @@
-"""Unit tests start no process and open no socket: those that do lie in test/process (DESIGN.md 7)."""
+"""Unit tests start no process and open no socket: those that do lie in test/process (docs/contributing.md)."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class LockParams:
 
 @dataclass(frozen=True, kw_only=True)
 class MuxParams:
-    """Keys of twist_mux's configuration file."""
+    """Keys of twist_mux's configuration file that the choice needs; the node reads `range_topics` itself."""
 
     topics: tuple[SourceParams, ...] = param(doc="velocity sources")
     locks: tuple[LockParams, ...] = param((), doc="locks")

@@ -5,8 +5,8 @@
     X-Rosbot-Patrol-Timestamp: SECONDS
     X-Rosbot-Patrol-Signature: sha256=HEX          HMAC-SHA256 with the secret over "SECONDS." and the body
 
-2xx is taken. Redirects are not followed: the notice, its picture and the signature go to the address that was named,
-and to no other.
+An answer of 2xx means that the receiver has accepted the notice. Redirects are not followed: the notice, its picture
+and the signature go to the address that was named, and to no other.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
 Three explanations compete: a person, a look-alike (a pet, a picture, a statue) and nobody. The scores tell the first
 two from the third; size and depth tell a person from a look-alike, by `Side.size`. A look-alike from near, where a part
-of it is in view, looks like a person to every network. Seen whole, it does so to some networks only: where the network
-gives it no box, that is no wonder, while a person would have got one. So what was seen from near (`Side.near`) and of
-the whole (`Side.whole`) is kept apart. Sides are independent and add up; pictures from one side are not, as the same
-view is misjudged again and again.
+of it is in view, looks like a person to every network. Seen whole, it does so to some networks only: a missing box is
+expected there, but unlikely for a person. So evidence from near (`Side.near`) and of the whole (`Side.whole`) is kept
+apart. Sides are independent and add up. Pictures from one side are not independent: the same view is misjudged again
+and again.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _HEIGHT = 1.3  # [m] visible height that is expected before one was measured
 class Side:
     """Evidence from one side.
 
-    What its pictures say follows a Polya urn (`urn`): each outcome becomes likelier by those before. A second picture
-    that says the same adds little where pictures are much alike (rho near 1), and all where they are independent.
+    A Polya urn (`urn`) models the pictures of one side: each outcome raises its own later probability. A second picture
+    with the same outcome adds little if pictures are much alike (rho near 1), and its full weight if independent.
 
     Attributes:
         eye: the camera when the side was first seen from there.

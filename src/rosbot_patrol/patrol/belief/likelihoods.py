@@ -1,9 +1,9 @@
 """What one picture says about one place: how likely it is with a person there, with nobody, and with a look-alike.
 
 The score, or the lack of a box, tells a person from nobody. It does not tell a person from a pet, a poster or a statue:
-networks take those for persons. Size and depth do: with q, the probability that a person has such a size and depth,
-they say log(q / (1 - q)). What is not measured, or so near that a pet looks
-alike, says nothing: it needs a second look.
+networks take those for persons. Size and depth do. Let q be the probability that a person has the measured size
+and depth: they contribute log(q / (1 - q)). A box without a measure, or so near that a pet looks like a person,
+contributes nothing and needs a second look.
 """
 
 from __future__ import annotations

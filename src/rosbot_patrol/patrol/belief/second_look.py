@@ -20,7 +20,7 @@ from rosbot_patrol.patrol.visibility.viewpoints import Viewpoint
 
 _PICTURES = 12  # of a look
 _SIZE = 3.0  # log-likelihood ratio of a first size, for a person
-_TURN = 1.5  # [m] of way that a look costs besides the drive
+_TURN = 1.5  # [m] cost of one look, as additional driving distance
 
 
 def best_second_look(

@@ -2,8 +2,8 @@
 
 Distances are taken in this order. Depth tells the nearest thing in the middle of the box, and whether all of it lies
 in one plane, as a picture on a wall does. The lidar tells what stands in the box's bearings that the map does not show:
-legs. Where neither tells, the lower edge of the box is taken for the feet, which is good to a few per cent right before
-the camera and to some tens of per cent farther off, as low as the camera is; a box that ends at the picture's lower
+legs. Where neither tells, the lower edge of the box is taken for the feet. The error of that distance is a few per
+cent near the camera and tens of per cent farther off, because the camera is low. A box that ends at the picture's lower
 edge has no feet.
 
 A depth camera that knows the depth of little of a box sees furniture before one who stands beyond its range, where the

@@ -1,8 +1,8 @@
 """Who was met on a mission: the same person once, another one as another.
 
 Somebody who is seen again near where they were last seen, or as far off as they can have walked, is the same. So is
-somebody in the same direction: their distance may have been measured wrongly. Who was in one picture beside another is
-never the same. Somebody whose place is not known is the one that was seen last.
+somebody in the same direction: their distance may have been measured wrongly. Two people seen
+side by side in one picture are never merged. Somebody without a known place counts as the one seen last.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ class PersonsParams:
     walking_speed: float = param(
         1.0, unit="m/s", lo=0.0, doc="growth of that distance with the time since the last sighting"
     )
-    walked_most: float = param(5.0, unit="m", lo=0.0, doc="limit of that growth; beyond it stands another person")
+    walked_most: float = param(
+        5.0, unit="m", lo=0.0, doc="upper limit of that growth; sightings farther apart are of different people"
+    )
 
 
 class Persons:

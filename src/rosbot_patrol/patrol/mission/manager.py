@@ -3,7 +3,7 @@
 Matches the tutorial's patrol_robot (a trigger of a room's sensor sends the robot there, it turns once, it comes back
 to room 0; persons and fire hydrants alarm).
 
-Differs (CONTRACTS, Settled 4 to 8; A0, quirks):
+Differs:
 - One mission runs at a time, and detections count while the robot drives, looks and returns. Calls that arrive
   meanwhile wait, one entry a room, the most urgent first (`agenda`, `calls.queue`). Calls that are answered already,
   that the robot sets off itself or that are not armed start nothing (`calls.call_filter`). From the way home the robot

@@ -106,7 +106,7 @@ class MissionRun:
     # -- verdict and end
 
     def decide(self, verdict: Verdict, reason: str) -> None:
-        """Set the verdict; a later one never takes back an earlier, but for a confirmation."""
+        """Set the verdict. A later verdict never replaces an earlier one, except that a confirmation always does."""
         mission = self.mission
         if mission.verdict is not None and verdict is not Verdict.CONFIRMED:
             is_clear = verdict is Verdict.CLEAR

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 VIEW_WIDTH = 1.047  # [rad] until a camera has told its own
 _STAY = 1.5  # [s] somebody half hidden shows well in one picture and hardly in the next
 _STAY_NEAR = 3.0  # [s] a pet rests for some seconds before it goes on
-_SWEEP = 0.5  # [rad] past what looks a little like a person
+_SWEEP = 0.5  # [rad] sweep of the camera, centred on what looks a little like a person
 _LOOKS = 4  # second looks at one hypothesis
 _LATE = 0.15  # [rad] a turn that should have begun this far back begins where the robot stands
 
@@ -224,7 +224,7 @@ class RoomSearch:
     def _second_look(self, search: _Search, survey: Survey, pose: Pose2D, inputs: Inputs) -> Viewpoint | None:
         """A viewpoint for the most probable open hypothesis that has one."""
         doubts = [each for each in survey.doubts_here(search.belief.open) if each.is_placed]
-        # Finally ignore live obstacles: move_base may find a way that this planner does not see.
+        # If nothing is found, plan again without live obstacles: move_base may find a way that this planner misses.
         blocked = survey.blocked(inputs), None
         for doubt in doubts:
             if len(doubt.second_looks) >= _LOOKS:

@@ -89,7 +89,7 @@ class Survey:
         return any(self._house.room_at(track.x, track.y) == self.mission.room.id for track in moving)
 
     def doubts_here(self, doubts: Iterable[Hypothesis]) -> list[Hypothesis]:
-        """The hypotheses in the room, those that were only seen from right before them, and those without a place."""
+        """The hypotheses in the room, those that were only seen from very close, and those without a place."""
         room = self.mission.room.id
         return [
             each

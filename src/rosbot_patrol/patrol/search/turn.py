@@ -1,6 +1,6 @@
 """Turn on the spot by a measured angle, independent of time.
 
-Differs from the original's makeSpin (CONTRACTS A0, quirks 3 to 5):
+Differs from the original's makeSpin:
 - The turned angle is the sum of wrapped yaw increments of odom -> base_link. So full turns are possible, and a wobble
   in the wrong direction is subtracted.
 - It slows down towards the end and ends with a zero twist; it also ends at a time-out, and says why.

@@ -19,8 +19,8 @@ from rosbot_patrol.patrol.house.floor import Array, Floor, Mask
 from rosbot_patrol.patrol.visibility.coverage import CoverageParams, sight_on_map, visible
 
 _FAR = math.inf
-_ROOMY = 0.6  # so far from all that the map shows nothing low that it does not show is met: the feet of a chair [m]
-_TIGHT = 0.8  # what a viewpoint nearer to things is worth against one that is not
+_ROOMY = 0.6  # [m] clearance from mapped obstacles that also avoids unmapped low ones, such as the feet of a chair
+_TIGHT = 0.8  # weight of a viewpoint with less clearance
 _SECTOR = 0.4  # [rad] width of a direction of second looks
 _RING = 1.0  # [m] likewise of a distance
 
@@ -219,7 +219,7 @@ class ViewpointPlanner:
         return math.remainder(first + inner / 2.0, math.tau), turn
 
     def ways(self, start: Pose2D, stands: Mask | None = None) -> Array:
-        """Length of the way from a pose to each cell [m], _FAR where the robot does not get."""
+        """Length of the way from a pose to each cell [m], _FAR where the robot cannot reach."""
         wide = self.floor.clearance >= self.params.passage_clearance
         if stands is not None:
             wide &= ~stands

@@ -2,7 +2,7 @@
 
     fault = read_fault({"kind": "odometry_slip", "factor": 0.3, "duration": 5.0}, source="a service")
 
-A fault defines its effect on readings; `fault_board.py` keeps the active ones for the engine. Times are simulated time,
+`fault_board.py` keeps the active faults and applies their effects on readings for the engine. Times are simulated time,
 except the delays and drops of a sensor's link, which are real time.
 """
 

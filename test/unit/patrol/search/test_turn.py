@@ -93,7 +93,7 @@ def test_nothing_to_turn_is_done_at_once():
 
 
 def test_a_wobble_the_wrong_way_counts_as_what_it_is():
-    # the original reads -2 degrees as 358 and is done at once (CONTRACTS A0, quirk 4)
+    # the original reads -2 degrees as 358 and is done at once
     spin = Spin(math.pi, clockwise=False)
     spin.step(0.0, 0.0)
     step = spin.step(0.1, math.radians(-2))
