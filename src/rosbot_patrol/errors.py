@@ -18,6 +18,7 @@
     |  `- NoPath
     |- ControlError       no velocity command
     |- ProtocolError      invalid bytes from a peer
+    |- DeviceError        a device that does not answer, or cannot be had
     |- DetectorError      a network, its weights or a picture
     |- ImageError         invalid bytes of a picture
     |- SensorError        a sensor's message that cannot be used
@@ -183,6 +184,20 @@ class ProtocolError(PatrolError):
     def __init__(self, peer: str, problem: str) -> None:
         super().__init__(f"{peer}: {problem}" if peer else problem)
         self.peer = peer
+        self.problem = problem
+
+
+class DeviceError(PatrolError):
+    """A device that does not answer, or cannot be had.
+
+    Args:
+        device: its port, address or name.
+        problem: what is wrong, and what to do.
+    """
+
+    def __init__(self, device: str, problem: str) -> None:
+        super().__init__(f"{device}: {problem}")
+        self.device = device
         self.problem = problem
 
 

@@ -19,7 +19,8 @@ ROWS: list[set[str]] = [
     {"grid", "scan", "goal"},
     {"maps", "images", "tf", "scan_line", "scan_check"},
     {"costmap", "scan_feed"},
-    {"planning", "amcl", "gmapping", "exploration", "detection", "rosserial", "control"},
+    {"planning", "amcl", "gmapping", "exploration", "detection", "rosserial", "control", "ekf"},
+    {"drivers"},
     {"navigation", "patrol", "alerts", "sensors", "simulation"},
     {"closed_loop", "campaign"},
     {"replay"},
@@ -37,7 +38,7 @@ ROWS_INSIDE: dict[str, list[set[str]]] = {
         {"dispatch"},
     ],
     "simulation": [
-        {"noise", "meshes"},
+        {"noise", "meshes", "devices"},
         {"scene"},
         {"sensors", "actors"},
         {"robot", "sdf"},
@@ -59,7 +60,7 @@ ROWS_INSIDE: dict[str, list[set[str]]] = {
     "rosserial": [{"protocol"}, {"server", "device"}],
     "ros": [
         {"runtime", "messages"},
-        {"amcl", "maps", "move_base", "drive", "detector", "bridge", "post", "simulator", "campaign"},
+        {"amcl", "maps", "move_base", "drive", "detector", "bridge", "post", "simulator", "campaign", "drivers"},
         {"patrol", "sensors"},
         {"gmapping"},
         {"tools"},

@@ -1,0 +1,177 @@
+#!/usr/bin/env python3
+"""Drivers of a real robot: what a lidar costs, and how soon its turn is a scan.
+
+    python3 benchmarks/drivers.py [--json FILE] [--seconds 20]
+
+- express_cpu_percent, ultra_cpu_percent: share of one core for bytes to scans, of a lidar with 8,000 and with 16,000
+  samples a second: frames, samples, turns, layout, without ROS.
+- scan_latency_ms, rplidar_cpu_percent, rplidar_mb: the node rplidarNode with an emulated A2 (8,000 samples a second) on
+  a pseudo-terminal. Latency: from the bytes that end a turn, handed to the terminal, to the message in a subscriber;
+  median.
+"""
+
+from __future__ import annotations
+
+import in_workspace  # noqa: F401 - first: it finds the interpreter
+
+# isort: split
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+from house import cost_of
+
+from rosbot_patrol.drivers.rplidar.laser_scan import fixed_angles
+from rosbot_patrol.drivers.rplidar.lidar import Lidar, samples_of_a_turn
+from rosbot_patrol.simulation.devices.rplidar import MODELS, RplidarDevice
+from rosbot_patrol.simulation.devices.serial_line import SerialLine, serve
+
+CHUNK = 256  # [bytes] that a serial device hands over at a time
+
+
+def room(angle: np.ndarray) -> np.ndarray:
+    """Distances [mm] in a room of 4 x 3 m, by angle [degrees]."""
+    radians = np.radians(angle)
+    with np.errstate(divide="ignore"):
+        return np.minimum(2000 / np.abs(np.cos(radians)), 1500 / np.abs(np.sin(radians)))
+
+
+class Recording:
+    """A lidar's stream, recorded beforehand and handed out in small pieces."""
+
+    def __init__(self, model: str, seconds: float) -> None:
+        self._device = RplidarDevice(MODELS[model], room)
+        self._now, self._seconds = 0.0, seconds
+        self._waiting = b""
+        self.stream: list[bytes] = []
+
+    def send(self, data: bytes) -> None:
+        """Take a request; the first scan is recorded at once."""
+        self._waiting += self._device.feed(data, self._now)
+        if self._device.is_scanning and not self.stream:
+            whole = b""
+            while self._now < self._seconds:
+                self._now += 0.1
+                whole += self._device.stream(self._now)
+            self.stream = [whole[at : at + CHUNK] for at in range(0, len(whole), CHUNK)][::-1]
+
+    def read(self, timeout: float) -> bytes:
+        """Answers, then the recording piece by piece."""
+        data, self._waiting = self._waiting, b""
+        if not data and self.stream:
+            data = self.stream.pop()
+        return data
+
+    def set_dtr(self, on: bool) -> None:
+        """Nothing."""
+
+    def close(self) -> None:
+        """Nothing."""
+
+
+def decoding(model: str, seconds: float) -> float:
+    """CPU time for the bytes of so many seconds, as a share of them [%]."""
+    wire = Recording(model, seconds)
+    lidar = Lidar(wire, sleep=lambda _: None)
+    lidar.connect()
+    mode = lidar.modes()[0][1]
+    lidar.start_scan(mode)
+    cells, turns = samples_of_a_turn(mode, 10.0), 0
+    began = time.process_time()
+    while wire.stream:
+        for turn in lidar.read_turns(0.0):
+            fixed_angles(turn, cells)
+            turns += 1
+    used = time.process_time() - began
+    if turns < 9 * seconds:
+        raise SystemExit(f"only {turns} turns in {seconds} s")
+    return 100.0 * used / seconds
+
+
+class Stamped(RplidarDevice):
+    """An emulated lidar that remembers when it handed over the frame in which each turn ends."""
+
+    def stream(self, now: float) -> bytes:
+        """Frames that are due."""
+        before = self._angle
+        data = super().stream(now)
+        if data and self._angle < before:
+            self.ended.append(time.monotonic())
+        return data
+
+
+def node(seconds: float) -> dict[str, float]:
+    """Latency, CPU and memory of rplidarNode."""
+    import rospy
+    from sensor_msgs.msg import LaserScan
+
+    from rosbot_patrol.ros.campaign.house import Master, end_group
+
+    with tempfile.TemporaryDirectory() as folder:
+        master = Master(Path(folder) / "roscore.log")
+        line = SerialLine(Path(folder) / "rplidar")
+        device = Stamped(MODELS["A2"], room)
+        device.ended = []
+        running = [True]
+        threading.Thread(target=serve, args=(device, line, lambda: running[0]), daemon=True).start()
+        heard: list[float] = []
+        rospy.Subscriber("/scan", LaserScan, lambda _: heard.append(time.monotonic()), queue_size=10, tcp_nodelay=True)
+        program = next(
+            path
+            for root in os.environ["CMAKE_PREFIX_PATH"].split(":")
+            if (path := Path(root, "lib", "rplidar_ros", "rplidarNode")).exists()
+        )
+        process = subprocess.Popen(
+            [sys.executable, str(program), f"_serial_port:={line.path}"],
+            start_new_session=True,
+            stdout=subprocess.DEVNULL,
+        )
+        try:
+            until = time.monotonic() + 30.0
+            while len(heard) < 10 and time.monotonic() < until:
+                time.sleep(0.1)
+            before, began = cost_of(process.pid), time.monotonic()
+            time.sleep(seconds)
+            after, used = cost_of(process.pid), time.monotonic() - began
+        finally:
+            running[0] = False
+            end_group(process)
+            master.stop()
+        late = [min((each - end for end in device.ended if end <= each), default=9.0) for each in heard[5:]]
+        assert before is not None
+        assert after is not None
+        return {
+            "scan_latency_ms": 1e3 * statistics.median(late),
+            "rplidar_cpu_percent": 100.0 * (after.cpu - before.cpu) / used,
+            "rplidar_mb": after.memory / 1e6,
+        }
+
+
+def main() -> None:
+    """Print the table, and write the figures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    options = parser.parse_args()
+    figures = {
+        "express_cpu_percent": decoding("A2", options.seconds),
+        "ultra_cpu_percent": decoding("A3", options.seconds),
+        **node(options.seconds),
+    }
+    print(f"{os.cpu_count()} cores")
+    for name, value in figures.items():
+        print(f"{name:24} {value:8.2f}")
+    if options.json:
+        options.json.write_text(json.dumps({"drivers": figures}, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

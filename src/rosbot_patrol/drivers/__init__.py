@@ -1,0 +1,1 @@
+"""Drivers of devices: bytes of a device in, measurements out."""

@@ -1,0 +1,1 @@
+"""Nodes of devices: drop-ins for the drivers of a real robot."""

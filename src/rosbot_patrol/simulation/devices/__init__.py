@@ -1,0 +1,1 @@
+"""Emulated devices: what a real one would send on its wire, from the simulated world."""
