@@ -105,7 +105,19 @@ def test_a_real_rosbot_ekf_brings_the_imus_publisher_itself() -> None:
         assert "imu_publisher" in names(parse(ROOT / "launch" / f"{launch}.launch"))
     assert "imu_publisher" not in names(parse(ROOT / "drop_in" / "rosbot_ekf" / "launch" / "all.launch"))
     both = parse(ROOT / "drop_in" / "rosbot_ekf" / "launch" / "all.launch", "rosbot_pro:=true", "mecanum:=true")
-    assert names(both)["missing_rosbot_ekf"] == ("rosbot_patrol", "missing_driver")
+    assert names(both)["rosbot_ekf"] == ("robot_localization", "ekf_localization_node")
+    assert both.params["/serial_node/port"].value == "/dev/ttyS4"
+    assert "mecanum_wheels" in names(both)
+    one = parse(ROOT / "drop_in" / "rosbot_ekf" / "launch" / "all.launch")
+    assert one.params["/serial_node/port"].value == "/dev/ttyS1"
+    assert one.params["/serial_node/baud"].value == 525000
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "drop_in" / "rplidar_ros" / "launch").glob("*.launch")), ids=str)
+def test_each_lidars_launch_file(path: Path) -> None:
+    config = parse(path, "frame_id:=laser")
+    assert names(config)["rplidarNode"] == ("rplidar_ros", "rplidarNode")
+    assert config.params["/rplidarNode/frame_id"].value == "laser"
 
 
 def test_another_robots_battery() -> None:
