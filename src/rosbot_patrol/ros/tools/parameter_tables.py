@@ -22,6 +22,7 @@ from rosbot_patrol.costmap.params import (
 )
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.detection.params import DarknetParams
+from rosbot_patrol.ekf.params import EkfParams, InputParams
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.images.compressed import CompressedParams
 from rosbot_patrol.images.compressed_depth import CompressedDepthParams
@@ -33,7 +34,7 @@ from rosbot_patrol.patrol.mission.drive import DriveParams
 from rosbot_patrol.patrol.mission.params import NodeParams
 from rosbot_patrol.patrol.search.look import LookParams
 from rosbot_patrol.patrol.search.turn import SpinParams
-from rosbot_patrol.patrol.senses.params import InputParams
+from rosbot_patrol.patrol.senses.params import InputParams as SenseParams
 from rosbot_patrol.planning.global_planners.global_planner import GlobalPlannerParams
 from rosbot_patrol.planning.global_planners.navfn import NavfnParams
 from rosbot_patrol.planning.local_planners.dwa_params import DWAPlannerParams
@@ -41,6 +42,7 @@ from rosbot_patrol.planning.local_planners.trajectory_params import TrajectoryPl
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
 from rosbot_patrol.ros.detector.republish_node import RepublishParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
+from rosbot_patrol.ros.drivers.rplidar_node import RplidarParams
 from rosbot_patrol.ros.gmapping.explore_node import ExploreParams
 from rosbot_patrol.ros.maps.server_node import MapServerParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
@@ -62,7 +64,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
         "patrol_robot",
         [
             ("", NodeParams),
-            ("", InputParams),
+            ("", SenseParams),
             ("", MailParams),
             ("", DriveParams),
             ("", LookParams),
@@ -115,6 +117,8 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
         [("", SensorWatchParams), ("", WatchTimes), ("", NoticeTimes), ("", LookTimes), ("", MailParams)],
     ),
     ("twist_mux", [("", TwistMuxParams)]),
+    ("rplidarNode", [("", RplidarParams)]),
+    ("ekf_localization_node", [("", EkfParams), ("<odom0, pose0, twist0, imu0, odom1, ...>_", InputParams)]),
     ("teleop_twist_keyboard.py", [("", TeleopParams)]),
     ("simulator", [("", SimulatorParams)]),
     ("narrator", [("", NarratorParams)]),
