@@ -28,7 +28,7 @@ def test_the_pages_hold_commands_that_run() -> None:
     """Counted, so that neither a marker nor a change of the extractor takes most of them out."""
     modes = [command.mode for page in PAGES for command in commands(page)]
     assert modes.count("run") >= 40
-    assert modes.count("not run") <= 55
+    assert modes.count("not run") <= 58
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,9 @@ def test_a_real_rosbot_ekf_brings_the_imus_publisher_itself() -> None:
     assert one.params["/serial_node/baud"].value == 525000
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "drop_in" / "rplidar_ros" / "launch").glob("*.launch")), ids=str)
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "drop_in" / "rplidar_ros" / "launch").glob("*.launch")), ids=lambda p: p.stem
+)
 def test_each_lidars_launch_file(path: Path) -> None:
     config = parse(path, "frame_id:=laser")
     assert names(config)["rplidarNode"] == ("rplidar_ros", "rplidarNode")
