@@ -16,10 +16,8 @@ import numpy as np
 from rosbot_patrol.ekf.filter import Ekf, Measurement
 from rosbot_patrol.ekf.readings import AccelerationReading, PoseReading, TwistReading
 from rosbot_patrol.ekf.sensor import Sensor, SensorConfig, Surroundings
-from rosbot_patrol.ekf.state import NAMES, ORIENTATION, POSE, SIZE, TURNING, Array, rotation
+from rosbot_patrol.ekf.state import ACCELERATION, NAMES, POSE, SIZE, TURNING, Array
 from rosbot_patrol.errors import TransformError
-
-_JUMP = 10.0  # [s] back in time that are a clock that was set
 
 
 @dataclass
@@ -39,8 +37,11 @@ class FilterCore:
     Args:
         ekf: the filter.
         configs: of the sensors by name.
-        around: frames and settings; its `state` and `turning_rate` are replaced by this filter's.
+        around: frames and settings.
         sensor_timeout: [s].
+
+    Attributes:
+        turning_rate: change of the turning speeds [rad/s^2], shape (3,).
     """
 
     def __init__(
@@ -48,25 +49,21 @@ class FilterCore:
     ) -> None:
         self.ekf = ekf
         self._first = ekf.covariance.copy()
-        shared = Surroundings(
-            world=around.world,
-            base=around.base,
-            lookup=around.lookup,
-            is_planar=around.is_planar,
-            gravity=around.gravity,
-            state=lambda: self.ekf.state,
-            turning_rate=lambda: self._turning_rate,
-        )
-        self.sensors = {name: Sensor(config, shared) for name, config in configs.items()}
+        self.sensors = {name: Sensor(config, around, self) for name, config in configs.items()}
         self.counts = {name: Counts() for name in configs}
         self._timeout = sensor_timeout
         self._queue: list[tuple[float, int, Measurement]] = []
         self._order = itertools.count()
         self._heard: dict[tuple[str, str], float] = {}
         self._updated: float | None = None
-        self._turning = np.zeros(3)
-        self._turning_rate = np.zeros(3)
+        self._turning: tuple[float, Array] | None = None  # of the last update: time, turning speeds
+        self.turning_rate = np.zeros(3)
         self._set_at = -np.inf
+
+    @property
+    def state(self) -> Array:
+        """The filter's state, shape (15,)."""
+        return self.ekf.state
 
     def hear(self, name: str, reading: PoseReading | TwistReading | AccelerationReading) -> None:
         """Take a reading of a sensor; one without a known frame counts as lost, one older than the last as late."""
@@ -146,7 +143,7 @@ class FilterCore:
 
     def acceleration(self) -> Array:
         """Linear accelerations of the base, without gravity [m/s^2], shape (3,)."""
-        return self.ekf.state[12:15].copy()
+        return self.ekf.state[ACCELERATION].copy()
 
     def _predict_silence(self, now: float, is_fresh: bool, to_now: bool) -> None:
         ekf = self.ekf
@@ -162,11 +159,11 @@ class FilterCore:
             ekf.stamp = now
 
     def _follow_turning(self, now: float) -> None:
-        turning = self.ekf.state[TURNING]
-        at = getattr(self, "_turned_at", None)
-        if at is not None and now > at:
-            self._turning_rate = (turning - self._turning) / (now - at)
-        self._turning, self._turned_at = turning.copy(), now
+        """Keep the change of the turning speeds from update to update, for IMUs away from the base's middle."""
+        turning = self.ekf.state[TURNING].copy()
+        if self._turning is not None and now > self._turning[0]:
+            self.turning_rate = (turning - self._turning[1]) / (now - self._turning[0])
+        self._turning = (now, turning)
 
 
 def unmeasured(configs: Mapping[str, SensorConfig], *, is_planar: bool) -> list[str]:
@@ -176,8 +173,3 @@ def unmeasured(configs: Mapping[str, SensorConfig], *, is_planar: bool) -> list[
         found |= config.mask
     planar = {"z", "roll", "pitch"} if is_planar else set()
     return [name for at, name in enumerate(NAMES[:6]) if not (found[at] or found[at + 6]) and name not in planar]
-
-
-def gravity_of(state: Array, gravity: float) -> Array:
-    """Gravity in the frame of the base [m/s^2], shape (3,)."""
-    return np.asarray(rotation(*state[ORIENTATION].tolist()).T @ np.array([0.0, 0.0, gravity]))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,8 +70,6 @@ class Surroundings:
         lookup: poses of frames.
         is_planar: the robot stays on a plane.
         gravity: [m/s^2].
-        state: the filter's present state.
-        turning_rate: change of its turning speeds [rad/s^2], shape (3,).
     """
 
     world: str
@@ -78,16 +77,33 @@ class Surroundings:
     lookup: Lookup
     is_planar: bool
     gravity: float
-    state: Callable[[], Array]
-    turning_rate: Callable[[], Array]
+
+
+class Motion(Protocol):
+    """What the filter knows at present."""
+
+    @property
+    def state(self) -> Array:
+        """Shape (15,)."""
+
+    @property
+    def turning_rate(self) -> Array:
+        """Change of the turning speeds [rad/s^2], shape (3,)."""
 
 
 class Sensor:
-    """One sensor, with its first and its last pose."""
+    """One sensor, with its first and its last pose.
 
-    def __init__(self, config: SensorConfig, around: Surroundings) -> None:
+    Args:
+        config: how it is used.
+        around: what all sensors share.
+        motion: of the robot, by the filter.
+    """
+
+    def __init__(self, config: SensorConfig, around: Surroundings, motion: Motion) -> None:
         self.config = config
         self._around = around
+        self._motion = motion
         self._first: Frame | None = None
         self._last: tuple[float, Frame, Array] | None = None
 
@@ -133,7 +149,7 @@ class Sensor:
         if not mask.any():
             return None
         frame = around.lookup(around.base, reading.frame, reading.stamp) if reading.frame else Frame()
-        state = around.state()
+        state = self._motion.state
         linear = reading.linear
         if config.removes_gravity:
             own = reading.orientation
@@ -143,7 +159,7 @@ class Sensor:
         turning = state[TURNING]
         linear = (
             frame.rotation @ linear
-            + np.cross(frame.origin, around.turning_rate())
+            + np.cross(frame.origin, self._motion.turning_rate)
             - np.cross(np.cross(frame.origin, turning), turning)
         )
         covariance = frame.rotation @ reading.covariance @ frame.rotation.T
@@ -181,7 +197,7 @@ class Sensor:
     def _twist(self, reading: TwistReading, mask: Mask, threshold: float) -> Measurement:
         around = self._around
         frame = around.lookup(around.base, reading.frame, reading.stamp) if reading.frame else Frame()
-        turning = around.state()[TURNING]
+        turning = self._motion.state[TURNING]
         measured = np.where(mask[3:], reading.angular, frame.rotation.T @ turning)
         angular = frame.rotation @ measured
         linear = frame.rotation @ reading.linear + np.cross(frame.origin, angular)

@@ -75,8 +75,6 @@ def made(odometry: str, imu: str, noise: list[float], mounting: Frame, timeout: 
         lookup=lookup,
         is_planar=False,
         gravity=9.80665,
-        state=lambda: np.zeros(SIZE),
-        turning_rate=lambda: np.zeros(3),
     )
     configs = {
         "odom0": SensorConfig(topic="odom0", mask=bits(odometry)),

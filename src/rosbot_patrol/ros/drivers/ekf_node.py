@@ -38,7 +38,6 @@ from rosbot_patrol.ekf.state import (
     ORIENTATION,
     POSE,
     POSITION,
-    SIZE,
     TURNING,
     TWIST,
     VELOCITY,
@@ -75,8 +74,6 @@ class EkfNode:
             lookup=self._lookup,
             is_planar=params.two_d_mode,
             gravity=params.gravitational_acceleration,
-            state=lambda: np.zeros(SIZE),
-            turning_rate=lambda: np.zeros(3),
         )
         self._core = FilterCore(params.ekf(), configs, around, params.silence)
         self._unmeasured = unmeasured(configs, is_planar=params.two_d_mode)

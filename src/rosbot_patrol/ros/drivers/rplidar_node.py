@@ -87,10 +87,11 @@ class RplidarNode:
         self._wanted = True  # by the services
         self._changed = threading.Event()
         self._services: list[rospy.Service] = []
-        self._lidar: Lidar | None = None
         self._mode: ScanMode | None = None
         self._is_running = False
-        self._turns = 0
+        self._began = rospy.Time()  # of the turn under way
+        self._heard = 0.0  # time of the last turn
+        self._turns = 0  # since the last report
         self._reported = 0.0
 
     def run(self) -> int:
@@ -139,7 +140,6 @@ class RplidarNode:
         except _Refused:
             lidar.close()
             raise
-        self._lidar = lidar
         return lidar, info
 
     def _meet(self, lidar: Lidar) -> DeviceInfo:
@@ -239,7 +239,7 @@ class RplidarNode:
         began, self._began = self._began, end
         layout = self._layout(turn)
         if layout is None:
-            log.warning("a turn of the lidar has no echo at all")
+            rospy.logwarn_throttle(10.0, "a turn of the lidar has no echo at all: no scan is published")
             return
         message = LaserScan()
         message.header.stamp, message.header.frame_id = began, self._params.frame_id
@@ -284,7 +284,6 @@ class RplidarNode:
 
     def _end(self, lidar: Lidar) -> None:
         self._is_running = False
-        self._lidar = None
         try:
             self._halt(lidar)
         except OSError as err:
