@@ -62,6 +62,7 @@ class DeviceSession:
 
     Args:
         publishers: topics that it publishes; subscribers: topics that it subscribes to.
+        services: that it offers, each by the announcements of its requests and of its answers.
         max_payload: longest message taken from the server [bytes].
         prover: makes a prover for each challenge of a server with keys; None: a device without a key.
         insist: talk only to a server that has proved that it has the key.
@@ -72,6 +73,7 @@ class DeviceSession:
         publishers: Sequence[TopicInfo],
         subscribers: Sequence[TopicInfo] = (),
         *,
+        services: Sequence[tuple[TopicInfo, TopicInfo]] = (),
         max_payload: int = 512,
         prover: Prover | None = None,
         insist: bool = False,
@@ -80,6 +82,7 @@ class DeviceSession:
             raise ValueError("a device without a key cannot insist on it")
         self._publishers = tuple(publishers)
         self._subscribers = tuple(subscribers)
+        self._services = tuple(services)
         self._parser = Parser(max_payload)
         self._output: list[bytes] = []
         self._last_bytes = 0.0
@@ -196,6 +199,9 @@ class DeviceSession:
             self._output.append(encode(TopicId.PUBLISHER, pack_topic_info(info)))
         for info in self._subscribers:
             self._output.append(encode(TopicId.SUBSCRIBER, pack_topic_info(info)))
+        for requests, answers in self._services:
+            self._output.append(encode(TopicId.SERVICE_SERVER_PUBLISHER, pack_topic_info(answers)))
+            self._output.append(encode(TopicId.SERVICE_SERVER_SUBSCRIBER, pack_topic_info(requests)))
         self._last_answer = now
         first = not self.configured
         self.configured = True
