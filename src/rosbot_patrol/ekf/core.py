@@ -167,7 +167,7 @@ class FilterCore:
 
 
 def unmeasured(configs: Mapping[str, SensorConfig], *, is_planar: bool) -> list[str]:
-    """Numbers of the pose whose error grows without bound, as no sensor measures them or their change."""
+    """Numbers of the pose that no sensor measures, nor their change: their error grows without bound."""
     found = np.zeros(SIZE, bool)
     for config in configs.values():
         found |= config.mask

@@ -43,7 +43,7 @@ class EkfParams:
     odom_frame: str = param("odom", doc="frame of the odometry")
     base_link_frame: str = param("base_link", doc="frame of the base")
     base_link_frame_output: str = param("", doc="child frame of the estimate; empty: base_link_frame")
-    world_frame: str = param("", doc="frame of the estimate: that of odometry or map; empty: odom_frame")
+    world_frame: str = param("", doc="frame of the estimate, odom_frame or map_frame; empty: odom_frame")
     transform_time_offset: float = param(0.0, unit="s", doc="added to the stamp of the transform")
     transform_timeout: float = param(0.0, unit="s", lo=0.0, doc="accepted, has no effect: look-ups never wait")
     publish_tf: bool = param(True, doc="publish the transform from world_frame")

@@ -111,7 +111,7 @@ class FrameFinder:
 
 
 def _count_nodes(data: bytes) -> int:
-    """Number of nodes at the head of the bytes whose check bits are right."""
+    """Number of nodes at the start of the data, up to the first with wrong check bits."""
     count = len(data) // NODE_SIZE
     nodes = np.frombuffer(data, np.uint8, count * NODE_SIZE).reshape(count, NODE_SIZE)
     is_right = (((nodes[:, 0] ^ nodes[:, 0] >> 1) & nodes[:, 1] & 1) == 1).tolist()

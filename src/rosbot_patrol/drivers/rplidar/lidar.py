@@ -1,6 +1,7 @@
 """An RPLIDAR behind a channel: asked, started, read, stopped. Each call blocks for the time that it says.
 
-The order of requests is that of the maker's SDK: stop whatever still runs, information, health, motor, modes, scan.
+The requests follow the order of the maker's SDK: stop a scan that still runs, ask for information, health and modes,
+start the motor, start the scan.
 """
 
 from __future__ import annotations

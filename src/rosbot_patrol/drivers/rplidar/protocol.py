@@ -97,7 +97,7 @@ def descriptor(answer: int, size: int, *, is_stream: bool = False) -> bytes:
 
 
 class AnswerReader:
-    """Find answers in a stream of bytes; what is none is skipped.
+    """Finds answers in a stream of bytes, and skips all other bytes.
 
     Attributes:
         skipped: bytes that belonged to no answer, since the last reset.

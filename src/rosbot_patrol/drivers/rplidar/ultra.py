@@ -1,7 +1,7 @@
 """The ultra capsules of an A3: three distances in 32 bits, coded with a variable scale.
 
-Each cabin has the distance of its first sample, with a resolution that falls with distance, and two predictions: one
-relative to its own distance, one to that of the next cabin.
+Each cabin holds the distance of its first sample; its resolution falls with distance. The second sample is coded
+relative to this distance, the third relative to the first distance of the next cabin.
 
 Source: behaviour of `handler_capsules.cpp` of Slamtec's SDK 2.1.
 """

@@ -1,4 +1,4 @@
-"""An emulated RPLIDAR: answers requests, and streams the room that it is told.
+"""An emulated RPLIDAR: answers requests, and streams samples of a given room.
 
 It knows nothing of time or ports: whoever runs it hands over the bytes that came and the time, and sends what it
 returns.
