@@ -37,6 +37,7 @@ _VIEW_EDGE = 0.1  # [rad] at the image borders where a miss says nothing
 _MOST = 60  # hypotheses
 _TRACK_ERROR = 0.2  # [m] error of a lidar track's place
 _FEWEST = 2  # boxes that confirm: one picture may be spoilt
+_LIKELY = 0.5  # posterior of somebody who tells from which others they are apart
 _EPISODE = 1.0  # [s] without a box, after which a box without a place is of something else
 _NOWHERE = Eye(pose=Pose2D(0.0, 0.0, 0.0), width=1.047)  # stands for a camera whose pose is unknown
 
@@ -147,10 +148,10 @@ class Belief:
                 hypothesis = known or self._begin(each.place, each.spread, at, label)
                 self._take(hypothesis, each, frame, view, at)
                 shown.append(hypothesis)
-        for a, b in combinations(shown, 2):
-            if a.last is not None and b.last is not None and not overlap(a.last, b.last):
-                a.together.add(b.number)
-                b.together.add(a.number)
+        for a, b in combinations([h for h in shown if self.posterior(h) > _LIKELY], 2):
+            if _are_beside(a, b):
+                a.together[b.number] += 1
+                b.together[a.number] += 1
         for hypothesis in self.hypotheses:
             if hypothesis.is_placed and not any(hypothesis is each for each in shown):
                 self._miss(hypothesis, eye, view)
@@ -268,21 +269,20 @@ class Belief:
         return hypothesis.is_confirmed
 
     def _merge(self) -> None:
-        """Make one of hypotheses at one place, unless a picture showed them side by side."""
+        """Make one of hypotheses at one place, unless they are two persons, or two boxes of one picture."""
         kept: list[Hypothesis] = []
         for hypothesis in self.hypotheses:
-            near = [k for k in kept if hypothesis.number not in k.together and self._is_one(k, hypothesis)]
+            near = [k for k in kept if self._is_one(k, hypothesis)]
             if near:
                 near[0].absorb(hypothesis, self.params)
                 for other in self.hypotheses:
-                    if hypothesis.number in other.together:
-                        other.together.add(near[0].number)
+                    other.rename(hypothesis.number, near[0].number)
             else:
                 kept.append(hypothesis)
         self.hypotheses = kept
 
     def _is_one(self, a: Hypothesis, b: Hypothesis) -> bool:
-        if not (a.is_placed and b.is_placed) or a.label != b.label:
+        if not (a.is_placed and b.is_placed) or a.label != b.label or a.number in b.others or _are_beside(a, b):
             return False
         return float(np.hypot(*(a.place - b.place))) < self.params.merge
 
@@ -335,3 +335,10 @@ class Belief:
         if not floor_seen:
             return Judgement(Verdict.UNVERIFIED, "too little of the floor was seen")
         return Judgement(Verdict.CLEAR, "the floor was seen, and nobody is there")
+
+
+def _are_beside(a: Hypothesis, b: Hypothesis) -> bool:
+    """Whether the newest picture of two is the same, and shows them in different columns."""
+    if a.last is None or b.last is None:
+        return False
+    return a.seen_at == b.seen_at and not overlap(a.last, b.last)

@@ -152,7 +152,7 @@ class IntruderDecision:
         seen = _confirmation(hypothesis, self.belief.posterior(hypothesis))
         key = hypothesis.number if hypothesis.is_placed else None
         pose = None if eye is None else eye.pose
-        person, is_new = self._persons.note(now, seen.measured, key, hypothesis.together, eye=pose)
+        person, is_new = self._persons.note(now, seen.measured, key, hypothesis.others, eye=pose)
         room, is_outside = self._room_at(person, house)
         person.label, person.room = seen.label, room.title if room else ""
         return Finding(

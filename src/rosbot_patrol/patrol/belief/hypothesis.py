@@ -28,6 +28,7 @@ from rosbot_patrol.patrol.records.inputs import Box, Measured
 Array = NDArray[np.float64]
 
 _SAME_EYE = 0.3  # [m] cameras this near to each other see the same side, wherever the object is
+_TOGETHER = 2  # pictures of two persons that tell them apart: one may be spoilt
 _HEIGHT = 1.3  # [m] visible height that is expected before one was measured
 
 
@@ -115,7 +116,7 @@ class Hypothesis:
         place: x, y in map [m], shape (2,); spread: its covariance [m2], shape (2, 2); at: time of both [s].
         height: visible height when last measured [m].
         seen_at: time of the last picture with a box of it [s].
-        together: numbers of those that one picture showed beside it.
+        together: pictures that likely showed a person here and another one elsewhere, by the other's number.
         sides: evidence; boxes: pictures with a box of it.
         against, possible: boxes with each reason against a person, and boxes without one.
         place_veto: reason by its place, None if there is none; known: name of the known object there.
@@ -134,7 +135,7 @@ class Hypothesis:
     is_placed: bool = True
     height: float = _HEIGHT
     seen_at: float = -math.inf
-    together: set[int] = field(default_factory=set)
+    together: Counter[int] = field(default_factory=Counter)
     sides: list[Side] = field(default_factory=list)
     boxes: int = 0
     against: Counter[Veto] = field(default_factory=Counter)
@@ -167,6 +168,11 @@ class Hypothesis:
     def veto_text(self) -> str:
         """The reason as a sentence, "" if there is none."""
         return "" if self.veto is None else f"it is {self.known}" if self.veto is Veto.KNOWN else self.veto.value
+
+    @property
+    def others(self) -> set[int]:
+        """Numbers of those that are surely not the same person: pictures showed both at once."""
+        return {number for number, pictures in self.together.items() if pictures >= _TOGETHER}
 
     @property
     def is_near_only(self) -> bool:
@@ -266,11 +272,18 @@ class Hypothesis:
                 self.sides[[each is own for each in self.sides].index(True)] = side
         self.boxes, self.possible = self.boxes + other.boxes, self.possible + other.possible
         self.scores += other.scores
-        self.together |= other.together
+        self.together += other.together
+        self.together.pop(self.number, None)
         self.against += other.against
         self.moved = max(self.moved, other.moved)
         self.is_confirmed |= other.is_confirmed
         self.seen_at = max(self.seen_at, other.seen_at)
+
+    def rename(self, gone: int, number: int) -> None:
+        """Take note that another hypothesis has become a part of a third, or of this one."""
+        pictures = self.together.pop(gone, 0)
+        if pictures and number != self.number:
+            self.together[number] += pictures
 
     def why(self, params: BeliefParams) -> str:
         """One sentence: what it is believed to be, and by what."""

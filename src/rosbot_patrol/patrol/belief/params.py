@@ -36,9 +36,7 @@ class BeliefParams:
     gate: float = param(3.0, lo=0.5, doc="maximum distance of a box from its hypothesis, in standard deviations")
     speed: float = param(1.0, unit="m/s", lo=0.0, doc="maximum speed of a person, three standard deviations")
     walked_most: float = param(4.0, unit="m", lo=0.0, doc="limit of the distance walked since the last sighting")
-    merge: float = param(
-        0.7, unit="m", lo=0.0, doc="closer hypotheses are one, unless a picture shows them side by side"
-    )
+    merge: float = param(0.7, unit="m", lo=0.0, doc="closer hypotheses are one, unless pictures show them side by side")
     whole_from: float = param(1.7, unit="m", lo=0.3, doc="distance from which a standing person shows whole")
     view_range: float = param(8.0, unit="m", lo=0.5, doc="range within which a missing box is evidence")
     person_top_min: float = param(

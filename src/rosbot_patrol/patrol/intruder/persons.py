@@ -1,8 +1,8 @@
 """Who was met on a mission: the same person once, another one as another.
 
 Somebody who is seen again near where they were last seen, or as far off as they can have walked, is the same. So is
-somebody in the same direction: their distance may have been measured wrongly. Two people seen
-side by side in one picture are never merged. Somebody without a known place counts as the one seen last.
+somebody in the same direction: their distance may have been measured wrongly. Two people whom pictures showed
+side by side are never merged. Somebody without a known place counts as the one seen last.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Persons:
             now: steady time [s].
             measured: where, None if unknown.
             key: sightings with the same key are known to be of the same person.
-            apart: keys of those who were in the same picture once.
+            apart: keys of those who are known to be others.
             eye: the camera in map, None if unknown.
         """
         person = self._by_key.get(key) if key is not None else None

@@ -269,6 +269,29 @@ def test_two_side_by_side_are_two() -> None:
     seen = Seen()
     seen.see(WEST, box_of(WEST, y=0.6), box_of(WEST, y=-0.6), pictures=8)
     a, b = seen.belief.hypotheses
-    assert (a.together, b.together) == ({b.number}, {a.number})
+    assert (a.others, b.others) == ({b.number}, {a.number})
     assert a.is_confirmed
     assert b.is_confirmed
+
+
+@pytest.mark.parametrize(("pictures", "probability"), [(1, 0.9), (8, 0.3)], ids=["one picture", "a pet's boxes"])
+def test_a_box_that_shows_nobody_tells_no_two_apart(pictures: int, probability: float) -> None:
+    """A box beside a person that is gone in the next picture, or as low as a pet: the person may walk there later."""
+    seen = Seen()
+    doubtful = replace(box_of(WEST, y=-0.6, tall=0.4), probability=probability)
+    seen.see(WEST, box_of(WEST, y=0.6), doubtful, pictures=pictures)
+    a, b = seen.belief.hypotheses
+    assert (a.others, b.others) == (set(), set())
+
+
+def test_two_that_became_one_are_still_apart_from_a_third() -> None:
+    """Three in a row; the middle one is lost, and found again beside the first."""
+    seen = Seen()
+    seen.see(WEST, *(box_of(WEST, y=y) for y in (-1.2, 0.0, 1.2)), pictures=8)
+    first, middle, last = seen.belief.hypotheses
+    middle.place = first.place + 0.1
+    first.together.pop(middle.number)
+    middle.together.pop(first.number)
+    seen.see(WEST, box_of(WEST, y=-1.2), box_of(WEST, y=1.2))
+    assert [h.number for h in seen.belief.hypotheses] == [first.number, last.number]
+    assert (first.others, last.others) == ({last.number}, {first.number})
