@@ -8,6 +8,8 @@
 - scan_latency_ms, rplidar_cpu_percent, rplidar_mb: the node rplidarNode with an emulated A2 (8,000 samples a second) on
   a pseudo-terminal. Latency: from the bytes that end a turn, handed to the terminal, to the message in a subscriber;
   median.
+- mjpeg_pass_cpu_percent, mjpeg_decode_cpu_percent, camera_mb: the node usb_cam_node with a network camera that sends
+  JPEGs of 640 x 480 and 50 kB, 30 a second: while only `compressed` has a subscriber, and while both have one.
 """
 
 from __future__ import annotations
@@ -27,10 +29,12 @@ import time
 from pathlib import Path
 
 import numpy as np
+import simplejpeg
 from house import cost_of
 
 from rosbot_patrol.drivers.rplidar.laser_scan import fixed_angles
 from rosbot_patrol.drivers.rplidar.lidar import Lidar, samples_of_a_turn
+from rosbot_patrol.simulation.devices.network_camera import NetworkCamera
 from rosbot_patrol.simulation.devices.rplidar import MODELS, RplidarDevice
 from rosbot_patrol.simulation.devices.serial_line import SerialLine, serve
 
@@ -108,15 +112,32 @@ class Stamped(RplidarDevice):
         return data
 
 
+def program(name: str, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start a program of a drop-in, PACKAGE/NAME."""
+    roots = os.environ["CMAKE_PREFIX_PATH"].split(":")
+    path = next(path for root in roots if (path := Path(root, "lib", name)).exists())
+    command = [sys.executable, str(path), *arguments]
+    return subprocess.Popen(command, start_new_session=True, stdout=subprocess.DEVNULL)
+
+
+def share_of(process: subprocess.Popen[bytes], seconds: float) -> tuple[float, float]:
+    """CPU [%] and memory [MB] of a node from now on."""
+    before, began = cost_of(process.pid), time.monotonic()
+    time.sleep(seconds)
+    after, used = cost_of(process.pid), time.monotonic() - began
+    assert before is not None
+    assert after is not None
+    return 100.0 * (after.cpu - before.cpu) / used, after.memory / 1e6
+
+
 def node(seconds: float) -> dict[str, float]:
     """Latency, CPU and memory of rplidarNode."""
     import rospy
     from sensor_msgs.msg import LaserScan
 
-    from rosbot_patrol.ros.campaign.house import Master, end_group
+    from rosbot_patrol.ros.campaign.house import end_group
 
     with tempfile.TemporaryDirectory() as folder:
-        master = Master(Path(folder) / "roscore.log")
         line = SerialLine(Path(folder) / "rplidar")
         device = Stamped(MODELS["A2"], room)
         device.ended = []
@@ -124,35 +145,69 @@ def node(seconds: float) -> dict[str, float]:
         threading.Thread(target=serve, args=(device, line, lambda: running[0]), daemon=True).start()
         heard: list[float] = []
         rospy.Subscriber("/scan", LaserScan, lambda _: heard.append(time.monotonic()), queue_size=10, tcp_nodelay=True)
-        program = next(
-            path
-            for root in os.environ["CMAKE_PREFIX_PATH"].split(":")
-            if (path := Path(root, "lib", "rplidar_ros", "rplidarNode")).exists()
-        )
-        process = subprocess.Popen(
-            [sys.executable, str(program), f"_serial_port:={line.path}"],
-            start_new_session=True,
-            stdout=subprocess.DEVNULL,
-        )
+        process = program("rplidar_ros/rplidarNode", f"_serial_port:={line.path}")
         try:
             until = time.monotonic() + 30.0
             while len(heard) < 10 and time.monotonic() < until:
                 time.sleep(0.1)
-            before, began = cost_of(process.pid), time.monotonic()
-            time.sleep(seconds)
-            after, used = cost_of(process.pid), time.monotonic() - began
+            cpu, memory = share_of(process, seconds)
         finally:
             running[0] = False
             end_group(process)
-            master.stop()
         late = [min((each - end for end in device.ended if end <= each), default=9.0) for each in heard[5:]]
-        assert before is not None
-        assert after is not None
         return {
             "scan_latency_ms": 1e3 * statistics.median(late),
-            "rplidar_cpu_percent": 100.0 * (after.cpu - before.cpu) / used,
-            "rplidar_mb": after.memory / 1e6,
+            "rplidar_cpu_percent": cpu,
+            "rplidar_mb": memory,
         }
+
+
+def jpeg() -> bytes:
+    """A picture of 640 x 480 that takes about 50 kB: soft colours and some noise."""
+    chance = np.random.default_rng(1)
+    coarse = chance.integers(40, 200, (12, 16, 3)).repeat(40, axis=0).repeat(40, axis=1)
+    pixels = coarse + chance.normal(0.0, 9.0, coarse.shape)
+    return bytes(simplejpeg.encode_jpeg(pixels.clip(0, 255).astype(np.uint8), 80, "RGB", "420"))
+
+
+def camera(seconds: float) -> dict[str, float]:
+    """CPU and memory of usb_cam_node."""
+    import rospy
+    from sensor_msgs.msg import CompressedImage, Image
+
+    from rosbot_patrol.ros.campaign.house import end_group
+
+    server, picture, ended = NetworkCamera(), jpeg(), threading.Event()
+
+    def show() -> None:
+        while not ended.wait(1.0 / 30.0):
+            server.show(picture)
+
+    threading.Thread(target=show, daemon=True).start()
+    heard: list[int] = []
+    rospy.Subscriber("/cam/image_raw/compressed", CompressedImage, lambda m: heard.append(len(m.data)))
+    process = program("usb_cam/usb_cam_node", "__name:=cam", f"_url:=http://127.0.0.1:{server.port}/stream")
+    try:
+        until = time.monotonic() + 30.0
+        while len(heard) < 10 and time.monotonic() < until:
+            time.sleep(0.1)
+        first = len(heard)
+        passed, _ = share_of(process, seconds)
+        rate = (len(heard) - first) / seconds
+        rospy.Subscriber("/cam/image_raw", Image, lambda _: None, buff_size=1 << 22)
+        time.sleep(1.0)
+        decoded, memory = share_of(process, seconds)
+    finally:
+        ended.set()
+        end_group(process)
+        server.close()
+    return {
+        "mjpeg_rate": rate,
+        "mjpeg_kb": len(picture) / 1e3,
+        "mjpeg_pass_cpu_percent": passed,
+        "mjpeg_decode_cpu_percent": decoded,
+        "camera_mb": memory,
+    }
 
 
 def main() -> None:
@@ -164,8 +219,15 @@ def main() -> None:
     figures = {
         "express_cpu_percent": decoding("A2", options.seconds),
         "ultra_cpu_percent": decoding("A3", options.seconds),
-        **node(options.seconds),
     }
+    from rosbot_patrol.ros.campaign.house import Master
+
+    with tempfile.TemporaryDirectory() as folder:
+        master = Master(Path(folder) / "roscore.log")
+        try:
+            figures |= {**node(options.seconds), **camera(options.seconds)}
+        finally:
+            master.stop()
     print(f"{os.cpu_count()} cores")
     for name, value in figures.items():
         print(f"{name:24} {value:8.2f}")

@@ -43,6 +43,7 @@ from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams
 from rosbot_patrol.ros.detector.republish_node import RepublishParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
 from rosbot_patrol.ros.drivers.rplidar_node import RplidarParams
+from rosbot_patrol.ros.drivers.usb_cam_node import UsbCamParams
 from rosbot_patrol.ros.gmapping.explore_node import ExploreParams
 from rosbot_patrol.ros.maps.server_node import MapServerParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
@@ -118,6 +119,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ),
     ("twist_mux", [("", TwistMuxParams)]),
     ("rplidarNode", [("", RplidarParams)]),
+    ("usb_cam_node", [("", UsbCamParams)]),
     ("ekf_localization_node", [("", EkfParams), ("<odom0, pose0, twist0, imu0, odom1, ...>_", InputParams)]),
     ("teleop_twist_keyboard.py", [("", TeleopParams)]),
     ("simulator", [("", SimulatorParams)]),
