@@ -46,7 +46,7 @@ ROWS_INSIDE: dict[str, list[set[str]]] = {
         {"population", "render"},
         {"scenario"},
         {"engine"},
-        {"player"},
+        {"player", "hardware"},
     ],
     "patrol": [
         {"house"},

@@ -12,8 +12,9 @@ pytest.importorskip("rospy", reason="ROS is not on the path: `. scripts/env` fir
 
 from rosbot_patrol.ros.simulator import messages
 from rosbot_patrol.ros.simulator import outputs as simulator_outputs
-from rosbot_patrol.ros.simulator.outputs import STEPS_PER_TICK, Outputs, RateParams, is_due
+from rosbot_patrol.ros.simulator.outputs import STEPS_PER_TICK, Outputs, is_due
 from rosbot_patrol.ros.simulator.pace import SharedClock
+from rosbot_patrol.ros.simulator.readings import RateParams, Readings
 from rosbot_patrol.simulation.engine import Engine
 from rosbot_patrol.simulation.robot.description import load_robot
 from rosbot_patrol.simulation.scene.scene import Body
@@ -81,7 +82,8 @@ def run(
     engine = Engine(World(), make_renderer=CountingRenderer)  # type: ignore[arg-type]
     engine.spawn_robot(load_robot(urdf))
     Wire.heard = set(topics)
-    outputs = Outputs(engine, rates or RateParams(), shared=shared)
+    rates = rates or RateParams()
+    outputs = Outputs(engine, rates, Readings(engine, rates), shared=shared)
     for tick in range(1, round(seconds / simulator_outputs.TICK) + 1):
         for _ in range(STEPS_PER_TICK):
             engine.step()

@@ -36,15 +36,17 @@ from rosbot_patrol.ros.runtime.node import load_params, now, run_node
 from rosbot_patrol.ros.runtime.process import Priority
 from rosbot_patrol.ros.simulator.doors import DoorServices
 from rosbot_patrol.ros.simulator.faults import FaultServices
-from rosbot_patrol.ros.simulator.outputs import STEPS_PER_TICK, TICK, Outputs, RateParams
+from rosbot_patrol.ros.simulator.outputs import STEPS_PER_TICK, TICK, Outputs
 from rosbot_patrol.ros.simulator.pace import Lockstep, LockstepParams, Pace, SharedClock, refuse_second_clock
 from rosbot_patrol.ros.simulator.packages import model_folders, package_finder
+from rosbot_patrol.ros.simulator.readings import RateParams, Readings
 from rosbot_patrol.ros.simulator.requests import Requests
 from rosbot_patrol.ros.simulator.scenario import ScenarioRunner
 from rosbot_patrol.rosserial.device.tcp_client import EspClient
 from rosbot_patrol.rosserial.protocol.keys import read_keys
 from rosbot_patrol.rosserial.server.settings import DEFAULT_TCP_PORT
 from rosbot_patrol.simulation.engine import Engine, EngineParams
+from rosbot_patrol.simulation.hardware import Hardware, HardwareParams, mounted
 from rosbot_patrol.simulation.render.egl import make_renderer
 from rosbot_patrol.simulation.robot.description import RobotDescription, load_robot, parse_robot
 from rosbot_patrol.simulation.scenario.file import Scenario, Start, read_scenario
@@ -95,6 +97,7 @@ class SimulatorParams(EngineParams):
     scenario_watched: bool = param(False, doc="start the scenario only when somebody listens to ~scenario")
     rates: RateParams = field(default_factory=RateParams)
     lockstep: LockstepParams = field(default_factory=LockstepParams)
+    hardware: HardwareParams = field(default_factory=HardwareParams)
 
     @property
     def engine(self) -> EngineParams:
@@ -117,7 +120,8 @@ class Simulator:
         self._params = p
         self._engine = Engine(world, p.engine, sensors=places, make_renderer=lambda: make_renderer(p.camera.renderer))
         if p.robot:
-            self._engine.spawn_robot(_description(p), Pose2D(p.x, p.y, p.yaw))
+            robot = _description(p)
+            self._engine.spawn_robot(mounted(robot) if p.hardware.folder else robot, Pose2D(p.x, p.y, p.yaw))
         self._paused = p.paused
         self._tick = 0
         self._command: Latest[Twist] = Latest()
@@ -125,12 +129,14 @@ class Simulator:
         self._shared = None if p.clock else SharedClock(now)
         if self._shared is None:
             refuse_second_clock()
-        self._outputs = Outputs(
-            self._engine,
-            p.rates,
-            exact_odometry=p.odometry == "ground_truth",
-            shared=self._shared,
-        )
+        self._hardware: Hardware | None = None
+        readings = None
+        if p.hardware.folder:
+            self._hardware = Hardware(self._engine, p.hardware)
+        else:
+            readings = Readings(self._engine, p.rates, exact_odometry=p.odometry == "ground_truth")
+            rospy.Subscriber("cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
+        self._outputs = Outputs(self._engine, p.rates, readings, shared=self._shared)
         self._requests = Requests(self._engine, self._set_paused, self._step_ticks)
         self._lockstep = Lockstep(p.lockstep, lambda: self._engine.now)
         if p.rate == 0.0 and p.clock:
@@ -147,7 +153,6 @@ class Simulator:
         self._report_world(world)
         self._doors = DoorServices(self._engine, self._requests.ask)
         self._faults = FaultServices(self._engine, self._clients, self._requests.ask, self._health, p.seed)
-        rospy.Subscriber("cmd_vel", Twist, lambda m: self._command.set(m, 0.0), queue_size=1, tcp_nodelay=True)
         log.info("world '%s': bodies: %d, motion sensors: %d", world.name, len(world.bodies), len(places))
 
     def run(self) -> None:
@@ -180,6 +185,8 @@ class Simulator:
         """Close the sensors' links and the engine."""
         for client in self._clients.values():
             client.stop(0.0)
+        if self._hardware is not None:
+            self._hardware.close()
         self._engine.close()
 
     def _restart_pace(self) -> None:
@@ -196,13 +203,15 @@ class Simulator:
 
     def _advance(self) -> None:
         command = self._command.take()
-        if command is not None:
+        if command is not None and not self._engine.faults.is_silent("base"):
             self._engine.command(twist_from_msg(command))
         for _ in range(STEPS_PER_TICK):
             if self._scenario is not None:
                 self._scenario.advance()
             self._engine.step()
         self._tick += 1
+        if self._hardware is not None:
+            self._hardware.advance()
         self._outputs.publish(self._tick)
         self._faults.follow()
         for sensor, is_high in self._engine.motion_sensors.changes(self._engine.now):

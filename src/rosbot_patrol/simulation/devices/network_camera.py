@@ -27,6 +27,7 @@ class NetworkCamera:
     def __init__(self, port: int = 0, *, user: str = "", password: str = "", names_lengths: bool = True) -> None:
         self._fresh = threading.Condition()
         self._jpeg, self._count = b"", 0
+        self._viewers = 0
         self._is_running = True
         self._names_lengths = names_lengths
         self._wanted = f"Basic {base64.b64encode(f'{user}:{password}'.encode()).decode()}" if user else ""
@@ -50,6 +51,11 @@ class NetworkCamera:
         with self._fresh:
             self._jpeg, self._count = jpeg, self._count + 1
             self._fresh.notify_all()
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether somebody watches the stream."""
+        return self._viewers > 0
 
     def close(self) -> None:
         """Go off the network; streams end."""
@@ -79,6 +85,8 @@ class NetworkCamera:
         request.send_header("Content-Type", f"multipart/x-mixed-replace;boundary={BOUNDARY}")
         request.end_headers()
         sent = 0
+        with self._fresh:
+            self._viewers += 1
         try:
             while self._is_running:
                 with self._fresh:
@@ -91,3 +99,6 @@ class NetworkCamera:
                     request.wfile.write(head.encode() + jpeg)
         except (BrokenPipeError, ConnectionResetError):
             return
+        finally:
+            with self._fresh:
+                self._viewers -= 1

@@ -37,6 +37,9 @@ class Drive(Protocol):
     def speeds(self) -> tuple[float, float]:
         """Speeds at present [m/s, rad/s]."""
 
+    def heading(self) -> tuple[float, float]:
+        """Yaw [rad] and turning rate [rad/s] by the IMU."""
+
 
 @dataclass
 class FreeDrive:
@@ -63,6 +66,10 @@ class FreeDrive:
     def speeds(self) -> tuple[float, float]:
         """The speeds that were set [m/s, rad/s]."""
         return self.wish
+
+    def heading(self) -> tuple[float, float]:
+        """Yaw [rad] and turning rate [rad/s]."""
+        return self.at[2], self.wish[1]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,9 +168,9 @@ class RosbotBase:
         if name == "velocity":  # in the frame odom, as the firmware has it
             return messages.twist((linear * math.cos(yaw), linear * math.sin(yaw)), turning)
         if name == "imu":
-            return messages.imu(yaw, turning, stamp)
+            return messages.imu(*self.drive.heading(), stamp)
         if name == "mpu9250":
-            return messages.old_imu(yaw, turning, stamp)
+            return messages.old_imu(*self.drive.heading(), stamp)
         if name == "battery":
             return messages.battery(self.voltage)
         frame = name.replace("/", "_") if self.firmware.names_frames else ""

@@ -16,6 +16,7 @@ from rosbot_patrol.params import unknown_name
 from rosbot_patrol.simulation.population import Population
 from rosbot_patrol.simulation.scenario.faults import (
     ALL_SENSORS,
+    BaseSilent,
     CameraBlack,
     CameraFrozen,
     CameraSilent,
@@ -40,7 +41,7 @@ log = logging.getLogger(__name__)
 
 F = TypeVar("F", bound=Fault)
 
-_SILENT = {"camera": CameraSilent, "lidar": LidarSilent}
+_SILENT = {"base": BaseSilent, "camera": CameraSilent, "lidar": LidarSilent}
 _CLOSE = 1e-9  # tolerance for equal times [s]
 
 
@@ -136,7 +137,7 @@ class FaultBoard:
     # Effects ---------------------------------------------------------------------------------------------------------
 
     def is_silent(self, what: str) -> bool:
-        """Whether "camera" or "lidar" is silent."""
+        """Whether "base", "camera" or "lidar" is silent."""
         return bool(self._in_force) and any(self._of(_SILENT[what]))
 
     def driven(self, twist: Twist2D) -> Twist2D:

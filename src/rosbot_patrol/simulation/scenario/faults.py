@@ -98,6 +98,13 @@ class LidarSilent(Fault):
 
 
 @dataclass(frozen=True, kw_only=True)
+class BaseSilent(Fault):
+    """The base's cable is pulled: neither odometry nor battery comes, and no command reaches it."""
+
+    kind: ClassVar[str] = "base_silent"
+
+
+@dataclass(frozen=True, kw_only=True)
 class OdometrySlip(Fault):
     """The wheels turn as commanded; the base covers only a part of the distance."""
 
@@ -217,6 +224,7 @@ _CLASSES: tuple[type[Fault], ...] = (
     CameraBlack,
     CameraSilent,
     LidarSilent,
+    BaseSilent,
     OdometrySlip,
     WheelStuck,
     MotionStuck,
