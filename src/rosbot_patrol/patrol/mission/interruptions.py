@@ -23,6 +23,8 @@ _STOP = "emergency stop"
 class LowBattery:
     """Sends the robot home while the battery is low, and lets no mission begin.
 
+    A look at somebody goes on, until the battery is empty.
+
     Args:
         params: thresholds.
         missions: that it ends.
@@ -30,7 +32,10 @@ class LowBattery:
 
     def __init__(self, params: BatteryParams, missions: Missions) -> None:
         self._battery, self._missions = BatteryWatch(params), missions
+        self._charging_wait = params.charging_wait
         self._went_home = False
+        self._resting_since: float | None = None
+        self._was_told = False  # that no charger is there
 
     @property
     def is_low(self) -> bool:
@@ -42,9 +47,18 @@ class LowBattery:
         """What to say at rest."""
         return f"{Activity.WAITING_FOR_BATTERY.value}, which is low ({self._battery.text})"
 
-    def step(self, now: float, inputs: Inputs, out: Commands) -> None:
-        """Look at the battery; now in steady time [s]."""
-        has_changed = self._battery.step(now, inputs.battery)
+    def step(self, now: float, inputs: Inputs, out: Commands, *, sees_somebody: bool = False) -> None:
+        """Look at the battery.
+
+        Args:
+            now: steady time [s].
+            inputs: of this step.
+            out: takes the commands.
+            sees_somebody: the camera shows what may be an intruder.
+        """
+        run = self._missions.run
+        at_rest = run is None and self._missions.way_home is None
+        has_changed = self._battery.step(now, inputs.battery, at_rest=at_rest)
         is_low, level = self._battery.is_low, self._battery.text
         if has_changed:
             text = f"the battery is low ({level}): the robot goes home and waits there"
@@ -52,16 +66,43 @@ class LowBattery:
             (log.warning if is_low else log.info)("%s", text)
             out.words += (OwnerMessage(kind="battery", text=text, is_over=not is_low),)
             self._went_home = False
-        run = self._missions.run
-        if is_low and run is not None and run.mission.phase is not Phase.RETURNING:
+        if not is_low or run is None or run.mission.phase is Phase.RETURNING:
+            return
+        looks = run.mission.phase is Phase.LOOKING and (sees_somebody or run.mission.verdict is Verdict.CONFIRMED)
+        if not looks or self._battery.is_empty:
             run.give_up(f"the battery is low ({level})")
             run.turn_home(out)
 
-    def send_home(self) -> None:
-        """Drive home from where the robot stands, once while the battery is low."""
-        if self.is_low and not self._went_home and self._missions.way_home is None:
+    def rest(self, now: float, out: Commands, *, is_home: bool) -> None:
+        """Drive home once while the battery is low; tell the owner if no charger is found.
+
+        Args:
+            now: steady time [s].
+            out: takes the commands.
+            is_home: the robot stands at home.
+        """
+        if self.is_low and not is_home and not self._went_home and self._missions.way_home is None:
             self._went_home = True
             self._missions.drive_home()
+        if self._missions.way_home is None:
+            self._tell_of_charger(now, out, is_home=is_home)
+
+    def _tell_of_charger(self, now: float, out: Commands, *, is_home: bool) -> None:
+        if not self.is_low or self._battery.is_charging:
+            if self._was_told:
+                text = f"the battery is being charged ({self._battery.text})"
+                text = text if self._battery.is_charging else "the battery is no longer low"
+                out.words += (OwnerMessage(kind="charger", text=text, is_over=True),)
+            self._resting_since, self._was_told = None, False
+            return
+        self._resting_since = now if self._resting_since is None else self._resting_since
+        if self._was_told or (is_home and now - self._resting_since < self._charging_wait):
+            return
+        self._was_told = True
+        where = "at home, but is not being charged" if is_home else "away from home, where it cannot be charged"
+        text = f"the battery is low ({self._battery.text}) and the robot stands {where}: plug it in"
+        log.warning("%s", text)
+        out.words += (OwnerMessage(kind="charger", text=text),)
 
 
 class EmergencyHold:

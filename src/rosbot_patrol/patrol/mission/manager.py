@@ -244,7 +244,8 @@ class PatrolManager:
         if self._is_first:
             self._is_first = False
             drop_the_old(self._missions, inputs.wall, self.params.resume_max_age, out)
-        self._battery.step(self._time, inputs, out)
+        sees_somebody = self._parts.decision.has_candidate(self._time)
+        self._battery.step(self._time, inputs, out, sees_somebody=sees_somebody)
         if not self._hold.step(inputs, out):
             self._choose(inputs, out)
             self._go_on(inputs, out)
@@ -309,8 +310,9 @@ class PatrolManager:
 
     def _rest(self, inputs: Inputs, out: Commands) -> None:
         missions = self._missions
-        if inputs.pose is not None and distance(inputs.pose, self._parts.rooms.base.pose) >= AT_HOME:
-            self._battery.send_home()
+        if inputs.pose is not None:
+            is_home = distance(inputs.pose, self._parts.rooms.base.pose) < AT_HOME
+            self._battery.rest(self._time, out, is_home=is_home)
         if missions.way_home is not None:
             missions.step_way_home(missions.way_home, self._time, inputs, out)
             return

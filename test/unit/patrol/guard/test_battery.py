@@ -85,3 +85,58 @@ def test_a_battery_that_was_low_stays_so_while_it_fades():
 def test_the_limit_by_voltage_can_be_switched_off():
     check_battery(BatteryParams(battery_low_voltage=0.0))
     check_battery(BatteryParams(battery_low_voltage=0.0, battery_ok_voltage=0.0))
+
+
+# -- sag, emptiness, charger
+
+
+def step_all(watch, volts, seconds, *, at_rest=False, start=0.0):
+    for k in range(round(seconds * 2.5)):
+        now = start + k / 2.5
+        watch.step(now, Battery(voltage=volts, at=now), at_rest=at_rest)
+    return start + seconds
+
+
+def test_a_sag_under_load_is_no_low_battery_but_a_lasting_one_is():
+    watch = BatteryWatch(BatteryParams())
+    now = step_all(watch, 11.2, 10.0)
+    now = step_all(watch, 10.5, 1.6, start=now)
+    assert not watch.is_low
+    now = step_all(watch, 11.2, 5.0, start=now)
+    step_all(watch, 10.5, 4.0, start=now)
+    assert watch.is_low
+
+
+def test_a_battery_is_empty_below_a_share_or_a_part_of_the_low_voltage():
+    watch = BatteryWatch(BatteryParams())
+    step_all(watch, 10.3, 6.0)
+    assert (watch.is_low, watch.is_empty) == (True, False)
+    step_all(watch, 10.2, 6.0, start=10.0)
+    assert watch.is_empty
+    watch.step(20.0, Battery(share=0.1, at=20.0))
+    assert (watch.is_low, watch.is_empty) == (True, False)
+    watch.step(21.0, Battery(share=0.07, at=21.0))
+    assert watch.is_empty
+
+
+def test_a_charger_shows_by_a_rise_at_rest_and_goes_with_a_fall_or_a_drive():
+    watch = BatteryWatch(BatteryParams())
+    now = step_all(watch, 10.6, 20.0, at_rest=True)
+    now = step_all(watch, 10.8, 40.0, at_rest=True, start=now)  # recovers from the drive
+    assert not watch.is_charging
+    now = step_all(watch, 11.2, 20.0, at_rest=True, start=now)
+    assert watch.is_charging
+    now = step_all(watch, 12.4, 20.0, at_rest=True, start=now)
+    assert watch.is_charging
+    now = step_all(watch, 12.2, 20.0, at_rest=True, start=now)  # unplugged
+    assert not watch.is_charging
+    now = step_all(watch, 12.6, 20.0, at_rest=True, start=now)
+    assert watch.is_charging
+    step_all(watch, 12.6, 1.0, start=now)
+    assert not watch.is_charging
+
+
+def test_a_driver_that_reports_charging_is_believed():
+    watch = BatteryWatch(BatteryParams())
+    watch.step(0.0, Battery(share=0.1, is_charging=True, at=0.0))
+    assert watch.is_charging

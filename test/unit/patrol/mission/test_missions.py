@@ -374,6 +374,53 @@ def set_battery(world, share, seconds=0.2):
         world.step()
 
 
+def set_voltage(world, volts, seconds):
+    end = world.now + seconds
+    while world.now < end:
+        world.battery = Battery(voltage=volts, at=world.now)
+        world.step()
+
+
+def words_of(world, kind):
+    return [word.text for out in world.all for word in out.words if word.kind == kind]
+
+
+def test_a_low_battery_ends_a_round_but_not_the_look_at_somebody_until_it_is_empty():
+    world = World(person_when=lambda w: w.x == 10.0)
+    world.triggers = [1]
+    world.run(lambda w: w.notices)
+    set_battery(world, 0.15, 3.0)
+    assert world.manager.mission.phase is Phase.LOOKING
+    set_battery(world, 0.07, 0.2)
+    assert world.manager.mission.phase is Phase.RETURNING
+    assert world.ended == [] or world.ended[-1].verdict is Verdict.CONFIRMED
+
+
+def test_a_low_battery_lets_a_look_at_somebody_end_by_itself():
+    world = World(person_when=lambda w: w.x == 10.0)
+    world.triggers = [1]
+    world.run(lambda w: w.notices)
+    set_battery(world, 0.15, 60.0)
+    assert world.ended[-1].verdict is Verdict.CONFIRMED
+    assert sum(speed * 0.04 for speed in world.speeds if speed) > 6.0
+    assert world.x == 0.0
+
+
+def test_the_owner_is_told_of_a_robot_that_waits_without_a_charger_and_of_the_charger():
+    world = World()
+    set_voltage(world, 10.5, 310.0)
+    (text,) = words_of(world, "charger")
+    assert text == "the battery is low (10.5 V) and the robot stands at home, but is not being charged: plug it in"
+    set_voltage(world, 10.9, 20.0)
+    assert words_of(world, "charger")[1:] == ["the battery is being charged (10.9 V)"]
+
+
+def test_the_owner_is_told_at_once_of_a_robot_that_cannot_get_home_with_a_low_battery():
+    world = World(x=20.0, refuse={0.0})
+    set_battery(world, 0.1, 30.0)
+    assert any("away from home, where it cannot be charged: plug it in" in text for text in words_of(world, "charger"))
+
+
 def test_a_low_battery_brings_it_home_where_it_waits():
     world = World()
     world.triggers = [3]
@@ -414,8 +461,7 @@ def test_by_voltage_where_the_share_is_not_told():
     world = World(manager)
     world.triggers = [1]
     for volts, is_low in [(10.5, False), (9.9, True), (10.5, True), (11.1, False)]:
-        world.battery = Battery(voltage=volts, at=world.now)
-        world.step()
+        set_voltage(world, volts, 6.0)
         assert manager._battery.is_low == is_low
 
 
