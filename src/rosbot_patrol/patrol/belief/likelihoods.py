@@ -22,6 +22,7 @@ from rosbot_patrol.patrol.records.inputs import Box, Eye, Measured
 Array = NDArray[np.float64]
 
 _LEAST = 0.02  # smallest q, and 1 less the largest: no single measurement is sure
+_LEGS = 0.7  # largest q of legs alone: a box around one leg of a dog looks like them
 _NEAR_ERROR = 0.35  # [m] error of a place by the floor up to which it tells the size
 _LOWEST = 16  # [px] height below which a box shows nothing
 _SHAPES = 0.15, 8.0  # height over width that a box of an object can have
@@ -112,6 +113,8 @@ class Likelihoods:
         if found is None:
             return None, False, None
         q, veto = found
+        if box.measured is not None and box.measured.has_legs:
+            q = min(q, _LEGS)
         return math.log(q / (1.0 - q)), False, veto
 
     def is_near(self, box: Box) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -249,6 +250,14 @@ def test_a_pet_from_near_that_shows_no_person_from_afar_is_nobody() -> None:
     for eye in (SOUTH, EAST, WEST):
         seen.see(eye, pictures=10)
     assert seen.posterior < seen.belief.params.clear_below
+
+
+def test_legs_from_one_side_confirm_nobody_and_from_two_a_person() -> None:
+    """A box around one leg of a dog looks like the legs of a person."""
+    seen = Seen()
+    for eye, is_enough in ((Pose2D(-0.8, 0.0, 0.0), False), (Pose2D(0.0, -0.8, math.pi / 2.0), True)):
+        seen.see(eye, box_of(eye, tall=0.5, is_cut_above=True, has_legs=True), pictures=40)
+        assert seen.only.is_confirmed == is_enough
 
 
 def test_two_boxes_around_one_person_are_one_person() -> None:
