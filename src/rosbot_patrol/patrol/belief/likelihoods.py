@@ -172,11 +172,11 @@ def _shares(box: Box, m: Measured, p: BeliefParams) -> dict[Veto, float]:
     shares = {
         Veto.LARGE: min(_normal((p.person_top_max - m.top) / error), _normal((p.person_width_max - m.width) / error))
     }
-    if goes_on(box, m) or m.is_cut_aside:  # the picture ends before the object does
-        return shares
     lying = _normal((m.width - p.lying_length) / error)
-    shares[Veto.PET] = max(_normal((m.top - p.person_top_min) / error), lying)
-    shares[Veto.SMALL] = max(_normal((m.height - p.person_height_min) / error), lying)
+    if not m.has_legs:  # of legs right before the camera only the lowest part is in the picture
+        shares[Veto.PET] = max(_normal((m.top - p.person_top_min) / error), lying)
+    if not (goes_on(box, m) or m.is_cut_aside):  # else it is larger than what the picture shows
+        shares[Veto.SMALL] = max(_normal((m.height - p.person_height_min) / error), lying)
     return shares
 
 

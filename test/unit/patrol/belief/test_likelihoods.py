@@ -100,3 +100,13 @@ def test_the_cautious_network_does_not_speak_boldly() -> None:
     person, nobody = Likelihoods(CAUTIOUS, PARAMS, 0.05).chances(Condition(0.3))
     assert np.log(person / nobody)[1:].max() <= PARAMS.picture_most + 1e-9
     assert (np.diff(np.log(person / nobody)[1:]) >= 0.0).all()
+
+
+@pytest.mark.parametrize("cut", ["is_cut_aside", "is_cut_above"])
+def test_a_part_that_is_as_tall_as_a_pet_may_be_says_little(cut: str) -> None:
+    """The tail of a dog at the image border, measured as far off as the wall behind it, is a metre tall."""
+    low, tall = (judge().box(box_of(WEST, tall=tall, **{cut: True}), EYE).size for tall in (1.0, 1.5))
+    assert low is not None
+    assert tall is not None
+    assert 0.0 < low < 1.5
+    assert tall > 3.0
