@@ -14,6 +14,7 @@ CALLS |= {"ActionServer", "ActionClient", "wait_for_service", "wait_for_message"
 
 # What all guards of one master share, and what launch files remap, as tf2 and darknet_ros name it.
 SHARED = {"/clock": "one time", "/diagnostics": "names there carry the namespace", "/tf": "tf2's name; remapped"}
+SHARED["/tf_static"] = SHARED["/tf"]
 # Programs that watch a guard at the root, as the tests do.
 WATCHERS = {"campaign/watch.py", "campaign/crash.py", "campaign/patrol.py"}
 

@@ -1,4 +1,4 @@
-"""Ways to a lidar: a serial device, TCP, UDP."""
+"""Ways to a device: a serial line, TCP, UDP."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class SerialChannel(_Waiting):
 
 
 class TcpChannel(_Waiting):
-    """A lidar behind a TCP port. Raises OSError if nothing answers there within 3 s."""
+    """A device behind a TCP port. Raises OSError if nothing answers there within 3 s."""
 
     def __init__(self, host: str, port: int) -> None:
         link = socket.create_connection((host, port), _CONNECT_WITHIN)
@@ -95,7 +95,7 @@ class TcpChannel(_Waiting):
 
 
 class UdpChannel(_Waiting):
-    """A lidar behind a UDP port. Raises OSError for a name that is not known."""
+    """A device behind a UDP port. Raises OSError for a name that is not known."""
 
     def __init__(self, host: str, port: int) -> None:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]

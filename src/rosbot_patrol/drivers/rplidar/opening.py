@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from rosbot_patrol.drivers.rplidar.channels import BAUDS, SerialChannel, TcpChannel, UdpChannel
+from rosbot_patrol.drivers.channels import BAUDS, SerialChannel, TcpChannel, UdpChannel
 from rosbot_patrol.drivers.rplidar.frames import FRAME_SIZES, FrameFinder
 from rosbot_patrol.drivers.rplidar.lidar import Channel, Lidar
 from rosbot_patrol.drivers.rplidar.protocol import AnswerType

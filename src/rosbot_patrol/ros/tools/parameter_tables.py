@@ -22,6 +22,7 @@ from rosbot_patrol.costmap.params import (
 )
 from rosbot_patrol.costmap.sensor_params import DepthSourceParams, RangeSensorParams, SourceParams
 from rosbot_patrol.detection.params import DarknetParams
+from rosbot_patrol.drivers.bases.adapter import AdapterParams
 from rosbot_patrol.ekf.params import EkfParams, InputParams
 from rosbot_patrol.gmapping.parameters import GmappingParams
 from rosbot_patrol.images.compressed import CompressedParams
@@ -42,8 +43,10 @@ from rosbot_patrol.planning.local_planners.trajectory_params import TrajectoryPl
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
 from rosbot_patrol.ros.detector.republish_node import RepublishParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
+from rosbot_patrol.ros.drivers.lds_node import LdsParams
 from rosbot_patrol.ros.drivers.rplidar_node import RplidarParams
 from rosbot_patrol.ros.drivers.usb_cam_node import UsbCamParams
+from rosbot_patrol.ros.drivers.wheel_odometry_node import WheelOdometryParams
 from rosbot_patrol.ros.gmapping.explore_node import ExploreParams
 from rosbot_patrol.ros.maps.server_node import MapServerParams
 from rosbot_patrol.ros.patrol.incident_keeper import RecordParams
@@ -120,6 +123,9 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("twist_mux", [("", TwistMuxParams)]),
     ("rplidarNode", [("", RplidarParams)]),
     ("usb_cam_node", [("", UsbCamParams)]),
+    ("base_adapter", [("", AdapterParams)]),
+    ("wheel_odometry", [("", WheelOdometryParams)]),
+    ("hlds_laser_publisher", [("", LdsParams)]),
     ("ekf_localization_node", [("", EkfParams), ("<odom0, pose0, twist0, imu0, odom1, ...>_", InputParams)]),
     ("teleop_twist_keyboard.py", [("", TeleopParams)]),
     ("simulator", [("", SimulatorParams)]),
