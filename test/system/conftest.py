@@ -14,7 +14,7 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 
 # What needs the machine's speed comes first; the last are houses whose clock waits for their nodes.
-ORDER = ("test_tutorial", "test_two_machines", "test_kills", "test_two_guards", "test_orders")
+ORDER = ("test_tutorial", "test_two_machines", "test_kills", "test_hardware", "test_two_guards", "test_orders")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
