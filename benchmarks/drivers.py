@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Drivers of a real robot: what a lidar costs, and how soon its turn is a scan.
 
-    python3 benchmarks/drivers.py [--json FILE] [--seconds 20]
+    python3 benchmarks/drivers.py [--json FILE] [--seconds 20] [--no-house]
 
 - express_cpu_percent, ultra_cpu_percent: share of one core for bytes to scans, of a lidar with 8,000 and with 16,000
   samples a second: frames, samples, turns, layout, without ROS.
@@ -10,6 +10,9 @@
   median.
 - mjpeg_pass_cpu_percent, mjpeg_decode_cpu_percent, camera_mb: the node usb_cam_node with a network camera that sends
   JPEGs of 640 x 480 and 50 kB, 30 a second: while only `compressed` has a subscriber, and while both have one.
+- hardware_realtime_factor, hardware_ready_s, robot_profile_mb, robot_profile_cores: `simulation:=hardware` on a mission
+  to room 5, all but the simulator: the nodes that a robot runs. Memory: the sum of what is resident; shared pages count
+  in each node.
 """
 
 from __future__ import annotations
@@ -38,6 +41,7 @@ from rosbot_patrol.simulation.devices.network_camera import NetworkCamera
 from rosbot_patrol.simulation.devices.rplidar import MODELS, RplidarDevice
 from rosbot_patrol.simulation.devices.serial_line import SerialLine, serve
 
+SIMULATION = ("/simulator", "/rosout", "/house_watch", "/rostopic")  # nodes that no robot runs
 CHUNK = 256  # [bytes] that a serial device hands over at a time
 
 
@@ -210,11 +214,39 @@ def camera(seconds: float) -> dict[str, float]:
     }
 
 
+def profile(folder: Path) -> dict[str, float]:
+    """The whole house through emulated devices."""
+    from rosbot_patrol.ros.campaign.house import House
+    from rosbot_patrol.ros.campaign.ports import BRIDGES, free_port
+
+    ports = {"bridge_port": free_port(BRIDGES), "camera_port": free_port()}
+    with House(folder, simulation="hardware", hardware_folder=str(folder / "devices"), **ports) as house:
+        ready = house.wait_ready(120.0)
+        ours = {name: pid for name, pid in house.pids().items() if not name.startswith(SIMULATION)}
+        before = {name: cost_of(pid) for name, pid in ours.items()}
+        mission = house.mission(5, timeout=600.0)
+        after = {name: cost_of(pid) for name, pid in ours.items()}
+    known = {name: (before[name], after[name]) for name in ours if before[name] and after[name]}
+    used = {name: last.cpu - first.cpu for name, (first, last) in known.items()}
+    print(f"the mission to room 5 took {mission.wall_seconds:.0f} s: {mission.verdict}")
+    for name in sorted(used, key=lambda each: -used[each]):
+        memory = known[name][1].memory / 1e6
+        print(f"  {name:32} {100.0 * used[name] / mission.wall_seconds:5.1f} % {memory:6.0f} MB")
+    return {
+        "hardware_realtime_factor": mission.sim_seconds / mission.wall_seconds,
+        "hardware_ready_s": ready,
+        "robot_profile_mb": sum(last.memory for _, last in known.values()) / 1e6,
+        "robot_profile_cores": sum(used.values()) / mission.wall_seconds,
+        "robot_profile_nodes": len(known),
+    }
+
+
 def main() -> None:
     """Print the table, and write the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--no-house", action="store_true", help="leave out the mission in the house")
     options = parser.parse_args()
     figures = {
         "express_cpu_percent": decoding("A2", options.seconds),
@@ -226,6 +258,8 @@ def main() -> None:
         master = Master(Path(folder) / "roscore.log")
         try:
             figures |= {**node(options.seconds), **camera(options.seconds)}
+            if not options.no_house:
+                figures |= profile(Path(folder) / "house")
         finally:
             master.stop()
     print(f"{os.cpu_count()} cores")
