@@ -44,7 +44,7 @@ def speak(_):
         m.header.stamp, m.header.frame_id = now, "odom"
         m.pose.pose.orientation.w = 1.0
         m.twist.twist.linear.x, m.twist.twist.angular.z = told["vx"], told.get("wz", 0.0)
-        m.twist.covariance = [0.001 if i % 7 == 0 else 0.0 for i in range(36)]
+        m.twist.covariance = [told.get("spread", 0.001) if i % 7 == 0 else 0.0 for i in range(36)]
         wheels.publish(m)
     if "pose" in told:
         m = PoseStamped(); m.header.stamp, m.header.frame_id = now, "odom"
@@ -197,3 +197,34 @@ def test_what_grows_without_bound_is_said(ros):
     ekf = Filter(ros, "_two_d_mode:=true", "_odom0:=wheels", f"_odom0_config:={mask}")
     ekf.tell('{"vx": 0.5}')
     ekf.peer.expect(lambda said: "yaw is not measured: its error grows without bound" in said.get("text", ""))
+
+
+def test_numbers_that_are_not_finite_and_a_covariance_of_zero_are_told(ros):
+    ekf = Filter(ros, *WHEELS)
+    ekf.tell('{"vx": 0.5}')
+    ekf.estimate(lambda e: e["vx"] > 0.4)
+    ekf.tell('{"vx": NaN}')
+    ekf.peer.expect(lambda said: said.get("text") == "it sends numbers that are not finite: they do not count")
+    ekf.tell('{"vx": 0.5, "spread": 0.0}')
+    ekf.peer.expect(lambda said: "it sends a covariance of 0" in said.get("text", ""))
+    assert math.isfinite(ekf.estimate()["x"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "frames"),
+    [
+        (("_invert_tf:=true",), ["base_link", "odom"]),
+        (("_world_frame:=map", "_map_frame:=map"), ["map", "odom"]),
+        (("_publish_tf:=false",), None),
+    ],
+)
+def test_the_transform_is_the_one_that_is_wanted(ros, arguments, frames):
+    origin = [*("0" * 6), "odom", "base_link"]
+    ros.processes.append(Process(["rosrun", "tf2_ros", "static_transform_publisher", *origin], ros.env))
+    ekf = Filter(ros, *WHEELS, *arguments)
+    ekf.tell('{"vx": 0.5}')
+    ekf.estimate(lambda e: e["vx"] > 0.4)
+    if frames is None:
+        assert not [said for said in ekf.peer.heard() if "tf" in said]
+    else:
+        ekf.peer.expect(lambda said: said.get("tf") == frames)

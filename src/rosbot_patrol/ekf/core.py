@@ -22,12 +22,20 @@ from rosbot_patrol.errors import TransformError
 
 @dataclass
 class Counts:
-    """What became of a sensor's readings."""
+    """What became of a sensor's readings.
+
+    Attributes:
+        spoilt: with a number that is not finite; it does not count.
+        unspread: with a variance of 0 or below, which counts as the smallest one.
+        problem: why the last one was lost.
+    """
 
     taken: int = 0
     rejected: int = 0
     late: int = 0
     lost: int = 0
+    spoilt: int = 0
+    unspread: int = 0
     problem: str = ""
 
 
@@ -85,6 +93,9 @@ class FilterCore:
             return
         self._heard[name, part] = reading.stamp
         if measurement is not None:
+            spread = np.diag(measurement.covariance)[measurement.mask]
+            counts.spoilt += not (np.isfinite(measurement.values[measurement.mask]).all() and np.isfinite(spread).all())
+            counts.unspread += bool((spread <= 0.0).any())
             heapq.heappush(self._queue, (measurement.stamp, next(self._order), measurement))
 
     def update(self, now: float, *, to_now: bool = False) -> None:

@@ -212,3 +212,13 @@ def test_a_clock_that_went_back_begins_anew() -> None:
     core.hear("in0", pose(2.0)(0.5))
     core.update(0.5)
     assert core.state[0] == pytest.approx(2.0, abs=0.01)
+
+
+def test_numbers_that_are_not_finite_and_variances_of_zero_are_counted() -> None:
+    core = core_of("000 000 111 111 000")
+    drive(core, 1.0, twist((1.0, 0.0, 0.0)))
+    core.hear("in0", twist((math.nan, 0.0, 0.0))(3.0))
+    core.hear("in0", TwistReading(3.1, "", np.array([1.0, 0.0, 0.0]), np.zeros(3), np.zeros((6, 6))))
+    core.update(4.0)
+    assert (core.counts["in0"].spoilt, core.counts["in0"].unspread) == (1, 1)
+    assert np.isfinite(core.state).all()

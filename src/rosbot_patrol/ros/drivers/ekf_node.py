@@ -78,6 +78,7 @@ class EkfNode:
         self._core = FilterCore(params.ekf(), configs, around, params.silence)
         self._unmeasured = unmeasured(configs, is_planar=params.two_d_mode)
         self._is_on = not params.disabled_at_startup
+        self._counted: dict[str, Counts] = {}
         self._published = -math.inf
         self._last = -math.inf
         self._reported = -math.inf
@@ -256,8 +257,9 @@ class EkfNode:
             counts = {name: Counts(**vars(each)) for name, each in self._core.counts.items()}
             is_begun = self._core.ekf.is_begun
         for name, each in counts.items():
-            level, text = _judge(silent[name], each)
+            level, text = _judge(silent[name], each, self._counted.get(name, Counts()))
             self._health.set(name, level, text, {**vars(each), "silent for [s]": f"{silent[name]:.1f}"})
+        self._counted = counts
         problems = [f"{each} is not measured: its error grows without bound" for each in self._unmeasured]
         if not self._is_on:
             problems = ["switched off: call the service ~enable"]
@@ -266,13 +268,17 @@ class EkfNode:
         self._health.set("", WARN if problems else OK, "; ".join(problems) or "estimates")
 
 
-def _judge(silent: float, counts: Counts) -> tuple[int, str]:
+def _judge(silent: float, counts: Counts, before: Counts) -> tuple[int, str]:
     if counts.lost and not counts.taken:
         return ERROR, f"its readings cannot be placed: {counts.problem}"
     if math.isinf(silent):
         return ERROR, "was never heard"
     if silent > _SILENT:
         return WARN, f"silent for {silent:.1f} s"
+    if counts.spoilt > before.spoilt:
+        return WARN, "it sends numbers that are not finite: they do not count"
+    if counts.unspread > before.unspread:
+        return WARN, "it sends a covariance of 0, which counts as 1e-9: set it in the driver"
     if counts.rejected > counts.taken:
         return WARN, "most of its readings are too far off and rejected"
     return OK, "heard"
