@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="needs ROS: source the workspace first")
 
-from ros_processes import Process, wait_for
+from ros_processes import Process, free_port, wait_for
 
 HERE = Path(__file__).parent
 LISTEN = """
@@ -44,10 +44,10 @@ rospy.spin()
 class Lidar:
     """An emulated lidar and the node that drives it."""
 
-    def __init__(self, ros, folder, model, *, any_speed=True):
+    def __init__(self, ros, folder, model, *, any_speed=True, port=""):
         self.ros = ros
         ros.forget("/rplidarNode")  # parameters outlive the node that was given them
-        self.port = folder / "rplidar"
+        self.port = port or folder / "rplidar"
         script = [sys.executable, str(HERE / "rplidar_room.py"), model, str(self.port)]
         self.room = Process([*script, "any_speed"] if any_speed else script, ros.env, stdin=subprocess.PIPE)
         ros.processes.append(self.room)
@@ -94,6 +94,20 @@ def test_the_room_comes_as_a_scan(ros, listener, tmp_path, model, count, off):
     assert scan["inc"] * count == pytest.approx(6.2831853, abs=1e-4)
     assert 0.05 < scan["time"] < 0.5
     listener.says("turns a second")
+
+
+@pytest.mark.parametrize("kind", ["tcp", "udp"])
+def test_a_lidar_behind_a_port_is_lost_and_found_again(ros, listener, tmp_path, kind):
+    port = free_port()
+    lidar = Lidar(ros, tmp_path, "S1" if kind == "tcp" else "S2", port=f"{kind}:{port}")
+    node = lidar.node(f"_channel_type:={kind}", f"_{kind}_ip:=127.0.0.1", f"_{kind}_port:={port}")
+    wait_for(lambda: len(scans(listener)) > 2, what="scans")
+    assert scans(listener)[-1]["off"] < 0.02
+    lidar.order("unplug")
+    node.says("the lidar is lost, and will be opened again")
+    lidar.order("plug_in")
+    before = len(scans(listener))
+    wait_for(lambda: len(scans(listener)) > before + 2, what="scans again")
 
 
 def test_services_stop_and_start_and_the_end_leaves_no_motor_running(ros, listener, tmp_path):
