@@ -141,9 +141,10 @@ class Settings:
     faults: bool = False
     network: str = "house"
     figures: str = "plain"
+    hardware: bool = False
 
 
-_LATER: dict[str, Any] = {"faults": False, "network": "house", "figures": "plain"}
+_LATER: dict[str, Any] = {"faults": False, "network": "house", "figures": "plain", "hardware": False}
 """Settings that folders of earlier campaigns lack, as those ran."""
 
 

@@ -65,6 +65,7 @@ def options(arguments: list[str]) -> argparse.Namespace:
     )
     parser.add_argument("--network", default="house", help="that looks for people, as network:= takes it")
     parser.add_argument("--figures", default="plain", choices=("plain", "detailed"), help="of simulated people")
+    parser.add_argument("--hardware", action="store_true", help="through emulated devices and a robot's drivers")
     parser.add_argument("--faults", action="store_true", help="something breaks in every other patrol")
     parser.add_argument("--life", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)  # run inside its own network and process space
@@ -84,6 +85,7 @@ class Campaign:
             faults=given.faults,
             network=given.network,
             figures=given.figures,
+            hardware=given.hardware,
         )
         self._folder = CampaignFolder(given.folder.resolve(), settings)
         self._floors: dict[str, tuple[HouseFiles, Floor]] = {}
@@ -118,6 +120,7 @@ class Campaign:
         write_atomic(folder / PLAN, json.dumps(patrol.to_plain(), indent=1).encode())
         command = [sys.executable, sys.argv[0], "--one", str(folder), "--timeout", str(self._given.timeout)]
         command += ["--network", self._given.network, "--figures", self._given.figures]
+        command += ["--hardware"] * self._given.hardware
         return Job(str(number), command + ["--space"] * space, folder / "campaign.log", self._given.timeout)
 
     def _plan(self, number: int) -> Patrol:
@@ -178,7 +181,7 @@ class Campaign:
         given, usual = self._given, options([])
         folder, more = f"again-{result.number}", houses + " --faults" * given.faults
         more += f" --network {given.network}" * (given.network != usual.network)
-        more += f" --figures {given.figures}" * (given.figures != usual.figures)
+        more += f" --figures {given.figures}" * (given.figures != usual.figures) + " --hardware" * given.hardware
         return f"rosrun rosbot_patrol campaign {folder} --seed {result.seed}{more} --only {result.number}"
 
     def _write(self) -> None:
@@ -187,7 +190,7 @@ class Campaign:
         table = markdown_table(HEADINGS, map(row, results))
         write_atomic(folder / "results.md", f"{table}\n\n{summary(results)}\n\n{self._failures(results)}\n".encode())
         given = self._given
-        eyes = f"network {given.network}, {given.figures} people"
+        eyes = f"network {given.network}, {given.figures} people" + ", emulated hardware" * given.hardware
         subtitle = f"seed {given.seed}, houses {', '.join(given.houses)}, {eyes}, {os.cpu_count()} cores"
         write_atomic(folder / "index.html", page(results, self.command, subtitle=subtitle).encode())
         write_atomic(folder / "results.json", json.dumps(figures(results), indent=1).encode())
@@ -200,7 +203,12 @@ def in_its_space(given: argparse.Namespace) -> int:
     status = 0
     try:
         if given.one:
-            play(given.one, package_root(), given.timeout, Eyes(network=given.network, figures=given.figures))
+            play(
+                given.one,
+                package_root(),
+                given.timeout,
+                Eyes(network=given.network, figures=given.figures, is_hardware=given.hardware),
+            )
         else:
             CrashLife(given.folder, package_root(), given.seed, given.crash).run()
     except HouseError as err:

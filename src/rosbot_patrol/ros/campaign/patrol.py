@@ -30,10 +30,12 @@ class Eyes:
     Attributes:
         network: that looks for people.
         figures: of the simulated people, plain or detailed.
+        is_hardware: through emulated devices and a robot's drivers, in real time.
     """
 
     network: str = "house"
     figures: str = "plain"
+    is_hardware: bool = False
 
 
 def play(folder: Path, root: Path, limit: float, eyes: Eyes) -> Result:
@@ -61,6 +63,8 @@ def play(folder: Path, root: Path, limit: float, eyes: Eyes) -> Result:
         "network": eyes.network,
         "figures": eyes.figures,
     }
+    if eyes.is_hardware:  # devices on wires have a clock of their own
+        arguments |= {"simulation": "hardware", "rate": 1, "hardware_folder": folder / "devices"}
     house = House(folder, "rosbot_patrol", "scenario.launch", seed=patrol.scenario["seed"], **arguments)
     problem = ""
     try:
