@@ -19,7 +19,7 @@ from rosbot_patrol.ros.campaign.ports import BRIDGES, free_port
 
 pytestmark = pytest.mark.system
 
-ROOM, INTRUDER_AT = 5, (4.2, 7.6)
+ROOM, INTRUDER_AT = 1, (4.7, 0.2)
 PULLED = 4.0  # [s] that each plug is out
 
 
