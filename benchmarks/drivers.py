@@ -12,7 +12,7 @@
   JPEGs of 640 x 480 and 50 kB, 30 a second: while only `compressed` has a subscriber, and while both have one.
 - hardware_realtime_factor, hardware_ready_s, robot_profile_mb, robot_profile_cores: `simulation:=hardware` on a mission
   to room 5, all but the simulator: the nodes that a robot runs. Memory: the sum of what is resident; shared pages count
-  in each node.
+  in each node. robot_profile_pss_mb: each shared page counts once.
 """
 
 from __future__ import annotations
@@ -214,6 +214,12 @@ def camera(seconds: float) -> dict[str, float]:
     }
 
 
+def proportional(pid: int) -> float:
+    """Memory of a process, each shared page divided among those that share it [MB]."""
+    lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1e3
+
+
 def profile(folder: Path) -> dict[str, float]:
     """The whole house through emulated devices."""
     from rosbot_patrol.ros.campaign.house import House
@@ -226,6 +232,7 @@ def profile(folder: Path) -> dict[str, float]:
         before = {name: cost_of(pid) for name, pid in ours.items()}
         mission = house.mission(5, timeout=600.0)
         after = {name: cost_of(pid) for name, pid in ours.items()}
+        shares = sum(map(proportional, ours.values()))
     known = {name: (before[name], after[name]) for name in ours if before[name] and after[name]}
     used = {name: last.cpu - first.cpu for name, (first, last) in known.items()}
     print(f"the mission to room 5 took {mission.wall_seconds:.0f} s: {mission.verdict}")
@@ -236,6 +243,7 @@ def profile(folder: Path) -> dict[str, float]:
         "hardware_realtime_factor": mission.sim_seconds / mission.wall_seconds,
         "hardware_ready_s": ready,
         "robot_profile_mb": sum(last.memory for _, last in known.values()) / 1e6,
+        "robot_profile_pss_mb": shares,
         "robot_profile_cores": sum(used.values()) / mission.wall_seconds,
         "robot_profile_nodes": len(known),
     }
