@@ -43,6 +43,7 @@ from rosbot_patrol.planning.local_planners.trajectory_params import TrajectoryPl
 from rosbot_patrol.planning.recoveries import ClearCostmapParams, MoveSlowParams, RotateParams
 from rosbot_patrol.ros.detector.republish_node import RepublishParams
 from rosbot_patrol.ros.drive.twist_mux_node import TwistMuxParams
+from rosbot_patrol.ros.drivers.astra_depth_node import AstraDepthParams
 from rosbot_patrol.ros.drivers.lds_node import LdsParams
 from rosbot_patrol.ros.drivers.rplidar_node import RplidarParams
 from rosbot_patrol.ros.drivers.usb_cam_node import UsbCamParams
@@ -123,6 +124,7 @@ SECTIONS: list[tuple[str, list[tuple[str, type]]]] = [
     ("twist_mux", [("", TwistMuxParams)]),
     ("rplidarNode", [("", RplidarParams)]),
     ("usb_cam_node", [("", UsbCamParams)]),
+    ("astra_depth", [("", AstraDepthParams)]),
     ("base_adapter", [("", AdapterParams)]),
     ("wheel_odometry", [("", WheelOdometryParams)]),
     ("hlds_laser_publisher", [("", LdsParams)]),
