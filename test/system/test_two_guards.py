@@ -88,7 +88,7 @@ def foreign_names(ns: str) -> list[str]:
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_guards_on_one_master_do_not_hear_each_other(guards: tuple[Guard, Guard]) -> None:
     first, second = guards
     with second.stays():
