@@ -28,6 +28,7 @@ ROOT = HERE.parents[1]
 # threads that wait for one another by turning round cost minutes on a busy machine
 ALONE = dict(os.environ, OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
 
+LARGE = ("yolov2-voc", "yolov3", "yolov3-voc")
 needs_darknet = pytest.mark.skipif(not LIBRARY.exists(), reason="Debian's package darknet is not installed")
 
 REGION = """
@@ -224,7 +225,10 @@ def test_real_network_with_random_weights_as_darknet(tmp_path, name, threshold):
 
 
 @needs_darknet
-@pytest.mark.parametrize("name", ["yolov2-tiny-voc", "yolov2", "yolov2-voc", "yolov3", "yolov3-voc"])
+@pytest.mark.parametrize(
+    "name",
+    ["yolov2-tiny-voc", "yolov2", *(pytest.param(name, marks=pytest.mark.long) for name in LARGE)],
+)
 def test_every_family_that_darknet_knows(tmp_path, name):
     """All layers of the network, with a sixteenth of their filters and a smaller input: seconds instead of minutes."""
     pixels = make_picture(320, 240)

@@ -133,6 +133,7 @@ def walls(grid: Any) -> np.ndarray:
     return np.column_stack((np.rint(ix + i.origin_x / i.resolution), np.rint(iy + i.origin_y / i.resolution)))
 
 
+@pytest.mark.long
 def test_the_patrol_decides_the_same(sim_ros: Ros, tmp_path: Path) -> None:
     first = tmp_path / "first.bag"
     which = f"topic != '/motion_trigger' or t.to_sec() < {FIRST}"
