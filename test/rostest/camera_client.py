@@ -99,6 +99,8 @@ class Client:
         counts, boxes = len(self.heard["count"]), len(self.heard["boxes"])
         self.camera.publish(message)
         self.wait(lambda: len(self.heard["count"]) > counts, 3.0)
+        if any(each.count for each in self.heard["count"][counts:]):  # the boxes come on a topic of their own
+            self.wait(lambda: len(self.heard["boxes"]) > boxes, 3.0)
         time.sleep(0.1)
         return self.heard["count"][counts:], self.heard["boxes"][boxes:]
 
