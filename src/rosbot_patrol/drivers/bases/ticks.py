@@ -1,4 +1,4 @@
-"""Odometry of two driven wheels from the ticks of their encoders, whose counters may wrap.
+"""Odometry of two driven wheels from the ticks of their encoders. The counters may wrap.
 
 The robot moves on an arc between two readings (Siegwart and Nourbakhsh, Introduction to Autonomous Mobile Robots,
 5.2.4).
