@@ -16,7 +16,7 @@ class AdapterParams:
 
     max_speed: float = param(0.5, unit="m/s", lo=0.0, doc="maximum speed of a command")
     max_turn: float = param(1.5, unit="rad/s", lo=0.0, doc="maximum turning speed of a command")
-    command_timeout: float = param(0.5, unit="s", lo=0.05, doc="silence after which the base is told to stop")
+    command_timeout: float = param(0.5, unit="s", lo=0.05, doc="silence after which the base gets a command to stop")
     command_rate: float = param(
         0.0, unit="Hz", lo=0.0, hi=100.0, doc="rate at which commands are repeated; 0: only as they come"
     )

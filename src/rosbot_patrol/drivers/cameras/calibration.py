@@ -156,7 +156,7 @@ class CalibrationStore:
         self._told: tuple[int, int] | None = None
 
     def of(self, width: int, height: int) -> Calibration:
-        """The calibration for pictures of a size; a calibration of another size is told once, and not used."""
+        """The calibration for pictures of a size. One of another size is not used, and logged once."""
         known = self._read()
         if known is not None and (known.width, known.height) == (width, height):
             return known

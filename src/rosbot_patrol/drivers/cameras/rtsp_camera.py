@@ -12,7 +12,7 @@ from rosbot_patrol.errors import DeviceError
 
 
 class RtspCamera:
-    """One camera behind an address. A picture's time is that of its arrival, as RTSP carries no other here.
+    """One camera behind an address. Pictures are stamped on arrival, because OpenCV passes on no other time.
 
     Args:
         url: rtsp://, with user and password if it wants them.

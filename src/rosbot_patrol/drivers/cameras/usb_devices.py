@@ -1,4 +1,4 @@
-"""USB cameras as the kernel lists them: which video device is which camera, wherever it was plugged in.
+"""USB cameras as the kernel lists them: which camera each video device belongs to.
 
 The number of a video device changes when a camera is plugged in again. Vendor, product and serial number do not.
 """

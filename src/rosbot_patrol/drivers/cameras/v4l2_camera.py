@@ -1,6 +1,6 @@
 """A camera of Video4Linux, read by OpenCV: its JPEGs as they are, or pixels.
 
-The time of a picture is that of its buffer, on the steady clock (uvcvideo).
+Pictures have the time stamps of the driver's buffers, on the steady clock (uvcvideo).
 """
 
 from __future__ import annotations

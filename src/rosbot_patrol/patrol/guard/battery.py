@@ -2,7 +2,7 @@
 
 Low by two thresholds: a robot at rest stays at home although its battery recovers a little. A voltage sags while the
 motors draw current, so its median over some seconds counts. A charger that the driver does not report shows itself by
-the voltage: that of a battery at rest rises by no other cause, once it has recovered from the drive.
+the voltage. At rest, once the battery has recovered from the drive, nothing else makes the voltage rise.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class BatteryParams:
         300.0,
         unit="s",
         lo=0.0,
-        doc="time at home with a low battery before the owner is told of a missing charger",
+        doc="time at home with a low battery before the owner gets a notice of the missing charger",
     )
     battery_voltage_first: bool = param(
         False, doc="use the voltage even if a share is reported (TurtleBot3: its share is volts / 11.1)"
