@@ -1,10 +1,16 @@
-"""Import of pybullet without the line about its build that it writes to every console."""
+"""Import of pybullet without the line about its build that it writes to every console.
+
+On a robot the simulator is not installed (`scripts/bootstrap --robot`). The import then succeeds all the same, and the
+first use raises a WorldError that says so.
+"""
 
 from __future__ import annotations
 
 import importlib
 import os
 from typing import Any
+
+from rosbot_patrol.errors import WorldError
 
 _CHATTER = b"pybullet build time:"
 
@@ -27,4 +33,12 @@ def _import_quietly(name: str) -> Any:
         os.write(2, b"".join(line for line in lines if not line.startswith(_CHATTER)))
 
 
-pybullet = _import_quietly("pybullet")
+class _NotInstalled:
+    def __getattr__(self, name: str) -> Any:
+        raise WorldError("pybullet", "the simulated house needs it and it is not installed: run scripts/bootstrap")
+
+
+try:
+    pybullet = _import_quietly("pybullet")
+except ModuleNotFoundError:
+    pybullet = _NotInstalled()
